@@ -55,7 +55,7 @@ pub use pose_loss::{
     Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss, Target,
     TargetError, Tile, light_samples,
 };
-pub use raster::depth_map;
+pub use raster::{depth_map, draw_depth};
 pub use registration::register_depth;
 pub use renderer::{
     BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,

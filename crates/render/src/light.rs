@@ -90,38 +90,45 @@ impl Light {
     }
 }
 
+/// Rounds of least squares: the first, and those that are weighted by what the one before left.
+const ROUNDS: usize = 6;
+
 fn fit_channel(samples: &[LightSample], channel: usize, ridge: f64) -> Option<Vector4<f64>> {
     let row = |s: &LightSample| {
         let n = s.normal.cast::<f64>();
         let a = s.albedo[channel] as f64;
-        Vector4::new(a, a * n.x, a * n.y, a * n.z)
+        (Vector4::new(a, a * n.x, a * n.y, a * n.z), s.observed[channel] as f64)
     };
+    let rows: Vec<(Vector4<f64>, f64)> = samples.iter().map(row).collect();
     let albedo_squared: f64 = samples.iter().map(|s| (s.albedo[channel] as f64).powi(2)).sum();
     let mut weights = vec![1.0; samples.len()];
+    let mut magnitudes = vec![0.0; samples.len()];
     let mut solution = Vector4::zeros();
-    for _ in 0..6 {
+    for round in 0..ROUNDS {
         let mut normal = Matrix4::zeros();
         let mut right = Vector4::zeros();
-        for (sample, weight) in samples.iter().zip(&weights) {
-            let row = row(sample);
+        for ((row, observed), weight) in rows.iter().zip(&weights) {
             normal += row * row.transpose() * *weight;
-            right += row * (*weight * sample.observed[channel] as f64);
+            right += row * (*weight * observed);
         }
         // The ambient entry gets a pull too faint to matter, which keeps the matrix definite.
         for (i, scale) in [1e-9, ridge, ridge, ridge].into_iter().enumerate() {
             normal[(i, i)] += scale.max(1e-9) * albedo_squared;
         }
         solution = normal.cholesky()?.solve(&right);
-        let residuals: Vec<f64> =
-            samples.iter().map(|s| s.observed[channel] as f64 - row(s).dot(&solution)).collect();
-        let mut magnitudes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+        if round + 1 == ROUNDS {
+            break;
+        }
+        for ((left, weight), (row, observed)) in magnitudes.iter_mut().zip(&mut weights).zip(&rows)
+        {
+            let residual = observed - row.dot(&solution);
+            (*left, *weight) = (residual.abs(), residual);
+        }
         let middle = magnitudes.len() / 2;
         let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f64::total_cmp);
         let scale = (2.4 * *median).max(1e-4);
-        weights
-            .iter_mut()
-            .zip(&residuals)
-            .for_each(|(w, r)| *w = 1.0 / (1.0 + (r / scale).powi(2)));
+        // These hold residuals so far.
+        weights.iter_mut().for_each(|w| *w = 1.0 / (1.0 + (*w / scale).powi(2)));
     }
     solution.iter().all(|v| v.is_finite()).then_some(solution)
 }

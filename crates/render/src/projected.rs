@@ -37,6 +37,17 @@ impl Region {
         bounds
     }
 
+    /// The same of the pixels of a mask. Rows without any, most of them, are found quickly.
+    pub(crate) fn around_mask(width: usize, pixels: &[bool]) -> Option<Self> {
+        let mut rows = pixels.chunks(width.max(1));
+        let y0 = rows.position(|row| row.contains(&true))?;
+        let last = rows.rposition(|row| row.contains(&true));
+        let y1 = last.map_or(y0 + 1, |row| y0 + 2 + row);
+        let shown = &pixels[y0 * width..(y1 * width).min(pixels.len())];
+        let within = Self::around(width, shown, |set| *set)?;
+        Some(Self { y0, y1, ..within })
+    }
+
     pub(crate) fn width(&self) -> usize {
         self.x1 - self.x0
     }

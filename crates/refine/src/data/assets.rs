@@ -195,6 +195,11 @@ impl<'a> Assets<'a> {
         &self.dataset
     }
 
+    /// Goes on with the same dataset as it is by now ([`Dataset::reread`]): objects and hands stay what they are.
+    pub fn replace_dataset(&mut self, dataset: Arc<Dataset>) {
+        self.dataset = Shared::Owned(dataset);
+    }
+
     /// The model of object `id`, in meters.
     ///
     /// # Errors

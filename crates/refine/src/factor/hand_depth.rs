@@ -65,14 +65,13 @@ impl HandDepthFactor {
         let (depth, camera) = (&observation.depth, &observation.camera);
         let mask = observation.mask.pixels();
         let width = depth.width();
-        let on_hand: Vec<usize> = (depth.pixels().iter().zip(hand.pixels()).enumerate())
+        let on_hand = (depth.pixels().iter().zip(hand.pixels()).enumerate())
             .filter(|(_, (measured, known))| {
-                **measured > 0.0
-                    && **known > 0.0
+                **known > 0.0
+                    && **measured > 0.0
                     && f64::from(**measured - **known).abs() < settings.reach
             })
-            .map(|(pixel, _)| pixel)
-            .collect();
+            .map(|(pixel, _)| pixel);
         // Around the mask's outline the object may be what is seen.
         let of_object = |pixel: usize| {
             let near = [0, MARGIN, MARGIN * width];
@@ -81,7 +80,7 @@ impl HandDepthFactor {
                 before.is_some_and(|p| mask[p]) || after.is_some_and(|m| *m)
             })
         };
-        let of_hand: Vec<usize> = on_hand.into_iter().filter(|p| !of_object(*p)).collect();
+        let of_hand: Vec<usize> = on_hand.filter(|p| !of_object(*p)).collect();
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
             Point {

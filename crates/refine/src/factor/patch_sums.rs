@@ -36,8 +36,8 @@ impl<const N: usize> PatchSums<N> {
     /// Adds all to `equations`: by object pose and camera, by the displacements of all patches, if there are any, and by what the image is off by,
     /// if somebody asks for that; `center` is the ray (x/z, y/z) to the object.
     pub(super) fn add_to(&self, center: &Vector2<f64>, equations: &mut NormalEquations) {
-        let (mut gradient, mut hessian) = self.equations();
         if let Some((warp, _)) = equations.image_warp() {
+            let (mut gradient, mut hessian) = self.equations();
             // Around the object's center, distortion is as a change of the camera; of depth images say nothing.
             let (known, camera) = (gradient.len(), N - Block::Camera.dimension());
             let (first, radial) = (N + equations.auxiliary(), radial_as_camera(center));
@@ -46,8 +46,21 @@ impl<const N: usize> PatchSums<N> {
             by_all.view_mut((camera, first), radial.shape()).copy_from(&radial);
             gradient = by_all.tr_mul(&gradient);
             hessian = by_all.tr_mul(&(hessian * &by_all));
+            add_to(equations, &gradient, &hessian);
+        } else {
+            self.add_plainly_to(equations);
         }
-        add_to(equations, &gradient, &hessian);
+    }
+
+    /// Adds all to `equations` but what the image is off by.
+    pub(super) fn add_plainly_to(&self, equations: &mut NormalEquations) {
+        let mut all = (SVector::zeros(), SMatrix::zeros());
+        for (gradient, hessian) in &self.parts {
+            all.0 += gradient;
+            all.1 += hessian;
+        }
+        let patches = &self.parts[..self.parts.len() - 1];
+        equations.add_by_patch(&[Block::ObjectPose, Block::Camera], &all, patches);
     }
 
     /// Gradient and Hessian by the parameters and by the displacements of all patches.

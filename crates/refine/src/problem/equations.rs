@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2};
 
+use super::triangular::{cholesky, solve_lower};
 use super::{Block, ImageWarp, Row};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
@@ -108,21 +109,30 @@ impl NormalEquations {
     /// Eliminates the auxiliary parameters, displacements in three directions each, by the Schur complement. Their prior is a
     /// Gaussian of mean zero, independent by direction; `precision`, the inverse of its covariance in one direction, is added.
     /// `None` if the sum is singular.
-    pub(crate) fn marginalize(&mut self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
-        self.grow();
+    pub(crate) fn marginalize(&self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
         let (n, m) = (self.dimension, self.auxiliary);
+        // As long as nothing depends on them there are none.
+        let known = self.has_auxiliary();
+        let part = |r: usize, c: usize, rows: usize, columns: usize| match known {
+            true => self.hessian.view((r, c), (rows, columns)).clone_owned(),
+            false => DMatrix::zeros(rows, columns),
+        };
+        let mut own = part(n, n, m, m);
         for c in 0..precision.ncols() {
             for r in 0..precision.nrows() {
                 for k in 0..3 {
-                    self.hessian[(n + 3 * r + k, n + 3 * c + k)] += precision[(r, c)];
+                    own[(3 * r + k, 3 * c + k)] += precision[(r, c)];
                 }
             }
         }
-        let factor = self.hessian.view((n, n), (m, m)).clone_owned().cholesky()?;
-        let lower = factor.l_dirty();
-        let coupling =
-            lower.solve_lower_triangular(&self.hessian.view((n, 0), (m, n)).clone_owned())?;
-        let pull = lower.solve_lower_triangular(&self.gradient.rows(n, m).clone_owned())?;
+        let lower = cholesky(own)?;
+        let mut coupling = part(n, 0, m, n);
+        let mut pull = match known {
+            true => self.gradient.rows(n, m).clone_owned(),
+            false => DVector::zeros(m),
+        };
+        solve_lower(&lower, coupling.as_mut_slice());
+        solve_lower(&lower, pull.as_mut_slice());
         let rest = Self {
             blocks: self.blocks.clone(),
             dimension: n,
@@ -249,6 +259,45 @@ impl NormalEquations {
         // Those of an image's warp too, where they are given.
         let auxiliary = gradient.len() - blocks.iter().map(|b| b.dimension()).sum::<usize>();
         self.add_views(blocks, auxiliary, &gradient.as_view(), &hessian.as_view());
+    }
+
+    /// Adds what the patches of a surface show, of each the gradient and Hessian by the parameters of `blocks`, the first three of which are the
+    /// object's place: a patch that is displaced does to what it shows what the object does when all of it is. `all` is their sum.
+    pub(crate) fn add_by_patch<const N: usize>(
+        &mut self,
+        blocks: &[Block],
+        all: &(SVector<f64, N>, SMatrix<f64, N, N>),
+        patches: &[(SVector<f64, N>, SMatrix<f64, N, N>)],
+    ) {
+        self.add(blocks, &all.0, &all.1);
+        if patches.is_empty() {
+            return;
+        }
+        self.grow();
+        let mut local = 0;
+        for block in blocks {
+            let size = block.dimension();
+            if let Some(to) = self.offset(*block) {
+                for (patch, (_, hessian)) in patches.iter().enumerate() {
+                    let at = self.dimension + 3 * patch;
+                    for column in 0..3 {
+                        for row in 0..size {
+                            let value = hessian[(local + row, column)];
+                            self.hessian[(to + row, at + column)] += value;
+                            self.hessian[(at + column, to + row)] += value;
+                        }
+                    }
+                }
+            }
+            local += size;
+        }
+        for (patch, (gradient, hessian)) in patches.iter().enumerate() {
+            let at = self.dimension + 3 * patch;
+            let mut own = self.gradient.fixed_rows_mut::<3>(at);
+            own += gradient.fixed_rows::<3>(0);
+            let mut own = self.hessian.fixed_view_mut::<3, 3>(at, at);
+            own += hessian.fixed_view::<3, 3>(0, 0);
+        }
     }
 
     fn add_views(

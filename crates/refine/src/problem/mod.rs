@@ -12,6 +12,7 @@ mod patches;
 mod rows;
 mod scaled_cholesky;
 mod state;
+mod triangular;
 
 pub(crate) use depth_field::DepthField;
 pub use equations::NormalEquations;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
-use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, depth_map};
+use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 
 use super::{Hand, HandMeasurement, Object, Observation};
 use crate::error::RefineError;
@@ -21,7 +21,9 @@ pub struct Frame<'a> {
     hand_depth: OnceLock<Arc<DepthImage>>,
     depth: OnceLock<Arc<DepthImage>>,
     /// Segmented images by what may hide the object and by how many times smaller they are.
-    segmented: Mutex<BTreeMap<(Occluders, usize), Segmented>>,
+    segmented: Mutex<BTreeMap<(Occluders, usize), Arc<Target>>>,
+    /// Root mean square of the colors under the mask.
+    brightness: OnceLock<f64>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<&'a Rig>,
@@ -42,7 +44,6 @@ pub enum Occluders {
 }
 
 /// The object in an image, with what may hide it.
-#[derive(Clone)]
 pub(crate) struct Segmented {
     pub(crate) target: Arc<Target>,
     /// Root mean square of the colors under the mask.
@@ -84,6 +85,7 @@ impl<'a> Frame<'a> {
             hand_depth: OnceLock::new(),
             depth: OnceLock::new(),
             segmented: Mutex::default(),
+            brightness: OnceLock::new(),
             backend: None,
             rig: None,
             rivals: None,
@@ -130,6 +132,11 @@ impl<'a> Frame<'a> {
     /// The same with the depth image of the hand, which is known already \[m\].
     pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
         Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
+    }
+
+    /// The same with a copy of the measured depth, which is there already \[m\].
+    pub(crate) fn with_depth(self, depth: &Arc<DepthImage>) -> Self {
+        Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
     }
 
     /// The same of an object that is nowhere but in these columns and rows.
@@ -223,48 +230,40 @@ impl<'a> Frame<'a> {
         factor: usize,
     ) -> Result<Segmented, RefineError> {
         let fault = |error: TargetError| RefineError::Images(error.to_string());
+        let Observation { camera, color, mask, .. } = self.observation;
         let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Entry::Vacant(unknown) = images.entry((occluders, 1)) {
-            let occluder = match occluders {
-                Occluders::Hand => (**self.hand_depth()).clone(),
-                Occluders::Measured => self.measured_occluder(),
-            };
-            let Observation { camera, color, mask, .. } = self.observation;
-            let target = Target::new(*camera, color, mask).and_then(|t| t.with_occluder(occluder));
-            let target = Arc::new(target.map_err(fault)?);
-            let brightness = brightness(self.observation);
-            unknown.insert(Segmented { target, brightness });
-        }
-        if !images.contains_key(&(occluders, factor)) {
-            let Segmented { target, brightness } = images[&(occluders, 1)].clone();
-            let target = Arc::new(target.downsampled(factor).map_err(fault)?);
-            images.insert((occluders, factor), Segmented { target, brightness });
-        }
-        Ok(images[&(occluders, factor)].clone())
+        let target = match images.entry((occluders, factor)) {
+            Entry::Occupied(known) => Arc::clone(known.get()),
+            Entry::Vacant(unknown) => {
+                let factor = factor.clamp(1, camera.width.min(camera.height));
+                let occluder = match occluders {
+                    Occluders::Hand if factor == 1 => (**self.hand_depth()).clone(),
+                    Occluders::Hand => self.hand_depth().downsampled(factor),
+                    Occluders::Measured => self.measured_occluder(factor),
+                };
+                let target = Target::reduced(*camera, color, mask, factor);
+                let target = target.and_then(|target| target.with_occluder(occluder));
+                Arc::clone(unknown.insert(Arc::new(target.map_err(fault)?)))
+            }
+        };
+        let brightness = *self.brightness.get_or_init(|| brightness(self.observation));
+        Ok(Segmented { target, brightness })
     }
 
-    /// Depth of the hand and of what was measured beside the mask, whichever is nearer.
-    fn measured_occluder(&self) -> DepthImage {
+    /// Depth of the hand and of what was measured beside the mask, whichever is nearer; `factor` times smaller.
+    fn measured_occluder(&self, factor: usize) -> DepthImage {
         let Observation { depth, mask, .. } = self.observation;
         let (width, height) = (depth.width(), depth.height());
-        let [columns, rows] = self.focus.clone().unwrap_or([0..width, 0..height]);
-        let hand = self.hand_depth().pixels();
-        let mut occluder = DepthImage::filled(width, height, 0.0);
-        for row in rows.start..rows.end.min(height) {
-            let line = row * width + columns.start..row * width + columns.end.min(width);
-            let seen = depth.pixels()[line.clone()].iter().zip(&mask.pixels()[line.clone()]);
-            let known = hand[line.clone()].iter().zip(seen);
-            let targets = occluder.pixels_mut()[line].iter_mut();
-            for (nearest, (hand, (depth, masked))) in targets.zip(known) {
-                *nearest = *hand;
-                let front = depth + IN_FRONT;
-                let nearer = *nearest <= 0.0 || front < *nearest;
-                if !masked && depth.is_finite() && *depth > 0.0 && nearer {
-                    *nearest = front;
-                }
-            }
-        }
-        occluder
+        let within = self.focus.clone().unwrap_or([0..width, 0..height]);
+        let (hand, depth, mask) = (self.hand_depth().pixels(), depth.pixels(), mask.pixels());
+        let nearest = |at: usize| {
+            let (hand, measured) = (hand[at], depth[at]);
+            let front = measured + IN_FRONT;
+            let nearer = hand <= 0.0 || front < hand;
+            let seen = !mask[at] && measured.is_finite() && measured > 0.0;
+            if seen && nearer { front } else { hand }
+        };
+        DepthImage::downsampled_of(width, height, factor, within, nearest)
     }
 }
 
@@ -284,11 +283,22 @@ fn brightness(observation: &Observation) -> f64 {
 
 /// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
 pub(crate) fn hand_depth(camera: &Camera, hand: Option<(&Hand, &HandMeasurement)>) -> DepthImage {
+    let mut depth = DepthImage::default();
+    draw_hand_depth(&mut depth, camera, hand);
+    depth
+}
+
+/// The same into an image that is there already.
+pub(crate) fn draw_hand_depth(
+    depth: &mut DepthImage,
+    camera: &Camera,
+    hand: Option<(&Hand, &HandMeasurement)>,
+) {
     match hand {
         Some((hand, measured)) => {
-            depth_map(camera, &hand.render_bodies(&measured.t_cam_hand, &measured.joints))
+            draw_depth(depth, camera, &hand.render_bodies(&measured.t_cam_hand, &measured.joints));
         }
-        None => DepthImage::filled(camera.width, camera.height, 0.0),
+        None => depth.refill(camera.width, camera.height, 0.0),
     }
 }
 

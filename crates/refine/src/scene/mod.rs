@@ -14,7 +14,7 @@ mod view;
 
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
 pub use example::{Scene, default_scene};
-pub(crate) use frame::hand_depth;
+pub(crate) use frame::draw_hand_depth;
 pub use frame::{Frame, Occluders};
 pub use hand::Hand;
 pub use inspect::{Subject, Warning};

@@ -31,19 +31,25 @@ impl Tracker {
     /// The first frame.
     pub(super) fn begin(
         &mut self,
-        mut sight: Sight,
+        sight: &mut Sight,
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        if sight.observation.mask.count() == 0 {
-            let mask = match &self.initial {
-                Some(pose) => self.segmenter.segment(&sight, &object, pose).map(|seen| seen.mask),
-                None => self.segmenter.anywhere(&sight),
-            };
-            sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
+        if sight.given.count() > 0 {
+            sight.observation.mask.copy_from(&sight.given);
+        } else if let Some(pose) = &self.initial {
+            if !self.segmenter.segment(sight, &object, pose) {
+                return Err(RefineError::EmptyMask);
+            }
+            // The pose may be far off.
+            sight.focus = None;
+        } else {
+            sight.observation.mask =
+                self.segmenter.anywhere(sight).ok_or(RefineError::EmptyMask)?;
         }
-        let mut frame = self.frame(&sight, &object, hand.as_ref(), rig.as_deref())?;
+        let sight = &*sight;
+        let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
         let initial = match self.initial {
             Some(pose) => pose,
             None => {
@@ -62,7 +68,7 @@ impl Tracker {
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
         self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
-        self.learn(&sight, &solved);
+        self.learn(sight, &solved);
         let timing = Timing { recovery: clock.lap(), ..Timing::default() };
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
@@ -107,12 +113,13 @@ impl Tracker {
     }
 
     /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
-    /// fit as if nothing had changed.
+    /// fit as if nothing had changed. It was looked at where it should be, and `seen` there or not.
     pub(super) fn recover(
         &mut self,
         sight: &mut Sight,
         predicted: &State,
         track: &TrackState,
+        seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
         let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
@@ -130,10 +137,15 @@ impl Tracker {
             if start.center().z <= 0.0 {
                 continue;
             }
-            let Some(seen) = self.segmenter.segment(sight, &self.object, &t_cam_object) else {
+            // Unless it was looked for elsewhere before, what shows the object there is known.
+            let known = reach == Recovery::Near && !long_lost;
+            if !(if known {
+                seen
+            } else {
+                self.segmenter.segment(sight, &self.object, &t_cam_object)
+            }) {
                 continue;
-            };
-            sight.show(seen);
+            }
             let (object, hand, rig) =
                 (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
             let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;

@@ -10,7 +10,9 @@ mod sight;
 mod tests;
 mod tracked;
 
+use std::mem;
 use std::ops::ControlFlow;
+use std::slice;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,7 +25,7 @@ pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
-use self::sight::Sight;
+use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
@@ -41,8 +43,11 @@ use crate::strategy::{Inconsistency, Posterior, chi_square_z, problem_of, surfac
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
 /// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
 ///
-/// A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]). A frame
-/// allocates: its terms, the hand's depth image and the renderer's buffers are made anew, from memory that the allocator has at hand.
+/// A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
+///
+/// Full-size images and what tells the object from the rest live in the memory of the frame before, so that following touches no new pages
+/// for them. The terms of the problem, their normal equations and the renderer's small buffers are made anew in every frame:
+/// `cargo bench -p prehend-refine --bench tracking` says how much that is.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -76,6 +81,8 @@ pub struct Tracker {
     /// Made when it is first needed.
     search: Option<PoseSearch>,
     segmenter: Segmenter,
+    /// Of the frame before.
+    images: Images,
 }
 
 /// A pose that was solved for.
@@ -118,6 +125,7 @@ impl Tracker {
             track: None,
             search: None,
             segmenter: Segmenter::default(),
+            images: Images::default(),
         })
     }
 
@@ -178,48 +186,67 @@ impl Tracker {
         }
         let in_hand = hand.is_some();
         let Some(track) = self.track.clone() else {
-            let sight = Sight::new(observation, self.hand.as_ref());
-            return self.begin(sight, time, &mut clock);
+            return self
+                .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
         let prediction = track.predict(time, &nominal, in_hand, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
-        let mut sight = Sight::new(observation, self.hand.as_ref());
-        let expected = &prediction.state.t_cam_object;
-        let seen = self.segmenter.segment(&sight, &self.object, expected);
+        self.with_sight(observation, |tracker, sight| {
+            tracker.look(sight, &track, &prediction, &nominal, time, &mut clock)
+        })
+    }
+
+    /// Does something with a frame whose hand was checked.
+    fn with_sight<T>(
+        &mut self,
+        observation: Observation,
+        what: impl FnOnce(&mut Self, &mut Sight) -> T,
+    ) -> T {
+        let images = mem::take(&mut self.images);
+        let mut sight = Sight::new(observation, self.hand.as_ref(), images);
+        let done = what(self, &mut sight);
+        self.images = sight.into_images();
+        done
+    }
+
+    /// Looks for the object: where it should be, and elsewhere.
+    fn look(
+        &mut self,
+        sight: &mut Sight,
+        track: &TrackState,
+        prediction: &Prediction,
+        nominal: &State,
+        time: Duration,
+        clock: &mut Clock,
+    ) -> Result<Tracked, RefineError> {
+        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
+        let object = Arc::clone(&self.object);
+        let seen = self.segmenter.segment(sight, &object, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
-        let seen = seen.map(|seen| sight.show(seen)).is_some();
         // What was away for long may be held in another way: it is looked for everywhere then.
         let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
         let mut rejection = Rejection::Unseen;
         if seen && long_lost {
             rejection = Rejection::LongLost;
         } else if seen {
-            match self.follow(
-                &sight,
-                &track,
-                &prediction,
-                &nominal,
-                time,
-                &mut clock,
-                &mut timing,
-            )? {
+            match self.follow(sight, track, prediction, nominal, time, clock, &mut timing)? {
                 Ok(tracked) => return Ok(tracked),
                 Err(own) => rejection = own,
             }
         }
         let predicted = &prediction.state;
         let again = match track.is_due(seen) {
-            true => self.recover(&mut sight, predicted, &track, long_lost)?,
+            true => self.recover(sight, predicted, track, seen, long_lost)?,
             false => None,
         };
         timing.recovery = clock.lap();
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
             let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
-            let mut next = self.remember(time, &solved, &nominal, in_hand, level);
+            let mut next = self.remember(time, &solved, nominal, in_hand, level);
             next.lost = track.lost;
             self.track = Some(next);
             let status = TrackStatus::Relocalized;
@@ -228,7 +255,7 @@ impl Tracker {
         if let Some(track) = &mut self.track {
             track.missed(seen);
         }
-        Ok(Tracked::lost(prediction.state, rejection, timing))
+        Ok(Tracked::lost(prediction.state.clone(), rejection, timing))
     }
 
     /// Follows the object from where it should be: the frame's outcome, or why it is not believed.
@@ -285,6 +312,7 @@ impl Tracker {
     ) -> Result<Frame<'a>, RefineError> {
         let mut frame =
             Frame::new(&sight.observation, object, hand)?.with_hand_depth(&sight.hand_depth);
+        frame = frame.with_depth(&sight.depth);
         if let Some(focus) = &sight.focus {
             frame = frame.with_focus(focus.clone());
         }
@@ -381,8 +409,8 @@ impl Tracker {
         let degrees = at.equations.gradient().len().saturating_sub(6);
         let distance = chi_square_z(2.0 * stated.cost(&calibrations), degrees);
         let also = Some(Inconsistency { factor: "calibrations", distance });
-        let found = [solved.solution.clone()];
-        Ok(Posterior::new(&found, fused.inflation, self.object.radius, false, also))
+        let found = slice::from_ref(&solved.solution);
+        Ok(Posterior::new(found, fused.inflation, self.object.radius, false, also))
     }
 
     fn remember(

@@ -1,12 +1,12 @@
 //! A frame as the tracker looks at it.
 
+use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 
 use prehend_render::{DepthImage, Mask};
 
-use super::segmentation::Segmentation;
-use crate::scene::{Hand, Observation, hand_depth};
+use crate::scene::{Hand, Observation, draw_hand_depth};
 
 /// A frame with its hand, and what shows the object in it as far as that is known.
 pub(super) struct Sight {
@@ -18,22 +18,47 @@ pub(super) struct Sight {
     pub(super) tells: bool,
     /// Depth image of the hand \[m\], 0 where it is not.
     pub(super) hand_depth: Arc<DepthImage>,
+    /// The measured depth, as terms share it \[m\].
+    pub(super) depth: Arc<DepthImage>,
     /// Columns and rows in which the object is, where that is known.
     pub(super) focus: Option<[Range<usize>; 2]>,
 }
 
+/// The images of a sight that is over, whose memory serves the next one.
+#[derive(Default)]
+pub(super) struct Images {
+    mask: Mask,
+    hand_depth: Arc<DepthImage>,
+    depth: Arc<DepthImage>,
+}
+
 impl Sight {
     /// Of a hand whose joints were checked.
-    pub(super) fn new(observation: Observation, hand: Option<&Arc<Hand>>) -> Self {
+    pub(super) fn new(
+        mut observation: Observation,
+        hand: Option<&Arc<Hand>>,
+        images: Images,
+    ) -> Self {
+        let Images { mask, mut hand_depth, mut depth } = images;
         let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
-        let hand_depth = Arc::new(hand_depth(&observation.camera, hand));
-        let given = observation.mask.clone();
+        draw_hand_depth(own(&mut hand_depth), &observation.camera, hand);
+        own(&mut depth).copy_from(&observation.depth);
+        let given = mem::replace(&mut observation.mask, mask);
         let tells = (1..given.pixels().len()).contains(&given.count());
-        Self { given, tells, observation, hand_depth, focus: None }
+        Self { given, tells, observation, hand_depth, depth, focus: None }
     }
 
-    /// Takes what shows the object for its mask.
-    pub(super) fn show(&mut self, Segmentation { mask, around }: Segmentation) {
-        (self.observation.mask, self.focus) = (mask, Some(around));
+    /// What is left of it for the next one.
+    pub(super) fn into_images(self) -> Images {
+        let Self { observation, hand_depth, depth, .. } = self;
+        Images { mask: observation.mask, hand_depth, depth }
     }
+}
+
+/// The image, or a new one if somebody still has the old one.
+fn own(image: &mut Arc<DepthImage>) -> &mut DepthImage {
+    if Arc::get_mut(image).is_none() {
+        *image = Arc::default();
+    }
+    Arc::make_mut(image)
 }

@@ -17,3 +17,4 @@ mod resume;
 mod study;
 mod track;
 mod truth;
+mod watch;

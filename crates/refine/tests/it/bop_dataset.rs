@@ -428,6 +428,7 @@ fn images_of_a_rig_are_views_of_one_moment() {
     assert!((view.t_view_cam().translation.z + 0.05).abs() < 1e-12);
     // The mask of the same number.
     assert_eq!(view.observation().mask.count(), 2);
+    assert_eq!(fixture.open().scene(4).unwrap().moments().unwrap(), [0]);
     for other in ["8", "\"7\""] {
         assert!(both(&place("7", 500.0), &place(other, 450.0)).unwrap().views.is_empty());
     }

@@ -69,19 +69,30 @@ impl Target {
     /// # Errors
     /// When the camera is impossible, a size differs from the camera's, no pixel of the mask is set, or a color under it is not finite.
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
+        Self::reduced(camera, image, mask, 1)
+    }
+
+    /// As [`new`](Self::new), and then [`downsampled`](Self::downsampled): one pixel for every block of `factor` by `factor`.
+    ///
+    /// # Errors
+    /// Those of both.
+    pub fn reduced(
+        camera: Camera,
+        image: &RgbImage,
+        mask: &Mask,
+        factor: usize,
+    ) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
         camera.check()?;
+        let (image, mask) = (image.pixels(), mask.pixels());
         // Outside the mask's bounds, which is most of the image, all is zero.
-        let bounds =
-            Region::around(camera.width, mask.pixels(), |&m| m).ok_or(TargetError::EmptyMask)?;
-        let pixels = camera.width * camera.height;
-        let (mut color, mut coverage) = (vec![[0.0; 3]; pixels], vec![0.0; pixels]);
-        for at in bounds.indices(camera.width).filter(|at| mask.pixels()[*at]) {
-            color[at] = image.pixels()[at];
-            coverage[at] = 1.0;
+        let bounds = Region::around_mask(camera.width, mask).ok_or(TargetError::EmptyMask)?;
+        let broken = |at: &usize| mask[*at] && image[*at].iter().any(|v| !v.is_finite());
+        if let Some(at) = bounds.indices(camera.width).find(broken) {
+            return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
-        Self::assemble(camera, color, coverage, bounds)
+        Self::of_blocks(&camera, factor, &bounds, |at| mask[at].then(|| (image[at], 1.0)))
     }
 
     /// From a picture of the object over black and how much of each pixel the object covers (0..=1, row-major; a matte),
@@ -145,23 +156,8 @@ impl Target {
     /// When nothing of the mask is left.
     pub fn downsampled(&self, factor: usize) -> Result<Self, TargetError> {
         let factor = factor.clamp(1, self.camera.width.min(self.camera.height));
-        let camera = self.camera.scaled(1.0 / factor as f64);
-        let share = 1.0 / (factor * factor) as f32;
-        let pixels = camera.width * camera.height;
-        let (mut color, mut coverage) = (vec![[0.0f32; 3]; pixels], vec![0.0f32; pixels]);
-        let bounds = self.bounds.reduced(factor, camera.width, camera.height);
-        for small in bounds.indices(camera.width) {
-            let (x, y) = (small % camera.width, small / camera.width);
-            let (c, a) = (&mut color[small], &mut coverage[small]);
-            for sy in y * factor..(y + 1) * factor {
-                for sx in x * factor..(x + 1) * factor {
-                    let at = sy * self.camera.width + sx;
-                    (0..3).for_each(|k| c[k] += share * self.color[at][k]);
-                    *a += share * self.coverage[at];
-                }
-            }
-        }
-        let mut target = Self::assemble(camera, color, coverage, bounds)?;
+        let pixel = |at: usize| Some((self.color[at], self.coverage[at]));
+        let mut target = Self::of_blocks(&self.camera, factor, &self.bounds, pixel)?;
         if let Some(depth) = &self.depth {
             target = target.with_depth(&depth.downsampled(factor))?;
         }
@@ -169,6 +165,33 @@ impl Target {
             target = target.with_occluder(occluder.downsampled(factor))?;
         }
         Ok(target)
+    }
+
+    /// One pixel for every block of `factor` by `factor`, of an image with nothing beyond `bounds`: means of color and coverage at each index.
+    fn of_blocks(
+        full: &Camera,
+        factor: usize,
+        bounds: &Region,
+        pixel: impl Fn(usize) -> Option<([f32; 3], f32)>,
+    ) -> Result<Self, TargetError> {
+        let factor = factor.clamp(1, full.width.min(full.height));
+        let camera = if factor == 1 { *full } else { full.scaled(1.0 / factor as f64) };
+        let share = 1.0 / (factor * factor) as f32;
+        let pixels = camera.width * camera.height;
+        let (mut color, mut coverage) = (vec![[0.0f32; 3]; pixels], vec![0.0f32; pixels]);
+        let small_bounds = bounds.reduced(factor, camera.width, camera.height);
+        for small in small_bounds.indices(camera.width) {
+            let (x, y) = (small % camera.width, small / camera.width);
+            let (c, a) = (&mut color[small], &mut coverage[small]);
+            for row in y * factor..(y + 1) * factor {
+                let first = row * full.width + x * factor;
+                for (own, covered) in (first..first + factor).filter_map(&pixel) {
+                    (0..3).for_each(|k| c[k] += share * own[k]);
+                    *a += share * covered;
+                }
+            }
+        }
+        Self::assemble(camera, color, coverage, small_bounds)
     }
 
     /// The camera.

@@ -178,12 +178,23 @@ pub(crate) fn rasterize(projected: &Projected, region: &Region) -> Vec<Visible> 
 /// drawn, nor are faces with a corner within a millimeter of its plane or behind it: cut large tables and walls into small faces.
 /// Meant for what is known and does not move during a refinement, such as the hand.
 pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> DepthImage {
+    let mut depth = DepthImage::default();
+    draw_depth(&mut depth, camera, bodies);
+    depth
+}
+
+/// The same into an image that is there already; what it has shown is gone.
+pub fn draw_depth(
+    depth: &mut DepthImage,
+    camera: &Camera,
+    bodies: &[(&RenderModel, Isometry3<f64>)],
+) {
     let drawn = |(model, pose): &(&RenderModel, Isometry3<f64>)| {
         let projected = Posed::new(model, camera, pose, 0.0).projected;
         rasterize(&projected, &projected.region)
     };
     let drawn: Vec<Vec<Visible>> = bodies.par_iter().map(drawn).collect();
-    let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);
+    depth.refill(camera.width, camera.height, 0.0);
     let nearest = depth.pixels_mut();
     for body in &drawn {
         for part in body {
@@ -198,7 +209,6 @@ pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> 
     }
     // So far 1/Z, which is what faces are flat in.
     nearest.iter_mut().filter(|w| **w > 0.0).for_each(|w| *w = 1.0 / *w);
-    depth
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
 
@@ -34,24 +34,24 @@ pub struct Scene {
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
-    pub(super) remaps: RemapCache,
-    pub(super) depth_remaps: RemapCache,
+    pub(super) remaps: Arc<RemapCache>,
+    pub(super) depth_remaps: Arc<RemapCache>,
     /// Images by the name of the rig that took them together.
-    pub(super) rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
+    rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
 }
 
 /// The name of a rig, which may be a number.
 #[derive(Clone, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(untagged, expecting = "is neither a string nor an integer")]
-pub(super) enum RigName {
+enum RigName {
     Number(i64),
     Text(String),
 }
 
 /// Of what rig an image is.
 #[derive(Deserialize)]
-pub(super) struct RigEntry {
-    pub(super) rig: Option<RigName>,
+struct RigEntry {
+    rig: Option<RigName>,
 }
 
 impl Dataset {
@@ -99,6 +99,23 @@ impl Dataset {
         })
     }
 
+    /// The same with files that are read anew, for somebody may have gone on writing them.
+    pub fn reread(&self) -> Self {
+        let again = |scene: &Scene| {
+            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root);
+            let (remaps, depth_remaps) =
+                (Arc::clone(&scene.remaps), Arc::clone(&scene.depth_remaps));
+            (scene.id, Scene { remaps, depth_remaps, ..new })
+        };
+        Self {
+            root: self.root.clone(),
+            split_dir: self.split_dir.clone(),
+            scenes: self.scenes.values().map(again).collect(),
+            models: Models::new(self.root.join("models")),
+            camera: JsonFile::new(self.root.join("camera.json")),
+        }
+    }
+
     /// The dataset's folder.
     pub fn root(&self) -> &Path {
         &self.root
@@ -138,8 +155,8 @@ impl Scene {
             camera: JsonFile::new(dir.join("scene_camera.json")),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
-            remaps: RemapCache::default(),
-            depth_remaps: RemapCache::default(),
+            remaps: Arc::default(),
+            depth_remaps: Arc::default(),
             rigs: OnceLock::new(),
             dir,
         }
@@ -160,11 +177,29 @@ impl Scene {
         &self.root
     }
 
-    /// The images that cameras of a rig took together with one that has `name` for its rig, ascending; itself among them.
+    /// The images that begin a moment: those that `scene_camera.json` lists, and of a rig that took several together the first, ascending.
     ///
     /// # Errors
     /// Those of [`images`](Self::images), and if an entry of `scene_camera.json` is broken.
-    pub(super) fn taken_together(&self, name: &RigName) -> Result<&[u32], DatasetError> {
+    pub fn moments(&self) -> Result<Vec<u32>, DatasetError> {
+        let mut images = self.images()?;
+        let rigs = self.rigs()?;
+        images.retain(|image| !rigs.values().any(|together| together[1..].contains(image)));
+        Ok(images)
+    }
+
+    /// The images that were taken together with `image`, ascending; itself among them.
+    ///
+    /// # Errors
+    /// Those of [`moments`](Self::moments), and if the image is not listed.
+    pub(super) fn taken_together(&self, image: u32) -> Result<Vec<u32>, DatasetError> {
+        let RigEntry { rig } = self.camera.entry(image)?;
+        let Some(name) = rig else { return Ok(vec![image]) };
+        Ok(self.rigs()?.get(&name).cloned().unwrap_or_default())
+    }
+
+    /// Images by the name of the rig that took them together.
+    fn rigs(&self) -> Result<&BTreeMap<RigName, Vec<u32>>, DatasetError> {
         let by_rig = || {
             let mut by_rig: BTreeMap<RigName, Vec<u32>> = BTreeMap::new();
             for image in self.images()? {
@@ -174,8 +209,7 @@ impl Scene {
             }
             Ok(by_rig)
         };
-        let rigs = self.rigs.get_or_init(by_rig).as_ref().map_err(Clone::clone)?;
-        Ok(rigs.get(name).map_or(&[], Vec::as_slice))
+        self.rigs.get_or_init(by_rig).as_ref().map_err(Clone::clone)
     }
 
     /// The images that `scene_camera.json` lists, ascending.

@@ -10,7 +10,7 @@ use prehend_render::{
 use serde::Deserialize;
 
 use super::bodies::{SceneBodies, missing};
-use super::dataset::{Dataset, RigEntry, Scene};
+use super::dataset::{Dataset, Scene};
 use super::error::DatasetError;
 use super::json::{JsonFile, Numbers, Positive, Rotation};
 use super::lens::Lens;
@@ -124,7 +124,7 @@ impl Frame<'_> {
     }
 
     /// The depth image, whether or not it exists.
-    fn depth_path(&self) -> PathBuf {
+    pub(super) fn depth_path(&self) -> PathBuf {
         self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
     }
 
@@ -256,12 +256,12 @@ impl Frame<'_> {
     }
 
     /// Whether the scene has color, and whether it has depth.
-    fn has_color(&self) -> bool {
+    pub(super) fn has_color(&self) -> bool {
         self.scene.dir().join("rgb").is_dir()
     }
 
     /// See [`has_color`](Self::has_color).
-    fn has_depth(&self) -> bool {
+    pub(super) fn has_depth(&self) -> bool {
         self.scene.dir().join("depth").is_dir()
     }
 
@@ -300,21 +300,17 @@ impl Frame<'_> {
         dataset: &Dataset,
         instance: usize,
     ) -> Result<Vec<(Observation, Isometry3<f64>)>, DatasetError> {
-        let RigEntry { rig: Some(name) } = self.scene.camera.entry(self.im_id)? else {
-            return Ok(Vec::new());
-        };
-        let t_cam_world = self.place()?;
+        let mut together = self.scene.taken_together(self.im_id)?;
+        together.retain(|image| *image != self.im_id);
         let mut seen = Vec::new();
-        for &image in self.scene.taken_together(&name)? {
-            if image == self.im_id {
-                continue;
-            }
+        for image in together {
             let other = dataset.frame(self.scene.id(), image)?;
             let mask = other.mask(instance);
             if let Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. }) = mask {
                 continue;
             }
-            seen.push((other.observation(instance)?, t_cam_world * other.place()?.inverse()));
+            let t_cam_other = self.place()? * other.place()?.inverse();
+            seen.push((other.observation(instance)?, t_cam_other));
         }
         Ok(seen)
     }

@@ -6,6 +6,7 @@
 //! `scene_tactile.json` (what is felt). A file is read when something of it is first asked for, so
 //! a missing or broken one disturbs only what needs it.
 
+mod arrival;
 mod atomic;
 mod bodies;
 mod dataset;
@@ -22,6 +23,7 @@ mod rivals;
 mod touch;
 mod visibility;
 
+pub use arrival::Stamp;
 pub use atomic::{check_writable, create_folder, write_atomically};
 pub use bodies::{Body, BodyKind, SceneBodies};
 pub(crate) use bodies::{KindName, body_sigmas};
@@ -37,7 +39,9 @@ pub(crate) use models_info::{diameter, extent_to_bop};
 pub(crate) use pose::{
     rotation_from_row_major, rotation_to_row_major, translation_from_mm, translation_to_mm,
 };
-pub use results::{ReadResults, ResultRow, read_results, share_image_times, write_results};
+pub use results::{
+    ReadResults, ResultRow, ResultsWriter, read_results, share_image_times, write_results,
+};
 pub use rivals::read_rivals;
 pub(crate) use touch::TactileEntry;
 pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};

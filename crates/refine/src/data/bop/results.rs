@@ -1,8 +1,9 @@
 //! Results files of the BOP challenge: one estimated pose a row.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 
@@ -133,23 +134,66 @@ pub fn share_image_times(rows: &mut [ResultRow]) {
 /// [`DatasetError::Field`] for a row with a value that is not finite (nothing is written), and
 /// [`DatasetError::Write`].
 pub fn write_results(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
-    let mut text = COLUMNS.join(",") + "\n";
+    let mut text = header();
     for (i, row) in rows.iter().enumerate() {
-        let ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time } = row;
-        let r = rotation_to_row_major(&t_cam_model.rotation);
-        let t_mm = translation_to_mm(&t_cam_model.translation);
-        for (column, values) in
-            [("score", &[*score][..]), ("R", &r), ("t", &t_mm), ("time", &[*time])]
-        {
-            if values.iter().any(|v| !v.is_finite()) {
-                let field = format!("row {i} (scene {scene_id}, image {im_id}): {column}");
-                return Err(DatasetError::field(file, &field, "not finite"));
-            }
-        }
-        let (r, t) = (spaced(&r), spaced(&t_mm));
-        text += &format!("{scene_id},{im_id},{obj_id},{score},{r},{t},{time}\n");
+        text += &line(file, i, row)?;
     }
     write_atomically(file, text.as_bytes())
+}
+
+/// A results file that grows by a row at a time, for readers that do not wait for its end.
+#[derive(Debug)]
+pub struct ResultsWriter {
+    path: PathBuf,
+    file: File,
+    rows: usize,
+}
+
+impl ResultsWriter {
+    /// A new file with nothing but the header; an existing one is replaced.
+    ///
+    /// # Errors
+    /// [`DatasetError::Write`].
+    pub fn create(path: &Path) -> Result<Self, DatasetError> {
+        let file = File::create(path).map_err(|e| DatasetError::writing(path, e))?;
+        let mut writer = Self { path: path.to_owned(), file, rows: 0 };
+        writer.write(&header())?;
+        Ok(writer)
+    }
+
+    /// Adds a row, all of it at once.
+    ///
+    /// # Errors
+    /// Those of [`write_results`].
+    pub fn add(&mut self, row: &ResultRow) -> Result<(), DatasetError> {
+        let line = line(&self.path, self.rows, row)?;
+        self.rows += 1;
+        self.write(&line)
+    }
+
+    fn write(&mut self, text: &str) -> Result<(), DatasetError> {
+        self.file.write_all(text.as_bytes()).map_err(|e| DatasetError::writing(&self.path, e))
+    }
+}
+
+fn header() -> String {
+    COLUMNS.join(",") + "\n"
+}
+
+/// The line of row `i` of `file`.
+fn line(file: &Path, i: usize, row: &ResultRow) -> Result<String, DatasetError> {
+    let ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time } = row;
+    let r = rotation_to_row_major(&t_cam_model.rotation);
+    let t_mm = translation_to_mm(&t_cam_model.translation);
+    for (column, values) in [("score", &[*score][..]), ("R", &r), ("t", &t_mm), ("time", &[*time])]
+    {
+        if values.iter().any(|v| !v.is_finite()) {
+            let field = format!("row {i} (scene {scene_id}, image {im_id}): {column}");
+            return Err(DatasetError::field(file, &field, "not finite"));
+        }
+    }
+    let (r, t) = (spaced(&r), spaced(&t_mm));
+    Ok(format!("{scene_id},{im_id},{obj_id},{score},{r},{t},{time}\n"))
 }
 
 /// Shortest decimals that read back as the same numbers, separated by spaces.

@@ -240,6 +240,20 @@ impl Factor for PointToPlaneFactor {
             rows[i].into_iter().enumerate().chain(displaced).chain(off)
         };
         let weighted = || fit.weights.iter().zip(&fit.left).enumerate();
+        let by_patch = || {
+            let mut sums = PatchSums::<N>::new(count);
+            for (i, (weight, left)) in weighted() {
+                let row = SVector::from(rows[i]);
+                let (gradient, hessian) = sums.of(patch(i));
+                gradient.axpy(weight * left, &row, 1.0);
+                hessian.ger(*weight, &row, &row, 1.0);
+            }
+            sums
+        };
+        if image_warp.is_none() && self.field.is_none() {
+            by_patch().add_plainly_to(equations);
+            return self.cost_of(&residuals, &fit);
+        }
         let (gradient, mut hessian) = if let Some(warp) = &image_warp {
             let size = first + warp.len();
             let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
@@ -252,14 +266,7 @@ impl Factor for PointToPlaneFactor {
             }
             (gradient, hessian)
         } else {
-            let mut sums = PatchSums::<N>::new(count);
-            for (i, (weight, left)) in weighted() {
-                let row = SVector::from(rows[i]);
-                let (gradient, hessian) = sums.of(patch(i));
-                gradient.axpy(weight * left, &row, 1.0);
-                hessian.ger(*weight, &row, &row, 1.0);
-            }
-            sums.equations()
+            by_patch().equations()
         };
         if let Some(field) = &self.field {
             hessian -= field.lost(&fit, hessian.nrows(), derivatives);

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
+use rayon::prelude::*;
 
 use super::Modality;
 use super::fit::Fit;
@@ -271,11 +272,12 @@ fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
     // A modality is not to blame for what the model is off by.
     let marginalized = |part: &Contribution| {
         let patches = &point.marginal.as_ref().filter(|_| part.equations.has_auxiliary())?.patches;
-        Some(part.equations.clone().marginalize(patches.precision())?.rest)
+        Some(part.equations.marginalize(patches.precision())?.rest)
     };
     let of = |part: &Contribution| {
         let distance = distance(marginalized(part).as_ref().unwrap_or(&part.equations))?;
         (distance > DISAGREES).then_some(Inconsistency { factor: part.name, distance })
     };
-    point.prior.iter().chain(&point.factors).filter_map(of).collect()
+    let parts: Vec<&Contribution> = point.prior.iter().chain(&point.factors).collect();
+    parts.into_par_iter().filter_map(of).collect()
 }

@@ -4,7 +4,7 @@ mod colors;
 mod parts;
 mod window;
 
-use std::ops::Range;
+use std::mem;
 
 use nalgebra::Isometry3;
 use prehend_render::Mask;
@@ -53,30 +53,34 @@ pub(super) struct Segmenter {
     color_evidence: Vec<f32>,
     /// How much of the object is seen, in squares of depth by pixels.
     seen_area: f32,
-}
-
-/// What shows the object.
-pub(super) struct Segmentation {
-    pub(super) mask: Mask,
-    /// Columns and rows in which that was looked for.
-    pub(super) around: [Range<usize>; 2],
+    /// Where the last frame was looked at; its memory serves the next one.
+    window: Window,
 }
 
 impl Segmenter {
-    /// The pixels of `sight` that show `object`, which should be at `t_cam_object`. None if hardly any of those do that should.
+    /// Takes the pixels of `sight` that show `object`, which should be at `t_cam_object`, for its mask, and says whether there are any: far less
+    /// than those that should is nothing.
     ///
     /// The mask that came with it is evidence as far as it agrees with pixels that are sure: one of no use tells nothing.
     pub(super) fn segment(
         &mut self,
-        sight: &Sight,
+        sight: &mut Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
-    ) -> Option<Segmentation> {
-        let window = Window::new(sight, object, t_cam_object, REACH)?;
-        self.judge_masks(&window);
+    ) -> bool {
+        let mut window = mem::take(&mut self.window);
+        let seen = window.look(sight, object, t_cam_object, REACH).is_some()
+            && self.segment_within(&window, sight);
+        self.window = window;
+        seen
+    }
+
+    fn segment_within(&mut self, window: &Window, sight: &mut Sight) -> bool {
+        self.judge_masks(window);
         let [set, unset] = self.mask_evidence(sight);
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
-        let mut mask = Mask::filled(width, height, false);
+        let mask = &mut sight.observation.mask;
+        mask.refill(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
             expected += pixel.share;
@@ -90,10 +94,10 @@ impl Segmenter {
                 continue;
             }
             seen += 1.0;
-            fill(&mut mask, pixel.at);
+            fill(mask, pixel.at);
         }
-        let around = window.range();
-        (seen >= LEAST_SHARE * expected && seen > 0.0).then_some(Segmentation { mask, around })
+        sight.focus = Some(window.range());
+        seen >= LEAST_SHARE * expected && seen > 0.0
     }
 
     /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
@@ -112,7 +116,7 @@ impl Segmenter {
                 false => self.color_evidence(pixel.color),
             };
             let told = if pixel.masked { set } else { unset };
-            pixel.near_hand(center) + color + told > 0.0
+            pixel.near_hand(center, &window.place(pixel)) + color + told > 0.0
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
         let columns = sight.observation.camera.width.div_ceil(STRIDE);
@@ -134,9 +138,10 @@ impl Segmenter {
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
-        let Some(window) = Window::new(sight, object, t_cam_object, 0.0) else {
+        let mut window = Window::default();
+        if window.look(sight, object, t_cam_object, 0.0).is_none() {
             return 0.0;
-        };
+        }
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
             let told = pixel.depth_evidence() + self.color_evidence(pixel.color);
@@ -150,9 +155,14 @@ impl Segmenter {
 
     /// Learns colors from a frame with the object at `t_cam_object`.
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
-        let Some(window) = Window::new(sight, object, t_cam_object, REACH) else {
-            return;
-        };
+        let mut window = mem::take(&mut self.window);
+        if window.look(sight, object, t_cam_object, REACH).is_some() {
+            self.learn_within(&window);
+        }
+        self.window = window;
+    }
+
+    fn learn_within(&mut self, window: &Window) {
         let area: f32 = window.pixels().map(Pixel::expected_area).sum();
         let gain = if self.seen_area > 0.0 { AREA_GAIN } else { 1.0 };
         self.seen_area += gain * (area - self.seen_area);
@@ -179,14 +189,18 @@ impl Segmenter {
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.
     fn judge_masks(&mut self, window: &Window) {
-        let expected: f32 = window.pixels().map(|pixel| pixel.share).sum();
-        let share = |label: Label, least: f32| {
-            let mut counts = [0.0_f32; 2];
-            for pixel in window.pixels().filter(|pixel| pixel.label() == Some(label)) {
-                counts[usize::from(pixel.masked)] += 1.0;
+        let mut expected = 0.0_f32;
+        // Of those that show the object and of others, how many are not in the mask and are.
+        let mut counts = [[0.0_f32; 2]; 2];
+        for pixel in window.pixels() {
+            expected += pixel.share;
+            if let Some(label) = pixel.label() {
+                counts[label as usize][usize::from(pixel.masked)] += 1.0;
             }
-            let all = counts[0] + counts[1];
-            (all >= ENOUGH.max(least)).then(|| counts[1] / all)
+        }
+        let share = |label: Label, least: f32| {
+            let [unset, set] = counts[label as usize];
+            (unset + set >= ENOUGH.max(least)).then(|| set / (unset + set))
         };
         let shares = (share(Label::Object, SURE_SHARE * expected), share(Label::Other, 0.0));
         (self.hits, self.false_alarms) = match shares {
@@ -209,7 +223,8 @@ impl Segmenter {
 }
 
 /// Sets the pixels that the one at a column and row stands for.
-fn fill(mask: &mut Mask, [x, y]: [usize; 2]) {
+fn fill(mask: &mut Mask, at: [u32; 2]) {
+    let [x, y] = at.map(|k| k as usize);
     let (width, height) = (mask.width(), mask.height());
     for row in y..(y + STRIDE).min(height) {
         let end = (x + STRIDE).min(width);
@@ -221,6 +236,7 @@ fn fill(mask: &mut Mask, [x, y]: [usize; 2]) {
 mod tests {
     use super::*;
     use crate::scene::default_scene;
+    use crate::tracker::sight::Images;
 
     /// What is seen of an object where it is, at least.
     const LEAST_OF_TRUTH: f64 = 0.5;
@@ -238,15 +254,16 @@ mod tests {
         let sight = |fill: Option<bool>| {
             let mut observation = scene.observation.clone();
             fill.iter().for_each(|fill| observation.mask.pixels_mut().fill(*fill));
-            Sight::new(observation, Some(&scene.hand))
+            Sight::new(observation, Some(&scene.hand), Images::default())
         };
         let mut segmenter = Segmenter::default();
         segmenter.learn(&sight(None), &scene.object, &scene.truth);
         // As far off as an object that slips between two frames.
         let off = Isometry3::translation(6e-3, -4e-3, 3e-3) * scene.truth;
         for fill in [None, Some(false), Some(true)] {
-            let found = segmenter.segment(&sight(fill), &scene.object, &off).unwrap();
-            let overlap = overlap(&found.mask, &scene.observation.mask);
+            let mut looked = sight(fill);
+            assert!(segmenter.segment(&mut looked, &scene.object, &off));
+            let overlap = overlap(&looked.observation.mask, &scene.observation.mask);
             assert!(overlap > 0.9, "{fill:?}: {overlap}");
             // From nothing, too.
             let found = segmenter.anywhere(&sight(fill)).unwrap();
@@ -254,7 +271,7 @@ mod tests {
             assert!(anywhere > 0.6, "{fill:?}: {anywhere}");
         }
         let away = Isometry3::translation(0.3, 0.0, 0.0) * scene.truth;
-        assert!(segmenter.segment(&sight(None), &scene.object, &away).is_none());
+        assert!(!segmenter.segment(&mut sight(None), &scene.object, &away));
         let shown = |pose: &Isometry3<f64>| segmenter.shown(&sight(None), &scene.object, pose);
         let [there, elsewhere] = [&scene.truth, &away].map(shown);
         assert!(there > LEAST_OF_TRUTH && there > elsewhere, "{there} {elsewhere}");

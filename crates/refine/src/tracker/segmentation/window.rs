@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_render::{Camera, depth_map};
+use prehend_render::{Camera, DepthImage, draw_depth};
 
 use super::STRIDE;
 use super::colors::color_index;
@@ -38,10 +38,10 @@ pub(super) enum Label {
 }
 
 /// One pixel of a window.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Pixel {
     /// Column and row in the picture.
-    pub(super) at: [usize; 2],
+    pub(super) at: [u32; 2],
     /// The share of its neighbors that should show the object.
     pub(super) share: f32,
     pub(super) color: u16,
@@ -50,24 +50,33 @@ pub(super) struct Pixel {
     object: f32,
     hand: f32,
     sensor: f32,
-    /// Where that is, camera frame \[m\]; known of whole pictures only.
-    place: Vector3<f32>,
 }
 
-/// Part of a picture at every so many pixels.
+/// Part of a picture at every so many pixels. It can look at many pictures, one after the other, in the same memory.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Window {
     pixels: Vec<Pixel>,
     range: [Range<usize>; 2],
+    /// Of the whole picture.
+    camera: Option<Camera>,
+    /// The object where it should be.
+    drawn: DepthImage,
+    /// Numbers of pixels, and sums of such.
+    values: Vec<f32>,
+    shown: Sums,
+    near: Sums,
+    count: Sums,
 }
 
 impl Window {
-    /// About an object at `t_cam_object`, and `reach` \[m\] to all sides; none if that is out of the picture.
-    pub(super) fn new(
+    /// Looks about an object at `t_cam_object`, and `reach` \[m\] to all sides; none if that is out of the picture.
+    pub(super) fn look(
+        &mut self,
         sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
         reach: f64,
-    ) -> Option<Self> {
+    ) -> Option<()> {
         let full = &sight.observation.camera;
         let center = t_cam_object * object.center;
         if center.z <= 0.0 {
@@ -88,58 +97,67 @@ impl Window {
         }
         let coarse = full.scaled(1.0 / STRIDE as f64);
         let camera: Camera = coarse.cropped(left, top, columns, rows);
-        let drawn = depth_map(&camera, &[(&object.model, *t_cam_object)]);
+        draw_depth(&mut self.drawn, &camera, &[(&object.model, *t_cam_object)]);
         let picture = |column: usize, row: usize| [(left + column) * STRIDE, (top + row) * STRIDE];
-        let mut pixels: Vec<Pixel> = Vec::with_capacity(columns * rows);
-        for row in 0..rows {
-            for column in 0..columns {
-                let at = picture(column, row);
-                let own = drawn.pixels()[row * columns + column];
-                let pixel = Pixel::sensed(sight, at);
+        self.pixels.clear();
+        for (row, line) in self.drawn.pixels().chunks(columns).enumerate() {
+            self.pixels.extend(line.iter().enumerate().map(|(column, &own)| {
+                let pixel = Pixel::sensed(sight, picture(column, row));
                 let hidden = pixel.hand > 0.0 && pixel.hand < own;
                 let share = if own > 0.0 && !hidden { 1.0 } else { 0.0 };
-                pixels.push(Pixel { share, object: own, ..pixel });
-            }
+                Pixel { share, object: own, ..pixel }
+            }));
         }
-        if pixels.iter().all(|pixel| pixel.share == 0.0) {
+        if self.pixels.iter().all(|pixel| pixel.share == 0.0) {
             return None;
         }
         let size = (columns, rows);
-        let depths: Vec<f32> = pixels.iter().map(|pixel| pixel.object).collect();
-        let drawn: Vec<f32> = depths.iter().map(|z| f32::from(u8::from(*z > 0.0))).collect();
-        let shown: Vec<f32> = pixels.iter().map(|pixel| pixel.share).collect();
-        let (shown, all) = (sums(&shown, size, BAND), sums(&vec![1.0; shown.len()], size, BAND));
-        let (near, count) = (sums(&depths, size, BEYOND), sums(&drawn, size, BEYOND));
+        let Self { pixels, values, .. } = self;
+        values.clear();
+        values.extend(pixels.iter().map(|pixel| pixel.share));
+        self.shown.find(values, size, BAND);
+        self.near.find(self.drawn.pixels(), size, BEYOND);
+        let drawn = |z: &f32| f32::from(u8::from(*z > 0.0));
+        values.clear();
+        values.extend(self.drawn.pixels().iter().map(drawn));
+        self.count.find(values, size, BEYOND);
+        let (shown, near, count) = (&self.shown.all, &self.near.all, &self.count.all);
         let middle = center.z as f32;
         for (i, pixel) in pixels.iter_mut().enumerate() {
-            pixel.share = shown[i] / all[i];
+            let across = squares(i % columns, columns, BAND);
+            pixel.share = shown[i] / (across * squares(i / columns, rows, BAND)) as f32;
             if pixel.object == 0.0 {
                 pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
             }
         }
         let ends = picture(columns, rows);
-        Some(Self { pixels, range: [left * STRIDE..ends[0], top * STRIDE..ends[1]] })
+        self.range = [left * STRIDE..ends[0], top * STRIDE..ends[1]];
+        Some(())
     }
 
     /// Of a whole picture, in which nothing is known of the object.
     pub(super) fn whole(sight: &Sight) -> Self {
         let full = &sight.observation.camera;
         let (columns, rows) = (full.width.div_ceil(STRIDE), full.height.div_ceil(STRIDE));
-        let pixel = |k: usize| {
-            let pixel = Pixel::sensed(sight, [k % columns * STRIDE, k / columns * STRIDE]);
-            let [x, y] = pixel.at.map(|x| x as f64);
-            let place = full.unproject(x, y, f64::from(pixel.sensor));
-            Pixel { place: place.coords.cast(), ..pixel }
-        };
+        let pixel = |k: usize| Pixel::sensed(sight, [k % columns * STRIDE, k / columns * STRIDE]);
         let range = [0..full.width, 0..full.height];
-        Self { pixels: (0..columns * rows).map(pixel).collect(), range }
+        let pixels = (0..columns * rows).map(pixel).collect();
+        Self { pixels, range, camera: Some(*full), ..Self::default() }
+    }
+
+    /// Where what is seen at a pixel of a whole picture is, camera frame \[m\].
+    pub(super) fn place(&self, pixel: &Pixel) -> Vector3<f32> {
+        let [x, y] = pixel.at.map(f64::from);
+        let place = self.camera.map(|camera| camera.unproject(x, y, f64::from(pixel.sensor)));
+        place.map_or_else(Vector3::zeros, |place| place.coords.cast())
     }
 
     /// The middle of what of the hand is seen, camera frame \[m\]; none without one.
     pub(super) fn hand_center(&self) -> Option<Vector3<f32>> {
         let on_hand = self.pixels.iter().filter(|pixel| pixel.is_on_hand());
-        let (sum, count) = on_hand
-            .fold((Vector3::zeros(), 0.0), |(sum, count), pixel| (sum + pixel.place, count + 1.0));
+        let (sum, count) = on_hand.fold((Vector3::zeros(), 0.0), |(sum, count), pixel| {
+            (sum + self.place(pixel), count + 1.0)
+        });
         (count > 0.0).then(|| sum / count)
     }
 
@@ -153,36 +171,57 @@ impl Window {
     }
 }
 
-/// Sums over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
-fn sums(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
-    let mut across = vec![0.0; values.len()];
-    for (line, sums) in values.chunks(columns).zip(across.chunks_mut(columns)) {
-        running_sums(columns, reach, |i| line[i], |i, sum| sums[i] = sum);
-    }
-    let mut all = vec![0.0; values.len()];
-    for column in 0..columns {
-        let at = |row: usize| row * columns + column;
-        running_sums(rows, reach, |i| across[at(i)], |i, sum| all[at(i)] = sum);
-    }
-    all
+/// Sums over squares of pixels.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    all: Vec<f32>,
+    across: Vec<f32>,
+    /// Of each column, of the rows at hand.
+    column: Vec<f32>,
 }
 
-fn running_sums(
-    count: usize,
-    reach: usize,
-    value: impl Fn(usize) -> f32,
-    mut set: impl FnMut(usize, f32),
-) {
-    let mut sum: f32 = (0..reach.min(count)).map(&value).sum();
-    for i in 0..count {
-        if i + reach < count {
-            sum += value(i + reach);
+impl Sums {
+    /// Of `values` over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
+    fn find(&mut self, values: &[f32], (columns, rows): (usize, usize), reach: usize) {
+        let Self { all, across, column } = self;
+        for sums in [&mut *all, &mut *across] {
+            sums.clear();
+            sums.resize(values.len(), 0.0);
         }
-        set(i, sum);
-        if i >= reach {
-            sum -= value(i - reach);
+        for (line, sums) in values.chunks(columns).zip(across.chunks_mut(columns)) {
+            let mut sum: f32 = line[..reach.min(columns)].iter().sum();
+            for i in 0..columns {
+                if let Some(next) = line.get(i + reach) {
+                    sum += next;
+                }
+                sums[i] = sum;
+                if i >= reach {
+                    sum -= line[i - reach];
+                }
+            }
+        }
+        // All columns at once, row by row: memory is read as it lies.
+        let line = |row: usize| &across[row * columns..(row + 1) * columns];
+        column.clear();
+        column.resize(columns, 0.0);
+        for row in 0..reach.min(rows) {
+            column.iter_mut().zip(line(row)).for_each(|(sum, value)| *sum += value);
+        }
+        for (row, sums) in all.chunks_mut(columns).enumerate() {
+            if row + reach < rows {
+                column.iter_mut().zip(line(row + reach)).for_each(|(sum, value)| *sum += value);
+            }
+            sums.copy_from_slice(column);
+            if row >= reach {
+                column.iter_mut().zip(line(row - reach)).for_each(|(sum, value)| *sum -= value);
+            }
         }
     }
+}
+
+/// How many of `size` pixels in a line are within `reach` of number `at`.
+fn squares(at: usize, size: usize, reach: usize) -> usize {
+    (at + reach + 1).min(size) - at.saturating_sub(reach)
 }
 
 impl Pixel {
@@ -191,14 +230,13 @@ impl Pixel {
         let Sight { observation, given, hand_depth, .. } = sight;
         let index = at[1] * observation.camera.width + at[0];
         Self {
-            at,
+            at: at.map(|k| k as u32),
             share: 0.0,
             color: color_index(&observation.color.pixels()[index]),
             masked: given.pixels()[index],
             object: 0.0,
             hand: hand_depth.pixels()[index],
             sensor: observation.depth.pixels()[index],
-            place: Vector3::zeros(),
         }
     }
 
@@ -245,10 +283,10 @@ impl Pixel {
         self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < 2.0 * HAND_SIGMA
     }
 
-    /// Whether what is seen here may be held by a hand about that place \[nat\].
-    pub(super) fn near_hand(&self, center: Option<Vector3<f32>>) -> f32 {
+    /// Whether what is seen here, at `place`, may be held by a hand about that place \[nat\].
+    pub(super) fn near_hand(&self, center: Option<Vector3<f32>>, place: &Vector3<f32>) -> f32 {
         let Some(center) = center else { return 0.0 };
-        match self.sensor > 0.0 && !self.is_on_hand() && (self.place - center).norm() < HELD {
+        match self.sensor > 0.0 && !self.is_on_hand() && (place - center).norm() < HELD {
             true => 0.0,
             false => -3.0,
         }
@@ -275,14 +313,18 @@ mod tests {
         let (columns, rows) = (13, 9);
         let value = |k: usize| f32::from(u8::from((k * 7).is_multiple_of(5)));
         let values: Vec<f32> = (0..columns * rows).map(value).collect();
-        let found = sums(&values, (columns, rows), 2);
-        for (k, found) in found.iter().enumerate() {
+        let mut sums = Sums::default();
+        sums.find(&values, (columns, rows), 2);
+        for (k, found) in sums.all.iter().enumerate() {
             let (x, y) = (k % columns, k / columns);
             let near = |i: &usize| (i % columns).abs_diff(x) <= 2 && (i / columns).abs_diff(y) <= 2;
             let expected: f32 = (0..values.len()).filter(near).map(|i| values[i]).sum();
             assert_eq!(*found, expected);
+            let count = squares(x, columns, 2) * squares(y, rows, 2);
+            assert_eq!(count, (0..values.len()).filter(near).count());
         }
         // Windows that are smaller than what they are summed over.
-        assert_eq!(sums(&[1.0, 2.0], (2, 1), 5), [3.0, 3.0]);
+        sums.find(&[1.0, 2.0], (2, 1), 5);
+        assert_eq!(sums.all, [3.0, 3.0]);
     }
 }

@@ -1,5 +1,7 @@
 //! `prehend track`.
 
+mod images;
+
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -11,13 +13,16 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::RefineError;
-use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
+use prehend_refine::data::bop::{Dataset, ResultRow, ResultsWriter, check_writable};
 use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::strategy::Posterior;
-use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
+use prehend_refine::tracker::{
+    Recovery, Rejection, Timing, TrackStatus, Tracked, Tracker, TrackerSettings,
+};
 use serde_json::json;
 
+use self::images::{Images, Watch, select_scene};
 use crate::options::{Rendering, Selection, limit_threads, open_rig, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
@@ -25,7 +30,8 @@ use crate::terminal::{cache, exit_code, progress, say, warn};
 #[command(next_help_heading = "Input")]
 #[command(
     override_usage = "prehend track --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
-                            prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]"
+                            prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]\n       \
+                            prehend track --dataset <DIR> --watch <FOLDER> --poses <FILE> --out <FILE> [OPTIONS]"
 )]
 pub(crate) struct Track {
     #[command(flatten)]
@@ -51,6 +57,16 @@ pub(crate) struct Track {
     /// Images a second: those of a scene, in order of their ids, are the frames; ids that are missing count
     #[arg(long, value_name = "HZ", default_value_t = 30.0)]
     rate: f64,
+    /// Follow one object while another process writes images into this scene folder of the dataset, until none comes for --idle or Ctrl-C is pressed
+    ///
+    /// An image is tracked once all of it is there: its entry in scene_camera.json, and in scene_bodies.json and scene_tactile.json where
+    /// these files are, and color, depth and what there is of masks to their ends; of a mask that comes later nothing is known. Images come in order of
+    /// their ids; one that is not whole when a later one is, is a failure. --out has each pose as soon as it is known.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["scene", "split", "targets"])]
+    watch: Option<PathBuf>,
+    /// The time without a new image after which --watch ends
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, requires = "watch")]
+    idle: f64,
     /// Write the poses here, as a BOP results file with a row an image; an existing one is replaced
     ///
     /// The score is the probability that a pose is within 5 mm and 5°, and 0 where the object is lost or there was no time to look: there the
@@ -80,15 +96,31 @@ pub(crate) struct Track {
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
 type Start = (Target, Option<Isometry3<f64>>);
 
-/// A frame that is done.
+/// A frame that is done, without what nobody asks for afterwards: there may be many.
 struct Done {
     row: ResultRow,
-    tracked: Tracked,
+    status: TrackStatus,
+    rejection: Option<Rejection>,
+    iterations: usize,
+    cost: f64,
+    timing: Timing,
+}
+
+/// What becomes of the frames.
+struct Outcome {
+    frames: Vec<Done>,
+    failures: Vec<String>,
+    /// The poses as they come, if they are written so.
+    rows: Option<ResultsWriter>,
 }
 
 impl Track {
-    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+    pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
+        let watched = self.watch.as_ref();
+        let watched =
+            watched.map(|folder| select_scene(&mut self.selection, folder)).transpose()?;
+        let idle = Duration::try_from_secs_f64(self.idle).map_err(|e| anyhow!("--idle: {e}"))?;
         if !(self.rate.is_finite() && self.rate > 0.0) {
             bail!("--rate: {} is no number of images a second", self.rate);
         }
@@ -101,11 +133,12 @@ impl Track {
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let dataset = self.selection.open()?;
-        let (starts, mut failures) = self.starts(&dataset)?;
+        let (starts, failures) = self.starts(&dataset, watched)?;
         let rig = open_rig(self.rig.as_deref())?;
         let mut assets = Assets::new(&dataset, 0);
         assets = assets.with_cache(cache()).with_rig(rig.clone()).with_optional_masks();
-        let mut frames = Vec::new();
+        let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
+        let mut outcome = Outcome { frames: Vec::new(), failures, rows };
         for start in &starts {
             let begin = |object, hand| {
                 let tracker = Tracker::new(object, hand, settings.clone())?;
@@ -115,14 +148,21 @@ impl Track {
                     None => tracker,
                 })
             };
-            let followed = self.follow(&mut assets, start, begin, &mut frames, &mut failures);
+            let watch = watched.map(|scene_id| Watch::new(scene_id, start.0.im_id, idle));
+            let watch = watch.transpose()?;
+            let followed = self.follow(&mut assets, start, watch, begin, &mut outcome);
             if let Err(error) = followed {
                 let Target { scene_id, obj_id, .. } = start.0;
-                failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
+                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
             }
         }
-        let rows = frames.iter().map(|f| f.row.clone()).collect();
-        write_poses(&self.out, rows, &mut failures)?;
+        let Outcome { frames, mut failures, rows } = outcome;
+        if rows.is_none() {
+            let rows = frames.iter().map(|f| f.row.clone()).collect();
+            write_poses(&self.out, rows, &mut failures)?;
+        } else if frames.is_empty() {
+            failures.push("no image has come".to_owned());
+        }
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
             let document = json!({ "frames": frames, "failures": failures });
@@ -134,10 +174,21 @@ impl Track {
     }
 
     /// What to follow, in order, and what is wrong with rows of the poses.
-    fn starts(&self, dataset: &Dataset) -> anyhow::Result<(Vec<Start>, Vec<String>)> {
+    fn starts(
+        &self,
+        dataset: &Dataset,
+        watched: Option<u32>,
+    ) -> anyhow::Result<(Vec<Start>, Vec<String>)> {
         let (starts, faults): (Vec<Start>, _) = if let Some(poses) = &self.poses {
             let (jobs, faults) = self.selection.jobs(poses)?;
             (jobs.into_iter().map(|j| (j.target, Some(j.row.t_cam_model))).collect(), faults)
+        } else if let Some(scene_id) = watched {
+            let known = match self.selection.object.as_slice() {
+                [] => dataset.models().object_ids()?,
+                named => named.to_vec(),
+            };
+            let start = |obj_id| (Target { scene_id, im_id: 0, obj_id, instance: 0 }, None);
+            (known.into_iter().map(start).collect(), Vec::new())
         } else {
             let targets = self.selection.targets(dataset, self.targets.as_deref())?;
             if targets.is_empty() {
@@ -153,29 +204,38 @@ impl Track {
                 *known = start;
             }
         }
+        if watched.is_some() && earliest.len() != 1 {
+            bail!("--watch follows one object, not {}: --object says which", earliest.len());
+        }
         Ok((earliest.into_values().collect(), faults))
     }
 
-    /// Follows one object by what `begin` makes; the frames that are done join `frames`, those at fault `failures`.
+    /// Follows one object by what `begin` makes through the images that `watch` brings, or those that there are.
     fn follow(
         &self,
         assets: &mut Assets<'_>,
         start: &Start,
+        watch: Option<Watch>,
         begin: impl Fn(Arc<Object>, Option<Arc<Hand>>) -> Result<Tracker, RefineError>,
-        frames: &mut Vec<Done>,
-        failures: &mut Vec<String>,
+        outcome: &mut Outcome,
     ) -> Result<(), AssetError> {
         let (Target { scene_id, obj_id, im_id: first, .. }, initial) = *start;
         let object = assets.object(obj_id)?;
-        let mut images = assets.dataset().scene(scene_id)?.images()?;
-        images.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
-        if images.is_empty() {
-            failures
-                .push(format!("scene {scene_id} object {obj_id}: no image from image {first} on"));
-        }
+        let bar = progress(0, "tracking");
+        let mut images = if let Some(watch) = watch {
+            Images::Watched(watch)
+        } else {
+            let mut ids = assets.dataset().scene(scene_id)?.moments()?;
+            ids.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
+            if ids.is_empty() {
+                let nothing = format!("no image from image {first} on");
+                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {nothing}"));
+            }
+            bar.set_length(ids.len() as u64);
+            Images::Listed(ids.into_iter())
+        };
         let mut tracker: Option<Tracker> = None;
-        let bar = progress(images.len(), "tracking");
-        for im_id in bar.wrap_iter(images.into_iter()) {
+        while let Some(im_id) = images.next(assets) {
             let target = Target { im_id, ..start.0 };
             let mut frame = || -> Result<Tracked, AssetError> {
                 let FrameInput { observation, hand, .. } = assets.load(&target, &[])?;
@@ -202,10 +262,15 @@ impl Track {
                     if self.time {
                         row.time = tracked.timing.total().as_secs_f64();
                     }
-                    frames.push(Done { row, tracked });
+                    if let Some(rows) = &mut outcome.rows {
+                        rows.add(&row)?;
+                    }
+                    let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
+                    outcome.frames.push(Done { row, status, rejection, iterations, cost, timing });
                 }
-                Err(error) => failures.push(format!("{target}: {error}")),
+                Err(error) => outcome.failures.push(format!("{target}: {error}")),
             }
+            bar.inc(1);
         }
         Ok(())
     }
@@ -214,8 +279,8 @@ impl Track {
 /// What became of `frames`, which are not empty.
 fn told(frames: &[Done]) -> String {
     // To find an object takes far longer than to follow it, and is rare.
-    let rare = |f: &&Done| matches!(f.tracked.status, TrackStatus::Relocalized | TrackStatus::Lost);
-    let of = |f: &Done| f.tracked.timing.total().as_secs_f64();
+    let rare = |f: &&Done| matches!(f.status, TrackStatus::Relocalized | TrackStatus::Lost);
+    let of = |f: &Done| f.timing.total().as_secs_f64();
     let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
     if seconds.is_empty() {
         seconds = frames.iter().map(of).collect();
@@ -231,7 +296,7 @@ fn told(frames: &[Done]) -> String {
     let all =
         [TrackStatus::Tracked, TrackStatus::Predicted, TrackStatus::Relocalized, TrackStatus::Lost];
     let count = |status: TrackStatus| {
-        let count = frames.iter().filter(|d| d.tracked.status == status).count();
+        let count = frames.iter().filter(|d| d.status == status).count();
         (count > 0).then(|| format!("{count} {}", status.name()))
     };
     let counts: Vec<String> = all.into_iter().filter_map(count).collect();
@@ -239,18 +304,17 @@ fn told(frames: &[Done]) -> String {
 }
 
 fn summary(frame: &Done) -> serde_json::Value {
-    let Done { row, tracked } = frame;
-    let pose = PlainPose::from(&tracked.t_cam_object);
+    let Done { row, status, rejection, iterations, cost, timing } = frame;
+    let pose = PlainPose::from(&row.t_cam_model);
     let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
-    let timing = &tracked.timing;
     json!({
         "scene_id": row.scene_id,
         "im_id": row.im_id,
         "obj_id": row.obj_id,
-        "following": tracked.status.name(),
-        "doubt": tracked.rejection.map(|d| d.to_string()),
-        "iterations": tracked.iterations,
-        "misfit": tracked.cost.is_finite().then_some(tracked.cost),
+        "following": status.name(),
+        "doubt": rejection.map(|d| d.to_string()),
+        "iterations": iterations,
+        "misfit": cost.is_finite().then_some(cost),
         "probability_within_5mm_5deg": row.score,
         "milliseconds": {
             "preparation": milliseconds(timing.preparation),
