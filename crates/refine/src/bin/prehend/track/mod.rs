@@ -1,6 +1,7 @@
 //! `prehend track`.
 
 mod images;
+mod strip;
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -73,6 +74,9 @@ pub(crate) struct Track {
     /// pose is where it should be.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
+    /// Write a picture of eight frames here (PNG), with the object's outline, of the first object that is followed: green where it was seen, red where it was only expected
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    strip: Option<PathBuf>,
     /// Print JSON on standard output: poses, how they came about, times and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -117,6 +121,7 @@ struct Outcome {
 impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
+        self.strip.as_deref().map(check_writable).transpose()?;
         let watched = self.watch.as_ref();
         let watched =
             watched.map(|folder| select_scene(&mut self.selection, folder)).transpose()?;
@@ -157,6 +162,13 @@ impl Track {
             }
         }
         let Outcome { frames, mut failures, rows } = outcome;
+        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
+            let first = |frame: &&Done| {
+                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
+            };
+            let followed: Vec<&Done> = frames.iter().filter(first).collect();
+            strip::write(file, &followed, target.instance, &mut assets)?;
+        }
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
