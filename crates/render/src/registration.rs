@@ -56,7 +56,7 @@ pub fn register_depth(
         let below = line(y + 1);
         for x in 1..width {
             let [a, b, c, d] = [&above[x - 1], &above[x], &below[x - 1], &below[x]];
-            // Along the shorter diagonal, or about the one corner that was not measured.
+            // Two halves, or the one without the corner that was not measured.
             let triangles = match (a, b, c, d) {
                 (Some(_), Some(_), Some(_), Some(_)) => [Some([a, b, c]), Some([b, d, c])],
                 (None, ..) => [Some([b, d, c]), None],
@@ -110,7 +110,8 @@ fn draw_triangle(corners: [&Corner; 3], image: &mut DepthImage) {
     let (left, right) = span([a.x, b.x, c.x], image.width());
     let (top, bottom) = span([a.y, b.y, c.y], image.height());
     let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    if area == 0.0 {
+    // What is seen from behind was not measured from this side.
+    if area <= 0.0 {
         return;
     }
     for y in top..bottom {

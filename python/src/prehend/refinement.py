@@ -37,8 +37,8 @@ class Estimate:
     """What fits worse than it does for right poses, and by how many standard deviations."""
     disagreements: list[tuple[str, float]] = field(default_factory=list)
     """Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance."""
-    let_off: list[str] = field(default_factory=list)
-    """Evidence that did not fit: the pose is found without it."""
+    let_off: str | None = None
+    """Evidence that did not fit, "color", "depth", "touch" or "views" (other cameras): the pose is found without it."""
     unobserved: list[float] = field(default_factory=list)
     """Standard deviations of surface motion along directions that the evidence says hardly anything of [m]."""
     exact: bool = False

@@ -19,6 +19,9 @@ pub struct LinkShape {
     grid: Option<SdfGrid>,
 }
 
+/// Cells along the longest side of a grid at most: those of tables and walls are coarser. Beside a flat face a distance is linear, and exact on any grid.
+const MOST_CELLS: f64 = 200.0;
+
 impl LinkShape {
     fn new(
         parts: &[TriMesh],
@@ -33,6 +36,7 @@ impl LinkShape {
             closest.iter().map(ClosestPoints::bounds).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let grid = bounds
             .map(|bounds| {
+                let spacing = spacing.max((bounds.1 - bounds.0).max() / MOST_CELLS);
                 let build = || {
                     SdfGrid::from_fn(bounds, spacing, margin, |p, _| union_distance(&closest, p))
                 };
@@ -120,7 +124,7 @@ impl RobotShape {
     /// Margin that suits contact on a hand: 12 mm.
     pub const DEFAULT_MARGIN: f64 = 0.012;
 
-    /// Builds every link's distance grid, sampled every `spacing` \[m\] and reaching `margin` \[m\] around
+    /// Builds every link's distance grid, sampled every `spacing` \[m\] (a 200th of links that are longer than that) and reaching `margin` \[m\] around
     /// the link: at least as far as distances will be asked for.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::{KinematicTree, PosedRobot};
-use prehend_geometry::shapes::cuboid;
+use prehend_geometry::shapes::{RoundedBox, cuboid, rounded_box};
 use prehend_geometry::{ClosestPoints, SplitMix64, TriMesh};
 use prehend_refine::scene::{Hand, Observation};
 use prehend_render::{Camera, Light, Mask, RenderModel, look_at, render_scene};
@@ -79,7 +79,7 @@ impl World {
         let height = -lowest(&mesh, &turn);
         let other = cuboid(Vector3::new(0.05, 0.05, 0.12));
         let direction = 6.0 * random.normal();
-        let beside = Vector3::new(0.1 * direction.cos(), 0.1 * direction.sin(), 0.06);
+        let beside = Vector3::new(0.14 * direction.cos(), 0.14 * direction.sin(), 0.06);
         let eye = Point3::new(0.45 * direction.cos(), 0.45 * direction.sin(), 0.3);
         Ok(Self {
             object: mesh,
@@ -122,14 +122,14 @@ impl World {
     ) -> anyhow::Result<Observation> {
         let t_cam_world = t_world_cam.inverse();
         let model = RenderModel::new(&self.object)?;
-        let table = RenderModel::new(&cuboid(Vector3::new(1.5, 1.5, 0.02)))?;
+        let table = RenderModel::new(&table())?;
         let other = self.other.as_ref();
         let other =
             other.map(|(mesh, pose)| Ok::<_, anyhow::Error>((RenderModel::new(mesh)?, pose)));
         let other = other.transpose()?;
         let mut bodies = vec![(&model, t_cam_world * self.t_world_object)];
         if self.has_table {
-            bodies.push((&table, t_cam_world * Translation3::new(0.0, 0.0, -0.01)));
+            bodies.push((&table, t_cam_world));
         }
         if let Some((model, pose)) = &other {
             bodies.push((model, t_cam_world * *pose));
@@ -156,6 +156,13 @@ impl World {
         }
         Ok(Observation::new(*camera, image.color, image.depth, mask))
     }
+}
+
+/// A plate that ends at height 0, of faces that are all before the camera or behind it.
+fn table() -> TriMesh {
+    let (size, flat) = (Vector3::new(1.5, 1.5, 0.02), Vector3::zeros());
+    let shape = RoundedBox { size, radius: 0.0, bulge: flat, arc_steps: 0, cell: 0.05 };
+    rounded_box(&shape).transformed(&Translation3::new(0.0, 0.0, -0.01).into())
 }
 
 /// A camera at `eye` that looks at `target`, in the world.

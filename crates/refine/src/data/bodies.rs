@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{KinematicTree, RobotError};
-use prehend_geometry::shapes::cuboid;
+use prehend_geometry::shapes::{RoundedBox, rounded_box};
 
 use crate::data::bop::{Tactile, TactileReading};
 use crate::scene::{BinaryContact, ContactPatch, HandMeasurement, ProximityReading, TouchReading};
@@ -22,35 +22,36 @@ pub(crate) struct PlacedBody {
     /// Its coordinates → camera coordinates \[m\].
     pub(crate) t_cam_body: Isometry3<f64>,
     /// Standard deviations of that in each direction and about each axis \[m, rad\], where they are said.
-    pub(crate) sigmas: Option<[f64; 2]>,
+    pub(crate) sigmas: [Option<f64>; 2],
 }
 
-/// Edge and thickness of the plate that stands for a plane \[m\].
-const PLATE: [f64; 2] = [1.0, 0.03];
-/// A plane is used about where the camera looks, if that is no farther away \[m\].
-const FARTHEST: f64 = 5.0;
-/// Standard deviation of what is exact \[m or rad\].
-const EXACT: f64 = 1e-6;
+/// Edge, thickness and largest face of the plate that stands for a plane \[m\]: faces that reach behind the camera are not drawn.
+const PLATE: [f64; 3] = [3.0, 0.2, 0.1];
+/// Standard deviation of a place that is said to be exact \[m or rad\].
+const EXACT_PLACE: f64 = 1e-6;
 
-/// The half-space below z = 0, as a plate.
+/// The half-space below z = 0 about the origin, as a plate.
 pub(crate) fn plate() -> TriMesh {
-    let [edge, thickness] = PLATE;
+    let [edge, thickness, cell] = PLATE;
     let below = Translation3::new(0.0, 0.0, -0.5 * thickness);
-    cuboid(Vector3::new(edge, edge, thickness)).transformed(&below.into())
+    let (size, flat) = (Vector3::new(edge, edge, thickness), Vector3::zeros());
+    let shape = RoundedBox { size, radius: 0.0, bulge: flat, arc_steps: 0, cell };
+    rounded_box(&shape).welded().transformed(&below.into())
 }
 
-/// A plane's pose with its origin where the camera looks at it.
-pub(crate) fn in_view(t_cam_plane: &Isometry3<f64>) -> Isometry3<f64> {
-    let normal = t_cam_plane * Vector3::z();
-    let depth = normal.dot(&t_cam_plane.translation.vector) / normal.z;
-    if depth > 0.0 && depth < FARTHEST {
-        Isometry3::from_parts(Translation3::new(0.0, 0.0, depth), t_cam_plane.rotation)
-    } else {
-        *t_cam_plane
+/// Refuses a name that would be mixed up with those of links.
+///
+/// # Errors
+/// What is wrong with it.
+pub(crate) fn check_name(name: &str) -> Result<(), String> {
+    match name.is_empty() || name.contains('/') {
+        true => Err(format!("name: {name:?} is empty or has a slash")),
+        false => Ok(()),
     }
 }
 
-/// Bodies of a frame, the one first that the others are placed beside: the first hand, or else the first body.
+/// Bodies of a frame, the one first that the others are placed beside: the first hand, or else the first body. The others are in the order of their
+/// names, so that frames which list them in another one have the same robot.
 pub(crate) struct Bodies(Vec<PlacedBody>);
 
 impl Bodies {
@@ -61,6 +62,7 @@ impl Bodies {
             return None;
         }
         bodies[..=first].rotate_right(1);
+        bodies[1..].sort_by(|a, b| a.name.cmp(&b.name));
         Some(Self(bodies))
     }
 
@@ -77,7 +79,7 @@ impl Bodies {
     pub(crate) fn measured(&self) -> HandMeasurement {
         let first = &self.0[0];
         let mut measured = HandMeasurement::new(first.t_cam_body, first.joints.clone());
-        measured.pose_sigmas = first.sigmas.map(|sigmas| sigmas.map(|sigma| sigma.max(EXACT)));
+        measured.pose_sigmas = first.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
         if self.0.len() == 1 {
             return measured;
         }
@@ -86,8 +88,9 @@ impl Bodies {
             let beside = first.t_cam_body.inverse() * body.t_cam_body;
             measured.joints.extend(KinematicTree::floating_joints(&beside));
             measured.joints.extend(&body.joints);
-            let [place, turn] = body.sigmas.unwrap_or_default().map(|sigma| sigma.max(EXACT));
-            let said = [[place; 3], [EXACT; 3], [turn; 3]].concat();
+            let exact = EXACT_PLACE;
+            let [place, turn] = body.sigmas.map(|sigma| sigma.unwrap_or_default().max(exact));
+            let said = [[place; 3], [exact; 3], [turn; 3]].concat();
             measured.joint_sigmas.extend(said.into_iter().map(Some));
             measured.joint_sigmas.extend(body.joints.iter().map(|_| None));
         }
@@ -106,9 +109,10 @@ impl Bodies {
         self.0.iter().any(|body| body.name == name)
     }
 
-    /// Its name where there is one alone.
-    pub(crate) fn first_name(&self) -> &str {
-        &self.0[0].name
+    /// Their names, for messages.
+    pub(crate) fn names(&self) -> String {
+        let quoted: Vec<String> = self.0.iter().map(|body| format!("{:?}", body.name)).collect();
+        quoted.join(", ")
     }
 
     /// `taxels` of the body called `name` as those of the whole robot.
@@ -178,12 +182,14 @@ impl Bodies {
 #[cfg(test)]
 mod tests {
     use nalgebra::UnitQuaternion;
+    use prehend_geometry::DistanceField;
+    use prehend_geometry::robot::RobotShape;
 
     use super::*;
 
     fn body(name: &str, is_hand: bool, t_cam_body: Isometry3<f64>) -> PlacedBody {
         let tree = Arc::new(KinematicTree::rigid("base", vec![plate()]));
-        let sigmas = Some([1e-3, 0.0]);
+        let sigmas = [Some(1e-3), None];
         PlacedBody { name: name.into(), tree, joints: Vec::new(), is_hand, t_cam_body, sigmas }
     }
 
@@ -197,7 +203,7 @@ mod tests {
             body("right", true, Isometry3::translation(0.0, 0.0, 0.7)),
         ];
         let bodies = Bodies::new(bodies).unwrap();
-        assert_eq!(bodies.first_name(), "left");
+        assert_eq!(bodies.names(), "\"left\", \"right\", \"table\"");
         let (tree, measured) = (bodies.tree().unwrap(), bodies.measured());
         let poses = tree.forward_kinematics(&measured.joints);
         let of = |link: &str| measured.t_cam_hand * poses[tree.link_index(link).unwrap()];
@@ -209,21 +215,24 @@ mod tests {
         assert!(near(of("right/base"), Isometry3::translation(0.0, 0.0, 0.7)));
         assert_eq!(measured.joint_sigmas.len(), measured.joints.len());
         assert_eq!(measured.joint_sigmas[0], Some(1e-3));
-        assert_eq!(measured.joint_sigmas[8], Some(EXACT));
+        assert_eq!(measured.joint_sigmas[8], Some(EXACT_PLACE));
+        assert_eq!(measured.pose_sigmas, [Some(1e-3), None]);
         assert!(Bodies::new(Vec::new()).is_none());
     }
 
     #[test]
-    fn a_plane_is_used_where_the_camera_looks() {
-        // A table below, seen at a slant: its origin is far to the side.
-        let turn = UnitQuaternion::from_euler_angles(2.2, 0.0, 0.0);
-        let table = Isometry3::from_parts([3.0, 0.4, 0.6].into(), turn);
-        let moved = in_view(&table);
-        assert_eq!(moved.translation.vector.xy(), Vector3::zeros().xy());
-        // The same plane.
-        let local = table.inverse() * Point3::from(moved.translation.vector);
-        assert!(local.z.abs() < 1e-12);
-        let behind = Isometry3::translation(0.0, 0.0, -1.0);
-        assert_eq!(in_view(&behind), behind);
+    fn a_plane_is_one_up_to_its_edge() {
+        let shape = RobotShape::new(
+            &KinematicTree::rigid("plane", vec![plate()]),
+            RobotShape::DEFAULT_SPACING,
+            RobotShape::DEFAULT_MARGIN,
+        );
+        let shape = shape.unwrap();
+        let grid = shape.links()[0].grid().unwrap();
+        for (x, y, z) in [(0.3, -1.2, 4e-3), (-1.37, 0.01, -7e-3), (0.013, 0.42, 0.0)] {
+            let sample = grid.sample(&Point3::new(x, y, z), 0.01).unwrap();
+            assert!((sample.distance - z).abs() < 1e-6, "{x} {y} {z}: {}", sample.distance);
+            assert!((sample.gradient - Vector3::z()).norm() < 1e-6);
+        }
     }
 }

@@ -9,9 +9,8 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use crate::data::assets::AssetError;
-use crate::data::bodies::{Bodies, PlacedBody, in_view, plate};
+use crate::data::bodies::{Bodies, PlacedBody, plate};
 use crate::data::bop::{Body, BodyKind, Frame, Tactile, TactileReading};
-use crate::error::RefineError;
 use crate::scene::{Hand, HandMeasurement, Object};
 
 /// Of what shape a body is.
@@ -98,10 +97,7 @@ impl Robots {
             name: body.name.clone(),
             joints,
             is_hand: body.as_hand().is_some(),
-            t_cam_body: match body.kind {
-                BodyKind::Plane => in_view(&body.t_cam_base),
-                BodyKind::Hand { .. } | BodyKind::Object { .. } => body.t_cam_base,
-            },
+            t_cam_body: body.t_cam_base,
             sigmas: body.sigmas,
             tree,
         })
@@ -115,22 +111,34 @@ impl Robots {
         shapes: Vec<(String, BodyShape)>,
         tactile: &[Tactile],
     ) -> Result<(Arc<Hand>, HandMeasurement), AssetError> {
-        if let Some(Tactile { body, .. }) = tactile.iter().find(|sensor| !all.has(&sensor.body)) {
-            let problem = format!("names {body:?}, but the hand is {:?}", all.first_name());
-            return Err(frame.tactile_fault("body", problem).into());
+        // One of several is called by its number.
+        let place = |k: usize| if tactile.len() > 1 { format!("[{k}]") } else { String::new() };
+        let field = |k: usize, name: &str| match place(k) {
+            list if list.is_empty() || name.is_empty() => list + name,
+            list => format!("{list}.{name}"),
+        };
+        for (k, Tactile { body, .. }) in tactile.iter().enumerate() {
+            if !all.has(body) {
+                let problem = format!("names {body:?}, the bodies are {}", all.names());
+                return Err(frame.tactile_fault(&field(k, "body"), problem).into());
+            }
         }
         let mut measured = all.measured();
         let mut skin = None;
-        for sensor in tactile {
+        for (k, sensor) in tactile.iter().enumerate() {
             if let TactileReading::Force { taxels, force } = &sensor.reading {
                 let layout = all.skin(&sensor.body, self.layout(taxels)?);
-                let layout = layout.map_err(|link| RefineError::TaxelLink { link })?;
+                let layout = layout.map_err(|link| {
+                    let problem =
+                        format!("{}: {:?} has no link {link:?}", taxels.display(), sensor.body);
+                    frame.tactile_fault(&field(k, "taxels"), problem)
+                })?;
                 if force.len() != layout.len() {
                     let (expected, found) = (layout.len(), force.len());
                     let file = taxels.display();
                     let problem =
                         format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                    return Err(frame.tactile_fault("force", problem).into());
+                    return Err(frame.tactile_fault(&field(k, "force"), problem).into());
                 }
                 measured.forces.clone_from(force);
                 skin = Some((sensor.body.clone(), taxels.clone(), layout));
@@ -147,14 +155,14 @@ impl Robots {
                 hand
             }
         };
-        for sensor in tactile {
+        for (k, sensor) in tactile.iter().enumerate() {
             let layout = match &sensor.reading {
                 TactileReading::Binary { taxels, .. }
                 | TactileReading::Proximity { taxels, .. } => self.layout(taxels)?,
                 TactileReading::Force { .. } | TactileReading::Patch { .. } => Vec::new(),
             };
             let reading = all.reading(&hand.tree, sensor, &layout);
-            measured.touch.extend(reading.map_err(|e| frame.tactile_fault("", e))?);
+            measured.touch.extend(reading.map_err(|e| frame.tactile_fault(&field(k, ""), e))?);
         }
         Ok((hand, measured))
     }

@@ -67,9 +67,9 @@ impl PriorSettings {
     pub(crate) fn of_hand(&self, hand: Option<&HandMeasurement>) -> Self {
         let mut prior = self.clone();
         let Some(hand) = hand else { return prior };
-        if let Some([translation, rotation]) = hand.pose_sigmas {
-            (prior.hand_translation, prior.hand_rotation) = (translation, rotation);
-        }
+        let [translation, rotation] = hand.pose_sigmas;
+        prior.hand_translation = translation.unwrap_or(prior.hand_translation);
+        prior.hand_rotation = rotation.unwrap_or(prior.hand_rotation);
         if !hand.joint_sigmas.is_empty() {
             prior.known_joints.clone_from(&hand.joint_sigmas);
         }

@@ -49,7 +49,7 @@ pub struct State {
     pub joints: Vec<f64>,
     /// How the camera differs from what is said of it.
     pub camera: CameraCalibrationError,
-    /// The same of the other cameras that see the object.
+    /// The same of the other cameras, whether or not they see the object.
     pub views: Vec<ViewCalibrationError>,
 }
 
@@ -85,7 +85,7 @@ impl State {
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
             joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
             camera: CameraCalibrationError::default(),
-            views: vec![ViewCalibrationError::default(); observation.seeing_views().count()],
+            views: vec![ViewCalibrationError::default(); observation.views.len()],
         };
         let depth = state.center().z;
         if depth <= 0.0 {

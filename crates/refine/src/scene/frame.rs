@@ -30,8 +30,18 @@ pub struct Frame<'a> {
     rivals: Option<Vec<Isometry3<f64>>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     focus: Option<[Range<usize>; 2]>,
-    /// What other cameras saw of the object, each with the first camera's coordinates → its own \[m\].
-    views: Vec<(Isometry3<f64>, Frame<'a>)>,
+    /// What other cameras saw of the object.
+    views: Vec<View<'a>>,
+}
+
+/// What another camera saw of the object.
+pub struct View<'a> {
+    /// Which of the observation's [`views`](Observation::views) it is.
+    pub index: usize,
+    /// The first camera's coordinates → its own \[m\].
+    pub t_view_cam: Isometry3<f64>,
+    /// What it saw, in its own coordinates.
+    pub frame: Frame<'a>,
 }
 
 /// What may hide the object in the image.
@@ -73,9 +83,12 @@ impl<'a> Frame<'a> {
         if let Some((hand, measured)) = hand {
             hand.check_joints(&measured.joints)?;
         }
-        let views = observation.seeing_views().map(|view| {
+        let seeing = observation.views.iter().enumerate();
+        let seeing = seeing.filter(|(_, view)| view.observation().mask.count() > 0);
+        let views = seeing.map(|(index, view)| {
             let hand = hand.map(|(hand, _)| hand);
-            Ok((view.t_view_cam(), Self::new(view.observation(), object, hand)?))
+            let frame = Self::new(view.observation(), object, hand)?;
+            Ok(View { index, t_view_cam: view.t_view_cam(), frame })
         });
         Ok(Self {
             views: views.collect::<Result<_, RefineError>>()?,
@@ -120,8 +133,13 @@ impl<'a> Frame<'a> {
     /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
     /// must not wait for each other.
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
+        let of_view = |view: View<'a>| {
+            let frame = view.frame.with_backend(Arc::clone(&backend));
+            View { frame, ..view }
+        };
+        let views = self.views.into_iter().map(of_view).collect();
         // The processor needs no sessions.
-        Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), ..self }
+        Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), views, ..self }
     }
 
     /// What renders, if not the processor at hand.
@@ -144,8 +162,8 @@ impl<'a> Frame<'a> {
         Self { focus: Some(focus), ..self }
     }
 
-    /// What other cameras saw of the object: for each the first camera's coordinates → its own \[m\], and its frame.
-    pub fn views(&self) -> &[(Isometry3<f64>, Frame<'a>)] {
+    /// What other cameras saw of the object: those with a mask of it.
+    pub fn views(&self) -> &[View<'a>] {
         &self.views
     }
 

@@ -6,7 +6,7 @@ use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage}
 use super::TouchReading;
 use crate::error::RefineError;
 
-/// Where the hand is said to be, and what it feels.
+/// Where the hand is said to be, and what it feels. Other bodies of a frame, tables, objects and further hands, are parts of it.
 #[derive(Clone, Debug)]
 pub struct HandMeasurement {
     /// Hand base coordinates → camera coordinates \[m\].
@@ -18,7 +18,7 @@ pub struct HandMeasurement {
     /// What sensors say that measure no forces.
     pub touch: Vec<TouchReading>,
     /// Standard deviations of `t_cam_hand` at the object's place in each direction, and about each axis \[m, rad\], where they are known.
-    pub pose_sigmas: Option<[f64; 2]>,
+    pub pose_sigmas: [Option<f64>; 2],
     /// Standard deviations of joint positions where they are known \[rad or m\], in the order of the joints; an empty list for none. The others are as
     /// accurate as the estimator's settings state.
     pub joint_sigmas: Vec<Option<f64>>,
@@ -28,7 +28,7 @@ impl HandMeasurement {
     /// A hand that feels nothing, with its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
     pub fn new(t_cam_hand: Isometry3<f64>, joints: Vec<f64>) -> Self {
         let (forces, touch, joint_sigmas) = (Vec::new(), Vec::new(), Vec::new());
-        Self { t_cam_hand, joints, forces, touch, pose_sigmas: None, joint_sigmas }
+        Self { t_cam_hand, joints, forces, touch, pose_sigmas: [None; 2], joint_sigmas }
     }
 
     /// The same with the force of the object on each taxel, in its link's frame \[N\].
@@ -112,11 +112,6 @@ impl Observation {
         self.views.push(AdditionalView { t_cam_view, observation });
         self.place_views();
         self
-    }
-
-    /// The other cameras that see the object: those with a mask of it.
-    pub(crate) fn seeing_views(&self) -> impl Iterator<Item = &AdditionalView> {
-        self.views.iter().filter(|view| view.observation.mask.count() > 0)
     }
 
     /// Tells the other cameras where the hand is. To be called when [`hand`](Self::hand) has changed.

@@ -412,6 +412,8 @@ fn a_scene_may_have_color_or_depth_alone() {
 fn images_of_a_rig_are_views_of_one_moment() {
     let fixture = Fixture::new();
     fixture.remove("scene_bodies.json");
+    // Of image 0 the object's mask is number 5.
+    fixture.mask("000003_000005", 3);
     let place = |rig: &str, z: f64| {
         format!(r#", "rig": {rig}, "cam_R_w2c": {I}, "cam_t_w2c": [0, 0, {z}]"#)
     };
@@ -426,8 +428,12 @@ fn images_of_a_rig_are_views_of_one_moment() {
     let seen = both(&place("7", 500.0), &place("7", 450.0)).unwrap();
     let [view] = &seen.views[..] else { panic!("not one view") };
     assert!((view.t_view_cam().translation.z + 0.05).abs() < 1e-12);
-    // The mask of the same number.
-    assert_eq!(view.observation().mask.count(), 2);
+    // The mask of the same number, or none.
+    assert_eq!(view.observation().mask.count(), 3);
+    let other = fixture.root().join("test/000004/mask_visib/000003_000005.png");
+    fs::rename(&other, other.with_file_name("000003_000006.png")).unwrap();
+    assert!(both(&place("7", 500.0), &place("7", 450.0)).unwrap().views.is_empty());
+    fs::rename(other.with_file_name("000003_000006.png"), &other).unwrap();
     assert_eq!(fixture.open().scene(4).unwrap().moments().unwrap(), [0]);
     for other in ["8", "\"7\""] {
         assert!(both(&place("7", 500.0), &place(other, 450.0)).unwrap().views.is_empty());
@@ -435,6 +441,12 @@ fn images_of_a_rig_are_views_of_one_moment() {
     assert!(both("", &place("7", 450.0)).unwrap().views.is_empty());
     let error = both(&place("7", 500.0), r#", "rig": 7"#).unwrap_err();
     assert!(error.contains("3.cam_R_w2c: is missing"), "{error}");
+    let error = both(&place("7", 500.0), &place("7", 500.0)).unwrap_err();
+    assert!(error.contains("3.cam_t_w2c: is the place of image 0 of the same rig, too"), "{error}");
+    let error = both(r#", "rig": 7"#, "").unwrap_err();
+    assert!(error.contains("0.cam_R_w2c: is missing"), "{error}");
+    // What is wrong with another image costs that one alone.
+    assert!(both(&place("7", 500.0), r#", "rig": [7]"#).unwrap().views.is_empty());
     let error = both(r#", "rig": [7]"#, "").unwrap_err();
     assert!(error.contains("0.rig: is neither a string nor an integer"), "{error}");
     // Places of images without a rig are never read.
@@ -455,8 +467,8 @@ fn bodies_and_sensors_of_every_kind_are_read_or_refused_by_name() {
         format!(r#"{{"name": "table", "kind": "plane", "sigma_mm": 2, "sigma_deg": 180, {pose}}}"#);
     let other = format!(r#"{{"name": "box", "kind": "object", "obj_id": 7, {pose}}}"#);
     let read = bodies(&[&hand[..], &table, &other].join(",")).unwrap().bodies;
-    assert_eq!(read[1].sigmas, Some([2e-3, std::f64::consts::PI]));
-    assert_eq!((&read[1].kind, read[0].sigmas), (&BodyKind::Plane, None));
+    assert_eq!(read[1].sigmas, [Some(2e-3), Some(std::f64::consts::PI)]);
+    assert_eq!((&read[1].kind, read[0].sigmas), (&BodyKind::Plane, [None; 2]));
     assert_eq!(read[2].kind, BodyKind::Object { obj_id: 7 });
     for (list, expected) in [
         (hand.replace("\"joints\": {}, ", ""), "0.bodies[0].joints: is missing"),
@@ -464,6 +476,10 @@ fn bodies_and_sensors_of_every_kind_are_read_or_refused_by_name() {
         (table.replace("plane", "wall"), "0.bodies[0].kind: unknown variant `wall`"),
         (table.replace(": 2,", ": -2,"), "0.bodies[0]: sigma_mm is -2, not zero or above"),
         (format!("{hand}, {hand}"), "0.bodies[1]: there are two bodies called \"hand\""),
+        (
+            table.replace("\"table\"", "\"a/b\""),
+            "0.bodies[0]: name: \"a/b\" is empty or has a slash",
+        ),
     ] {
         let error = bodies(&list).unwrap_err();
         assert!(error.contains(&format!("scene_bodies.json: {expected}")), "{error}");

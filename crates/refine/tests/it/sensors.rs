@@ -11,7 +11,7 @@ use nalgebra::Isometry3;
 use prehend_geometry::SplitMix64;
 use prehend_refine::data::load_frame_file;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
-use prehend_refine::strategy::{Estimate, Fused, Modality, Posterior};
+use prehend_refine::strategy::{Estimate, Fused, Posterior};
 use prehend_refine::{Observation, refine};
 use serde_json::{Value, json};
 
@@ -133,11 +133,30 @@ fn values_that_cannot_be_name_the_file_and_the_field() {
     let touch =
         |sensor: Value| move |frame: &mut Value| frame["robot"]["touch"] = json!([sensor.clone()]);
     type Change<'a> = &'a dyn Fn(&mut Value);
-    let cases: [(Change<'_>, &str); 13] = [
+    let cases: [(Change<'_>, &str); 16] = [
         (&|f| f["cam_t_d2c"] = json!([1, 2, 3]), "cam_R_d2c: is missing"),
         (
             &|f| f["depth_dist"] = json!({ "model": "brown_conrady", "coefficients": [] }),
             "depth_K: is missing",
+        ),
+        (
+            &|f| f["bodies"] = json!([{ "name": "", "kind": "plane", "pose": plane["pose"] }]),
+            "bodies[0]: name: \"\" is empty or has a slash",
+        ),
+        (
+            &|f| {
+                f["depth_K"] = f["K"].clone();
+                f["cam_R_d2c"] = json!([1, 0, 0, 0, 1, 0, 0, 0, 1]);
+                f["cam_t_d2c"] = json!([0, 0, -9000]);
+            },
+            "cam_t_d2c: nothing that depth measured is in the color image",
+        ),
+        (
+            &|f| {
+                f["depth_K"] = f["K"].clone();
+                f.as_object_mut().unwrap().retain(|key, _| key != "depth");
+            },
+            "depth: is missing",
         ),
         (&|f| f["depth_K"] = json!([1, 2, 3]), "depth_K: expected 9 numbers, found 3"),
         (
@@ -200,7 +219,6 @@ fn of_changed(change: impl Fn([usize; 2], &mut [f32; 3], &mut f32)) -> (f64, f64
 
 #[test]
 fn depth_that_does_not_fit_is_let_off_by_name() {
-    let depth = [Modality::Depth, Modality::FreeSpace];
     // Light goes through to what is behind.
     let transparent = of_changed(|_, _, depth| *depth += 0.12);
     // Highlights are where they seem to be.
@@ -209,7 +227,7 @@ fn depth_that_does_not_fit_is_let_off_by_name() {
     });
     let near = of_changed(|_, _, depth| *depth -= 0.02);
     for (pe, oe, posterior) in [transparent, shiny, near] {
-        assert_eq!(posterior.let_off, depth);
+        assert_eq!(posterior.let_off, Some("depth"));
         assert!(pe < 0.3 && oe < 1.0 && posterior.probability() > 0.9, "{pe} {oe}");
     }
 }
@@ -223,9 +241,9 @@ fn another_texture_is_told_or_does_no_harm() {
     });
     for (pe, oe, posterior) in [negative, board] {
         assert!(pe < 0.2 && oe < 1.5, "{pe} {oe}");
-        assert!(posterior.let_off.iter().all(|kind| *kind == Modality::Color));
+        assert!(posterior.let_off.is_none_or(|kind| kind == "color"));
     }
     // What is as it should be is all used.
     let (.., posterior) = of_changed(|_, _, _| ());
-    assert!(posterior.let_off.is_empty() && posterior.probability() > 0.9);
+    assert!(posterior.let_off.is_none() && posterior.probability() > 0.9);
 }

@@ -26,7 +26,10 @@ impl Dataset {
             !file.exists() || file.root().is_ok_and(|entries| entries.contains_key(&key))
         });
         let together = scene.taken_together(im_id);
-        let seen = |images: Vec<u32>| images.iter().all(|image| self.is_seen(scene, *image));
+        let seen = |images: Option<Vec<u32>>| {
+            let images = images.unwrap_or_else(|| vec![im_id]);
+            images.iter().all(|image| self.is_seen(scene, *image))
+        };
         told && together.is_ok_and(seen)
     }
 

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::error::DatasetError;
 use super::json::{JsonFile, Numbers, Rotation};
 use super::pose::translation_from_mm;
+use crate::data::bodies::check_name;
 
 /// A body whose shape is known, and its pose as well as is said.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +20,8 @@ pub struct Body {
     pub kind: BodyKind,
     /// Its coordinates (a robot's base link) → camera coordinates \[m\].
     pub t_cam_base: Isometry3<f64>,
-    /// Standard deviations of that, in each direction and about each axis \[m, rad\]; none if nothing is said.
-    pub sigmas: Option<[f64; 2]>,
+    /// Standard deviations of that, in each direction and about each axis \[m, rad\], where they are said.
+    pub sigmas: [Option<f64>; 2],
 }
 
 /// What a body is.
@@ -94,23 +95,17 @@ pub(crate) enum KindName {
     Object,
 }
 
-/// Standard deviations \[m, rad\] of what is said in millimeters and degrees; none if neither is.
+/// Standard deviations \[m, rad\] of what is said in millimeters and degrees.
 ///
 /// # Errors
 /// If one is negative or not finite.
-pub(crate) fn body_sigmas(mm: Option<f64>, deg: Option<f64>) -> Result<Option<[f64; 2]>, String> {
-    if mm.is_none() && deg.is_none() {
-        return Ok(None);
-    }
-    let sigmas = [("sigma_mm", mm), ("sigma_deg", deg)].map(|(name, sigma)| {
-        let sigma = sigma.unwrap_or(0.0);
-        match sigma.is_finite() && sigma >= 0.0 {
-            true => Ok(sigma),
-            false => Err(format!("{name} is {sigma}, not zero or above")),
+pub(crate) fn body_sigmas(mm: Option<f64>, deg: Option<f64>) -> Result<[Option<f64>; 2], String> {
+    for (name, sigma) in [("sigma_mm", mm), ("sigma_deg", deg)] {
+        if let Some(sigma) = sigma.filter(|sigma| !sigma.is_finite() || *sigma < 0.0) {
+            return Err(format!("{name} is {sigma}, not zero or above"));
         }
-    });
-    let [mm, deg] = sigmas;
-    Ok(Some([mm? * 1e-3, deg?.to_radians()]))
+    }
+    Ok([mm.map(|mm| mm * 1e-3), deg.map(f64::to_radians)])
 }
 
 /// What is said of a field that is not there, as serde has it.
@@ -147,6 +142,7 @@ impl SceneBodies {
         let mut read: Vec<Body> = Vec::with_capacity(bodies.len());
         for (k, entry) in bodies.into_iter().enumerate() {
             let fault = |problem: &str| file.fault(&format!("{im_id}.bodies[{k}]"), problem);
+            check_name(&entry.name).map_err(|problem| fault(&problem))?;
             let body = entry.read(root).map_err(|problem| fault(&problem))?;
             if read.iter().any(|other| other.name == body.name) {
                 return Err(fault(&format!("there are two bodies called {:?}", body.name)));

@@ -1,6 +1,6 @@
 //! A BOP dataset as an estimator may see it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -13,7 +13,7 @@ use super::lens::RemapCache;
 use super::models::Models;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
-/// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the cameras' world poses are ever opened.
+/// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.
 /// Those belong to [`super::GroundTruth`].
 #[derive(Debug)]
 pub struct Dataset {
@@ -180,22 +180,23 @@ impl Scene {
     /// The images that begin a moment: those that `scene_camera.json` lists, and of a rig that took several together the first, ascending.
     ///
     /// # Errors
-    /// Those of [`images`](Self::images), and if an entry of `scene_camera.json` is broken.
+    /// Those of [`images`](Self::images).
     pub fn moments(&self) -> Result<Vec<u32>, DatasetError> {
         let mut images = self.images()?;
-        let rigs = self.rigs()?;
-        images.retain(|image| !rigs.values().any(|together| together[1..].contains(image)));
+        let others = self.rigs()?.values().flat_map(|together| &together[1..]);
+        let others: BTreeSet<u32> = others.copied().collect();
+        images.retain(|image| !others.contains(image));
         Ok(images)
     }
 
-    /// The images that were taken together with `image`, ascending; itself among them.
+    /// The images that a rig took together with `image`, ascending, itself among them; `None` of an image without a rig.
     ///
     /// # Errors
-    /// Those of [`moments`](Self::moments), and if the image is not listed.
-    pub(super) fn taken_together(&self, image: u32) -> Result<Vec<u32>, DatasetError> {
+    /// Those of [`images`](Self::images), and if the image's entry of `scene_camera.json` is broken.
+    pub(super) fn taken_together(&self, image: u32) -> Result<Option<Vec<u32>>, DatasetError> {
         let RigEntry { rig } = self.camera.entry(image)?;
-        let Some(name) = rig else { return Ok(vec![image]) };
-        Ok(self.rigs()?.get(&name).cloned().unwrap_or_default())
+        let Some(name) = rig else { return Ok(None) };
+        Ok(Some(self.rigs()?.get(&name).cloned().unwrap_or_default()))
     }
 
     /// Images by the name of the rig that took them together.
@@ -203,7 +204,8 @@ impl Scene {
         let by_rig = || {
             let mut by_rig: BTreeMap<RigName, Vec<u32>> = BTreeMap::new();
             for image in self.images()? {
-                if let RigEntry { rig: Some(name) } = self.camera.entry(image)? {
+                // One that is broken fails by itself.
+                if let Ok(RigEntry { rig: Some(name) }) = self.camera.entry(image) {
                     by_rig.entry(name).or_default().push(image);
                 }
             }

@@ -206,12 +206,16 @@ impl Frame<'_> {
     /// # Errors
     /// When it is absent, does not decode, or no pixel is set.
     pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
-        let file = self.mask_path(instance)?;
-        let stored = Mask::load(&file)?;
+        self.read_mask(&self.mask_path(instance)?)
+    }
+
+    /// The mask in `file`.
+    fn read_mask(&self, file: &Path) -> Result<Mask, DatasetError> {
+        let stored = Mask::load(file)?;
         let size = (stored.width(), stored.height());
-        let mask = self.undistorted(&file, stored, size, Remap::mask)?;
+        let mask = self.undistorted(file, stored, size, Remap::mask)?;
         if mask.count() == 0 {
-            return Err(DatasetError::EmptyMask { file });
+            return Err(DatasetError::EmptyMask { file: file.to_owned() });
         }
         Ok(mask)
     }
@@ -255,12 +259,12 @@ impl Frame<'_> {
         Ok(())
     }
 
-    /// Whether the scene has color, and whether it has depth.
+    /// Whether the scene has a folder of color images.
     pub(super) fn has_color(&self) -> bool {
         self.scene.dir().join("rgb").is_dir()
     }
 
-    /// See [`has_color`](Self::has_color).
+    /// Whether the scene has a folder of depth images.
     pub(super) fn has_depth(&self) -> bool {
         self.scene.dir().join("depth").is_dir()
     }
@@ -275,6 +279,10 @@ impl Frame<'_> {
             false => None,
         };
         let size = color.as_ref().map(|color| (color.width(), color.height()));
+        if self.depth_camera.is_some() && color.is_none() {
+            let problem = "is of a camera beside the color camera, and the scene has no rgb";
+            return Err(self.fault(&self.scene.camera, "depth_K", problem));
+        }
         let depth = if self.has_depth() || color.is_none() {
             self.depth_of(size)?
         } else {
@@ -300,17 +308,28 @@ impl Frame<'_> {
         dataset: &Dataset,
         instance: usize,
     ) -> Result<Vec<(Observation, Isometry3<f64>)>, DatasetError> {
-        let mut together = self.scene.taken_together(self.im_id)?;
-        together.retain(|image| *image != self.im_id);
+        let Some(together) = self.scene.taken_together(self.im_id)? else { return Ok(Vec::new()) };
+        let t_cam_world = self.place()?;
+        let number = self.mask_path(instance).ok().and_then(|file| mask_number(&file));
+        let number = number.unwrap_or(instance);
         let mut seen = Vec::new();
-        for image in together {
+        for image in together.into_iter().filter(|image| *image != self.im_id) {
             let other = dataset.frame(self.scene.id(), image)?;
-            let mask = other.mask(instance);
-            if let Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. }) = mask {
-                continue;
+            let t_cam_other = t_cam_world * other.place()?.inverse();
+            if t_cam_other == Isometry3::identity() {
+                let problem = format!("is the place of image {} of the same rig, too", self.im_id);
+                return Err(self.scene.camera.fault(&format!("{image}.cam_t_w2c"), &problem));
             }
-            let t_cam_other = self.place()? * other.place()?.inverse();
-            seen.push((other.observation(instance)?, t_cam_other));
+            let file = self.scene.dir().join("mask_visib");
+            let file = file.join(format!("{image:06}_{number:06}.png"));
+            let mask = match other.read_mask(&file) {
+                Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. }) => continue,
+                read => read?,
+            };
+            let mut view = other.unsegmented()?;
+            self.check_size(&file, (mask.width(), mask.height()), &view)?;
+            view.mask = mask;
+            seen.push((view, t_cam_other));
         }
         Ok(seen)
     }
@@ -367,7 +386,12 @@ impl Frame<'_> {
     }
 
     fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
-        let dot = if field.is_empty() { "" } else { "." };
+        let dot = if field.is_empty() || field.starts_with('[') { "" } else { "." };
         DatasetError::field(file.path(), &format!("{}{dot}{field}", self.im_id), problem)
     }
+}
+
+/// The number of the object that the mask in `file` is of.
+fn mask_number(file: &Path) -> Option<usize> {
+    file.file_stem()?.to_str()?.split_once('_')?.1.parse().ok()
 }

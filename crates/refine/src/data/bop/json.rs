@@ -88,12 +88,17 @@ impl JsonFile {
         }
     }
 
-    /// An error about a field, where `problem` may be that a part of it is missing.
+    /// See [`field_fault`].
     pub(super) fn fault(&self, field: &str, problem: &str) -> DatasetError {
-        let (absent, problem) = plain(problem);
-        let absent = absent.map(|name| format!(".{name}")).unwrap_or_default();
-        DatasetError::field(&self.path, &format!("{field}{absent}"), problem)
+        field_fault(&self.path, field, problem)
     }
+}
+
+/// An error about a field, where `problem` may be that a part of it is missing.
+pub(crate) fn field_fault(file: &Path, field: &str, problem: &str) -> DatasetError {
+    let (absent, problem) = plain(problem);
+    let absent = absent.map(|name| format!(".{name}")).unwrap_or_default();
+    DatasetError::field(file, &format!("{field}{absent}"), problem)
 }
 
 /// What a file of one layout says.

@@ -31,7 +31,7 @@ pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
-pub(crate) use json::{Numbers, Positive, Rotation, read_json};
+pub(crate) use json::{Numbers, Positive, Rotation, field_fault, read_json};
 pub(crate) use lens::{Lens, RemapCache};
 pub use models::{ModelInfo, Models};
 pub use models_info::write_symmetries;

@@ -38,6 +38,11 @@ impl ImagesLayout<'_> {
             return Err(field("rgb", "is missing, and so is depth".to_owned()));
         };
         let own = self.depth_camera(field)?;
+        if own.is_some() && (color.is_none() || depth.is_none()) {
+            // It is beside the color camera.
+            let lacks = if color.is_none() { "rgb" } else { "depth" };
+            return Err(field(lacks, "is missing".to_owned()));
+        }
         let of = if color.is_some() { "rgb" } else { "depth" };
         let others = [
             ("depth", depth_size.filter(|_| own.is_none())),
@@ -54,7 +59,12 @@ impl ImagesLayout<'_> {
         let mut color = color.unwrap_or_else(|| RgbImage::filled(w, h, [0.0; 3]));
         let mut depth = match (depth, &own) {
             (Some(depth), Some(own)) => {
-                own.register(depth, &camera, &RemapCache::default()).map_err(fault)?
+                let depth = own.register(depth, &camera, &RemapCache::default()).map_err(fault)?;
+                if depth.pixels().iter().all(|z| *z == 0.0) {
+                    let problem = "nothing that depth measured is in the color image";
+                    return Err(field("cam_t_d2c", problem.to_owned()));
+                }
+                depth
             }
             (Some(depth), None) => depth,
             (None, _) => DepthImage::filled(w, h, 0.0),

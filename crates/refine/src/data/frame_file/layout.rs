@@ -151,6 +151,8 @@ pub(super) struct RobotLayout {
     pub(super) urdf: PathBuf,
     pub(super) base_pose: Pose,
     pub(super) joints: BTreeMap<String, f64>,
+    pub(super) sigma_mm: Option<f64>,
+    pub(super) sigma_deg: Option<f64>,
     pub(super) taxels: Option<PathBuf>,
     /// Force of the object on each taxel, in its link's frame \[N\].
     pub(super) forces: Option<Vec<Numbers<3>>>,

@@ -9,8 +9,8 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use super::layout::{BodyLayout, Layout, RobotLayout};
-use crate::data::bodies::{Bodies, PlacedBody, in_view, plate};
-use crate::data::bop::{DatasetError, KindName, TactileReading, body_sigmas};
+use crate::data::bodies::{Bodies, PlacedBody, check_name, plate};
+use crate::data::bop::{DatasetError, KindName, TactileReading, body_sigmas, field_fault};
 use crate::scene::HandMeasurement;
 
 /// What the robot of a frame file is called beside other bodies.
@@ -56,12 +56,19 @@ impl Layout {
         measured.forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
         for (k, entry) in robot.touch.iter().enumerate() {
             let name = format!("robot.touch[{k}]");
-            let fault = |problem: String| DatasetError::field(file, &name, problem);
+            let fault = |problem: String| field_fault(file, &name, &problem);
             let mut sensor = entry.clone().read(folder).map_err(fault)?;
-            ROBOT.clone_into(&mut sensor.body);
+            if sensor.body.is_empty() {
+                ROBOT.clone_into(&mut sensor.body);
+            }
+            if !all.has(&sensor.body) {
+                let problem = format!("names {:?}, the bodies are {}", sensor.body, all.names());
+                return Err(DatasetError::field(file, &format!("{name}.body"), problem));
+            }
             let layout = match &sensor.reading {
                 TactileReading::Force { .. } => {
-                    return Err(fault("forces are robot.forces".to_owned()));
+                    let problem = "is missing or force, which is what robot.forces are".to_owned();
+                    return Err(DatasetError::field(file, &format!("{name}.kind"), problem));
                 }
                 TactileReading::Binary { taxels, .. }
                 | TactileReading::Proximity { taxels, .. } => layout(taxels)?,
@@ -84,7 +91,8 @@ impl RobotLayout {
             tree: Arc::new(tree),
             is_hand: true,
             t_cam_body: self.base_pose.0,
-            sigmas: None,
+            sigmas: body_sigmas(self.sigma_mm, self.sigma_deg)
+                .map_err(|problem| DatasetError::field(file, "robot", problem))?,
         })
     }
 }
@@ -96,7 +104,8 @@ impl BodyLayout {
         };
         let needed = |part: &'static str| move || field(part, "is missing".to_owned());
         let broken = |error: String| DatasetError::unusable(file, error);
-        let (mut joints, mut t_cam_body) = (Vec::new(), self.pose.0);
+        check_name(&self.name).map_err(|problem| DatasetError::field(file, name, problem))?;
+        let mut joints = Vec::new();
         let tree = match self.kind {
             KindName::Hand => {
                 let urdf = self.urdf.as_ref().ok_or_else(needed("urdf"))?;
@@ -106,10 +115,7 @@ impl BodyLayout {
                 joints = tree.joint_vector(said).map_err(|e| field("joints", e.to_string()))?;
                 tree
             }
-            KindName::Plane => {
-                t_cam_body = in_view(&t_cam_body);
-                KinematicTree::rigid("plane", vec![plate()])
-            }
+            KindName::Plane => KinematicTree::rigid("plane", vec![plate()]),
             KindName::Object => {
                 let mesh = self.mesh.as_ref().ok_or_else(needed("mesh"))?;
                 let unit = self.mesh_unit.ok_or_else(needed("mesh_unit"))?;
@@ -124,7 +130,7 @@ impl BodyLayout {
             tree: Arc::new(tree),
             joints,
             is_hand: self.kind == KindName::Hand,
-            t_cam_body,
+            t_cam_body: self.pose.0,
             sigmas: sigmas.map_err(|problem| DatasetError::field(file, name, problem))?,
         })
     }

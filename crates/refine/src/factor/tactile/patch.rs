@@ -54,8 +54,8 @@ struct NormalProbe {
     link: usize,
     /// Link frame \[m\].
     position: Point3<f64>,
-    /// Two directions across the normal, link frame.
-    across: [Vector3<f64>; 2],
+    /// Two directions across the normal, and the normal itself, link frame.
+    axes: [Vector3<f64>; 3],
     weighting: Weighting,
 }
 
@@ -79,15 +79,16 @@ impl ContactPatchFactor {
                 let distance = Distance::Is(0.0);
                 probes.push(Probe { link, position, distance, weighting: on_surface });
                 let first = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
-                let across = [first, normal.cross(&first)];
-                normals.push(NormalProbe { link, position, across, weighting });
+                let axes = [first, normal.cross(&first), *normal];
+                normals.push(NormalProbe { link, position, axes, weighting });
             }
         }
         let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
         Ok(Self { points: Probes { object, hand, probes }, normals })
     }
 
-    /// What of the object's normal is across the skin's, both ways.
+    /// By what the object's normal differs from that against the skin's. Along that it is off by the square of a small angle, and by all if it is
+    /// the wrong way round.
     fn normal_rows(&self, state: &State, hand: &ArticulatedRobot, rows: &mut Rows<'_>) {
         let object = &self.points.object;
         let mut joints = vec![0.0; state.joints.len()];
@@ -97,15 +98,15 @@ impl ContactPatchFactor {
             let local = state.t_cam_object.inverse_transform_point(&point);
             let (_, closest) = object.surface.signed_distance(&local);
             let normal = state.t_cam_object * object.normals[closest.face as usize];
-            for across in &probe.across {
-                let across = t_cam_link * across;
-                rows.add(across.dot(&normal), &probe.weighting, |row| {
+            for (axis, expected) in probe.axes.iter().zip([0.0, 0.0, -1.0]) {
+                let axis = t_cam_link * axis;
+                rows.add(axis.dot(&normal) - expected, &probe.weighting, |row| {
                     // Turned by ω the normal becomes n + ω×n, and the skin's direction likewise.
-                    let turn = normal.cross(&across);
+                    let turn = normal.cross(&axis);
                     row.block(Block::ObjectPose, &[0.0, 0.0, 0.0, turn.x, turn.y, turn.z]);
                     row.block(Block::HandPose, &[0.0, 0.0, 0.0, -turn.x, -turn.y, -turn.z]);
                     joints.fill(0.0);
-                    let end = point + across;
+                    let end = point + axis;
                     let heads = hand.point_jacobian(probe.link, &end);
                     let tails = hand.point_jacobian(probe.link, &point);
                     for ((joint, tail), (_, head)) in tails.zip(heads) {

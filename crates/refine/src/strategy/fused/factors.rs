@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
@@ -12,7 +12,7 @@ use crate::factor::{
     SupportFactor, TactileFactor, TouchModel, ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
-use crate::scene::{Frame, TouchReading};
+use crate::scene::{CameraView, Frame, TouchReading};
 
 /// What of a frame is seen.
 const SEEN: [Modality; 5] = [
@@ -99,7 +99,7 @@ fn view_factors(
     settings: &FusedSettings,
     with_patches: bool,
 ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
-    if frame.views().is_empty() {
+    if frame.views().is_empty() || !settings.views {
         return Ok(Vec::new());
     }
     let mut settings = settings.clone();
@@ -107,11 +107,11 @@ fn view_factors(
     if with_patches {
         settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.model.gp_sigma);
     }
-    let view = |(k, (t_view_cam, seen)): (usize, &(Isometry3<f64>, Frame<'_>))| {
-        let factors = factors_of(seen, stage, &settings, None)?;
-        Ok(Arc::new(ViewFactor::new(k, factors, *t_view_cam)) as Arc<dyn Factor>)
+    let view = |view: &CameraView<'_>| {
+        let factors = factors_of(&view.frame, stage, &settings, None)?;
+        Ok(Arc::new(ViewFactor::new(view.index, factors, view.t_view_cam)) as Arc<dyn Factor>)
     };
-    frame.views().iter().enumerate().map(view).collect()
+    frame.views().iter().map(view).collect()
 }
 
 /// What compares pictures, if anything does.

@@ -1,6 +1,6 @@
 //! Evidence that does not fit is let off.
 
-use super::{Fused, Modality, Posterior};
+use super::{Fused, FusedSettings, Modality, Posterior};
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::scene::Frame;
@@ -10,12 +10,51 @@ use crate::strategy::{Estimate, Observer};
 const FITS: f64 = 0.5;
 
 /// What may be let off: colors of another texture or under odd lights, depth of what shines or lets light through, a skin that feels what is not
-/// there. Outlines, and that things are not in the same place, always count.
-const KINDS: [&[Modality]; 3] = [
-    &[Modality::Color],
-    &[Modality::Depth, Modality::FreeSpace],
-    &[Modality::Touch, Modality::Quiet],
-];
+/// there, cameras that are elsewhere. Outlines, and that things are not in the same place, always count.
+const KINDS: [Kind; 4] = [Kind::Color, Kind::Depth, Kind::Touch, Kind::Views];
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Color,
+    Depth,
+    Touch,
+    Views,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Color => "color",
+            Self::Depth => "depth",
+            Self::Touch => "touch",
+            Self::Views => "views",
+        }
+    }
+
+    /// What of the settings it is.
+    fn modalities(self) -> &'static [Modality] {
+        match self {
+            Self::Color => &[Modality::Color],
+            Self::Depth => &[Modality::Depth, Modality::FreeSpace],
+            Self::Touch => &[Modality::Touch, Modality::Quiet],
+            Self::Views => &[],
+        }
+    }
+
+    /// Whether `frame` brings it, and it is used.
+    fn is_in(self, frame: &Frame<'_>, settings: &FusedSettings) -> bool {
+        let used = self.modalities().iter().any(|kind| settings.modalities.contains(kind));
+        match self {
+            Self::Color => used && frame.observation().has_colors(),
+            Self::Depth => used && frame.masked_depths(1000).is_ok(),
+            Self::Touch => {
+                let hand = frame.hand().map(|(_, hand)| hand);
+                used && hand.is_some_and(|h| !h.forces.is_empty() || !h.touch.is_empty())
+            }
+            Self::Views => settings.views && !frame.views().is_empty(),
+        }
+    }
+}
 
 fn probability(found: &Estimate) -> f64 {
     found.posterior.as_ref().map_or(0.0, Posterior::probability)
@@ -31,24 +70,24 @@ impl Fused {
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
         // What was broken off is not judged.
-        let fit = found.posterior.as_ref().and_then(|posterior| posterior.fit.as_ref());
-        if fit.is_none_or(|fit| fit.probability >= FITS) {
+        let fit = |found: &Estimate| Some(found.posterior.as_ref()?.fit.as_ref()?.probability);
+        if fit(&found).is_none_or(|fit| fit >= FITS) {
             return Ok(found);
         }
         let mut best = found;
-        for kinds in KINDS {
-            if !kinds.iter().any(|kind| self.settings.modalities.contains(kind)) {
-                continue;
-            }
+        for kind in KINDS.into_iter().filter(|kind| kind.is_in(frame, &self.settings)) {
             let mut fused = self.clone();
-            fused.settings.modalities.retain(|modality| !kinds.contains(modality));
+            fused.settings.modalities.retain(|modality| !kind.modalities().contains(modality));
+            fused.settings.views &= kind != Kind::Views;
             // What only colors tell apart is not known without them, wherever the start was.
-            let colorless = kinds.contains(&Modality::Color);
-            let rivals = frame.rivals().or_else(|| colorless.then_some(&[]));
+            let rivals = frame.rivals().or_else(|| (kind == Kind::Color).then_some(&[]));
             let mut other = fused.run_from(frame, initial, rivals, observe)?;
+            if fit(&other).is_none() {
+                break;
+            }
             if probability(&other) > probability(&best).max(FITS) {
                 if let Some(posterior) = &mut other.posterior {
-                    posterior.let_off = kinds.to_vec();
+                    posterior.let_off = Some(kind.name());
                 }
                 best = other;
             }

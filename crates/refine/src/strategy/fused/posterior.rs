@@ -5,7 +5,6 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 
-use super::Modality;
 use super::fit::Fit;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
@@ -53,8 +52,8 @@ pub struct Posterior {
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
     pub inconsistencies: Vec<Inconsistency>,
-    /// Evidence that did not fit and was let off: the pose is found without it.
-    pub let_off: Vec<Modality>,
+    /// Evidence that did not fit and was let off, `color`, `depth`, `touch` or `views`: the pose is found without it.
+    pub let_off: Option<&'static str>,
     /// Whether the best pose fits as right ones do, where that was asked.
     pub fit: Option<Fit>,
     /// Why the search ended.
@@ -137,7 +136,7 @@ impl Posterior {
         Self {
             unobservable: unobservable(&hypotheses[0].covariance, radius),
             inconsistencies,
-            let_off: Vec::new(),
+            let_off: None,
             fit: None,
             hypotheses,
             termination: best.termination,

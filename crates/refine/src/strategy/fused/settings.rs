@@ -117,6 +117,8 @@ pub struct Stage {
 pub struct FusedSettings {
     /// Modality to use, where the observation brings it.
     pub modalities: Vec<Modality>,
+    /// Whether other cameras' images are used, where there are any.
+    pub views: bool,
     /// What is estimated beside the pose; the rest is believed as it is said to be.
     pub nuisances: Vec<Nuisance>,
     /// Stated accuracies.
@@ -132,7 +134,7 @@ pub struct FusedSettings {
     pub calibration_test: bool,
     /// Where the rig is known and nothing fits, search the frame from nothing and refine what that finds, too.
     pub search_unfit: bool,
-    /// Where something does not fit, try without colors, without depth and without touch, and let that off which was to blame.
+    /// Where something does not fit, try without colors, depth, touch or other cameras, and let that off which was to blame.
     pub let_off: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
     pub max_effective_samples: f64,
@@ -191,6 +193,7 @@ impl Default for FusedSettings {
         let (depth, hand_depth) = (PointToPlaneSettings::default(), HandDepthSettings::default());
         Self {
             modalities: Modality::ALL.to_vec(),
+            views: true,
             nuisances: Nuisance::ALL.to_vec(),
             prior: PriorSettings::default(),
             stages: vec![

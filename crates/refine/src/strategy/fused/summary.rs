@@ -22,9 +22,9 @@ pub struct PosteriorSummary {
     pub unobserved_mm: Vec<f64>,
     /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
     pub disagreements: Vec<(String, f64)>,
-    /// Evidence that did not fit and was let off.
+    /// Evidence that did not fit and was let off: `color`, `depth`, `touch` or `views` (other cameras).
     #[serde(default)]
-    pub let_off: Vec<String>,
+    pub let_off: Option<String>,
     /// Shares of the posterior that the poses found have, the best first.
     pub weights: Vec<f64>,
     /// Why the search ended.
@@ -49,7 +49,7 @@ impl From<&Posterior> for PosteriorSummary {
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),
             disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
-            let_off: posterior.let_off.iter().map(|m| m.name().to_owned()).collect(),
+            let_off: posterior.let_off.map(str::to_owned),
             weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
             ending: posterior.termination.name().to_owned(),
             exact: posterior.exact,

@@ -162,18 +162,20 @@ impl Track {
             }
         }
         let Outcome { frames, mut failures, rows } = outcome;
-        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
-            let first = |frame: &&Done| {
-                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
-            };
-            let followed: Vec<&Done> = frames.iter().filter(first).collect();
-            strip::write(file, &followed, target.instance, &mut assets)?;
-        }
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
+        }
+        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
+            let first = |frame: &&Done| {
+                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
+            };
+            let followed: Vec<&Done> = frames.iter().filter(first).collect();
+            if let Err(error) = strip::write(file, &followed, target.instance, &mut assets) {
+                failures.push(format!("--strip: {error}"));
+            }
         }
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
@@ -246,7 +248,8 @@ impl Track {
             bar.set_length(ids.len() as u64);
             Images::Listed(ids.into_iter())
         };
-        let mut tracker: Option<Tracker> = None;
+        // With the hand, and what else there is, of the first image.
+        let mut tracker: Option<(Tracker, Option<Arc<Hand>>)> = None;
         while let Some(im_id) = images.next(assets) {
             let target = Target { im_id, ..start.0 };
             let mut frame = || -> Result<Tracked, AssetError> {
@@ -254,11 +257,14 @@ impl Track {
                 let seconds = f64::from(im_id - first) / self.rate;
                 let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                 let tracker = match &mut tracker {
-                    Some(tracker) => tracker,
+                    Some((tracker, first)) => {
+                        require_same(first.as_ref(), hand.as_ref())?;
+                        tracker
+                    }
                     none => {
-                        let mut new = begin(Arc::clone(&object), hand)?;
+                        let mut new = begin(Arc::clone(&object), hand.clone())?;
                         initial.iter().for_each(|pose| new.start_from(pose));
-                        none.insert(new)
+                        &mut none.insert((new, hand)).0
                     }
                 };
                 Ok(tracker.push(observation, time)?)
@@ -286,6 +292,21 @@ impl Track {
         }
         Ok(())
     }
+}
+
+/// Refuses an image with other bodies than the first one: joints would be those of something else.
+fn require_same(first: Option<&Arc<Hand>>, now: Option<&Arc<Hand>>) -> Result<(), RefineError> {
+    let (Some(first), Some(now)) = (first, now) else { return Ok(()) };
+    let (expected, found) = (first.tree.joint_names(), now.tree.joint_names());
+    if Arc::ptr_eq(first, now) || expected == found {
+        return Ok(());
+    }
+    let differs = |names: &[String], others: &[String]| {
+        names.iter().find(|name| !others.contains(name)).cloned()
+    };
+    let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
+    let problem = format!("are others than in the first image: joint {which:?} is in one only");
+    Err(RefineError::Setting { name: "bodies", problem })
 }
 
 /// What became of `frames`, which are not empty.
