@@ -16,6 +16,8 @@ pub struct ClosestDerivative {
     pub by_corners: [Matrix3<f64>; 3],
     /// `p - c` \[m\].
     pub offset: Vector3<f64>,
+    /// Gradients of the barycentric weights by the closest point, along the face \[1/m\]: by the query each is multiplied by `by_query`.
+    pub weight_gradients: [Vector3<f64>; 3],
     barycentric: [f64; 3],
 }
 
@@ -68,6 +70,11 @@ impl ClosestPoints {
         let t = &self.bvh.triangles[self.bvh.slot[closest.face as usize] as usize];
         let offset = point - closest.point;
         let w = closest.barycentric;
+        // Surface gradients of the weights of the second and third corner.
+        let area = t.ab.cross(&t.ac).norm();
+        let second = t.ac.cross(&t.normal) / area;
+        let third = t.normal.cross(&t.ab) / area;
+        let gradients = [-second - third, second, third];
         let mut by_query = Matrix3::zeros();
         let mut by_corners = [Matrix3::zeros(); 3];
         match closest.feature {
@@ -87,18 +94,19 @@ impl ClosestPoints {
             Feature::Face => {
                 let n = t.normal;
                 by_query = Matrix3::identity() - n * n.transpose();
-                // Surface gradients of the weights of the second and third corner.
-                let area = t.ab.cross(&t.ac).norm();
-                let second = t.ac.cross(&n) / area;
-                let third = n.cross(&t.ab) / area;
                 let height = offset.dot(&n);
-                let gradients = [-second - third, second, third];
                 for k in 0..3 {
                     by_corners[k] = (n * w[k] + gradients[k] * height) * n.transpose();
                 }
             }
         }
-        ClosestDerivative { by_query, by_corners, offset, barycentric: w }
+        ClosestDerivative {
+            by_query,
+            by_corners,
+            offset,
+            barycentric: w,
+            weight_gradients: gradients,
+        }
     }
 }
 
@@ -107,6 +115,28 @@ mod tests {
     use super::*;
     use crate::mesh::TriMesh;
     use crate::random::SplitMix64;
+    use crate::shapes::sphere;
+
+    #[test]
+    fn weights_change_as_the_query_moves() {
+        let surface = ClosestPoints::new(&sphere(0.1, 12).welded()).unwrap();
+        let mut random = SplitMix64::new(3);
+        for _ in 0..200 {
+            let query = Point3::from(Vector3::from_fn(|_, _| 0.08 * random.normal()));
+            let closest = surface.closest(&query, f64::INFINITY).unwrap();
+            let derivative = surface.derivative(&query, &closest);
+            let step = Vector3::from_fn(|_, _| 1e-7 * random.normal());
+            let moved = surface.closest(&(query + step), f64::INFINITY).unwrap();
+            if (moved.face, moved.feature) != (closest.face, closest.feature) {
+                continue;
+            }
+            for k in 0..3 {
+                let change = moved.barycentric[k] - closest.barycentric[k];
+                let expected = derivative.weight_gradients[k].dot(&(derivative.by_query * step));
+                assert!((change - expected).abs() < 1e-9, "{k}: {change} {expected}");
+            }
+        }
+    }
 
     fn vector(random: &mut SplitMix64) -> Vector3<f64> {
         Vector3::from([(); 3].map(|()| random.uniform() - 0.5))

@@ -147,7 +147,9 @@ mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
     use crate::problem::Block;
-    use crate::scene::{HandMeasurement, Observation};
+    use crate::scene::{
+        BinaryContact, ContactPatch, HandMeasurement, Observation, ProximityReading, TouchReading,
+    };
 
     #[test]
     fn gradients_match_differences() {
@@ -184,6 +186,72 @@ mod tests {
         assert_eq!(probes(&observation, &taxels), all - 1);
         forces(&mut observation).fill(HandMeasurement::UNKNOWN_FORCE);
         assert_eq!([&taxels, &contacts].map(|settings| probes(&observation, settings)), [0, 0]);
+    }
+
+    #[test]
+    fn gradients_of_touch_without_forces_match_differences() {
+        let scene = scene();
+        let place = |taxel: &Taxel| (scene.hand.link_of(taxel).unwrap(), taxel.position);
+        let (mut contacts, mut distances) = (Vec::new(), Vec::new());
+        for (k, taxel) in scene.hand.taxels.iter().enumerate() {
+            let (link, position) = place(taxel);
+            contacts.push(BinaryContact { link, position, touched: k % 3 == 0 });
+            distances.push(ProximityReading { link, position, distance: 0.002 * (k % 7) as f64 });
+        }
+        let of_pad: Vec<&Taxel> = scene.hand.taxels.iter().filter(|t| t.patch == "11").collect();
+        let patch = ContactPatch {
+            link: place(of_pad[0]).0,
+            points: of_pad.iter().map(|taxel| taxel.position).collect(),
+            normals: of_pad.iter().map(|taxel| taxel.normal).collect(),
+        };
+        let mut observation = scene.observation.clone();
+        observation.hand.as_mut().unwrap().touch = vec![
+            TouchReading::Binary(contacts),
+            TouchReading::Proximity(distances),
+            TouchReading::Patch(patch),
+        ];
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let (binary, proximity, patch) = (
+            BinaryTouchFactor::new(&frame, &BinaryTouchSettings::default(), [true; 2]).unwrap(),
+            ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap(),
+            ContactPatchFactor::new(&frame, &ContactPatchSettings::default()).unwrap(),
+        );
+        let factors: [&dyn Factor; 3] = [&binary, &proximity, &patch];
+        for seed in 0..3 {
+            let (_, state) = fixture(seed);
+            for factor in factors {
+                for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
+                    assert_gradient(factor, &state, block, 1e-7, 1e-3);
+                }
+            }
+        }
+        // What is not used says nothing.
+        let neither = BinaryTouchSettings::default();
+        let neither = BinaryTouchFactor::new(&frame, &neither, [false; 2]).unwrap();
+        assert_eq!(neither.cost(&fixture(0).1), 0.0);
+    }
+
+    #[test]
+    fn a_patch_on_the_wrong_side_costs() {
+        let scene = scene();
+        let (_, state) = fixture(0);
+        let truth = State { t_cam_object: scene.truth, ..state };
+        // Where the object touches a pad, the skin's normal is against its own.
+        let taxels = scene.hand.taxels.iter();
+        let touched = taxels.zip(&scene.observation.hand.as_ref().unwrap().forces);
+        let touched = touched.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm())).unwrap().0;
+        let cost = |sign: f64| {
+            let mut observation = scene.observation.clone();
+            observation.hand.as_mut().unwrap().touch = vec![TouchReading::Patch(ContactPatch {
+                link: scene.hand.link_of(touched).unwrap(),
+                points: vec![touched.position],
+                normals: vec![touched.normal * sign],
+            })];
+            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let settings = ContactPatchSettings::default();
+            ContactPatchFactor::new(&frame, &settings).unwrap().cost(&truth)
+        };
+        assert!(cost(-1.0) > cost(1.0) + 5.0, "{} {}", cost(1.0), cost(-1.0));
     }
 
     #[test]

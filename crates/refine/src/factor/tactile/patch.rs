@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
+use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::ArticulatedRobot;
 
 use super::probes::{Distance, Probe, Probes};
@@ -42,8 +43,7 @@ impl ContactPatchSettings {
 
 /// Points of patches are on the object's surface, and its normals there are opposite to the skin's ([`TouchReading::Patch`]).
 ///
-/// The normal of a face is that of the whole face: between two faces it jumps, by less than what the sensor is off by if the mesh is fine
-/// where it is curved.
+/// The object's normals are smooth over its surface where its faces are small, so that costs do not jump as points pass from face to face.
 pub struct ContactPatchFactor {
     points: Probes,
     normals: Vec<NormalProbe>,
@@ -96,21 +96,36 @@ impl ContactPatchFactor {
             let t_cam_link = hand.posed().t_world_links()[probe.link];
             let point = t_cam_link * probe.position;
             let local = state.t_cam_object.inverse_transform_point(&point);
-            let (_, closest) = object.surface.signed_distance(&local);
-            let normal = state.t_cam_object * object.normals[closest.face as usize];
+            let Some(closest) = object.surface.closest(&local, f64::INFINITY) else { continue };
+            let derivative = object.surface.derivative(&local, &closest);
+            // The normal, and how it changes with the closest point, in the object's frame.
+            let corners = object.corner_normals[closest.face as usize];
+            let (mut normal, mut bend) = (Vector3::zeros(), Matrix3::zeros());
+            for (k, corner) in corners.iter().enumerate() {
+                normal += corner * closest.barycentric[k];
+                bend += corner * derivative.weight_gradients[k].transpose();
+            }
+            let normal = state.t_cam_object * normal;
+            let turn_object = state.t_cam_object.rotation.to_rotation_matrix().into_inner();
+            let bend = turn_object * bend * derivative.by_query * turn_object.transpose();
             for (axis, expected) in probe.axes.iter().zip([0.0, 0.0, -1.0]) {
                 let axis = t_cam_link * axis;
                 rows.add(axis.dot(&normal) - expected, &probe.weighting, |row| {
-                    // Turned by ω the normal becomes n + ω×n, and the skin's direction likewise.
+                    // Turned by ω the normal becomes n + ω×n, and the skin's direction likewise. Where the object moves by v, its surface
+                    // is met elsewhere, at −v.
                     let turn = normal.cross(&axis);
-                    row.block(Block::ObjectPose, &[0.0, 0.0, 0.0, turn.x, turn.y, turn.z]);
-                    row.block(Block::HandPose, &[0.0, 0.0, 0.0, -turn.x, -turn.y, -turn.z]);
+                    let along = -bend.tr_mul(&axis);
+                    let mut by_object = twist_row(&(point.coords - state.center()), &along);
+                    let mut turned = by_object.fixed_rows_mut::<3>(3);
+                    turned += turn;
+                    row.block(Block::ObjectPose, by_object.as_slice());
+                    row.block(Block::HandPose, (-by_object).as_slice());
                     joints.fill(0.0);
                     let end = point + axis;
                     let heads = hand.point_jacobian(probe.link, &end);
                     let tails = hand.point_jacobian(probe.link, &point);
                     for ((joint, tail), (_, head)) in tails.zip(heads) {
-                        joints[joint] += (head - tail).dot(&normal);
+                        joints[joint] += (head - tail).dot(&normal) - along.dot(&tail);
                     }
                     row.block(Block::Joints(joints.len()), &joints);
                 });

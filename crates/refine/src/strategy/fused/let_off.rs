@@ -6,8 +6,11 @@ use crate::problem::State;
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Observer};
 
-/// Where the probability is less, something does not fit; where it is more without a kind of evidence, that was it.
+/// Where model and data are right with less probability, something does not fit.
 const FITS: f64 = 0.5;
+/// Where the pose is right with more without a kind of evidence, that was it. Without colors a wrong pose may look as right as another one does: of two
+/// alike, neither has so much.
+const CONVINCES: f64 = 0.75;
 
 /// What may be let off: colors of another texture or under odd lights, depth of what shines or lets light through, a skin that feels what is not
 /// there, cameras that are elsewhere. Outlines, and that things are not in the same place, always count.
@@ -85,7 +88,7 @@ impl Fused {
             if fit(&other).is_none() {
                 break;
             }
-            if probability(&other) > probability(&best).max(FITS) {
+            if probability(&other) > probability(&best).max(CONVINCES) {
                 if let Some(posterior) = &mut other.posterior {
                     posterior.let_off = Some(kind.name());
                 }

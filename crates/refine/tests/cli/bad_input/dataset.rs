@@ -190,7 +190,7 @@ fn entries_of_an_image() {
                         e["bodies"].as_array_mut().unwrap().push(hand);
                     });
                 },
-                &["scene_bodies.json: 0.bodies: expected one hand, found 2"],
+                &["scene_bodies.json: 0.bodies[1]: there are two bodies called \"hand\""],
             ),
             (
                 "missing joint",
@@ -236,7 +236,7 @@ fn entries_of_an_image() {
             (
                 "forces of another body",
                 |p| entry(p, "scene_tactile.json", |e| e["body"] = json!("left_hand")),
-                &["scene_tactile.json: 0.body: names \"left_hand\", but the hand is \"hand\""],
+                &["scene_tactile.json: 0.body: names \"left_hand\", the bodies are \"hand\""],
             ),
             (
                 "a force of two numbers",
