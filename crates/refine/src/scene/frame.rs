@@ -31,11 +31,11 @@ pub struct Frame<'a> {
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     focus: Option<[Range<usize>; 2]>,
     /// What other cameras saw of the object.
-    views: Vec<View<'a>>,
+    views: Vec<CameraView<'a>>,
 }
 
 /// What another camera saw of the object.
-pub struct View<'a> {
+pub struct CameraView<'a> {
     /// Which of the observation's [`views`](Observation::views) it is.
     pub index: usize,
     /// The first camera's coordinates → its own \[m\].
@@ -88,7 +88,7 @@ impl<'a> Frame<'a> {
         let views = seeing.map(|(index, view)| {
             let hand = hand.map(|(hand, _)| hand);
             let frame = Self::new(view.observation(), object, hand)?;
-            Ok(View { index, t_view_cam: view.t_view_cam(), frame })
+            Ok(CameraView { index, t_view_cam: view.t_view_cam(), frame })
         });
         Ok(Self {
             views: views.collect::<Result<_, RefineError>>()?,
@@ -133,9 +133,9 @@ impl<'a> Frame<'a> {
     /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
     /// must not wait for each other.
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
-        let of_view = |view: View<'a>| {
+        let of_view = |view: CameraView<'a>| {
             let frame = view.frame.with_backend(Arc::clone(&backend));
-            View { frame, ..view }
+            CameraView { frame, ..view }
         };
         let views = self.views.into_iter().map(of_view).collect();
         // The processor needs no sessions.
@@ -163,7 +163,7 @@ impl<'a> Frame<'a> {
     }
 
     /// What other cameras saw of the object: those with a mask of it.
-    pub fn views(&self) -> &[View<'a>] {
+    pub fn views(&self) -> &[CameraView<'a>] {
         &self.views
     }
 

@@ -15,7 +15,7 @@ mod view;
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
 pub use example::{Scene, default_scene};
 pub(crate) use frame::draw_hand_depth;
-pub use frame::{Frame, Occluders, View as CameraView};
+pub use frame::{CameraView, Frame, Occluders};
 pub use hand::Hand;
 pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose};
