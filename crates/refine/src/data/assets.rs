@@ -258,7 +258,7 @@ impl<'a> Assets<'a> {
                 if self.masks_optional => {}
             read => read?,
         }
-        for (view, t_cam_view) in frame.taken_together(&self.dataset.clone(), instance)? {
+        for (view, t_cam_view) in frame.taken_together(&self.dataset, instance)? {
             observation = observation.with_view(view, t_cam_view);
         }
         let Some(SceneBodies { gravity, bodies }) = present(frame.bodies(), !required.is_empty())?

@@ -30,8 +30,17 @@ const PLATE: [f64; 3] = [3.0, 0.2, 0.1];
 /// Standard deviation of a place that is said to be exact \[m or rad\].
 const EXACT_PLACE: f64 = 1e-6;
 
-/// The half-space below z = 0 about the origin, as a plate.
-pub(crate) fn plate() -> TriMesh {
+/// The half-space below z = 0 about the origin, as a body.
+pub(crate) fn plane() -> KinematicTree {
+    KinematicTree::rigid("plane", vec![plate()])
+}
+
+/// Another object, as a body.
+pub(crate) fn solid(mesh: &TriMesh) -> KinematicTree {
+    KinematicTree::rigid("object", vec![mesh.cleaned().0])
+}
+
+fn plate() -> TriMesh {
     let [edge, thickness, cell] = PLATE;
     let below = Translation3::new(0.0, 0.0, -0.5 * thickness);
     let (size, flat) = (Vector3::new(edge, edge, thickness), Vector3::zeros());
@@ -119,12 +128,12 @@ impl Bodies {
     ///
     /// # Errors
     /// The name of a link that does not exist.
-    pub(crate) fn skin(&self, name: &str, taxels: Vec<Taxel>) -> Result<Vec<Taxel>, String> {
-        let named = |taxel: Taxel| match self.link_name(name, &taxel.link) {
-            Some(link) => Ok(Taxel { link, ..taxel }),
-            None => Err(taxel.link),
+    pub(crate) fn skin(&self, name: &str, taxels: &[Taxel]) -> Result<Vec<Taxel>, String> {
+        let named = |taxel: &Taxel| match self.link_name(name, &taxel.link) {
+            Some(link) => Ok(Taxel { link, ..taxel.clone() }),
+            None => Err(taxel.link.clone()),
         };
-        taxels.into_iter().map(named).collect()
+        taxels.iter().map(named).collect()
     }
 
     /// What a sensor that measures no forces says, on links of `tree`, that of all bodies; `layout` are its taxels, if it has such. Forces are no such reading.
@@ -222,12 +231,8 @@ mod tests {
 
     #[test]
     fn a_plane_is_one_up_to_its_edge() {
-        let shape = RobotShape::new(
-            &KinematicTree::rigid("plane", vec![plate()]),
-            RobotShape::DEFAULT_SPACING,
-            RobotShape::DEFAULT_MARGIN,
-        );
-        let shape = shape.unwrap();
+        let (spacing, margin) = (RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN);
+        let shape = RobotShape::new(&plane(), spacing, margin).unwrap();
         let grid = shape.links()[0].grid().unwrap();
         for (x, y, z) in [(0.3, -1.2, 4e-3), (-1.37, 0.01, -7e-3), (0.013, 0.42, 0.0)] {
             let sample = grid.sample(&Point3::new(x, y, z), 0.01).unwrap();

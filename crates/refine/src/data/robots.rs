@@ -9,7 +9,7 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use crate::data::assets::AssetError;
-use crate::data::bodies::{Bodies, PlacedBody, plate};
+use crate::data::bodies::{Bodies, PlacedBody, plane, solid};
 use crate::data::bop::{Body, BodyKind, Frame, Tactile, TactileReading};
 use crate::scene::{Hand, HandMeasurement, Object};
 
@@ -32,7 +32,7 @@ pub(super) struct Robots {
     /// All bodies of frames together.
     hands: HashMap<HandKey, Arc<Hand>>,
     /// Layouts of taxels.
-    layouts: HashMap<PathBuf, Vec<Taxel>>,
+    layouts: HashMap<PathBuf, Arc<[Taxel]>>,
     cache: Option<GridCache>,
 }
 
@@ -76,11 +76,8 @@ impl Robots {
             None => {
                 let tree = Arc::new(match &body.kind {
                     BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
-                    BodyKind::Plane => KinematicTree::rigid("plane", vec![plate()]),
-                    BodyKind::Object { obj_id } => {
-                        let parts = objects.get(obj_id).map(|object| object.mesh.cleaned().0);
-                        KinematicTree::rigid("object", parts.into_iter().collect())
-                    }
+                    BodyKind::Plane => plane(),
+                    BodyKind::Object { obj_id } => solid(&objects[obj_id].mesh),
                 });
                 self.trees.insert(shape, Arc::clone(&tree));
                 tree
@@ -124,56 +121,55 @@ impl Robots {
             }
         }
         let mut measured = all.measured();
-        let mut skin = None;
-        for (k, sensor) in tactile.iter().enumerate() {
-            if let TactileReading::Force { taxels, force } = &sensor.reading {
-                let layout = all.skin(&sensor.body, self.layout(taxels)?);
-                let layout = layout.map_err(|link| {
-                    let problem =
-                        format!("{}: {:?} has no link {link:?}", taxels.display(), sensor.body);
+        let force = tactile.iter().enumerate().find_map(|(k, sensor)| match &sensor.reading {
+            TactileReading::Force { taxels, force } => Some((k, &sensor.body, taxels, force)),
+            _ => None,
+        });
+        let key = (shapes, force.map(|(_, body, taxels, _)| (body.clone(), taxels.clone())));
+        let known = self.hands.get(&key).cloned();
+        let mut skin = Vec::new();
+        if let Some((k, body, taxels, force)) = force {
+            let (layout, file) = (self.layout(taxels)?, taxels.display());
+            if known.is_none() {
+                skin = all.skin(body, &layout).map_err(|link| {
+                    let problem = format!("{file}: {body:?} has no link {link:?}");
                     frame.tactile_fault(&field(k, "taxels"), problem)
                 })?;
-                if force.len() != layout.len() {
-                    let (expected, found) = (layout.len(), force.len());
-                    let file = taxels.display();
-                    let problem =
-                        format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                    return Err(frame.tactile_fault(&field(k, "force"), problem).into());
-                }
-                measured.forces.clone_from(force);
-                skin = Some((sensor.body.clone(), taxels.clone(), layout));
             }
+            if force.len() != layout.len() {
+                let (expected, found) = (layout.len(), force.len());
+                let problem =
+                    format!("expected {expected} forces, one a taxel of {file}, found {found}");
+                return Err(frame.tactile_fault(&field(k, "force"), problem).into());
+            }
+            measured.forces.clone_from(force);
         }
-        let layout = skin.as_ref().map(|(body, file, _)| (body.clone(), file.clone()));
-        let key = (shapes, layout);
-        let hand = match self.hands.get(&key) {
-            Some(hand) => Arc::clone(hand),
+        let hand = match known {
+            Some(hand) => hand,
             None => {
-                let taxels = skin.map(|(.., taxels)| taxels).unwrap_or_default();
-                let hand = Arc::new(Hand::cached(all.tree()?, taxels, self.cache.as_ref())?);
+                let hand = Arc::new(Hand::cached(all.tree()?, skin, self.cache.as_ref())?);
                 self.hands.insert(key, Arc::clone(&hand));
                 hand
             }
         };
         for (k, sensor) in tactile.iter().enumerate() {
-            let layout = match &sensor.reading {
-                TactileReading::Binary { taxels, .. }
-                | TactileReading::Proximity { taxels, .. } => self.layout(taxels)?,
-                TactileReading::Force { .. } | TactileReading::Patch { .. } => Vec::new(),
-            };
-            let reading = all.reading(&hand.tree, sensor, &layout);
+            if let TactileReading::Force { .. } = sensor.reading {
+                continue;
+            }
+            let layout = sensor.reading.taxels().map(|taxels| self.layout(taxels)).transpose()?;
+            let reading = all.reading(&hand.tree, sensor, layout.as_deref().unwrap_or_default());
             measured.touch.extend(reading.map_err(|e| frame.tactile_fault(&field(k, ""), e))?);
         }
         Ok((hand, measured))
     }
 
     /// A layout of taxels.
-    fn layout(&mut self, file: &Path) -> Result<Vec<Taxel>, AssetError> {
+    fn layout(&mut self, file: &Path) -> Result<Arc<[Taxel]>, AssetError> {
         if let Some(known) = self.layouts.get(file) {
-            return Ok(known.clone());
+            return Ok(Arc::clone(known));
         }
-        let layout = load_taxels(file)?;
-        self.layouts.insert(file.to_owned(), layout.clone());
+        let layout: Arc<[Taxel]> = load_taxels(file)?.into();
+        self.layouts.insert(file.to_owned(), Arc::clone(&layout));
         Ok(layout)
     }
 }

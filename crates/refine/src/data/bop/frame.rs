@@ -253,8 +253,13 @@ impl Frame<'_> {
         observation: &mut Observation,
         instance: usize,
     ) -> Result<(), DatasetError> {
-        let mask = self.mask(instance)?;
-        self.check_size(&self.mask_path(instance)?, (mask.width(), mask.height()), observation)?;
+        self.segment_by(observation, &self.mask_path(instance)?)
+    }
+
+    /// The same of the mask in `file`.
+    fn segment_by(&self, observation: &mut Observation, file: &Path) -> Result<(), DatasetError> {
+        let mask = self.read_mask(file)?;
+        self.check_size(file, (mask.width(), mask.height()), observation)?;
         observation.mask = mask;
         Ok(())
     }
@@ -322,13 +327,14 @@ impl Frame<'_> {
             }
             let file = self.scene.dir().join("mask_visib");
             let file = file.join(format!("{image:06}_{number:06}.png"));
-            let mask = match other.read_mask(&file) {
-                Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. }) => continue,
-                read => read?,
-            };
+            if !file.is_file() {
+                continue;
+            }
             let mut view = other.unsegmented()?;
-            self.check_size(&file, (mask.width(), mask.height()), &view)?;
-            view.mask = mask;
+            match other.segment_by(&mut view, &file) {
+                Err(DatasetError::EmptyMask { .. }) => continue,
+                segmented => segmented?,
+            }
             seen.push((view, t_cam_other));
         }
         Ok(seen)

@@ -56,6 +56,18 @@ pub enum TactileReading {
     },
 }
 
+impl TactileReading {
+    /// The layout, where there is one.
+    pub fn taxels(&self) -> Option<&Path> {
+        match self {
+            Self::Force { taxels, .. }
+            | Self::Binary { taxels, .. }
+            | Self::Proximity { taxels, .. } => Some(taxels),
+            Self::Patch { .. } => None,
+        }
+    }
+}
+
 /// As files have it.
 #[derive(Clone, Deserialize)]
 pub(crate) struct TactileEntry {

@@ -9,7 +9,7 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use super::layout::{BodyLayout, Layout, RobotLayout};
-use crate::data::bodies::{Bodies, PlacedBody, check_name, plate};
+use crate::data::bodies::{Bodies, PlacedBody, check_name, plane, solid};
 use crate::data::bop::{DatasetError, KindName, TactileReading, body_sigmas, field_fault};
 use crate::scene::HandMeasurement;
 
@@ -65,15 +65,11 @@ impl Layout {
                 let problem = format!("names {:?}, the bodies are {}", sensor.body, all.names());
                 return Err(DatasetError::field(file, &format!("{name}.body"), problem));
             }
-            let layout = match &sensor.reading {
-                TactileReading::Force { .. } => {
-                    let problem = "is missing or force, which is what robot.forces are".to_owned();
-                    return Err(DatasetError::field(file, &format!("{name}.kind"), problem));
-                }
-                TactileReading::Binary { taxels, .. }
-                | TactileReading::Proximity { taxels, .. } => layout(taxels)?,
-                TactileReading::Patch { .. } => Vec::new(),
-            };
+            if let TactileReading::Force { .. } = &sensor.reading {
+                let problem = "is missing or force, which is what robot.forces are".to_owned();
+                return Err(DatasetError::field(file, &format!("{name}.kind"), problem));
+            }
+            let layout = sensor.reading.taxels().map(layout).transpose()?.unwrap_or_default();
             measured.touch.extend(all.reading(&tree, &sensor, &layout).map_err(fault)?);
         }
         Ok(Some((tree, skin, measured)))
@@ -115,13 +111,12 @@ impl BodyLayout {
                 joints = tree.joint_vector(said).map_err(|e| field("joints", e.to_string()))?;
                 tree
             }
-            KindName::Plane => KinematicTree::rigid("plane", vec![plate()]),
+            KindName::Plane => plane(),
             KindName::Object => {
                 let mesh = self.mesh.as_ref().ok_or_else(needed("mesh"))?;
                 let unit = self.mesh_unit.ok_or_else(needed("mesh_unit"))?;
                 let mesh = TriMesh::load(&folder.join(mesh)).map_err(|e| broken(e.to_string()))?;
-                let mesh = mesh.scaled(unit.meters()).cleaned().0;
-                KinematicTree::rigid("object", vec![mesh])
+                solid(&mesh.scaled(unit.meters()))
             }
         };
         let sigmas = body_sigmas(self.sigma_mm, self.sigma_deg);

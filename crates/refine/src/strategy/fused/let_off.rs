@@ -1,5 +1,7 @@
 //! Evidence that does not fit is let off.
 
+use strum::IntoStaticStr;
+
 use super::{Fused, FusedSettings, Modality, Posterior};
 use crate::error::RefineError;
 use crate::problem::State;
@@ -16,7 +18,8 @@ const CONVINCES: f64 = 0.75;
 /// there, cameras that are elsewhere. Outlines, and that things are not in the same place, always count.
 const KINDS: [Kind; 4] = [Kind::Color, Kind::Depth, Kind::Touch, Kind::Views];
 
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 enum Kind {
     Color,
     Depth,
@@ -25,15 +28,6 @@ enum Kind {
 }
 
 impl Kind {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Color => "color",
-            Self::Depth => "depth",
-            Self::Touch => "touch",
-            Self::Views => "views",
-        }
-    }
-
     /// What of the settings it is.
     fn modalities(self) -> &'static [Modality] {
         match self {
@@ -90,7 +84,7 @@ impl Fused {
             }
             if probability(&other) > probability(&best).max(CONVINCES) {
                 if let Some(posterior) = &mut other.posterior {
-                    posterior.let_off = Some(kind.name());
+                    posterior.let_off = Some(kind.into());
                 }
                 best = other;
             }

@@ -457,7 +457,7 @@ impl Walk<'_> {
     /// How well `point` explains what the frame shows.
     fn fit(&self, point: &Linearization) -> Result<Fit, RefineError> {
         let (fused, frame, said) = (self.fused, self.frame, self.initial);
-        let stated = &fused.settings.prior.of_hand(frame.observation().hand.as_ref());
+        let stated = &self.settings.prior;
         let camera = &frame.observation().camera;
         let by_rig = frame.rig().map(|rig| rig.marginal_prior(said, camera, stated)).transpose()?;
         // Where the pose was said to be has nothing to do with it.
