@@ -13,6 +13,7 @@ use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
 use super::skin::{SkinEvidence, SkinReading};
+use super::views::Views;
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
@@ -57,6 +58,7 @@ pub struct Calibrator {
     kept_play: PlaySquares,
     kept_disagreements: Vec<f64>,
     kept_skin: SkinEvidence,
+    kept_views: Views,
     /// Passes that were solved for since then.
     solved: usize,
     /// Solutions since then that the rig is the mean of; none while it is still on its way.
@@ -112,6 +114,7 @@ impl Calibrator {
             kept_play: PlaySquares::default(),
             kept_disagreements: Vec::new(),
             kept_skin: SkinEvidence::default(),
+            kept_views: Views::default(),
             solved: 0,
             averaged: 0,
         })
@@ -272,11 +275,15 @@ impl Calibrator {
         self.solved += 1;
         let mut sums = self.kept.clone();
         sums.merge(pass.sums.clone());
+        let mut views = self.kept_views.clone();
+        views.merge(&pass.views);
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.
         let mut eliminated = BTreeMap::new();
         for (id, (of_object, pull)) in &sums.0 {
+            let share = views.share(*id);
+            let (of_object, pull) = &(of_object * share, pull * share);
             hessian += of_object.view((0, 0), (n, n));
             gradient += pull.rows(0, n);
             if let Some(field) = self.rig.objects.get(id) {
@@ -326,6 +333,7 @@ impl Calibrator {
     pub fn keep(&mut self, pass: Pass) {
         self.kept.merge(pass.sums);
         self.kept_skin.add(&pass.skin);
+        self.kept_views.merge(&pass.views);
         self.kept_play.merge(&pass.squares);
         self.kept_disagreements.extend(pass.disagreements);
         (self.solved, self.averaged) = (0, 0);

