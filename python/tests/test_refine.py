@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import prehend
-from prehend.datasets import Bop, Result, read_results, write_results
+from prehend.datasets import Bop, Result, read_results, read_rivals, write_results
 
 DATA = Path(os.environ.get("PREHEND_DATA", "")) / "mujoco"
 needs_data = pytest.mark.skipif(
@@ -283,6 +283,22 @@ def test_results_files(tmp_path):
         write_results(file, [Result(1, 2, 3, np.full((4, 4), np.nan))])
     with pytest.raises(prehend.Error, match="no-dataset"):
         Bop(tmp_path / "no-dataset")
+
+
+def test_rivals_files(tmp_path):
+    file = tmp_path / "poses.csv.rivals.csv"
+    poses = [np.eye(4) for _ in range(4)]
+    for k, pose in enumerate(poses):
+        pose[2, 3] = 0.5 + 0.1 * k
+    rows = [Result(1, 0, 7, poses[0]), Result(1, 1, 7, poses[0]), Result(1, 2, 7, poses[1])]
+    searched = [rows[2], rows[2]._replace(pose=poses[2]), rows[2]._replace(pose=poses[3]), rows[0]]
+    write_results(file, searched)
+    first, second, third = read_rivals(file, rows)
+    assert first.shape == (0, 4, 4) and second is None
+    assert (third == poses[2:]).all()
+    write_results(file, [rows[0], rows[1]._replace(pose=poses[1])])
+    with pytest.raises(prehend.Error, match="scene 1 image 1 object 7: neither"):
+        read_rivals(file, rows)
 
 
 @pytest.fixture(scope="module")

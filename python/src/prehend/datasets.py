@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ._prehend import Dataset, Error, Frame
 
-__all__ = ["Bop", "Result", "read_results", "write_results"]
+__all__ = ["Bop", "Result", "read_results", "read_rivals", "write_results"]
 
 
 class Bop(Dataset):
@@ -112,6 +112,34 @@ def read_results(path: str | os.PathLike[str]) -> list[Result]:
             seen[scene, image] = instance + 1
             results.append(Result(scene, image, number, pose, score, time, instance))
     return results
+
+
+def read_rivals(path: str | os.PathLike[str], poses: Sequence[Result]) -> list[NDArray[np.float64] | None]:
+    """The rivals of each pose, n × 4 × 4, camera ← object [m], as `prehend initial --search` writes them: the other poses that a search ended with, or None for
+    a pose that comes from none.
+
+    A rivals file is a results file in which the rows of a pose follow each other: first the pose itself. A row that is neither a pose nor after one of the same object
+    and image is an error.
+    """
+
+    def key(row: Result) -> tuple[int, int, int, bytes]:
+        return row.scene, row.image, row.object, row.pose.tobytes()
+
+    places: dict[tuple[int, int, int, bytes], list[int]] = {}
+    for place, pose in enumerate(poses):
+        places.setdefault(key(pose), []).append(place)
+    found: dict[int, list[NDArray[np.float64]]] = {}
+    current: int | None = None
+    for row in read_results(path):
+        if free := places.get(key(row)):
+            current = free.pop(0)
+            found[current] = []
+        elif current is not None and poses[current].ids[:3] == row.ids[:3]:
+            found[current].append(row.pose)
+        else:
+            target = f"scene {row.scene} image {row.image} object {row.object}"
+            raise Error(f"{os.fspath(path)}: {target}: neither a pose to be refined nor after such a one")
+    return [np.reshape(found[k], (-1, 4, 4)) if k in found else None for k in range(len(poses))]
 
 
 def write_results(path: str | os.PathLike[str], results: Iterable[Result]) -> None:
