@@ -1,5 +1,6 @@
 //! Color, depth and mask images, and their files.
 
+use std::fs;
 use std::io::Cursor;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -146,7 +147,15 @@ impl RgbImage {
     /// # Errors
     /// When the file cannot be read or decoded.
     pub fn load(path: &Path) -> Result<Self, ImageError> {
-        let image = decode(path)?.into_rgb32f();
+        Self::decode(&read(path)?, path)
+    }
+
+    /// The image whose PNG or JPEG file has the contents `bytes`; errors call it `name`.
+    ///
+    /// # Errors
+    /// When they cannot be decoded.
+    pub fn decode(bytes: &[u8], name: &Path) -> Result<Self, ImageError> {
+        let image = decode(bytes, name)?.into_rgb32f();
         let (width, height) = (image.width() as usize, image.height() as usize);
         Self::new(width, height, image.pixels().map(|p| p.0).collect())
     }
@@ -166,16 +175,25 @@ impl RgbImage {
     /// # Errors
     /// When the file cannot be written.
     pub fn save_jpeg(&self, path: &Path, quality: u8) -> Result<(), ImageError> {
-        let (width, height) = (self.width as u32, self.height as u32);
-        let mut bytes = Vec::new();
-        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
-            .encode(&self.to_bytes(), width, height, image::ExtendedColorType::Rgb8)
-            .map_err(|source| ImageError::Codec { path: path.into(), source })?;
+        let bytes = self.to_jpeg(quality);
+        let bytes = bytes.map_err(|source| ImageError::Codec { path: path.into(), source })?;
         write_atomic(path, &bytes).map_err(|source| ImageError::Io { path: path.into(), source })
     }
 
-    /// Three bytes a pixel.
-    fn to_bytes(&self) -> Vec<u8> {
+    /// The contents of a JPEG file of quality `quality` (1..=100, clamped); values are clamped to 0..=1.
+    ///
+    /// # Errors
+    /// When it cannot be encoded: it has more than 65535 columns or rows, or none.
+    pub fn to_jpeg(&self, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+        let (width, height) = (self.width as u32, self.height as u32);
+        let mut bytes = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
+            .encode(&self.to_bytes(), width, height, image::ExtendedColorType::Rgb8)?;
+        Ok(bytes)
+    }
+
+    /// Three bytes a pixel, row by row; values are clamped to 0..=1.
+    pub fn to_bytes(&self) -> Vec<u8> {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
         self.pixels.iter().flat_map(|p| p.map(byte)).collect()
     }
@@ -197,12 +215,20 @@ impl DepthImage {
     /// # Errors
     /// When the file cannot be read, is not 16-bit gray, or `scale` is not positive.
     pub fn load(path: &Path, scale: f64) -> Result<Self, ImageError> {
-        check_scale(path, scale)?;
-        let image = match decode(path)? {
+        Self::decode(&read(path)?, scale, path)
+    }
+
+    /// The same of the file whose contents are `bytes`; errors call it `name`.
+    ///
+    /// # Errors
+    /// When they cannot be decoded or are not 16-bit gray, or `scale` is not positive.
+    pub fn decode(bytes: &[u8], scale: f64, name: &Path) -> Result<Self, ImageError> {
+        check_scale(name, scale)?;
+        let image = match decode(bytes, name)? {
             DynamicImage::ImageLuma16(image) => image,
             other => {
                 return Err(ImageError::Kind {
-                    path: path.into(),
+                    path: name.into(),
                     expected: "16-bit gray",
                     found: format!("{:?}", other.color()),
                 });
@@ -277,7 +303,7 @@ impl Mask {
     /// When the file cannot be read or decoded.
     pub fn load(path: &Path) -> Result<Self, ImageError> {
         // 16 bits, or the smallest values of a 16-bit file would round to zero.
-        let image = decode(path)?.into_luma16();
+        let image = decode(&read(path)?, path)?.into_luma16();
         let (width, height) = (image.width() as usize, image.height() as usize);
         Self::new(width, height, image.pixels().map(|p| p.0[0] > 0).collect())
     }
@@ -345,10 +371,14 @@ fn check_scale(path: &Path, scale: f64) -> Result<(), ImageError> {
     Err(ImageError::Scale { path: path.into(), scale })
 }
 
-fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
-    let io = |source| ImageError::Io { path: path.into(), source };
-    let reader = image::ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
-    reader.decode().map_err(|source| ImageError::Codec { path: path.into(), source })
+fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
+    fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })
+}
+
+fn decode(bytes: &[u8], name: &Path) -> Result<DynamicImage, ImageError> {
+    let io = |source| ImageError::Io { path: name.into(), source };
+    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(io)?;
+    reader.decode().map_err(|source| ImageError::Codec { path: name.into(), source })
 }
 
 /// Encodes in memory, to write the file atomically.

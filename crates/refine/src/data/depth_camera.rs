@@ -36,7 +36,16 @@ impl DepthCamera {
             return if nothing { Ok(None) } else { Err("depth_K") };
         };
         let t_color_depth = t_color_depth.unwrap_or_else(Isometry3::identity);
-        Ok(Some(Self { camera, lens, t_color_depth }))
+        Ok(Some(Self::beside(camera, lens, t_color_depth)))
+    }
+
+    /// Behind `lens`, in that place beside the color camera \[m\].
+    pub(crate) fn beside(
+        camera: Camera,
+        lens: Option<Distortion>,
+        t_color_depth: Isometry3<f64>,
+    ) -> Self {
+        Self { camera, lens, t_color_depth }
     }
 
     /// `depth`, which it measured \[m\], as the pinhole camera `camera` would have.

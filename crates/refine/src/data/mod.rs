@@ -11,6 +11,8 @@ mod depth_camera;
 mod frame_file;
 pub mod identity;
 mod journal;
+#[cfg(feature = "mcap")]
+pub mod mcap;
 mod noise;
 mod pose;
 mod robots;

@@ -18,6 +18,8 @@ mod journal;
 mod lens;
 mod localization;
 mod pose_error;
+#[cfg(feature = "mcap")]
+mod recording;
 mod results;
 mod rig;
 mod search;

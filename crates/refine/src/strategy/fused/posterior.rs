@@ -151,6 +151,15 @@ impl Posterior {
         self.hypotheses[0].covariance
     }
 
+    /// The same of a left twist about `point` (camera frame) \[m\] instead of the center.
+    pub fn covariance_at(&self, point: &Point3<f64>) -> Matrix6<f64> {
+        let mut moves = Matrix6::identity();
+        // The point is displaced by t + ω × (point − center).
+        let arm = (point.coords - self.center).cross_matrix();
+        moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm);
+        moves * self.covariance() * moves.transpose()
+    }
+
     /// Standard deviation along the direction that is known least \[m of surface motion\]; `radius` turns radians into that.
     pub(crate) fn widest(&self, radius: f64) -> f64 {
         directions(&self.covariance(), radius)[0].1

@@ -1,30 +1,40 @@
 //! `prehend track`.
 
+mod done;
+mod film;
 mod images;
+#[cfg_attr(not(feature = "mcap"), path = "no_log.rs")]
+mod log;
 mod strip;
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use indicatif::ProgressBar;
 use nalgebra::Isometry3;
 use prehend_refine::RefineError;
-use prehend_refine::data::bop::{Dataset, ResultRow, ResultsWriter, check_writable};
-use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
+use prehend_refine::data::bop::{
+    Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
+};
+use prehend_refine::data::{Assets, FrameInput, Target};
+use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::strategy::Posterior;
-use prehend_refine::tracker::{
-    Recovery, Rejection, Timing, TrackStatus, Tracked, Tracker, TrackerSettings,
-};
+use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
+use prehend_render::Backend;
 use serde_json::json;
 
+use self::done::{Done, summary, told};
+use self::film::{Film, Moment, SceneFilm};
 use self::images::{Images, Watch, select_scene};
-use crate::options::{Rendering, Selection, limit_threads, open_rig, row, write_poses};
+use self::log::{Log, LogWriter};
+use crate::options::{Rendering, Selection, Unit, limit_threads, open_rig, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -32,11 +42,15 @@ use crate::terminal::{cache, exit_code, progress, say, warn};
 #[command(
     override_usage = "prehend track --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
                             prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]\n       \
-                            prehend track --dataset <DIR> --watch <FOLDER> --poses <FILE> --out <FILE> [OPTIONS]"
+                            prehend track --dataset <DIR> --watch <FOLDER> --poses <FILE> --out <FILE> [OPTIONS]\n       \
+                            prehend track --mcap <LOG> --mesh <FILE> --search --out <FILE> [OPTIONS]",
+    mut_arg("dataset", |arg| arg.required(false).required_unless_present("mcap"))
 )]
 pub(crate) struct Track {
     #[command(flatten)]
-    selection: Selection,
+    selection: Option<Selection>,
+    #[command(flatten)]
+    log: LogOptions,
     /// Begin at the first pose of every object of a scene in this BOP results file
     #[arg(
         long,
@@ -97,18 +111,41 @@ pub(crate) struct Track {
     rendering: Rendering,
 }
 
+/// A robot's log, and what is tracked in it.
+#[derive(Args)]
+#[command(next_help_heading = "Robot's log")]
+pub(crate) struct LogOptions {
+    /// Instead of a dataset, follow one object through the images of this recording: an MCAP file of ROS 2 messages (docs/LOGS.md lists the topics that are read)
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["dataset", "watch", "strip", "targets"])]
+    mcap: Option<PathBuf>,
+    /// The object's mesh (PLY, OBJ, STL, glTF)
+    #[arg(long, value_name = "FILE", requires = "mcap")]
+    mesh: Option<PathBuf>,
+    /// Unit of the mesh
+    #[arg(long, value_name = "UNIT", default_value = "m", requires = "mcap")]
+    mesh_unit: Unit,
+    /// Mass of the object [default: 500 kg/m³]
+    #[arg(long, value_name = "KG", requires = "mcap")]
+    mass: Option<f64>,
+    /// The hand as URDF: its joints are in the log, and its root link is a frame of the log's transforms
+    #[arg(long, value_name = "URDF", requires = "mcap")]
+    hand: Option<PathBuf>,
+    /// Taxels of that hand (see docs/DATASET.md): the log has their forces
+    #[arg(long, value_name = "CSV", requires = "hand")]
+    taxels: Option<PathBuf>,
+    /// Which topic has what, where several could: color=NAME, depth=NAME or mask=NAME; may be repeated
+    #[arg(long, value_name = "WHAT=NAME", requires = "mcap")]
+    topic: Vec<String>,
+    /// The frame of the log whose z-axis points up
+    #[arg(long, value_name = "FRAME", default_value = "world", requires = "mcap")]
+    world: String,
+    /// Write what was sensed and found to this MCAP file, which viewers (Foxglove, Rerun) open and --mcap reads again
+    #[arg(long, value_name = "LOG", help_heading = "Output")]
+    mcap_out: Option<PathBuf>,
+}
+
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
 type Start = (Target, Option<Isometry3<f64>>);
-
-/// A frame that is done, without what nobody asks for afterwards: there may be many.
-struct Done {
-    row: ResultRow,
-    status: TrackStatus,
-    rejection: Option<Rejection>,
-    iterations: usize,
-    cost: f64,
-    timing: Timing,
-}
 
 /// What becomes of the frames.
 struct Outcome {
@@ -116,16 +153,37 @@ struct Outcome {
     failures: Vec<String>,
     /// The poses as they come, if they are written so.
     rows: Option<ResultsWriter>,
+    /// What was sensed and found, if that is recorded.
+    log: Option<LogWriter>,
+}
+
+/// How objects are followed.
+struct Following {
+    settings: TrackerSettings,
+    backend: Arc<dyn Backend>,
+    rig: Option<Arc<Rig>>,
+}
+
+impl Following {
+    /// A tracker of an object with a hand.
+    fn begin(&self, object: Arc<Object>, hand: Option<Arc<Hand>>) -> Result<Tracker, RefineError> {
+        let tracker = Tracker::new(object, hand, self.settings.clone())?;
+        let tracker = tracker.with_backend(Arc::clone(&self.backend));
+        Ok(match &self.rig {
+            Some(rig) => tracker.with_rig(Arc::clone(rig)),
+            None => tracker,
+        })
+    }
 }
 
 impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
-        check_writable(&self.out)?;
-        self.strip.as_deref().map(check_writable).transpose()?;
-        let watched = self.watch.as_ref();
-        let watched =
-            watched.map(|folder| select_scene(&mut self.selection, folder)).transpose()?;
-        let idle = Duration::try_from_secs_f64(self.idle).map_err(|e| anyhow!("--idle: {e}"))?;
+        let outputs = [Some(&self.out), self.strip.as_ref(), self.log.mcap_out.as_ref()];
+        outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
+        let mut selection = self.selection.take();
+        let watched = self.watch.as_ref().zip(selection.as_mut());
+        let watched = watched.map(|(folder, selection)| select_scene(selection, folder));
+        let watched = watched.transpose()?;
         if !(self.rate.is_finite() && self.rate > 0.0) {
             bail!("--rate: {} is no number of images a second", self.rate);
         }
@@ -137,46 +195,26 @@ impl Track {
         };
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
-        let dataset = self.selection.open()?;
-        let (starts, failures) = self.starts(&dataset, watched)?;
         let rig = open_rig(self.rig.as_deref())?;
-        let mut assets = Assets::new(&dataset, 0);
-        assets = assets.with_cache(cache()).with_rig(rig.clone()).with_optional_masks();
+        let following = Following { settings, backend, rig };
+        let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
-        let mut outcome = Outcome { frames: Vec::new(), failures, rows };
-        for start in &starts {
-            let begin = |object, hand| {
-                let tracker = Tracker::new(object, hand, settings.clone())?;
-                let tracker = tracker.with_backend(Arc::clone(&backend));
-                Ok(match &rig {
-                    Some(rig) => tracker.with_rig(Arc::clone(rig)),
-                    None => tracker,
-                })
-            };
-            let watch = watched.map(|scene_id| Watch::new(scene_id, start.0.im_id, idle));
-            let watch = watch.transpose()?;
-            let followed = self.follow(&mut assets, start, watch, begin, &mut outcome);
-            if let Err(error) = followed {
-                let Target { scene_id, obj_id, .. } = start.0;
-                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
+        let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log };
+        match (&self.log.mcap, &selection) {
+            (Some(file), _) => self.track_log(file, &following, &mut outcome)?,
+            (None, Some(selection)) => {
+                self.track_scenes(selection, watched, &following, &mut outcome)?;
             }
+            (None, None) => bail!("--dataset or --mcap: there is nothing to be tracked"),
         }
-        let Outcome { frames, mut failures, rows } = outcome;
+        let Outcome { frames, mut failures, rows, log } = outcome;
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
         }
-        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
-            let first = |frame: &&Done| {
-                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
-            };
-            let followed: Vec<&Done> = frames.iter().filter(first).collect();
-            if let Err(error) = strip::write(file, &followed, target.instance, &mut assets) {
-                failures.push(format!("--strip: {error}"));
-            }
-        }
+        log.filter(|_| !frames.is_empty()).map(LogWriter::finish).transpose()?;
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
             let document = json!({ "frames": frames, "failures": failures });
@@ -187,24 +225,118 @@ impl Track {
         Ok(exit_code(frames.len(), &failures))
     }
 
+    /// Follows objects through scenes of a dataset.
+    fn track_scenes(
+        &self,
+        selection: &Selection,
+        watched: Option<u32>,
+        following: &Following,
+        outcome: &mut Outcome,
+    ) -> anyhow::Result<()> {
+        let idle = Duration::try_from_secs_f64(self.idle).map_err(|e| anyhow!("--idle: {e}"))?;
+        let dataset = selection.open()?;
+        let (starts, failures) = self.starts(selection, &dataset, watched)?;
+        outcome.failures = failures;
+        if outcome.log.is_some() && starts.len() > 1 {
+            bail!(
+                "--mcap-out has one object, not {}: --scene and --object say which",
+                starts.len()
+            );
+        }
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        assets = assets.with_rig(following.rig.clone()).with_optional_masks();
+        for &(start, initial) in &starts {
+            let watch = watched.map(|scene_id| Watch::new(scene_id, start.im_id, idle));
+            let followed = || {
+                let object = assets.object(start.obj_id)?;
+                let (images, count) = match watch.transpose()? {
+                    Some(watch) => (Images::Watched(watch), 0),
+                    None => self.images(selection, &assets, start)?,
+                };
+                let bar = progress(count, "tracking");
+                let assets = &mut assets;
+                let mut film = SceneFilm { assets, images, start, rate: self.rate };
+                self.follow(&mut film, &bar, &object, initial, following, outcome)
+            };
+            if let Err(error) = followed() {
+                let Target { scene_id, obj_id, .. } = start;
+                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {error:#}"));
+            }
+        }
+        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
+            let first = |frame: &&Done| {
+                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
+            };
+            let followed: Vec<&Done> = outcome.frames.iter().filter(first).collect();
+            if let Err(error) = strip::write(file, &followed, target.instance, &mut assets) {
+                outcome.failures.push(format!("--strip: {error}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Images of the scene of `start` from there on, and how many there are.
+    fn images(
+        &self,
+        selection: &Selection,
+        assets: &Assets<'_>,
+        start: Target,
+    ) -> anyhow::Result<(Images, usize)> {
+        let Target { scene_id, im_id: first, .. } = start;
+        let mut ids = assets.dataset().scene(scene_id)?.moments()?;
+        ids.retain(|id| *id >= first && selection.admits_image(scene_id, *id));
+        if ids.is_empty() {
+            bail!("no image from image {first} on");
+        }
+        let count = ids.len();
+        Ok((Images::Listed(ids.into_iter()), count))
+    }
+
+    /// Follows an object through a robot's log.
+    fn track_log(
+        &self,
+        file: &Path,
+        following: &Following,
+        outcome: &mut Outcome,
+    ) -> anyhow::Result<()> {
+        let log = Log::open(&self.log, file)?;
+        outcome.failures.extend_from_slice(log.faults());
+        let mut start = Target { scene_id: 0, im_id: 0, obj_id: 1, instance: 0 };
+        let mut initial = None;
+        if let Some(file) = &self.poses {
+            let ReadResults { rows, errors, .. } = read_results(file)?;
+            let first = rows.first();
+            let first = first.ok_or_else(|| match errors.first() {
+                Some(error) => anyhow!("{}: {error}", file.display()),
+                None => anyhow!("{}: no poses: there is nothing but a header", file.display()),
+            })?;
+            let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = *first;
+            (start, initial) = (Target { scene_id, im_id, obj_id, ..start }, Some(t_cam_model));
+        }
+        let bar = progress(log.count(), "tracking");
+        let mut film = log.film(start, following.rig.clone())?;
+        self.follow(&mut film, &bar, log.object(), initial, following, outcome)
+    }
+
     /// What to follow, in order, and what is wrong with rows of the poses.
     fn starts(
         &self,
+        selection: &Selection,
         dataset: &Dataset,
         watched: Option<u32>,
     ) -> anyhow::Result<(Vec<Start>, Vec<String>)> {
         let (starts, faults): (Vec<Start>, _) = if let Some(poses) = &self.poses {
-            let (jobs, faults) = self.selection.jobs(poses)?;
+            let (jobs, faults) = selection.jobs(poses)?;
             (jobs.into_iter().map(|j| (j.target, Some(j.row.t_cam_model))).collect(), faults)
         } else if let Some(scene_id) = watched {
-            let known = match self.selection.object.as_slice() {
+            let known = match selection.object.as_slice() {
                 [] => dataset.models().object_ids()?,
                 named => named.to_vec(),
             };
             let start = |obj_id| (Target { scene_id, im_id: 0, obj_id, instance: 0 }, None);
             (known.into_iter().map(start).collect(), Vec::new())
         } else {
-            let targets = self.selection.targets(dataset, self.targets.as_deref())?;
+            let targets = selection.targets(dataset, self.targets.as_deref())?;
             if targets.is_empty() {
                 bail!("nothing is of the scenes, images and objects asked for");
             }
@@ -224,56 +356,43 @@ impl Track {
         Ok((earliest.into_values().collect(), faults))
     }
 
-    /// Follows one object by what `begin` makes through the images that `watch` brings, or those that there are.
+    /// Follows `object` through `film`, from `initial` on if that is known.
     fn follow(
         &self,
-        assets: &mut Assets<'_>,
-        start: &Start,
-        watch: Option<Watch>,
-        begin: impl Fn(Arc<Object>, Option<Arc<Hand>>) -> Result<Tracker, RefineError>,
+        film: &mut dyn Film,
+        bar: &ProgressBar,
+        object: &Arc<Object>,
+        initial: Option<Isometry3<f64>>,
+        following: &Following,
         outcome: &mut Outcome,
-    ) -> Result<(), AssetError> {
-        let (Target { scene_id, obj_id, im_id: first, .. }, initial) = *start;
-        let object = assets.object(obj_id)?;
-        let bar = progress(0, "tracking");
-        let mut images = if let Some(watch) = watch {
-            Images::Watched(watch)
-        } else {
-            let mut ids = assets.dataset().scene(scene_id)?.moments()?;
-            ids.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
-            if ids.is_empty() {
-                let nothing = format!("no image from image {first} on");
-                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {nothing}"));
-            }
-            bar.set_length(ids.len() as u64);
-            Images::Listed(ids.into_iter())
-        };
+    ) -> anyhow::Result<()> {
         // With the hand, and what else there is, of the first image.
         let mut tracker: Option<(Tracker, Option<Arc<Hand>>)> = None;
-        while let Some(im_id) = images.next(assets) {
-            let target = Target { im_id, ..start.0 };
-            let mut frame = || -> Result<Tracked, AssetError> {
-                let FrameInput { observation, hand, .. } = assets.load(&target, &[])?;
-                let seconds = f64::from(im_id - first) / self.rate;
-                let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+        while let Some(Moment { target, time, input }) = film.next() {
+            let log = &mut outcome.log;
+            let frame = || -> anyhow::Result<Tracked> {
+                let FrameInput { observation, hand, .. } = input?;
                 let tracker = match &mut tracker {
                     Some((tracker, first)) => {
                         require_same(first.as_ref(), hand.as_ref())?;
                         tracker
                     }
                     none => {
-                        let mut new = begin(Arc::clone(&object), hand.clone())?;
+                        let mut new = following.begin(Arc::clone(object), hand.clone())?;
                         initial.iter().for_each(|pose| new.start_from(pose));
-                        &mut none.insert((new, hand)).0
+                        &mut none.insert((new, hand.clone())).0
                     }
                 };
-                Ok(tracker.push(observation, time)?)
+                let Some(log) = log else { return Ok(tracker.push(observation, time)?) };
+                let tracked = tracker.track(&observation, time)?;
+                log.add(time, (object, hand.as_deref()), &observation, &tracked)?;
+                Ok(tracked)
             };
             match frame() {
                 Ok(tracked) => {
                     bar.set_message(tracked.status.name());
                     if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
-                        warn(&bar, target, format!("lost: {doubt}"));
+                        warn(bar, target, format!("lost: {doubt}"));
                     }
                     let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
                     let mut row = row(&target, tracked.t_cam_object, score);
@@ -286,7 +405,7 @@ impl Track {
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
                     outcome.frames.push(Done { row, status, rejection, iterations, cost, timing });
                 }
-                Err(error) => outcome.failures.push(format!("{target}: {error}")),
+                Err(error) => outcome.failures.push(format!("{target}: {error:#}")),
             }
             bar.inc(1);
         }
@@ -307,55 +426,4 @@ fn require_same(first: Option<&Arc<Hand>>, now: Option<&Arc<Hand>>) -> Result<()
     let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
     let problem = format!("are others than in the first image: joint {which:?} is in one only");
     Err(RefineError::Setting { name: "bodies", problem })
-}
-
-/// What became of `frames`, which are not empty.
-fn told(frames: &[Done]) -> String {
-    // To find an object takes far longer than to follow it, and is rare.
-    let rare = |f: &&Done| matches!(f.status, TrackStatus::Relocalized | TrackStatus::Lost);
-    let of = |f: &Done| f.timing.total().as_secs_f64();
-    let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
-    if seconds.is_empty() {
-        seconds = frames.iter().map(of).collect();
-    }
-    let total: f64 = seconds.iter().sum();
-    seconds.sort_by(f64::total_cmp);
-    let mut text = format!("{} frames tracked", frames.len());
-    // Without time for any of them they were only predicted.
-    if total > 0.0 {
-        let (rate, median) = (seconds.len() as f64 / total, 1e3 * seconds[seconds.len() / 2]);
-        text += &format!(" at {rate:.1} a second, median {median:.1} ms");
-    }
-    let all =
-        [TrackStatus::Tracked, TrackStatus::Predicted, TrackStatus::Relocalized, TrackStatus::Lost];
-    let count = |status: TrackStatus| {
-        let count = frames.iter().filter(|d| d.status == status).count();
-        (count > 0).then(|| format!("{count} {}", status.name()))
-    };
-    let counts: Vec<String> = all.into_iter().filter_map(count).collect();
-    format!("{text}: {}", counts.join(", "))
-}
-
-fn summary(frame: &Done) -> serde_json::Value {
-    let Done { row, status, rejection, iterations, cost, timing } = frame;
-    let pose = PlainPose::from(&row.t_cam_model);
-    let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
-    json!({
-        "scene_id": row.scene_id,
-        "im_id": row.im_id,
-        "obj_id": row.obj_id,
-        "following": status.name(),
-        "doubt": rejection.map(|d| d.to_string()),
-        "iterations": iterations,
-        "misfit": cost.is_finite().then_some(cost),
-        "probability_within_5mm_5deg": row.score,
-        "milliseconds": {
-            "preparation": milliseconds(timing.preparation),
-            "steps": milliseconds(timing.steps),
-            "judgement": milliseconds(timing.validation),
-            "recovery": milliseconds(timing.recovery),
-        },
-        "t_cam_model_mm": pose.translation_m.map(|v| v * 1e3),
-        "quaternion_wxyz": pose.quaternion_wxyz,
-    })
 }

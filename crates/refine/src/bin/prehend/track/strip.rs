@@ -6,7 +6,7 @@ use prehend_refine::data::{Assets, Target};
 use prehend_refine::tracker::TrackStatus;
 use prehend_render::{RenderModel, RgbImage, draw_outline};
 
-use super::Done;
+use super::done::Done;
 
 /// Frames side by side, and rows of them.
 const COLUMNS: usize = 4;
@@ -15,9 +15,17 @@ const ROWS: usize = 2;
 const SMALLER: usize = 2;
 const GAP: usize = 4;
 /// Width of outlines before that \[px\], their color where the object was seen, and where it was only expected.
-const LINE: f64 = 4.0;
+pub(super) const LINE: f64 = 4.0;
 const SEEN: [f32; 3] = [0.2, 0.9, 0.3];
 const EXPECTED: [f32; 3] = [0.95, 0.2, 0.15];
+
+/// Color of the outline where the object is followed so.
+pub(super) fn color_of(status: TrackStatus) -> [f32; 3] {
+    match status {
+        TrackStatus::Tracked | TrackStatus::Relocalized => SEEN,
+        TrackStatus::Predicted | TrackStatus::Lost => EXPECTED,
+    }
+}
 
 /// Writes some of `frames`, evenly in time, with the object's outline.
 ///
@@ -35,17 +43,13 @@ pub(super) fn write(
         let Done { row, status, .. } = &frames[k * (frames.len() - 1) / (count - 1).max(1)];
         let (scene_id, im_id, obj_id) = (row.scene_id, row.im_id, row.obj_id);
         let input = assets.load(&Target { scene_id, im_id, obj_id, instance }, &[])?;
-        let color = match status {
-            TrackStatus::Tracked | TrackStatus::Relocalized => SEEN,
-            TrackStatus::Predicted | TrackStatus::Lost => EXPECTED,
-        };
         let mut image = input.observation.color;
         let camera = &input.observation.camera;
         let model = match &model {
             Some(model) => model,
             None => model.insert(RenderModel::new(&input.object.mesh)?),
         };
-        draw_outline(&mut image, camera, model, &row.t_cam_model, color, LINE);
+        draw_outline(&mut image, camera, model, &row.t_cam_model, color_of(*status), LINE);
         let small = image.downsampled(SMALLER);
         let (width, height) = (small.width(), small.height());
         let strip: &mut RgbImage = strip.get_or_insert_with(|| {

@@ -1,0 +1,211 @@
+//! The frames of a recording.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::BufReader;
+
+use mcap::io::MessageReader;
+use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
+
+use super::error::RecordingError;
+use super::images::{self, describe};
+use super::recording::{Recording, messages, type_of};
+use super::topics::ImageTopic;
+use crate::data::depth_camera::DepthCamera;
+use crate::scene::{Hand, Observation};
+
+/// Images are of the same moment if they are not farther apart \[ns\].
+const TOGETHER: i64 = 20_000_000;
+/// Images of one topic that are kept until those of the others have come.
+const WAITING: usize = 8;
+
+/// A moment of a recording.
+pub struct RecordedFrame {
+    /// When the image was taken, by the clock of the recording \[ns\].
+    pub nanoseconds: i64,
+    /// What was sensed.
+    pub observation: Result<Observation, RecordingError>,
+}
+
+/// The frames of a [`Recording`], one after the other. A few images are in memory at a time.
+pub struct Frames<'a> {
+    recording: &'a Recording,
+    hand: Option<&'a Hand>,
+    messages: MessageReader<BufReader<File>>,
+    first: Stream,
+    depth: Option<Stream>,
+    mask: Option<Stream>,
+    ended: bool,
+}
+
+/// Images of one topic that have been read and not used.
+struct Stream {
+    topic: ImageTopic,
+    waiting: VecDeque<(i64, Vec<u8>)>,
+}
+
+impl Stream {
+    fn new(topic: &ImageTopic) -> Self {
+        Self { topic: topic.clone(), waiting: VecDeque::new() }
+    }
+
+    /// Whether an image of the moment `at` will not come any more, or has.
+    fn is_past(&self, at: i64) -> bool {
+        self.waiting.iter().any(|(stamp, _)| *stamp >= at)
+    }
+
+    /// The image nearest to `at`. What is older is let go.
+    fn take(&mut self, at: i64) -> Option<Vec<u8>> {
+        let distance = |k: usize| self.waiting.get(k).map(|(stamp, _)| (stamp - at).abs());
+        let nearest = (0..self.waiting.len()).min_by_key(|k| distance(*k))?;
+        if distance(nearest)? > TOGETHER {
+            self.waiting.retain(|(stamp, _)| *stamp > at);
+            return None;
+        }
+        self.waiting.drain(..=nearest).next_back().map(|(_, data)| data)
+    }
+}
+
+impl<'a> Frames<'a> {
+    pub(super) fn new(
+        recording: &'a Recording,
+        hand: Option<&'a Hand>,
+    ) -> Result<Self, RecordingError> {
+        let topics = &recording.topics;
+        let first = topics.first().ok_or_else(|| RecordingError::Topic {
+            file: recording.file.clone(),
+            topic: "images".to_owned(),
+            problem: "there are none".to_owned(),
+        })?;
+        let first = Stream::new(first);
+        let depth = topics.depth.as_ref().filter(|depth| depth.name != first.topic.name);
+        Ok(Self {
+            recording,
+            hand,
+            messages: messages(&recording.file)?,
+            depth: depth.map(Stream::new),
+            mask: topics.mask.as_ref().map(Stream::new),
+            first,
+            ended: false,
+        })
+    }
+
+    /// Reads a message.
+    fn read(&mut self) {
+        // What is wrong with the file was found when it was opened.
+        let Some(Ok(message)) = self.messages.next() else {
+            self.ended = true;
+            return;
+        };
+        let streams = [Some(&mut self.first), self.depth.as_mut(), self.mask.as_mut()];
+        let of_topic = |stream: &&mut Stream| stream.topic.name == message.channel.topic;
+        let Some(stream) = streams.into_iter().flatten().find(of_topic) else { return };
+        if type_of(&message) != stream.topic.kind {
+            return;
+        }
+        if let Ok((header, _)) = describe(&stream.topic.kind, &message.data) {
+            let stamp = header.stamp.nanoseconds();
+            stream.waiting.push_back((stamp, message.data.into_owned()));
+        }
+    }
+
+    /// What the images of one moment show.
+    fn observe(
+        &self,
+        at: i64,
+        first: &[u8],
+        depth: Option<&[u8]>,
+        mask: Option<&[u8]>,
+    ) -> Result<Observation, RecordingError> {
+        let recording = self.recording;
+        let fault = |topic: &str, problem: String| RecordingError::Topic {
+            file: recording.file.clone(),
+            topic: format!("{topic} at {:.3} s", at as f64 * 1e-9),
+            problem,
+        };
+        let of = |stream: &Stream, problem| fault(&stream.topic.name, problem);
+        let lens_fault = |e: DistortionError| of(&self.first, e.to_string());
+        let kind = &self.first.topic.kind;
+        let (color, alone) = match recording.topics.color {
+            Some(_) => (Some(images::color(kind, first).map_err(|e| of(&self.first, e))?), None),
+            None => (None, Some(images::depth(kind, first).map_err(|e| of(&self.first, e))?)),
+        };
+        let size = color.as_ref().map(|image| (image.width(), image.height()));
+        let size = size.or(alone.as_ref().map(|image| (image.width(), image.height())));
+        let (width, height) = size.unwrap_or_default();
+        let camera = Camera { width, height, ..recording.camera.camera };
+        let expected = (recording.camera.camera.width, recording.camera.camera.height);
+        if expected != (width, height) {
+            let (w, h) = expected;
+            let problem = format!("{width}x{height} pixels, its camera_info is of {w}x{h}");
+            return Err(of(&self.first, problem));
+        }
+        let mut color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
+        let (mut depth, registered) = match (alone, depth, &self.depth) {
+            (Some(depth), ..) => (depth, true),
+            (None, Some(data), Some(stream)) => {
+                let depth = images::depth(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
+                match &recording.depth_camera {
+                    None => (depth, true),
+                    Some(own) => {
+                        let place = recording.in_camera(&stream.topic.frame_id, at);
+                        let place = place.map_err(|e| of(stream, e))?;
+                        let own = DepthCamera::beside(own.camera, own.lens, place);
+                        let depth = own.register(depth, &camera, &recording.depth_remaps);
+                        (depth.map_err(|e| of(stream, e.to_string()))?, false)
+                    }
+                }
+            }
+            _ => (DepthImage::filled(width, height, 0.0), false),
+        };
+        let mut mask = match (mask, &self.mask) {
+            (Some(data), Some(stream)) => {
+                images::mask(&stream.topic.kind, data).map_err(|e| of(stream, e))?
+            }
+            _ => Mask::filled(width, height, false),
+        };
+        if let Some(lens) = recording.camera.lens {
+            let remap: &Remap = &recording.remaps.get(camera, lens);
+            color = remap.rgb(&color).map_err(lens_fault)?;
+            mask = remap.mask(&mask).map_err(lens_fault)?;
+            if registered {
+                depth = remap.depth(&depth).map_err(lens_fault)?;
+            }
+        }
+        let mut observation = Observation::new(camera, color, depth, mask);
+        let checked = observation.check_sizes();
+        checked.map_err(|(image, problem)| fault(image, problem))?;
+        observation.gravity = recording.gravity(at);
+        if let Some(hand) = self.hand {
+            let measured = recording.hand(hand, at).map_err(|e| fault("the hand", e))?;
+            observation.hand = Some(measured);
+        }
+        Ok(observation)
+    }
+}
+
+impl Iterator for Frames<'_> {
+    type Item = RecordedFrame;
+
+    fn next(&mut self) -> Option<RecordedFrame> {
+        loop {
+            if let Some((at, _)) = self.first.waiting.front() {
+                let at = *at;
+                let past = |stream: &Option<Stream>| {
+                    stream.as_ref().is_none_or(|stream| stream.is_past(at))
+                };
+                let patient = !self.ended && self.first.waiting.len() < WAITING;
+                if !patient || (past(&self.depth) && past(&self.mask)) {
+                    let (_, first) = self.first.waiting.pop_front()?;
+                    let depth = self.depth.as_mut().and_then(|stream| stream.take(at));
+                    let mask = self.mask.as_mut().and_then(|stream| stream.take(at));
+                    let observation = self.observe(at, &first, depth.as_deref(), mask.as_deref());
+                    return Some(RecordedFrame { nanoseconds: at, observation });
+                }
+            } else if self.ended {
+                return None;
+            }
+            self.read();
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! A recording, opened: all but its images is read.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use mcap::io::MessageReader;
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::hand::Taxel;
+
+use super::camera::Lensed;
+use super::error::RecordingError;
+use super::frames::Frames;
+use super::images::describe;
+use super::messages::{
+    CameraInfo, CompressedImage, Image, JointState, Named, TransformMessage, Vector3Stamped,
+    WrenchStamped, decode,
+};
+use super::series::Series;
+use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
+use super::transforms::Transforms;
+use crate::data::bop::RemapCache;
+use crate::scene::{Hand, HandMeasurement};
+
+/// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
+///
+/// What is small, poses of frames, joints and forces, is kept in memory; images are read as they are asked for.
+pub struct Recording {
+    pub(super) file: PathBuf,
+    pub(super) topics: Chosen,
+    /// Of the images that are the frames, and of depth if that has one of its own.
+    pub(super) camera: Lensed,
+    pub(super) depth_camera: Option<Lensed>,
+    transforms: Transforms,
+    world: String,
+    joints: HashMap<String, Series<f64>>,
+    /// By frame \[N\].
+    forces: HashMap<String, Series<Vector3<f64>>>,
+    /// What is said of gravity \[m/s²\], and in which frame.
+    gravity: Option<(String, Series<Vector3<f64>>)>,
+    count: usize,
+    faults: Vec<String>,
+    pub(super) remaps: RemapCache,
+    pub(super) depth_remaps: RemapCache,
+}
+
+/// Joints are where they were last said to be for so long \[ns\].
+const HELD: i64 = 100_000_000;
+/// Forces belong to an image if they are not farther from it than this \[ns\].
+const FELT: i64 = 50_000_000;
+/// Acceleration of free fall \[m/s²\].
+const GRAVITY: f64 = 9.81;
+
+/// What the first reading finds.
+#[derive(Default)]
+struct Found {
+    images: Known,
+    counts: HashMap<String, usize>,
+    cameras: HashMap<String, CameraInfo>,
+    transforms: Transforms,
+    joints: HashMap<String, Series<f64>>,
+    forces: HashMap<String, Series<Vector3<f64>>>,
+    /// With its frame.
+    gravity: Option<(String, Series<Vector3<f64>>)>,
+    /// By topic: the first fault, and how many there are.
+    faults: BTreeMap<String, (String, usize)>,
+}
+
+impl Recording {
+    /// Opens `file`. Unless there is a topic of gravity, that is along −z of the frame `world`, if it is connected with the camera's.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or there are no images or no camera of them. Messages that are broken, and a file that is cut off, are
+    /// [faults](Self::faults).
+    pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, RecordingError> {
+        let mut found = Found::default();
+        for message in messages(file)? {
+            match message {
+                Ok(message) => found.take(&message),
+                Err(source) if found.images.is_empty() => {
+                    return Err(RecordingError::Format { file: file.to_owned(), source });
+                }
+                Err(source) => {
+                    found.faults.insert("its end".to_owned(), (source.to_string(), 1));
+                }
+            }
+        }
+        let fault =
+            |(topic, problem)| RecordingError::Topic { file: file.to_owned(), topic, problem };
+        let topics = Chosen::new(&found.images, topics).map_err(fault)?;
+        let of_frames = topics.first().cloned();
+        let Some(first) = of_frames else {
+            return Err(fault(("images".to_owned(), "there are none".to_owned())));
+        };
+        let camera = found.camera(&first).map_err(fault)?;
+        let camera = camera.ok_or_else(|| {
+            let expected = camera_topics(&first.name).collect::<Vec<_>>().join(" or ");
+            fault((first.name.clone(), format!("its camera is expected in {expected}")))
+        })?;
+        let own = topics.depth.as_ref().filter(|depth| depth.name != first.name);
+        let depth_camera = match own {
+            Some(depth) => found
+                .camera(depth)
+                .map_err(fault)?
+                .filter(|own| *own != camera || plain(&depth.frame_id) != plain(&first.frame_id)),
+            None => None,
+        };
+        let faults = found.faults.iter().map(|(topic, (problem, count))| {
+            let more =
+                if *count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
+            format!("{}: {topic}: {problem}{more}", file.display())
+        });
+        Ok(Self {
+            file: file.to_owned(),
+            camera,
+            depth_camera,
+            world: world.to_owned(),
+            count: found.counts.get(&first.name).copied().unwrap_or_default(),
+            faults: faults.collect(),
+            topics,
+            transforms: found.transforms,
+            joints: found.joints,
+            forces: found.forces,
+            gravity: found.gravity,
+            remaps: RemapCache::default(),
+            depth_remaps: RemapCache::default(),
+        })
+    }
+
+    /// What was wrong with messages, which were left out.
+    pub fn faults(&self) -> &[String] {
+        &self.faults
+    }
+
+    /// How many frames there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The frames, in the order of the file; with what is known of `hand`, if there is one.
+    ///
+    /// # Errors
+    /// If the file cannot be opened any more.
+    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, RecordingError> {
+        Frames::new(self, hand)
+    }
+
+    /// Name of the camera's frame.
+    pub fn camera_frame(&self) -> &str {
+        self.topics.first().map_or("", |topic| plain(&topic.frame_id))
+    }
+
+    /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.
+    pub(super) fn gravity(&self, at: i64) -> Option<Vector3<f64>> {
+        let mix = |a: &Vector3<f64>, b: &Vector3<f64>, part| a.lerp(b, part);
+        if let Some((frame, series)) = &self.gravity {
+            let told = series.at(at, HELD, mix)?;
+            return match plain(frame) == self.camera_frame() {
+                true => Some(told),
+                false => Some(self.transforms.between(self.camera_frame(), frame, at)? * told),
+            };
+        }
+        if !self.transforms.knows(&self.world) {
+            return None;
+        }
+        let t_cam_world = self.transforms.between(self.camera_frame(), &self.world, at)?;
+        Some(t_cam_world * Vector3::new(0.0, 0.0, -GRAVITY))
+    }
+
+    /// Coordinates of the frame `from` → those of the camera \[m\].
+    ///
+    /// # Errors
+    /// That nothing says so.
+    pub(super) fn in_camera(&self, from: &str, at: i64) -> Result<Isometry3<f64>, String> {
+        let camera = self.camera_frame();
+        let place = self.transforms.between(camera, from, at);
+        place.ok_or_else(|| format!("no transform says where {from:?} is in {camera:?} then"))
+    }
+
+    /// Where `hand` is at a moment, and what it feels.
+    ///
+    /// # Errors
+    /// What is not known.
+    pub(super) fn hand(&self, hand: &Hand, at: i64) -> Result<HandMeasurement, String> {
+        let root = &hand.tree.links()[0].name;
+        let t_cam_hand = self.in_camera(root, at)?;
+        let position = |name: &String| {
+            let series = self.joints.get(name)?;
+            let position = series.at(at, HELD, |a, b, part| a + (b - a) * part)?;
+            Some((name.clone(), position))
+        };
+        let known = hand.tree.joint_names().iter().filter_map(position);
+        let joints = hand.tree.joint_vector(&known.collect()).map_err(|e| e.to_string())?;
+        Ok(HandMeasurement::new(t_cam_hand, joints).with_forces(self.felt(&hand.taxels, at)))
+    }
+
+    /// The force on each taxel \[N\], none if nothing is known of any.
+    fn felt(&self, taxels: &[Taxel], at: i64) -> Vec<Vector3<f64>> {
+        let alone = |link: &str| taxels.iter().filter(|taxel| taxel.link == link).count() == 1;
+        let force = |taxel: &Taxel| {
+            let own = self.forces.get(&taxel_frame(taxel.index));
+            let series =
+                own.or_else(|| self.forces.get(&taxel.link).filter(|_| alone(&taxel.link)));
+            series.and_then(|series| series.nearest(at, FELT))
+        };
+        let felt: Vec<_> = taxels.iter().map(force).collect();
+        if felt.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        felt.into_iter().map(|force| force.unwrap_or(HandMeasurement::UNKNOWN_FORCE)).collect()
+    }
+}
+
+/// The frame of the wrench on taxel `index`.
+pub(super) fn taxel_frame(index: usize) -> String {
+    format!("taxel_{index}")
+}
+
+fn plain(name: &str) -> &str {
+    name.trim_start_matches('/')
+}
+
+/// The messages of `file`, in its order.
+pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
+    let opened = File::open(file);
+    let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
+    Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
+}
+
+impl Found {
+    /// Takes over what a message says.
+    fn take(&mut self, message: &mcap::Message<'_>) {
+        let topic = &message.channel.topic;
+        if topic.starts_with(OURS) {
+            return;
+        }
+        if let Err(problem) = self.read(topic, message) {
+            let (_, count) = self.faults.entry(topic.clone()).or_insert((problem, 0));
+            *count += 1;
+        }
+    }
+
+    fn read(&mut self, topic: &str, message: &mcap::Message<'_>) -> Result<(), String> {
+        let (kind, data) = (type_of(message), message.data.as_ref());
+        if message.channel.message_encoding != "cdr" {
+            return Ok(());
+        }
+        if kind == Image::TYPE || kind == CompressedImage::TYPE {
+            *self.counts.entry(topic.to_owned()).or_default() += 1;
+            if !self.images.contains_key(topic) {
+                let (header, content) = describe(kind, data)?;
+                self.images.insert(topic.to_owned(), (kind.to_owned(), header, content));
+            }
+        } else if kind == CameraInfo::TYPE {
+            if !self.cameras.contains_key(topic) {
+                self.cameras.insert(topic.to_owned(), decode(data)?);
+            }
+        } else if kind == JointState::TYPE {
+            let JointState { header, name, position, .. } = decode(data)?;
+            for (name, position) in name.into_iter().zip(position) {
+                let series = self.joints.entry(name).or_default();
+                series.push(header.stamp.nanoseconds(), position);
+            }
+        } else if kind == TransformMessage::TYPE {
+            let fixed = topic.ends_with("tf_static");
+            let TransformMessage { transforms } = decode(data)?;
+            transforms.iter().for_each(|transform| self.transforms.add(transform, fixed));
+        } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
+            let Vector3Stamped { header, vector } = decode(data)?;
+            let (_, series) =
+                self.gravity.get_or_insert_with(|| (header.frame_id, Series::default()));
+            series.push(header.stamp.nanoseconds(), vector.into());
+        } else if kind == WrenchStamped::TYPE {
+            let WrenchStamped { header, force, .. } = decode(data)?;
+            let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();
+            series.push(header.stamp.nanoseconds(), force.into());
+        }
+        Ok(())
+    }
+
+    /// The camera of the images of `topic`, if anything is said of it.
+    fn camera(&self, topic: &ImageTopic) -> Result<Option<Lensed>, (String, String)> {
+        let info = camera_topics(&topic.name).find_map(|name| self.cameras.get_key_value(&name));
+        let Some((name, info)) = info else { return Ok(None) };
+        let camera = Lensed::new(info, &topic.name);
+        camera.map(Some).map_err(|problem| (name.clone(), problem))
+    }
+}
+
+/// Name of the type of `message`, empty without one.
+pub(super) fn type_of<'a>(message: &'a mcap::Message<'_>) -> &'a str {
+    message.channel.schema.as_ref().map_or("", |schema| &schema.name)
+}

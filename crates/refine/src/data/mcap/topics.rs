@@ -1,0 +1,153 @@
+//! Which topics are read.
+
+use std::collections::BTreeMap;
+
+use super::images::Content;
+use super::messages::Header;
+
+/// Everything that this program writes besides what it has read is below it, and is not read again.
+pub(super) const OURS: &str = "/prehend/";
+
+/// Topics of images to be read; one without a name is the only one that can be meant.
+#[derive(Clone, Debug, Default)]
+pub struct ImageTopics {
+    /// Color.
+    pub color: Option<String>,
+    /// Depth.
+    pub depth: Option<String>,
+    /// What of the image is the object, where that is known; by itself a gray one whose name ends in `mask`.
+    pub mask: Option<String>,
+}
+
+/// A topic of images: what its first message says.
+#[derive(Clone, Debug)]
+pub(super) struct ImageTopic {
+    pub(super) name: String,
+    /// Type of the messages.
+    pub(super) kind: String,
+    pub(super) frame_id: String,
+}
+
+/// The topics of images that are read.
+#[derive(Clone, Debug)]
+pub(super) struct Chosen {
+    pub(super) color: Option<ImageTopic>,
+    pub(super) depth: Option<ImageTopic>,
+    pub(super) mask: Option<ImageTopic>,
+}
+
+/// Topics of images by name: type of the messages, and what the first one says.
+pub(super) type Known = BTreeMap<String, (String, Header, Content)>;
+
+impl Chosen {
+    /// Of the topics that a recording has, those that are `wanted`.
+    ///
+    /// # Errors
+    /// What is looked for, and why it is not found.
+    pub(super) fn new(known: &Known, wanted: &ImageTopics) -> Result<Self, (String, String)> {
+        let is_mask = |name: &str| name.ends_with("mask");
+        let among = |content: Content, masks: bool| {
+            let fits = move |(name, found): &(&String, &(String, Header, Content))| {
+                found.2 == content && is_mask(name) == masks && !name.starts_with(OURS)
+            };
+            known.iter().filter(fits).map(|(name, _)| name.as_str()).collect::<Vec<_>>()
+        };
+        let mut colors = among(Content::Color, false);
+        if colors.is_empty() {
+            colors = among(Content::Gray, false);
+        }
+        let pick = |what: &str, name: &Option<String>, candidates: &[&str]| {
+            let name = match (name.as_deref(), candidates) {
+                (Some(name), _) => name,
+                (None, []) => return Ok(None),
+                (None, [only]) => *only,
+                (None, several) => {
+                    let problem = format!("say which it is: {}", several.join(", "));
+                    return Err((format!("the topic of {what}"), problem));
+                }
+            };
+            let Some((kind, header, _)) = known.get(name) else {
+                let names: Vec<&str> = known.keys().map(String::as_str).collect();
+                let problem = format!("there are no images of this name, but {}", names.join(", "));
+                return Err((name.to_owned(), problem));
+            };
+            let (name, kind) = (name.to_owned(), kind.clone());
+            Ok(Some(ImageTopic { name, kind, frame_id: header.frame_id.clone() }))
+        };
+        let chosen = Self {
+            color: pick("color", &wanted.color, &colors)?,
+            depth: pick("depth", &wanted.depth, &among(Content::Depth, false))?,
+            mask: pick("masks", &wanted.mask, &among(Content::Gray, true))?,
+        };
+        if chosen.color.is_none() && chosen.depth.is_none() {
+            return Err(("images".to_owned(), "there are none".to_owned()));
+        }
+        Ok(chosen)
+    }
+
+    /// The topic whose messages are the frames: color, or depth without it.
+    pub(super) fn first(&self) -> Option<&ImageTopic> {
+        self.color.as_ref().or(self.depth.as_ref())
+    }
+}
+
+/// Topics that may have the camera of the images of `topic`, the likeliest first: `camera_info` beside them, or above what a transport has added.
+pub(super) fn camera_topics(topic: &str) -> impl Iterator<Item = String> {
+    let mut above = topic;
+    std::iter::from_fn(move || {
+        above = above.rsplit_once('/')?.0;
+        Some(format!("{above}/camera_info"))
+    })
+}
+
+/// Whether the images of `topic` were rectified (`image_rect`, `image_rect_color`).
+pub(super) fn is_rectified(topic: &str) -> bool {
+    topic.split('/').any(|part| part.starts_with("image_rect"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(topics: &[(&str, Content)]) -> Known {
+        let entry = |(name, content): &(&str, Content)| {
+            ((*name).to_owned(), ("kind".to_owned(), Header::default(), *content))
+        };
+        topics.iter().map(entry).collect()
+    }
+
+    #[test]
+    fn the_only_topics_are_taken_and_several_are_asked_about() {
+        use Content::{Color, Depth, Gray};
+        let some = known(&[
+            ("/a/color", Color),
+            ("/a/infra", Gray),
+            ("/a/mask", Gray),
+            ("/d", Depth),
+            ("/prehend/overlay", Color),
+        ]);
+        let name = |topic: &Option<ImageTopic>| topic.as_ref().map(|topic| topic.name.clone());
+        let chosen = Chosen::new(&some, &ImageTopics::default()).unwrap();
+        assert_eq!(name(&chosen.color).as_deref(), Some("/a/color"));
+        assert_eq!(name(&chosen.mask).as_deref(), Some("/a/mask"));
+        let two = known(&[("/d", Depth), ("/e", Depth)]);
+        let (what, problem) = Chosen::new(&two, &ImageTopics::default()).unwrap_err();
+        assert_eq!(
+            (what.as_str(), problem.as_str()),
+            ("the topic of depth", "say which it is: /d, /e")
+        );
+        let wanted = ImageTopics { depth: Some("/e".to_owned()), ..ImageTopics::default() };
+        let chosen = Chosen::new(&two, &wanted).unwrap();
+        assert_eq!(chosen.first().unwrap().name, "/e");
+        let wanted = ImageTopics { color: Some("/f".to_owned()), ..ImageTopics::default() };
+        assert_eq!(Chosen::new(&two, &wanted).unwrap_err().0, "/f");
+        assert!(Chosen::new(&Known::new(), &ImageTopics::default()).is_err());
+    }
+
+    #[test]
+    fn cameras_are_looked_for_beside_images_and_above() {
+        let topics: Vec<_> = camera_topics("/c/image_raw/compressed").collect();
+        assert_eq!(topics, ["/c/image_raw/camera_info", "/c/camera_info", "/camera_info"]);
+        assert!(is_rectified("/c/image_rect_color/compressed") && !is_rectified("/c/image_raw"));
+    }
+}
