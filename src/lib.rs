@@ -8,7 +8,12 @@
 //! - [`render`]: a rasterizer with closed-form pose derivatives;
 //! - `refine` (feature of that name, a default): refining the 6-DoF pose of an object held in a robot hand.
 //!
+//! The [guide](https://github.com/prehend/prehend/tree/main/docs/guide) is the module `guide`, where the feature `refine` is on.
+//!
 //! Other features: `gpu` renders on graphics devices, `faer` solves sparse linear systems. [`nalgebra`] is the version that all of them speak.
+
+#[cfg(feature = "refine")]
+pub mod guide;
 
 pub use nalgebra;
 pub use prehend_autodiff as autodiff;

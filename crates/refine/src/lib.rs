@@ -17,7 +17,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`symmetry`] | motions that map an object onto itself, all but its print too
+//! | [`symmetry`] | motions that map an object onto itself, all but its print too |
 //! | [`scene`] | what there is: observation, object, hand |
 //! | [`problem`] | state, factors, noise models, normal equations, solver |
 //! | [`factor`] | one kind of evidence a file |

@@ -145,6 +145,7 @@ impl NamedMethod {
 
     /// The fused estimator with less than all evidence, or with quantities believed that it would estimate: what each of them
     /// is worth.
+    #[cfg(any(feature = "cli", test))]
     pub(crate) fn ablations() -> &'static [Self] {
         &ABLATIONS
     }

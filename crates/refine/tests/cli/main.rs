@@ -11,6 +11,7 @@ mod fixture;
 mod fused;
 mod info;
 mod initial;
+mod log;
 mod messages;
 mod pages;
 mod resume;
