@@ -49,6 +49,16 @@ pub enum ImageError {
         /// Pixels given.
         found: usize,
     },
+    /// The file says that it has more pixels than are read.
+    #[error("{}: {width} x {height} pixels, at most {MOST_PIXELS} are read", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
     /// A depth scale is zero, negative or not finite.
     #[error("{}: depth scale {scale} m per unit, expected a finite number above zero", path.display())]
     Scale {
@@ -375,10 +385,18 @@ fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
     fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })
 }
 
+/// An image file may have so many pixels: 8192 x 8192. A few bytes can claim more than fits into memory.
+const MOST_PIXELS: u64 = 1 << 26;
+
 fn decode(bytes: &[u8], name: &Path) -> Result<DynamicImage, ImageError> {
     let io = |source| ImageError::Io { path: name.into(), source };
-    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(io)?;
-    reader.decode().map_err(|source| ImageError::Codec { path: name.into(), source })
+    let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(io);
+    let codec = |source| ImageError::Codec { path: name.into(), source };
+    let (width, height) = reader()?.into_dimensions().map_err(codec)?;
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        return Err(ImageError::TooLarge { path: name.into(), width, height });
+    }
+    reader()?.decode().map_err(codec)
 }
 
 /// Encodes in memory, to write the file atomically.
@@ -429,6 +447,17 @@ mod tests {
         let deep = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![0u16, 1]);
         deep.unwrap().save(&path).unwrap();
         assert_eq!(Mask::load(&path).unwrap().pixels(), [false, true]);
+    }
+
+    /// A PNG file of zeros takes a thousandth of its pixels.
+    #[test]
+    fn images_of_too_many_pixels_are_refused_by_their_headers() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("large.png");
+        image::GrayImage::new(12_000, 12_000).save(&path).unwrap();
+        for read in [RgbImage::load(&path).err(), Mask::load(&path).err()] {
+            assert!(matches!(read, Some(ImageError::TooLarge { width: 12_000, .. })), "{read:?}");
+        }
     }
 
     #[test]

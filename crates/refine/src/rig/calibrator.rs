@@ -282,8 +282,6 @@ impl Calibrator {
         // Objects have to do with the rig alone: each is eliminated by itself.
         let mut eliminated = BTreeMap::new();
         for (id, (of_object, pull)) in &sums.0 {
-            let share = views.share(*id);
-            let (of_object, pull) = &(of_object * share, pull * share);
             hessian += of_object.view((0, 0), (n, n));
             gradient += pull.rows(0, n);
             if let Some(field) = self.rig.objects.get(id) {
@@ -292,7 +290,11 @@ impl Calibrator {
                     Elimination::new(of_object, pull, coefficients).ok_or_else(not_finite)?;
                 hessian += &object.hessian;
                 gradient += &object.gradient;
-                eliminated.insert(*id, object.coefficients());
+                // What frames that are alike get wrong of a surface does not average out; what they say of the rig does.
+                let share = views.share(*id);
+                let (of_object, pull) = (of_object * share, pull * share);
+                let object = Elimination::new(&of_object, &pull, coefficients);
+                eliminated.insert(*id, object.ok_or_else(not_finite)?.coefficients());
             }
         }
         let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;

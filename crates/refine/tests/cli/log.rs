@@ -60,8 +60,16 @@ mod with_logs {
         assert!(said.code == 1 && said.err.contains("sound"), "{}", said.err);
         std::fs::write(place.path("log.mcap"), &log[..log.len() - 100]).unwrap();
         let said = place.prehend(&format!("{LOG} --out cut.csv"));
-        assert!(said.code == 2 && said.err.contains("log.mcap: its end: "), "{}", said.err);
+        assert!(
+            said.code == 2 && said.err.contains("log.mcap: the file is cut off"),
+            "{}",
+            said.err
+        );
         assert_eq!(place.poses("cut.csv").len(), 2);
+        for taken in ["log.mcap", "ds/init.csv", "t.csv"] {
+            let said = place.prehend(&format!("{LOG} --out t.csv --mcap-out {taken}"));
+            assert!(said.code == 1 && said.err.contains("--mcap-out"), "{}", said.err);
+        }
         std::fs::write(place.path("log.mcap"), &log[..100]).unwrap();
         let said = place.prehend(&format!("{LOG} --out none.csv --mcap-out none.mcap"));
         assert!(said.code == 1 && said.err.contains("log.mcap"), "{}", said.err);

@@ -128,3 +128,28 @@ fn what_is_missing_is_named() {
     let error = with_hand.observation.err().unwrap().to_string();
     assert!(error.contains("no transform says where") && error.contains("at 0.050 s"), "{error}");
 }
+
+#[test]
+fn an_image_that_is_broken_fails_its_frame_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("log.mcap");
+    let sequence = sequence(3);
+    let mut writer = RecordingWriter::create(&file).unwrap();
+    for (k, frame) in sequence.frames.iter().enumerate() {
+        let mut observation = frame.observation.clone();
+        if k == 1 {
+            // Its camera_info is that of the first.
+            observation.color = observation.color.downsampled(2);
+            observation.camera = observation.camera.scaled(0.5);
+            observation.depth = observation.depth.downsampled(2);
+            observation.mask = observation.mask.downsampled(2);
+        }
+        writer.sensed(STEP * (k as i64 + 1), &observation, None).unwrap();
+    }
+    writer.finish().unwrap();
+    let recording = Recording::open(&file, &ImageTopics::default(), "world").unwrap();
+    let read: Vec<_> = recording.frames(None).unwrap().collect();
+    assert_eq!(read.iter().map(|f| f.observation.is_ok()).collect::<Vec<_>>(), [true, false, true]);
+    let error = read[1].observation.as_ref().err().unwrap().to_string();
+    assert!(error.contains("at 0.100 s: 320x240 pixels, its camera_info is of 640x480"), "{error}");
+}

@@ -107,6 +107,9 @@ impl From<ImageError> for DatasetError {
             ImageError::Scale { path, scale } => {
                 Self::unusable(path, format!("{scale} m per depth unit: must be above zero"))
             }
+            ImageError::TooLarge { path, width, height } => {
+                Self::unusable(path, format!("{width} x {height} pixels are too many"))
+            }
             ImageError::Size { .. } => Self::unusable(Path::new(""), error.to_string()),
         }
     }

@@ -9,7 +9,7 @@ use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage}
 
 use super::error::RecordingError;
 use super::images::{self, describe};
-use super::recording::{Recording, messages, type_of};
+use super::recording::{Recording, messages, moment, type_of};
 use super::topics::ImageTopic;
 use crate::data::depth_camera::DepthCamera;
 use crate::scene::{Hand, Observation};
@@ -18,6 +18,8 @@ use crate::scene::{Hand, Observation};
 const TOGETHER: i64 = 20_000_000;
 /// Images of one topic that are kept until those of the others have come.
 const WAITING: usize = 8;
+/// Images of one topic that are kept at most, should those of the frames come late or end.
+const LONGEST: usize = 32;
 
 /// A moment of a recording.
 pub struct RecordedFrame {
@@ -103,9 +105,12 @@ impl<'a> Frames<'a> {
         if type_of(&message) != stream.topic.kind {
             return;
         }
-        if let Ok((header, _)) = describe(&stream.topic.kind, &message.data) {
-            let stamp = header.stamp.nanoseconds();
-            stream.waiting.push_back((stamp, message.data.into_owned()));
+        // One that cannot be read comes as it is: the frame says what is wrong.
+        let header = describe(&stream.topic.kind, &message.data).map(|(header, _)| header);
+        let at = moment(&header.unwrap_or_default(), &message);
+        stream.waiting.push_back((at, message.data.into_owned()));
+        if stream.waiting.len() > LONGEST {
+            stream.waiting.pop_front();
         }
     }
 
@@ -134,12 +139,12 @@ impl<'a> Frames<'a> {
         let size = size.or(alone.as_ref().map(|image| (image.width(), image.height())));
         let (width, height) = size.unwrap_or_default();
         let camera = Camera { width, height, ..recording.camera.camera };
-        let expected = (recording.camera.camera.width, recording.camera.camera.height);
-        if expected != (width, height) {
-            let (w, h) = expected;
+        let check_size = |stream: &Stream, width, height, camera: &Camera| {
+            let (w, h) = (camera.width, camera.height);
             let problem = format!("{width}x{height} pixels, its camera_info is of {w}x{h}");
-            return Err(of(&self.first, problem));
-        }
+            if (w, h) == (width, height) { Ok(()) } else { Err(of(stream, problem)) }
+        };
+        check_size(&self.first, width, height, &recording.camera.camera)?;
         let mut color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let (mut depth, registered) = match (alone, depth, &self.depth) {
             (Some(depth), ..) => (depth, true),
@@ -148,6 +153,7 @@ impl<'a> Frames<'a> {
                 match &recording.depth_camera {
                     None => (depth, true),
                     Some(own) => {
+                        check_size(stream, depth.width(), depth.height(), &own.camera)?;
                         let place = recording.in_camera(&stream.topic.frame_id, at);
                         let place = place.map_err(|e| of(stream, e))?;
                         let own = DepthCamera::beside(own.camera, own.lens, place);

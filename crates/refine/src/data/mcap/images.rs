@@ -111,7 +111,10 @@ pub(super) fn mask(kind: &str, data: &[u8]) -> Result<Mask, String> {
 /// Rows of the pixels of `image`, each of so many bytes.
 fn rows<'a>(image: &Image<'a>, bytes: usize) -> Result<impl Iterator<Item = &'a [u8]>, String> {
     let (width, step) = (image.width as usize * bytes, image.step as usize);
-    let needed = (image.height as usize).checked_sub(1).map(|rows| rows * step + width);
+    let needed = (image.height as usize).checked_sub(1).map(|rows| {
+        // Of sizes that need not be true.
+        rows.saturating_mul(step).saturating_add(width)
+    });
     if width == 0 || step < width || needed.is_none_or(|needed| image.data.len() < needed) {
         return Err(format!(
             "{} bytes in rows of {step} are no {}x{} pixels encoded as {:?}",

@@ -328,3 +328,26 @@ pub(super) fn decode<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T, St
     };
     read.map(|(message, _)| message).map_err(|e| e.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_read_in_both_orders_of_bytes() {
+        let stamp = Time::from_nanoseconds(-1_500_000_000);
+        assert_eq!(stamp.nanoseconds(), -1_500_000_000);
+        let header = Header { stamp, frame_id: "tip".to_owned() };
+        let vector = Vector3 { x: 1.0, y: -2.0, z: 3.5 };
+        let message = Vector3Stamped { header, vector };
+        assert_eq!(decode::<Vector3Stamped>(&encode(&message).unwrap()).unwrap(), message);
+        let big = re_cdr::to_vec::<_, BigEndian>(&message).unwrap();
+        let big = [&[0, 0, 0, 0], big.as_slice()].concat();
+        assert_eq!(decode::<Vector3Stamped>(&big).unwrap(), message);
+        for end in 0..big.len() {
+            assert!(decode::<Vector3Stamped>(&big[..end]).is_err(), "{end}");
+        }
+        let other = [&[0, 7, 0, 0], &big[4..]].concat();
+        assert!(decode::<Vector3Stamped>(&other).unwrap_err().contains("[0, 7]"));
+    }
+}

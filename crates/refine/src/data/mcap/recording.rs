@@ -6,6 +6,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
 
@@ -14,14 +15,14 @@ use super::error::RecordingError;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
-    CameraInfo, CompressedImage, Image, JointState, Named, TransformMessage, Vector3Stamped,
-    WrenchStamped, decode,
+    CameraInfo, CompressedImage, Header, Image, JointState, Named, TransformMessage,
+    Vector3Stamped, WrenchStamped, decode,
 };
 use super::series::Series;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
-use super::transforms::Transforms;
+use super::transforms::{Transforms, plain};
 use crate::data::bop::RemapCache;
-use crate::scene::{Hand, HandMeasurement};
+use crate::scene::{Hand, HandMeasurement, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
 ///
@@ -45,8 +46,6 @@ pub struct Recording {
     pub(super) depth_remaps: RemapCache,
 }
 
-/// Joints are where they were last said to be for so long \[ns\].
-const HELD: i64 = 100_000_000;
 /// Forces belong to an image if they are not farther from it than this \[ns\].
 const FELT: i64 = 50_000_000;
 /// Acceleration of free fall \[m/s²\].
@@ -82,7 +81,8 @@ impl Recording {
                     return Err(RecordingError::Format { file: file.to_owned(), source });
                 }
                 Err(source) => {
-                    found.faults.insert("its end".to_owned(), (source.to_string(), 1));
+                    let problem = format!("it cannot be read any further: {source}");
+                    found.faults.insert("the file is cut off or broken".to_owned(), (problem, 1));
                 }
             }
         }
@@ -153,9 +153,8 @@ impl Recording {
 
     /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.
     pub(super) fn gravity(&self, at: i64) -> Option<Vector3<f64>> {
-        let mix = |a: &Vector3<f64>, b: &Vector3<f64>, part| a.lerp(b, part);
         if let Some((frame, series)) = &self.gravity {
-            let told = series.at(at, HELD, mix)?;
+            let told = series.nearest(at, i64::MAX)?;
             return match plain(frame) == self.camera_frame() {
                 true => Some(told),
                 false => Some(self.transforms.between(self.camera_frame(), frame, at)? * told),
@@ -187,7 +186,7 @@ impl Recording {
         let t_cam_hand = self.in_camera(root, at)?;
         let position = |name: &String| {
             let series = self.joints.get(name)?;
-            let position = series.at(at, HELD, |a, b, part| a + (b - a) * part)?;
+            let position = series.at(at, |a, b, part| a + (b - a) * part)?;
             Some((name.clone(), position))
         };
         let known = hand.tree.joint_names().iter().filter_map(position);
@@ -217,15 +216,25 @@ pub(super) fn taxel_frame(index: usize) -> String {
     format!("taxel_{index}")
 }
 
-fn plain(name: &str) -> &str {
-    name.trim_start_matches('/')
+/// The longest record, compressed or not \[bytes\]: a broken length must not take all memory.
+const LONGEST: usize = 1 << 29;
+
+/// When a message was made \[ns\]; when it was recorded, if it does not say so.
+pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
+    match header.stamp.nanoseconds() {
+        0 => i64::try_from(message.log_time).unwrap_or(i64::MAX),
+        stamp => stamp,
+    }
 }
 
 /// The messages of `file`, in its order.
 pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
     let opened = File::open(file);
     let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
-    Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
+    let options = LinearReaderOptions::default()
+        .with_record_length_limit(LONGEST)
+        .with_validate_chunk_crcs(true);
+    Ok(MessageReader::new_with_options(BufReader::with_capacity(1 << 20, opened), options))
 }
 
 impl Found {
@@ -260,21 +269,28 @@ impl Found {
             let JointState { header, name, position, .. } = decode(data)?;
             for (name, position) in name.into_iter().zip(position) {
                 let series = self.joints.entry(name).or_default();
-                series.push(header.stamp.nanoseconds(), position);
+                series.push(moment(&header, message), position);
             }
         } else if kind == TransformMessage::TYPE {
             let fixed = topic.ends_with("tf_static");
             let TransformMessage { transforms } = decode(data)?;
-            transforms.iter().for_each(|transform| self.transforms.add(transform, fixed));
+            for transform in &transforms {
+                self.transforms.add(transform, moment(&transform.header, message), fixed)?;
+            }
         } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
             let Vector3Stamped { header, vector } = decode(data)?;
-            let (_, series) =
-                self.gravity.get_or_insert_with(|| (header.frame_id, Series::default()));
-            series.push(header.stamp.nanoseconds(), vector.into());
+            let (at, vector) = (moment(&header, message), Vector3::from(vector));
+            check_gravity(&vector).map_err(|e| e.to_string())?;
+            let first = || (header.frame_id.clone(), Series::default());
+            let (frame, series) = self.gravity.get_or_insert_with(first);
+            if *frame == header.frame_id {
+                series.push(at, vector);
+            }
         } else if kind == WrenchStamped::TYPE {
             let WrenchStamped { header, force, .. } = decode(data)?;
+            let at = moment(&header, message);
             let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();
-            series.push(header.stamp.nanoseconds(), force.into());
+            series.push(at, force.into());
         }
         Ok(())
     }

@@ -4,6 +4,9 @@
 #[derive(Clone, Debug)]
 pub(super) struct Series<T>(Vec<(i64, T)>);
 
+/// A value counts for so long before and after its moment \[ns\].
+const HELD: i64 = 100_000_000;
+
 impl<T> Default for Series<T> {
     fn default() -> Self {
         Self(Vec::new())
@@ -21,29 +24,27 @@ impl<T: Copy> Series<T> {
         }
     }
 
-    /// The value at the moment `at`: in between by `mix`, which is given how far from the first to the second it is; before the first
-    /// and after the last that of these, for as long as `slack` \[ns\].
-    pub(super) fn at(&self, at: i64, slack: i64, mix: impl Fn(&T, &T, f64) -> T) -> Option<T> {
+    /// The value at the moment `at`: between two that are near by `mix`, which is given how far from the first to the second it is, else the
+    /// nearest one, as long as that counts.
+    pub(super) fn at(&self, at: i64, mix: impl Fn(&T, &T, f64) -> T) -> Option<T> {
         let place = self.0.partition_point(|(known, _)| *known <= at);
         let before = place.checked_sub(1).and_then(|k| self.0.get(k));
         match (before, self.0.get(place)) {
             (Some((known, value)), _) if *known == at => Some(*value),
-            (Some((from, first)), Some((to, second))) => {
+            (Some((from, first)), Some((to, second))) if to.saturating_sub(*from) <= 2 * HELD => {
                 Some(mix(first, second, (at - from) as f64 / (to - from) as f64))
             }
-            (Some((known, value)), None) | (None, Some((known, value))) => {
-                ((known - at).abs() <= slack).then_some(*value)
-            }
-            (None, None) => None,
+            _ => self.nearest(at, HELD),
         }
     }
 
-    /// The value nearest to the moment `at`, if it is not farther than `slack` \[ns\].
-    pub(super) fn nearest(&self, at: i64, slack: i64) -> Option<T> {
+    /// The value nearest to the moment `at`, if it is not farther than `most` \[ns\].
+    pub(super) fn nearest(&self, at: i64, most: i64) -> Option<T> {
         let place = self.0.partition_point(|(known, _)| *known <= at);
         let around = &self.0[place.saturating_sub(1)..(place + 1).min(self.0.len())];
-        let nearest = around.iter().min_by_key(|(known, _)| (known - at).abs());
-        nearest.filter(|(known, _)| (known - at).abs() <= slack).map(|(_, value)| *value)
+        let distance = |known: i64| known.saturating_sub(at).saturating_abs();
+        let nearest = around.iter().min_by_key(|(known, _)| distance(*known));
+        nearest.filter(|(known, _)| distance(*known) <= most).map(|(_, value)| *value)
     }
 }
 
@@ -54,15 +55,16 @@ mod tests {
     #[test]
     fn values_are_mixed_between_moments_and_held_for_a_while_beyond() {
         let mut series = Series::default();
-        for (at, value) in [(20, 2.0), (10, 1.0), (30, 7.0), (30, 3.0)] {
-            series.push(at, value);
+        let ms = 1_000_000;
+        for (at, value) in [(20, 2.0), (10, 1.0), (430, 7.0), (430, 3.0)] {
+            series.push(at * ms, value);
         }
-        let at = |at| series.at(at, 5, |a, b, part| a + (b - a) * part);
-        assert_eq!(
-            [4, 6, 10, 15, 30, 35, 36].map(at),
-            [None, Some(1.0), Some(1.0), Some(1.5), Some(3.0), Some(3.0), None]
-        );
-        assert_eq!([14, 26, 40].map(|at| series.nearest(at, 5)), [Some(1.0), Some(3.0), None]);
+        let at = |at| series.at(at * ms, |a, b, part| a + (b - a) * part);
+        assert_eq!([-91, -89, 10, 15].map(at), [None, Some(1.0), Some(1.0), Some(1.5)]);
+        // Nothing is known in a gap.
+        assert_eq!([119, 121, 331, 531].map(at), [Some(2.0), None, Some(3.0), None]);
+        assert_eq!([14, 26].map(|at| series.nearest(at * ms, 7 * ms)), [Some(1.0), Some(2.0)]);
+        assert_eq!(series.nearest(i64::MIN, i64::MAX), Some(1.0));
         assert_eq!(Series::<f64>::default().nearest(0, i64::MAX), None);
     }
 }

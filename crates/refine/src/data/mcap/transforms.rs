@@ -1,7 +1,6 @@
 //! Where frames are in one another (ROS's `tf`).
 
 use std::collections::HashMap;
-use std::iter;
 
 use nalgebra::Isometry3;
 
@@ -11,80 +10,106 @@ use super::series::Series;
 /// All frames, each in its parent.
 #[derive(Debug, Default)]
 pub(super) struct Transforms {
-    frames: HashMap<String, Place>,
+    /// Numbers of frames by name.
+    numbers: HashMap<String, usize>,
+    /// By number.
+    frames: Vec<Motion>,
 }
 
-#[derive(Debug)]
+/// A frame in its parent, which may be another one later.
+#[derive(Debug, Default)]
+struct Motion {
+    fixed: Option<Place>,
+    moving: Series<Place>,
+}
+
+#[derive(Clone, Copy, Debug)]
 struct Place {
-    parent: String,
-    /// Its coordinates → those of the parent \[m\].
-    poses: Poses,
+    parent: usize,
+    /// The frame's coordinates → those of the parent \[m\].
+    pose: Isometry3<f64>,
 }
-
-#[derive(Debug)]
-enum Poses {
-    Fixed(Isometry3<f64>),
-    Moving(Series<Isometry3<f64>>),
-}
-
-/// A frame is where it was last said to be for so long \[ns\].
-const HELD: i64 = 100_000_000;
 
 /// ROS 1 let names begin with a slash.
-fn plain(name: &str) -> &str {
+pub(super) fn plain(name: &str) -> &str {
     name.trim_start_matches('/')
 }
 
 impl Transforms {
-    /// Takes over where a frame is, once and for all if it is `fixed`. What is no pose is left out.
-    pub(super) fn add(&mut self, message: &TransformStamped, fixed: bool) {
-        let Some(pose) = message.transform.isometry() else { return };
+    /// Takes over where a frame is at the moment `at` \[ns\], or once and for all if it is `fixed`.
+    ///
+    /// # Errors
+    /// That the numbers are no pose.
+    pub(super) fn add(
+        &mut self,
+        message: &TransformStamped,
+        at: i64,
+        fixed: bool,
+    ) -> Result<(), String> {
         let (child, parent) = (plain(&message.child_frame_id), plain(&message.header.frame_id));
-        let place = self.frames.entry(child.to_owned()).or_insert_with(|| Place {
-            parent: parent.to_owned(),
-            poses: Poses::Moving(Series::default()),
-        });
-        parent.clone_into(&mut place.parent);
-        match &mut place.poses {
-            _ if fixed => place.poses = Poses::Fixed(pose),
-            Poses::Moving(series) => series.push(message.header.stamp.nanoseconds(), pose),
-            Poses::Fixed(known) => *known = pose,
+        let pose = message.transform.isometry().ok_or_else(|| {
+            format!("{child:?} in {parent:?}: not finite, or the quaternion is not of length 1")
+        })?;
+        let place = Place { parent: self.number(parent), pose };
+        let child = self.number(child);
+        let motion = &mut self.frames[child];
+        match fixed {
+            true => motion.fixed = Some(place),
+            false => motion.moving.push(at, place),
         }
+        Ok(())
+    }
+
+    fn number(&mut self, name: &str) -> usize {
+        if let Some(known) = self.numbers.get(name) {
+            return *known;
+        }
+        let number = self.frames.len();
+        self.numbers.insert(name.to_owned(), number);
+        self.frames.push(Motion::default());
+        number
     }
 
     /// Whether anything is said of the frame `name`.
     pub(super) fn knows(&self, name: &str) -> bool {
-        let name = plain(name);
-        self.frames.contains_key(name) || self.frames.values().any(|place| place.parent == name)
+        self.numbers.contains_key(plain(name))
     }
 
     /// Coordinates of `from` → those of `to` \[m\] at the moment `at` \[ns\]; none if the two are not connected then.
     pub(super) fn between(&self, to: &str, from: &str, at: i64) -> Option<Isometry3<f64>> {
         let (to, from) = (plain(to), plain(from));
-        let above: Vec<&str> = self.ancestors(to).collect();
-        let meeting = self.ancestors(from).find(|name| above.contains(name))?;
-        let (t_meeting_to, t_meeting_from) =
-            (self.up(to, meeting, at)?, self.up(from, meeting, at)?);
-        Some(t_meeting_to.inverse() * t_meeting_from)
-    }
-
-    /// The frame, its parent, the parent's parent …; a circle ends.
-    fn ancestors<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a str> {
-        let parent = |name: &&'a str| Some(self.frames.get(*name)?.parent.as_str());
-        iter::successors(Some(name), parent).take(self.frames.len() + 1)
-    }
-
-    /// Coordinates of `name` → those of `ancestor` \[m\].
-    fn up(&self, name: &str, ancestor: &str, at: i64) -> Option<Isometry3<f64>> {
-        let mut pose = Isometry3::identity();
-        for name in self.ancestors(name).take_while(|name| *name != ancestor) {
-            let in_parent = match &self.frames.get(name)?.poses {
-                Poses::Fixed(pose) => *pose,
-                Poses::Moving(series) => series.at(at, HELD, |a, b, part| a.lerp_slerp(b, part))?,
-            };
-            pose = in_parent * pose;
+        if to == from {
+            return Some(Isometry3::identity());
         }
-        Some(pose)
+        let number = |name: &str| self.numbers.get(name).copied();
+        let above = self.chain(number(to)?, at);
+        self.chain(number(from)?, at).into_iter().find_map(|(meeting, t_meeting_from)| {
+            let (_, t_meeting_to) = above.iter().find(|(other, _)| *other == meeting)?;
+            Some(t_meeting_to.inverse() * t_meeting_from)
+        })
+    }
+
+    /// The frame, its parent, the parent's parent … at the moment `at`, each with the frame's coordinates → its own. In a circle, which no
+    /// robot has, each is there once.
+    fn chain(&self, frame: usize, at: i64) -> Vec<(usize, Isometry3<f64>)> {
+        let mut chain = vec![(frame, Isometry3::identity())];
+        while chain.len() <= self.frames.len() {
+            let Some((last, pose)) = chain.last() else { break };
+            let Some(place) = self.frames[*last].at(at) else { break };
+            chain.push((place.parent, place.pose * pose));
+        }
+        chain
+    }
+}
+
+impl Motion {
+    fn at(&self, at: i64) -> Option<Place> {
+        self.fixed.or_else(|| {
+            self.moving.at(at, |a, b, part| match a.parent == b.parent {
+                true => Place { parent: a.parent, pose: a.pose.lerp_slerp(&b.pose, part) },
+                false => *if part < 0.5 { a } else { b },
+            })
+        })
     }
 }
 
@@ -95,9 +120,9 @@ mod tests {
     use super::*;
     use crate::data::mcap::messages::{Header, Time};
 
-    fn placed(parent: &str, child: &str, at: i64, pose: &Isometry3<f64>) -> TransformStamped {
+    fn placed(parent: &str, child: &str, pose: &Isometry3<f64>) -> TransformStamped {
         TransformStamped {
-            header: Header { stamp: Time::from_nanoseconds(at), frame_id: parent.to_owned() },
+            header: Header { stamp: Time::default(), frame_id: parent.to_owned() },
             child_frame_id: child.to_owned(),
             transform: pose.into(),
         }
@@ -109,21 +134,30 @@ mod tests {
         let camera = Isometry3::new(Vector3::new(0.0, 0.0, 1.0), Vector3::x());
         let arm = Isometry3::new(Vector3::new(0.5, 0.0, 0.0), Vector3::z() * 0.3);
         let hand = [0.0, 0.1].map(|x| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::y() * x));
-        all.add(&placed("world", "camera", 0, &camera), true);
-        all.add(&placed("/world", "arm", 0, &arm), true);
+        all.add(&placed("world", "camera", &camera), 0, true).unwrap();
+        all.add(&placed("/world", "arm", &arm), 0, true).unwrap();
         for (at, hand) in [(0, &hand[0]), (100, &hand[1])] {
-            all.add(&placed("arm", "hand", at, hand), false);
+            all.add(&placed("arm", "hand", hand), at, false).unwrap();
         }
         let middle = hand[0].lerp_slerp(&hand[1], 0.5);
+        let near = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+            (a.to_homogeneous() - b.to_homogeneous()).norm() < 1e-12
+        };
         let found = all.between("camera", "hand", 50).unwrap();
-        let expected = camera.inverse() * arm * middle;
-        assert!((found.to_homogeneous() - expected.to_homogeneous()).norm() < 1e-12);
+        assert!(near(&found, &(camera.inverse() * arm * middle)));
         assert_eq!(all.between("camera", "camera", 7), Some(Isometry3::identity()));
         assert!(all.knows("world") && !all.knows("moon"));
         assert_eq!(all.between("camera", "moon", 0), None);
-        // Nothing is known of where the hand is a second later, and in a circle of where anything is.
+        // Nothing is known of where the hand is a second later.
         assert_eq!(all.between("camera", "hand", 1_000_000_000), None);
-        all.add(&placed("hand", "world", 0, &arm), true);
+        // The hand is handed over: it is where it was before, and in another frame from then on.
+        all.add(&placed("world", "hand", &arm), 200, false).unwrap();
+        assert!(near(&all.between("arm", "hand", 0).unwrap(), &hand[0]));
+        assert!(near(&all.between("world", "hand", 200).unwrap(), &arm));
+        // A circle ends.
+        all.add(&placed("hand", "world", &arm), 0, true).unwrap();
         assert_eq!(all.between("camera", "moon", 0), None);
+        let nothing = Isometry3::translation(f64::NAN, 0.0, 0.0);
+        assert!(all.add(&placed("world", "x", &nothing), 0, false).unwrap_err().contains("\"x\""));
     }
 }

@@ -25,10 +25,10 @@ use crate::scene::{Hand, HandMeasurement, Observation};
 use crate::strategy::Posterior;
 use crate::tracker::{TrackStatus, Tracked};
 
-/// Names of frames.
-const CAMERA: &str = "camera";
-const WORLD: &str = "world";
-const OBJECT: &str = "object";
+/// Names of frames: none that a robot's links have.
+const CAMERA: &str = "prehend_camera";
+const WORLD: &str = "prehend_world";
+const OBJECT: &str = "prehend_object";
 
 /// JPEG quality of pictures with outlines.
 const QUALITY: u8 = 85;
@@ -51,6 +51,9 @@ impl RecordingWriter {
     pub fn create(file: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { file: file.to_owned(), source };
         let name = file.file_name().ok_or_else(|| io(io::ErrorKind::InvalidInput.into()))?;
+        if file.exists() && !file.is_file() {
+            return Err(io(io::Error::other("is there, and no regular file")));
+        }
         let mut hidden = OsString::from(".");
         hidden.push(name);
         hidden.push(format!(".{}.tmp", process::id()));
@@ -149,7 +152,7 @@ impl RecordingWriter {
         let corners = mesh.faces.iter().flat_map(|face| (0..3).map(move |k| corner(face, k)));
         let marker = Marker {
             header: header(at, OBJECT),
-            ns: OBJECT.to_owned(),
+            ns: "object".to_owned(),
             id: 0,
             kind: Marker::TRIANGLES,
             action: 0,

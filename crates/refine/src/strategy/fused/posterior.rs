@@ -153,10 +153,7 @@ impl Posterior {
 
     /// The same of a left twist about `point` (camera frame) \[m\] instead of the center.
     pub fn covariance_at(&self, point: &Point3<f64>) -> Matrix6<f64> {
-        let mut moves = Matrix6::identity();
-        // The point is displaced by t + ω × (point − center).
-        let arm = (point.coords - self.center).cross_matrix();
-        moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm);
+        let moves = about(&(point.coords - self.center));
         moves * self.covariance() * moves.transpose()
     }
 
@@ -207,6 +204,13 @@ impl Posterior {
         let factor = self.covariance().cholesky();
         factor.map_or(f64::INFINITY, |factor| twist.dot(&factor.solve(&twist)).max(0.0).sqrt())
     }
+}
+
+/// What takes a left twist about a center to that about a point which is `arm` away from it \[m\]: the point is displaced by t + ω × arm.
+fn about(arm: &Vector3<f64>) -> Matrix6<f64> {
+    let mut moves = Matrix6::identity();
+    moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
+    moves
 }
 
 /// Laplace's approximation of the mode at `point`: covariance of the object's pose with all else integrated out, and the logarithm of its mass, which
@@ -288,4 +292,20 @@ fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
     };
     let parts: Vec<&Contribution> = point.prior.iter().chain(&point.factors).collect();
     parts.into_par_iter().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_twist_about_another_point_is_the_same_motion() {
+        let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.5), Vector3::new(0.3, 1.0, -0.4));
+        let (center, point) = (Vector3::new(0.12, -0.1, 0.55), Vector3::new(0.1, -0.2, 0.5));
+        let twist = Vector6::new(2.0, -1.0, 3.0, 0.5, -0.7, 1.1) * 1e-6;
+        let elsewhere = about(&(point - center)) * twist;
+        let [a, b] = [(center, twist), (point, elsewhere)]
+            .map(|(center, twist)| perturb_about(&pose, &center, &twist));
+        assert!((a.to_homogeneous() - b.to_homogeneous()).norm() < 1e-11);
+    }
 }

@@ -10,6 +10,8 @@ use serde_json::json;
 /// A frame that is done, without what nobody asks for afterwards: there may be many.
 pub(super) struct Done {
     pub(super) row: ResultRow,
+    /// By the clock of a log \[ns\], if it is of one.
+    pub(super) stamp: Option<i64>,
     pub(super) status: TrackStatus,
     pub(super) rejection: Option<Rejection>,
     pub(super) iterations: usize,
@@ -46,12 +48,13 @@ pub(super) fn told(frames: &[Done]) -> String {
 
 /// A frame as JSON.
 pub(super) fn summary(frame: &Done) -> serde_json::Value {
-    let Done { row, status, rejection, iterations, cost, timing } = frame;
+    let Done { row, stamp, status, rejection, iterations, cost, timing } = frame;
     let pose = PlainPose::from(&row.t_cam_model);
     let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
     json!({
         "scene_id": row.scene_id,
         "im_id": row.im_id,
+        "stamp_ns": stamp,
         "obj_id": row.obj_id,
         "following": status.name(),
         "doubt": rejection.map(|d| d.to_string()),

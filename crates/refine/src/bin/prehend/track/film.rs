@@ -11,6 +11,8 @@ pub(super) struct Moment {
     pub(super) target: Target,
     /// Since the first one.
     pub(super) time: Duration,
+    /// By the clock of a log \[ns\], if it is of one.
+    pub(super) stamp: Option<i64>,
     pub(super) input: anyhow::Result<FrameInput>,
 }
 
@@ -38,6 +40,6 @@ impl Film for SceneFilm<'_, '_> {
         let seconds = f64::from(im_id - start.im_id) / *rate;
         let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         let input = assets.load(&target, &[]).map_err(anyhow::Error::from);
-        Some(Moment { target, time, input })
+        Some(Moment { target, time, stamp: None, input })
     }
 }

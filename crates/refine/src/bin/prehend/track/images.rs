@@ -35,6 +35,18 @@ impl Images {
     }
 }
 
+/// Is set when Ctrl-C is pressed; pressed again, it ends the process.
+pub(super) fn stop_on_ctrl_c() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let pressed = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if pressed.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?;
+    Ok(stop)
+}
+
 /// A scene into which another process writes images.
 pub(super) struct Watch {
     scene_id: u32,
@@ -56,13 +68,7 @@ pub(super) struct Watch {
 impl Watch {
     /// From the image `first` on, until none comes for `idle` or Ctrl-C is pressed; pressed again, it ends the process.
     pub(super) fn new(scene_id: u32, first: u32, idle: Duration) -> anyhow::Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let pressed = Arc::clone(&stop);
-        ctrlc::set_handler(move || {
-            if pressed.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        })?;
+        let stop = stop_on_ctrl_c()?;
         let (stamps, listed) = (None, Vec::new());
         Ok(Self { scene_id, next: first, idle, over: false, stop, stamps, listed, arrived: 0 })
     }

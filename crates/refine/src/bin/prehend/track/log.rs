@@ -20,7 +20,7 @@ use super::film::{Film, Moment};
 use super::strip::{LINE, color_of};
 use crate::terminal::cache;
 
-/// Logs begin so late, since `tf` takes the moment zero for any moment.
+/// Logs of datasets begin so late, since `tf` takes the moment zero for any moment.
 const START: Duration = Duration::from_secs(1);
 
 /// A recording, with what is tracked in it.
@@ -111,7 +111,9 @@ impl Film for LogFilm<'_> {
             let (object, hand) = (Arc::clone(&self.log.object), self.log.hand.clone());
             Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
         };
-        Some(Moment { target, time, input: input() })
+        let stamp = Some(frame.nanoseconds);
+        let input = input();
+        Some(Moment { target, time, stamp, input })
     }
 }
 
@@ -127,15 +129,18 @@ impl LogWriter {
         Ok(Self { writer: RecordingWriter::create(file)?, model: None })
     }
 
-    /// A frame and what was found in it.
+    /// A frame and what was found in it, `time` after the first, or at the moment `stamp` \[ns\].
     pub(super) fn add(
         &mut self,
-        time: Duration,
+        (time, stamp): (Duration, Option<i64>),
         (object, hand): (&Object, Option<&Hand>),
         observation: &Observation,
         tracked: &Tracked,
     ) -> anyhow::Result<()> {
-        let at = i64::try_from((START + time).as_nanos())?;
+        let at = match stamp {
+            Some(stamp) => stamp,
+            None => i64::try_from((START + time).as_nanos())?,
+        };
         self.writer.sensed(at, observation, hand)?;
         let model = match &self.model {
             Some(model) => model,

@@ -12,6 +12,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
@@ -22,6 +23,7 @@ use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
     Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
 };
+use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object};
@@ -32,7 +34,7 @@ use serde_json::json;
 
 use self::done::{Done, summary, told};
 use self::film::{Film, Moment, SceneFilm};
-use self::images::{Images, Watch, select_scene};
+use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
 use self::log::{Log, LogWriter};
 use crate::options::{Rendering, Selection, Unit, limit_threads, open_rig, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
@@ -162,6 +164,8 @@ struct Following {
     settings: TrackerSettings,
     backend: Arc<dyn Backend>,
     rig: Option<Arc<Rig>>,
+    /// Whether to end before the film does, so that what is recorded is kept.
+    stop: Option<Arc<AtomicBool>>,
 }
 
 impl Following {
@@ -180,6 +184,15 @@ impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
         let outputs = [Some(&self.out), self.strip.as_ref(), self.log.mcap_out.as_ref()];
         outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
+        let log = &self.log;
+        if let Some(written) = log.mcap_out.as_deref().map(canonical)
+            && [Some(&self.out), self.strip.as_ref(), log.mcap.as_ref(), self.poses.as_ref()]
+                .into_iter()
+                .flatten()
+                .any(|other| canonical(other) == written)
+        {
+            bail!("--mcap-out {written}: is another of the files, too");
+        }
         let mut selection = self.selection.take();
         let watched = self.watch.as_ref().zip(selection.as_mut());
         let watched = watched.map(|(folder, selection)| select_scene(selection, folder));
@@ -196,7 +209,9 @@ impl Track {
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let rig = open_rig(self.rig.as_deref())?;
-        let following = Following { settings, backend, rig };
+        // A scene that is watched ends by itself.
+        let stop = (log.mcap_out.is_some() && watched.is_none()).then(stop_on_ctrl_c);
+        let following = Following { settings, backend, rig, stop: stop.transpose()? };
         let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
         let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log };
@@ -214,7 +229,10 @@ impl Track {
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
         }
-        log.filter(|_| !frames.is_empty()).map(LogWriter::finish).transpose()?;
+        let log = log.filter(|_| !frames.is_empty());
+        if let Some(Err(error)) = log.map(LogWriter::finish) {
+            failures.push(format!("--mcap-out: {error:#}"));
+        }
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
             let document = json!({ "frames": frames, "failures": failures });
@@ -368,8 +386,11 @@ impl Track {
     ) -> anyhow::Result<()> {
         // With the hand, and what else there is, of the first image.
         let mut tracker: Option<(Tracker, Option<Arc<Hand>>)> = None;
-        while let Some(Moment { target, time, input }) = film.next() {
-            let log = &mut outcome.log;
+        let stopped = || following.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        while !stopped()
+            && let Some(Moment { target, time, stamp, input }) = film.next()
+        {
+            let Outcome { log, failures, .. } = outcome;
             let frame = || -> anyhow::Result<Tracked> {
                 let FrameInput { observation, hand, .. } = input?;
                 let tracker = match &mut tracker {
@@ -383,9 +404,14 @@ impl Track {
                         &mut none.insert((new, hand.clone())).0
                     }
                 };
-                let Some(log) = log else { return Ok(tracker.push(observation, time)?) };
+                let Some(writer) = log else { return Ok(tracker.push(observation, time)?) };
                 let tracked = tracker.track(&observation, time)?;
-                log.add(time, (object, hand.as_deref()), &observation, &tracked)?;
+                let seen = (&**object, hand.as_deref());
+                if let Err(error) = writer.add((time, stamp), seen, &observation, &tracked) {
+                    // Of a log with a gap nobody would know.
+                    failures.push(format!("--mcap-out: {error:#}; it was given up"));
+                    *log = None;
+                }
                 Ok(tracked)
             };
             match frame() {
@@ -403,7 +429,15 @@ impl Track {
                         rows.add(&row)?;
                     }
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
-                    outcome.frames.push(Done { row, status, rejection, iterations, cost, timing });
+                    outcome.frames.push(Done {
+                        row,
+                        stamp,
+                        status,
+                        rejection,
+                        iterations,
+                        cost,
+                        timing,
+                    });
                 }
                 Err(error) => outcome.failures.push(format!("{target}: {error:#}")),
             }

@@ -58,7 +58,7 @@ impl LogWriter {
 
     pub(super) fn add(
         &mut self,
-        _: Duration,
+        _: (Duration, Option<i64>),
         _: (&Object, Option<&Hand>),
         _: &Observation,
         _: &Tracked,
