@@ -33,8 +33,8 @@ impl Views {
         }
     }
 
-    /// What part of an object's frames is not like others: the weight of each, if a thousand frames of a film, which share their errors, are to count as
-    /// the few views that they show.
+    /// What part of an object's frames is not like others: the weight of what each says of its surface, so that a thousand frames of a film count as the
+    /// few views that they have of it.
     pub(super) fn share(&self, obj_id: u32) -> f64 {
         self.0.get(&obj_id).map_or(1.0, |(frames, distinct)| distinct.len() as f64 / *frames as f64)
     }
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_of_a_film_count_as_the_views_that_they_show() {
+    fn frames_of_a_film_count_as_the_views_that_they_have() {
         let at = |degrees: f64| Isometry3::rotation(Vector3::y() * degrees.to_radians());
         let (mut first, mut second) = (Views::default(), Views::default());
         for k in 0..60 {
