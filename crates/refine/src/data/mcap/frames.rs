@@ -74,20 +74,13 @@ impl<'a> Frames<'a> {
         hand: Option<&'a Hand>,
     ) -> Result<Self, RecordingError> {
         let topics = &recording.topics;
-        let first = topics.first().ok_or_else(|| RecordingError::Topic {
-            file: recording.file.clone(),
-            topic: "images".to_owned(),
-            problem: "there are none".to_owned(),
-        })?;
-        let first = Stream::new(first);
-        let depth = topics.depth.as_ref().filter(|depth| depth.name != first.topic.name);
         Ok(Self {
             recording,
             hand,
             messages: messages(&recording.file)?,
-            depth: depth.map(Stream::new),
+            depth: topics.depth.as_ref().map(Stream::new),
             mask: topics.mask.as_ref().map(Stream::new),
-            first,
+            first: Stream::new(&topics.frames),
             ended: false,
         })
     }
@@ -131,9 +124,9 @@ impl<'a> Frames<'a> {
         let of = |stream: &Stream, problem| fault(&stream.topic.name, problem);
         let lens_fault = |e: DistortionError| of(&self.first, e.to_string());
         let kind = &self.first.topic.kind;
-        let (color, alone) = match recording.topics.color {
-            Some(_) => (Some(images::color(kind, first).map_err(|e| of(&self.first, e))?), None),
-            None => (None, Some(images::depth(kind, first).map_err(|e| of(&self.first, e))?)),
+        let (color, alone) = match recording.topics.has_color {
+            true => (Some(images::color(kind, first).map_err(|e| of(&self.first, e))?), None),
+            false => (None, Some(images::depth(kind, first).map_err(|e| of(&self.first, e))?)),
         };
         let size = color.as_ref().map(|image| (image.width(), image.height()));
         let size = size.or(alone.as_ref().map(|image| (image.width(), image.height())));

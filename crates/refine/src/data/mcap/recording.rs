@@ -89,17 +89,13 @@ impl Recording {
         let fault =
             |(topic, problem)| RecordingError::Topic { file: file.to_owned(), topic, problem };
         let topics = Chosen::new(&found.images, topics).map_err(fault)?;
-        let of_frames = topics.first().cloned();
-        let Some(first) = of_frames else {
-            return Err(fault(("images".to_owned(), "there are none".to_owned())));
-        };
-        let camera = found.camera(&first).map_err(fault)?;
+        let first = &topics.frames;
+        let camera = found.camera(first).map_err(fault)?;
         let camera = camera.ok_or_else(|| {
             let expected = camera_topics(&first.name).collect::<Vec<_>>().join(" or ");
             fault((first.name.clone(), format!("its camera is expected in {expected}")))
         })?;
-        let own = topics.depth.as_ref().filter(|depth| depth.name != first.name);
-        let depth_camera = match own {
+        let depth_camera = match &topics.depth {
             Some(depth) => found
                 .camera(depth)
                 .map_err(fault)?
@@ -148,7 +144,7 @@ impl Recording {
 
     /// Name of the camera's frame.
     pub fn camera_frame(&self) -> &str {
-        self.topics.first().map_or("", |topic| plain(&topic.frame_id))
+        plain(&self.topics.frames.frame_id)
     }
 
     /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.

@@ -31,7 +31,10 @@ pub(super) struct ImageTopic {
 /// The topics of images that are read.
 #[derive(Clone, Debug)]
 pub(super) struct Chosen {
-    pub(super) color: Option<ImageTopic>,
+    /// Each of its images is a frame: color, or depth without it.
+    pub(super) frames: ImageTopic,
+    pub(super) has_color: bool,
+    /// Depth beside color.
     pub(super) depth: Option<ImageTopic>,
     pub(super) mask: Option<ImageTopic>,
 }
@@ -74,20 +77,19 @@ impl Chosen {
             let (name, kind) = (name.to_owned(), kind.clone());
             Ok(Some(ImageTopic { name, kind, frame_id: header.frame_id.clone() }))
         };
-        let chosen = Self {
-            color: pick("color", &wanted.color, &colors)?,
-            depth: pick("depth", &wanted.depth, &among(Content::Depth, false))?,
-            mask: pick("masks", &wanted.mask, &among(Content::Gray, true))?,
+        let color = pick("color", &wanted.color, &colors)?;
+        let depth = pick("depth", &wanted.depth, &among(Content::Depth, false))?;
+        let mask = pick("masks", &wanted.mask, &among(Content::Gray, true))?;
+        let has_color = color.is_some();
+        let (frames, depth) = match (color, depth) {
+            (Some(color), depth) => {
+                let beside = depth.filter(|depth| depth.name != color.name);
+                (color, beside)
+            }
+            (None, Some(depth)) => (depth, None),
+            (None, None) => return Err(("images".to_owned(), "there are none".to_owned())),
         };
-        if chosen.color.is_none() && chosen.depth.is_none() {
-            return Err(("images".to_owned(), "there are none".to_owned()));
-        }
-        Ok(chosen)
-    }
-
-    /// The topic whose messages are the frames: color, or depth without it.
-    pub(super) fn first(&self) -> Option<&ImageTopic> {
-        self.color.as_ref().or(self.depth.as_ref())
+        Ok(Self { frames, has_color, depth, mask })
     }
 }
 
@@ -126,10 +128,9 @@ mod tests {
             ("/d", Depth),
             ("/prehend/overlay", Color),
         ]);
-        let name = |topic: &Option<ImageTopic>| topic.as_ref().map(|topic| topic.name.clone());
         let chosen = Chosen::new(&some, &ImageTopics::default()).unwrap();
-        assert_eq!(name(&chosen.color).as_deref(), Some("/a/color"));
-        assert_eq!(name(&chosen.mask).as_deref(), Some("/a/mask"));
+        assert_eq!((chosen.frames.name.as_str(), chosen.has_color), ("/a/color", true));
+        assert_eq!(chosen.mask.unwrap().name, "/a/mask");
         let two = known(&[("/d", Depth), ("/e", Depth)]);
         let (what, problem) = Chosen::new(&two, &ImageTopics::default()).unwrap_err();
         assert_eq!(
@@ -138,7 +139,7 @@ mod tests {
         );
         let wanted = ImageTopics { depth: Some("/e".to_owned()), ..ImageTopics::default() };
         let chosen = Chosen::new(&two, &wanted).unwrap();
-        assert_eq!(chosen.first().unwrap().name, "/e");
+        assert_eq!((chosen.frames.name.as_str(), chosen.has_color), ("/e", false));
         let wanted = ImageTopics { color: Some("/f".to_owned()), ..ImageTopics::default() };
         assert_eq!(Chosen::new(&two, &wanted).unwrap_err().0, "/f");
         assert!(Chosen::new(&Known::new(), &ImageTopics::default()).is_err());
