@@ -165,9 +165,10 @@ mod tests {
                         sums
                     };
                     let at = sums(&[0.0; 6]);
-                    let reference = finite_difference_gradient(|x| sums(x).quadratic.value, &[0.0; 6], 1e-4);
+                    // Where Huber's pieces are joined the slope's own slope jumps by at most |∂r|² < 25 a match, and
+                    // the difference is off by a quarter of that times the step.
+                    let reference = finite_difference_gradient(|x| sums(x).quadratic.value, &[0.0; 6], 1e-7);
                     for (g, r) in at.quadratic.gradient.iter().zip(&reference) {
-                        // Tukey and Huber bend where they are joined.
                         prop_assert!((g - r).abs() < 1e-5, "{:?} {:?}: {} {}", metric, kernel, g, r);
                     }
                     if kernel == RobustKernel::Squared && !matches.is_empty() {
