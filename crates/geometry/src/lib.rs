@@ -27,6 +27,7 @@ pub mod sample;
 pub mod sdf;
 mod self_intersection;
 pub mod shapes;
+mod simplify;
 pub mod topology;
 pub mod volume;
 mod weld;

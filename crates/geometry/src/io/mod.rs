@@ -5,7 +5,6 @@
 //! (`mesh.scaled(1e-3)` for BOP models in millimeters).
 
 mod atomic;
-mod base64;
 mod error;
 pub(crate) mod folder;
 mod gltf;

@@ -5,9 +5,21 @@ use prehend_geometry::TriMesh;
 use prehend_render::{Camera, DepthImage, ModelError, RenderModel, depth_map};
 
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, Models, diameter};
+use crate::data::bop::{DatasetError, ModelInfo, Models, diameter};
 use crate::error::RefineError;
 use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
+
+/// What `models_info.json` says of an object, if it says anything.
+///
+/// # Errors
+/// If the file is broken: without its symmetries, a symmetric object would be scored wrongly.
+pub(super) fn model_info(models: &Models, obj_id: u32) -> Result<Option<ModelInfo>, DatasetError> {
+    match models.info(obj_id) {
+        Ok(info) => Ok(Some(info)),
+        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => Ok(None),
+        Err(broken) => Err(broken),
+    }
+}
 
 /// An object to score poses of.
 pub(super) struct EvaluationModel {
@@ -25,13 +37,9 @@ impl EvaluationModel {
     /// # Errors
     /// If `models_info.json` is broken or the mesh cannot be rendered.
     pub(super) fn new(models: &Models, obj_id: u32, mesh: TriMesh) -> Result<Self, AssetError> {
-        let (symmetries, diameter) = match models.info(obj_id) {
-            Ok(info) => (info.symmetries, info.diameter),
-            Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => {
-                (Default::default(), diameter(&mesh.vertices))
-            }
-            // Without its symmetries, a symmetric object would be scored wrongly.
-            Err(broken) => return Err(broken.into()),
+        let (symmetries, diameter) = match model_info(models, obj_id)? {
+            Some(info) => (info.symmetries, info.diameter),
+            None => (Default::default(), diameter(&mesh.vertices)),
         };
         let unusable = |e: ModelError| RefineError::Object {
             object: format!("{obj_id}"),

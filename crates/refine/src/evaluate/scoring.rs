@@ -8,10 +8,11 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
 use prehend_render::DepthImage;
 
-use super::model::EvaluationModel;
+use super::model::{EvaluationModel, model_info};
 use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
 use crate::data::{AssetError, ContactModel, load_mesh};
-use crate::evaluate::metrics::{Contact, ScoredRow};
+use crate::evaluate::metrics::{Contact, ScoredRow, oe_symmetric_deg, pe_cm};
+use crate::symmetry::Symmetries;
 
 /// What scoring needs of an object, prepared once.
 struct Model {
@@ -64,6 +65,21 @@ impl<'a> Scorer<'a> {
     /// If a file that scoring needs is missing or broken, or the image shows no such object.
     pub fn true_pose(&self, row: &ResultRow) -> Result<Isometry3<f64>, AssetError> {
         Ok(self.truth.pose(row.scene_id, row.im_id, row.obj_id, &row.t_cam_model)?)
+    }
+
+    /// How far the pose of `row` is from the true one \[m\], and how much it is turned up to symmetry \[rad\]; none where the dataset does not tell the truth.
+    ///
+    /// # Errors
+    /// If a file with the truth is broken, or the image shows no such object.
+    pub fn pose_error(&self, row: &ResultRow) -> Result<Option<[f64; 2]>, AssetError> {
+        let truth = match self.true_pose(row) {
+            Err(AssetError::Dataset(DatasetError::Missing { .. })) => return Ok(None),
+            found => found?,
+        };
+        let info = model_info(self.truth.models(), row.obj_id)?;
+        let symmetries = info.map_or_else(Symmetries::default, |info| info.symmetries);
+        let degrees = oe_symmetric_deg(&row.t_cam_model, &truth, &symmetries);
+        Ok(Some([1e-2 * pe_cm(&row.t_cam_model, &truth), degrees.to_radians()]))
     }
 
     /// The score of `row`; contact metrics only where the scene says where the hand is.

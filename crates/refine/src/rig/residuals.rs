@@ -26,6 +26,15 @@ const FEWEST: usize = 30;
 
 impl FrameResiduals {
     /// Of `frame` with the object at `t_cam_object` \[m\].
+    ///
+    /// # Errors
+    /// If the pose is not finite, or forces do not fit the taxels.
+    pub fn of(frame: &Frame<'_>, t_cam_object: &Isometry3<f64>) -> Result<Self, RefineError> {
+        let has_mask = frame.observation().mask.count() > 0;
+        Self::new(frame, t_cam_object, &TactileSettings::default(), has_mask)
+    }
+
+    /// As [`Self::of`] has it, with these settings of touch; the mask counts only if there is one.
     pub(super) fn new(
         frame: &Frame<'_>,
         t_cam_object: &Isometry3<f64>,
@@ -42,9 +51,28 @@ impl FrameResiduals {
             touch: touch.map_or_else(Vec::new, |touch| touch.touched_distances(&state)),
         })
     }
+
+    /// Medians over the frame, of each sensor that says something.
+    pub fn sensors(&self) -> Vec<SensorResidual> {
+        let Self { depth: [on_object, on_hand], outline, touch } = self;
+        let millimeters =
+            |pixels: &[([usize; 2], f64)]| pixels.iter().map(|(_, r)| r * 1e3).collect();
+        let kinds: [(&str, &str, Vec<f64>); 4] = [
+            ("depth on the object", "mm", millimeters(on_object)),
+            ("depth on the hand", "mm", millimeters(on_hand)),
+            ("outline", PIXELS, outline.iter().copied().collect()),
+            ("touched skin", "mm", touch.iter().map(|r| r * 1e3).collect()),
+        ];
+        let residual = |(sensor, unit, values): (&'static str, &'static str, Vec<f64>)| {
+            let size = median(values.iter().map(|v| v.abs()))?;
+            let offset = median(values.iter().copied()).filter(|_| unit != PIXELS);
+            Some(SensorResidual { sensor, unit, size, offset })
+        };
+        kinds.into_iter().filter_map(residual).collect()
+    }
 }
 
-/// Residuals of a sensor over frames: medians of the frames' medians.
+/// Residuals of a sensor: medians of a frame, or over frames, the medians of those.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorResidual {
     /// What is measured.
@@ -60,8 +88,8 @@ pub struct SensorResidual {
 /// Residuals of many frames, by sensor.
 #[derive(Clone, Debug)]
 pub struct Residuals {
-    /// By name and unit: of each frame the median and the median size.
-    frames: BTreeMap<(&'static str, &'static str), Vec<[f64; 2]>>,
+    /// By name and unit: those of each frame.
+    frames: BTreeMap<(&'static str, &'static str), Vec<SensorResidual>>,
     /// Width and height of images \[px\].
     size: [usize; 2],
     /// By cell of the image, row by row: sum and number of residuals of depth \[m\].
@@ -89,21 +117,10 @@ impl Residuals {
 
     /// Adds those of a frame.
     pub fn add(&mut self, frame: &FrameResiduals) {
-        let FrameResiduals { depth: [on_object, on_hand], outline, touch } = frame;
-        let millimeters =
-            |pixels: &[([usize; 2], f64)]| pixels.iter().map(|(_, r)| r * 1e3).collect();
-        let kinds: [((&str, &str), Vec<f64>); 4] = [
-            (("depth on the object", "mm"), millimeters(on_object)),
-            (("depth on the hand", "mm"), millimeters(on_hand)),
-            (("outline", PIXELS), outline.iter().copied().collect()),
-            (("touched skin", "mm"), touch.iter().map(|r| r * 1e3).collect()),
-        ];
-        for (kind, values) in kinds {
-            let middle = median(values.iter().copied());
-            if let Some((middle, size)) = middle.zip(median(values.iter().map(|v| v.abs()))) {
-                self.frames.entry(kind).or_default().push([middle, size]);
-            }
+        for residual in frame.sensors() {
+            self.frames.entry((residual.sensor, residual.unit)).or_default().push(residual);
         }
+        let [on_object, on_hand] = &frame.depth;
         let columns = self.size[0].div_ceil(CELL);
         for ([x, y], residual) in on_object.iter().chain(on_hand) {
             if let Some((sum, count)) = self.cells.get_mut(y / CELL * columns + x / CELL) {
@@ -115,12 +132,12 @@ impl Residuals {
 
     /// Of each sensor that any frame has.
     pub fn sensors(&self) -> Vec<SensorResidual> {
-        let over_frames =
-            |frames: &[[f64; 2]], k: usize| median(frames.iter().map(|frame| frame[k]));
-        let of = |(&(sensor, unit), frames): (&(&'static str, &'static str), &Vec<[f64; 2]>)| {
-            let offset = over_frames(frames, 0).filter(|_| unit != PIXELS);
-            Some(SensorResidual { sensor, unit, size: over_frames(frames, 1)?, offset })
-        };
+        let of =
+            |(&(sensor, unit), frames): (&(&'static str, &'static str), &Vec<SensorResidual>)| {
+                let size = median(frames.iter().map(|frame| frame.size))?;
+                let offset = median(frames.iter().filter_map(|frame| frame.offset));
+                Some(SensorResidual { sensor, unit, size, offset })
+            };
         self.frames.iter().filter_map(of).collect()
     }
 

@@ -10,14 +10,23 @@ use std::sync::Arc;
 
 use ::gltf::mesh::Mode;
 use ::gltf::{Gltf, Node, Primitive, Semantic, buffer, image};
+use base64::Engine;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use nalgebra::{Matrix4, Point3, Vector3};
 
 use self::accessor::Buffers;
 use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
-use super::{MeshError, base64, texture};
+use super::{MeshError, texture};
 use crate::mesh::{Texture, TriMesh};
+
+/// Some writers leave the padding of data URIs out.
+const DATA_URI: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
@@ -94,7 +103,7 @@ fn check_container(bytes: &[u8]) -> Result<(), &'static str> {
 fn fetch(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, text) = data.split_once(";base64,").ok_or("a data URI that is not base64")?;
-        return base64::decode(text).ok_or_else(|| "broken base64".into());
+        return DATA_URI.decode(text).map_err(|e| format!("broken base64: {e}"));
     }
     texture::beside(path, &percent_decoded(uri))
 }

@@ -45,7 +45,7 @@ impl Check {
     /// Checks the frame of `file`.
     fn frame(&self, file: &Path) -> anyhow::Result<ExitCode> {
         let (input, t_cam_object) = load_frame_file(file, 0, cache().as_ref(), None)?;
-        let mut report = Report::create(&self.report)?;
+        let mut report = Report::create(&self.report, "Input")?;
         let (picture, warnings) = drawn(&input, &t_cam_object);
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         report.add_picture(&file.display().to_string(), &picture, &warnings)?;
@@ -58,7 +58,7 @@ impl Check {
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
-        let mut report = Report::create(&self.report)?;
+        let mut report = Report::create(&self.report, "Input")?;
         let mut done = 0;
         let bar = progress(jobs.len(), "drawing");
         for job in bar.wrap_iter(jobs.iter()) {

@@ -11,6 +11,7 @@ mod logging;
 mod options;
 mod pages;
 mod refine;
+mod report;
 mod study;
 mod symmetry;
 mod synth;

@@ -1,54 +1,47 @@
 //! One page that shows a run.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use prehend_geometry::TriMesh;
 use prehend_render::RgbImage;
 
-use super::curves::loss_curves;
-use super::picture::before_and_after;
+use super::document::{Block, Chart, Document, Figure, LabeledPicture};
+use super::frame::{DrawingEntry, FrameDrawing, FrameEntry, FrameReport, loss_chart, residuals};
+use super::picture::{compared, image_and_outline};
+use super::scene::{encoded_hand, encoded_scene, object_mesh};
+use crate::data::AssetError;
 use crate::data::bop::{DatasetError, create_folder, write_atomically};
-use crate::scene::{Object, Observation};
-use crate::strategy::Trace;
+use crate::error::RefineError;
+use crate::scene::{Hand, Object};
 
-/// The pictures of one refined frame.
-pub struct FrameReport {
-    /// The initial pose's outline beside the refined one's.
-    picture: RgbImage,
-    /// Loss curves, as SVG.
-    curves: String,
-    /// What to say below.
-    caption: String,
-}
+/// What the page is made of; the data take the place of the last.
+const SKELETON: &str = include_str!("page/index.html");
+const STYLE: &str = include_str!("page/style.css");
+const SCRIPTS: [&str; 8] = [
+    include_str!("page/dom.js"),
+    include_str!("page/chart.js"),
+    include_str!("page/slider.js"),
+    include_str!("page/taxels.js"),
+    include_str!("page/scene.js"),
+    include_str!("page/detail.js"),
+    include_str!("page/frames.js"),
+    include_str!("page/main.js"),
+];
 
-impl FrameReport {
-    /// Draws a refinement that began at `initial`.
-    pub fn draw(
-        observation: &Observation,
-        object: &Object,
-        initial: &Isometry3<f64>,
-        (refined, iteration): (&Isometry3<f64>, usize),
-        trace: &Trace,
-    ) -> Self {
-        let iterations = trace.iterations.len().saturating_sub(1);
-        let moved = refined * object.center - initial * object.center;
-        let turned = refined.rotation.angle_to(&initial.rotation).to_degrees();
-        Self {
-            picture: before_and_after(observation, object, initial, refined),
-            curves: loss_curves(trace),
-            caption: format!(
-                "moved {:.1} mm and {turned:.1}°; pose of iteration {iteration} of {iterations}",
-                moved.norm() * 1e3,
-            ),
-        }
-    }
-}
+/// Quality of pictures, of 100.
+const QUALITY: u8 = 85;
 
-/// A folder of pictures with an `index.html`.
+/// A folder with an `index.html` that needs nothing else: pictures, meshes, style and scripts are in it.
 pub struct Report {
     folder: PathBuf,
-    body: String,
-    count: usize,
+    document: Document,
+    /// Objects that were drawn, as they were, and the numbers of their meshes.
+    objects: Vec<(Arc<Object>, TriMesh, usize)>,
+    /// Hands that were drawn, by their numbers.
+    hands: Vec<Arc<Hand>>,
 }
 
 impl Report {
@@ -56,91 +49,204 @@ impl Report {
     ///
     /// # Errors
     /// If it cannot be made.
-    pub fn create(folder: &Path) -> Result<Self, DatasetError> {
+    pub fn create(folder: &Path, title: &str) -> Result<Self, DatasetError> {
         create_folder(folder)?;
-        Ok(Self { folder: folder.into(), body: String::new(), count: 0 })
+        let document = Document { title: title.to_owned(), ..Document::default() };
+        let (objects, hands) = (Vec::new(), Vec::new());
+        Ok(Self { folder: folder.into(), document, objects, hands })
     }
 
-    /// Adds a refined frame.
-    ///
-    /// # Errors
-    /// If a picture cannot be written.
-    pub fn add(&mut self, title: &str, frame: &FrameReport) -> Result<(), DatasetError> {
-        let name = self.picture(&frame.picture)?;
-        let curves = format!("{}.svg", name.trim_end_matches(".png"));
-        write_atomically(&self.folder.join(&curves), frame.curves.as_bytes())?;
-        let caption = escape(&frame.caption);
-        self.section(
-            title,
-            &format!(
-                "<p>{caption}</p><div><figure><img src=\"{name}\" alt=\"\">\
-                 <figcaption><b class=before>initial</b> and <b class=after>refined</b> \
-                 outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div>"
-            ),
-        );
-        Ok(())
+    /// Adds something to say of the whole run: what, and a figure or a few words.
+    pub fn add_fact(&mut self, what: &str, value: impl Into<String>) {
+        self.document.facts.push([what.to_owned(), value.into()]);
+    }
+
+    /// Adds a table: a heading a column, and rows of as many cells.
+    pub fn add_table<S: Into<String>>(
+        &mut self,
+        title: &str,
+        headings: impl IntoIterator<Item = S>,
+        rows: Vec<Vec<String>>,
+    ) {
+        let headings = headings.into_iter().map(Into::into).collect();
+        self.document.blocks.push(Block::Table { title: title.to_owned(), headings, rows });
     }
 
     /// Adds a picture with remarks.
     ///
     /// # Errors
-    /// If the picture cannot be written.
+    /// If the picture cannot be encoded.
     pub fn add_picture(
         &mut self,
         title: &str,
         picture: &RgbImage,
         remarks: &[String],
-    ) -> Result<(), DatasetError> {
-        let name = self.picture(picture)?;
-        let remarks: String = remarks.iter().map(|r| format!("<li>{}</li>", escape(r))).collect();
-        self.section(title, &format!("<ul>{remarks}</ul><img src=\"{name}\" alt=\"\">"));
+    ) -> Result<(), RefineError> {
+        let (title, remarks, picture) = (title.to_owned(), remarks.to_vec(), jpeg(picture)?);
+        self.document.blocks.push(Block::Picture { title, remarks, picture });
         Ok(())
     }
 
-    /// Adds a table: a heading a column, and rows of as many cells.
-    pub fn add_table(&mut self, title: &str, headings: &[&str], rows: &[Vec<String>]) {
-        let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| -> String {
-            cells.map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect()
-        };
-        let head = cells("th", &mut headings.iter().copied());
-        let row = |row: &Vec<String>| {
-            format!("<tr>{}</tr>", cells("td", &mut row.iter().map(String::as_str)))
-        };
-        let rows: String = rows.iter().map(row).collect();
-        self.section(title, &format!("<table><tr>{head}</tr>{rows}</table>"));
+    /// Adds two pictures of the same, before and after, over each other.
+    ///
+    /// # Errors
+    /// If a picture cannot be encoded.
+    pub fn add_comparison(
+        &mut self,
+        title: &str,
+        pictures: &[RgbImage; 2],
+    ) -> Result<(), RefineError> {
+        let pictures = labeled(["before", "after"], pictures)?;
+        self.document.blocks.push(Block::Comparison { title: title.to_owned(), pictures });
+        Ok(())
     }
 
-    fn section(&mut self, title: &str, content: &str) {
-        self.body += &format!("<section><h2>{}</h2>{content}</section>\n", escape(title));
+    /// Adds a picture in the form of an SVG document.
+    pub fn add_svg(&mut self, title: &str, svg: &str) {
+        let picture = format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
+        let title = title.to_owned();
+        self.document.blocks.push(Block::Picture { title, remarks: Vec::new(), picture });
+    }
+
+    /// Adds curves.
+    pub fn add_chart(&mut self, chart: Chart) {
+        self.document.blocks.push(Block::Chart(chart));
+    }
+
+    /// Adds a frame, with what there is to draw of it.
+    ///
+    /// # Errors
+    /// If it cannot be drawn: it is in the table all the same.
+    pub fn add_frame(
+        &mut self,
+        frame: FrameReport,
+        drawing: Option<&FrameDrawing<'_>>,
+    ) -> Result<(), AssetError> {
+        let columns = &mut self.document.columns;
+        for Figure { column, .. } in &frame.figures {
+            if !columns.contains(column) {
+                columns.push(*column);
+            }
+        }
+        let mut entry = FrameEntry::from(frame);
+        let drawn = drawing.map(|drawing| self.draw(drawing)).transpose();
+        let failed = match drawn {
+            Ok(drawn) => {
+                entry.drawing = drawn;
+                Ok(())
+            }
+            Err(error) => Err(error),
+        };
+        self.document.frames.push(entry);
+        failed
+    }
+
+    fn draw(&mut self, drawing: &FrameDrawing<'_>) -> Result<DrawingEntry, AssetError> {
+        let FrameDrawing { input, initial, t_cam_object, trace, .. } = drawing;
+        let (observation, object) = (&input.observation, &input.object);
+        let pictures = match initial {
+            Some(initial) => labeled(
+                ["initial", "refined"],
+                &compared(observation, object, initial, t_cam_object),
+            ),
+            None => labeled(
+                ["image", "outline"],
+                &image_and_outline(observation, object, input.hand.as_deref(), t_cam_object),
+            ),
+        };
+        let hand = input.hand.as_ref().map(|hand| self.hand(hand));
+        let index = self.object(object);
+        let (_, mesh, number) = &self.objects[index];
+        Ok(DrawingEntry {
+            pictures: pictures?,
+            residuals: residuals(drawing)?,
+            chart: trace.and_then(loss_chart),
+            scene: encoded_scene(drawing, mesh, *number, hand)?,
+        })
+    }
+
+    /// Where `object` is among those that were drawn.
+    fn object(&mut self, object: &Arc<Object>) -> usize {
+        let known = self.objects.iter().position(|(known, ..)| Arc::ptr_eq(known, object));
+        known.unwrap_or_else(|| {
+            let (mesh, encoded) = object_mesh(&object.mesh);
+            self.objects.push((Arc::clone(object), mesh, self.document.meshes.len()));
+            self.document.meshes.push(encoded);
+            self.objects.len() - 1
+        })
+    }
+
+    /// The number of `hand`.
+    fn hand(&mut self, hand: &Arc<Hand>) -> usize {
+        let known = self.hands.iter().position(|known| Arc::ptr_eq(known, hand));
+        known.unwrap_or_else(|| {
+            let encoded = encoded_hand(hand, &mut self.document.meshes);
+            self.document.hands.push(encoded);
+            self.hands.push(Arc::clone(hand));
+            self.hands.len() - 1
+        })
     }
 
     /// Writes the page and returns its path.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(self) -> Result<PathBuf, DatasetError> {
-        let page = self.folder.join("index.html");
-        let html = format!("{HEAD}{}</body></html>\n", self.body);
-        write_atomically(&page, html.as_bytes())?;
-        Ok(page)
-    }
-
-    fn picture(&mut self, picture: &RgbImage) -> Result<String, DatasetError> {
-        let name = format!("{:04}.png", self.count);
-        self.count += 1;
-        let file = self.folder.join(&name);
-        picture.save(&file).map_err(|e| DatasetError::Write { file, problem: e.to_string() })?;
-        Ok(name)
+    pub fn finish(mut self) -> Result<PathBuf, DatasetError> {
+        let Document { columns, frames, .. } = &mut self.document;
+        columns.retain(|column| frames.iter().any(|frame| frame.figures.contains_key(column.key)));
+        let file = self.folder.join("index.html");
+        let fail = |e: serde_json::Error| DatasetError::Write {
+            file: file.clone(),
+            problem: e.to_string(),
+        };
+        // Nothing in it may end the element that it is in.
+        let data = serde_json::to_string(&self.document).map_err(fail)?.replace("</", "<\\/");
+        let mut page = String::with_capacity(data.len() + 100_000);
+        let mut rest = SKELETON;
+        for (mark, content) in
+            [("{{STYLE}}", STYLE), ("{{DATA}}", &data), ("{{SCRIPTS}}", &SCRIPTS.concat())]
+        {
+            let (before, after) = rest.split_once(mark).unwrap_or((rest, ""));
+            page += before;
+            page += content;
+            rest = after;
+        }
+        page += rest;
+        write_atomically(&file, page.as_bytes())?;
+        Ok(file)
     }
 }
 
-const HEAD: &str = "<!doctype html><html lang=en><meta charset=utf-8><title>Prehend</title><style>\
-    body{font:15px/1.4 system-ui,sans-serif;margin:2em auto;max-width:1400px;color:#222}\
-    section{border-top:1px solid #ddd;padding:.5em 0}section>div{display:flex;flex-wrap:wrap;gap:1em}\
-    h2{font-size:1.1em;margin:.5em 0}figure{margin:0}img{max-width:100%}\
-    table{border-collapse:collapse}td,th{padding:.1em .8em;text-align:right}\
-    td:first-child,th:first-child{text-align:left}.before{color:#d33}.after{color:#2a4}li{color:#a40}</style><body><h1>Prehend</h1>\n";
+fn labeled(
+    labels: [&str; 2],
+    [first, second]: &[RgbImage; 2],
+) -> Result<[LabeledPicture; 2], RefineError> {
+    let picture = |label: &str, image| {
+        Ok::<_, RefineError>(LabeledPicture { label: label.to_owned(), picture: jpeg(image)? })
+    };
+    Ok([picture(labels[0], first)?, picture(labels[1], second)?])
+}
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+/// The picture as a `data:` URI.
+fn jpeg(picture: &RgbImage) -> Result<String, RefineError> {
+    let bytes = picture.to_jpeg(QUALITY).map_err(|e| RefineError::Images(e.to_string()))?;
+    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_whole_and_nothing_in_its_data_ends_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut report = Report::create(dir.path(), "a </script> in a title").unwrap();
+        report.add_fact("frames", "1");
+        let page = std::fs::read_to_string(report.finish().unwrap()).unwrap();
+        assert!(page.ends_with("</html>\n") && !page.contains("{{"));
+        assert!(page.contains(r"a <\/script> in a title"));
+        // The data's element and the scripts'.
+        assert_eq!(page.matches("</script>").count(), 2);
+        assert!(!page.contains("http://") && !page.contains("https://"), "it needs the network");
+    }
 }

@@ -1,7 +1,7 @@
 //! Overlays: the object's outline at a pose over the image.
 
-use nalgebra::Isometry3;
-use prehend_render::{RgbImage, draw_outline};
+use nalgebra::{Isometry3, Vector2};
+use prehend_render::{Camera, RgbImage, draw_outline};
 
 use crate::rig::Residuals;
 use crate::scene::{Hand, Object, Observation};
@@ -16,16 +16,40 @@ const HAND: [f32; 3] = [0.35, 0.6, 1.0];
 /// Light pixels between two pictures.
 const GAP: usize = 6;
 
-/// The image around the object twice: with the outline at `before`, and with that at `after`.
+/// The image around the object twice, side by side: with the outline at `before`, and with that at `after`.
 pub fn before_and_after(
     observation: &Observation,
     object: &Object,
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
 ) -> RgbImage {
-    let image = brightened(observation);
-    let outlined = |pose, color| outlined(image.clone(), observation, object, None, pose, color);
-    side_by_side([outlined(before, BEFORE), outlined(after, AFTER)], window(observation))
+    side_by_side(&compared(observation, object, before, after))
+}
+
+/// The image around the object with the outline at `before`, and with that at `after`.
+pub(super) fn compared(
+    observation: &Observation,
+    object: &Object,
+    before: &Isometry3<f64>,
+    after: &Isometry3<f64>,
+) -> [RgbImage; 2] {
+    let (image, window) = (brightened(observation), window(observation, object, after));
+    [(before, BEFORE), (after, AFTER)].map(|(pose, color)| {
+        cut(&outlined(image.clone(), observation, object, None, pose, color), window)
+    })
+}
+
+/// The image around the object, and the same with the object's outline and the hand's.
+#[cfg(feature = "cli")]
+pub(super) fn image_and_outline(
+    observation: &Observation,
+    object: &Object,
+    hand: Option<&Hand>,
+    t_cam_object: &Isometry3<f64>,
+) -> [RgbImage; 2] {
+    let (image, window) = (brightened(observation), window(observation, object, t_cam_object));
+    let outlined = outlined(image.clone(), observation, object, hand, t_cam_object, AFTER);
+    [cut(&image, window), cut(&outlined, window)]
 }
 
 /// The image around the object twice, with outlines of object and hand: as an observation, a model and a pose (object → camera \[m\]) have
@@ -34,18 +58,23 @@ pub fn rig_picture(
     before: (&Observation, &Object, &Isometry3<f64>),
     after: (&Observation, &Object, &Isometry3<f64>),
     hand: &Hand,
-) -> RgbImage {
-    let draw = |(observation, object, pose): (&Observation, &Object, &Isometry3<f64>), color| {
+) -> [RgbImage; 2] {
+    let window = window(before.0, before.1, before.2);
+    [(before, BEFORE), (after, AFTER)].map(|((observation, object, pose), color)| {
         // Undistorted images are others than those before.
-        outlined(brightened(observation), observation, object, Some(hand), pose, color)
-    };
-    side_by_side([draw(before, BEFORE), draw(after, AFTER)], window(before.0))
+        let image = brightened(observation);
+        cut(&outlined(image, observation, object, Some(hand), pose, color), window)
+    })
 }
 
 /// Mean residuals of depth over the image before and after a calibration: red where depth is measured too far away, blue where too near, by
 /// `brightest` \[m\] where colors are full; gray where none was seen.
-pub fn depth_residual_picture(before: &Residuals, after: &Residuals, brightest: f64) -> RgbImage {
-    let draw = |residuals: &Residuals| {
+pub fn depth_residual_picture(
+    before: &Residuals,
+    after: &Residuals,
+    brightest: f64,
+) -> [RgbImage; 2] {
+    [before, after].map(|residuals| {
         let (width, height) = residuals.size();
         let mut image = RgbImage::filled(width, height, [0.6; 3]);
         for (i, pixel) in image.pixels_mut().iter_mut().enumerate() {
@@ -56,16 +85,18 @@ pub fn depth_residual_picture(before: &Residuals, after: &Residuals, brightest: 
             }
         }
         image
-    };
-    let (width, height) = before.size();
-    side_by_side([draw(before), draw(after)], [0, 0, width, height])
+    })
 }
 
-/// Left, top, width and height of two images, beside each other.
-fn side_by_side(images: [RgbImage; 2], window @ [.., width, height]: [usize; 4]) -> RgbImage {
+/// Two images of the same size beside each other.
+fn side_by_side(images: &[RgbImage; 2]) -> RgbImage {
+    let (width, height) = (images[0].width(), images[0].height());
     let mut pair = RgbImage::filled(2 * width + GAP, height, [1.0; 3]);
+    let row = pair.width();
     for (k, image) in images.iter().enumerate() {
-        copy(image, window, &mut pair, k * (width + GAP));
+        for (y, line) in image.pixels().chunks(width.max(1)).enumerate() {
+            pair.pixels_mut()[y * row + k * (width + GAP)..][..width].copy_from_slice(line);
+        }
     }
     pair
 }
@@ -110,11 +141,12 @@ fn brightened(observation: &Observation) -> RgbImage {
     image
 }
 
-/// Left, top, width and height of the mask's surroundings \[px\].
-fn window(observation: &Observation) -> [usize; 4] {
+/// Left, top, width and height of the surroundings of the mask, or without one, of the object at a pose \[px\].
+fn window(observation: &Observation, object: &Object, t_cam_object: &Isometry3<f64>) -> [usize; 4] {
     let mask = &observation.mask;
     let (width, height) = (mask.width(), mask.height());
-    let Some([left, top, columns, rows]) = mask.bounds() else { return [0, 0, width, height] };
+    let bounds = mask.bounds().or_else(|| projected(&observation.camera, object, t_cam_object));
+    let Some([left, top, columns, rows]) = bounds else { return [0, 0, width, height] };
     // Square and half as large again, so that the hand and a misplaced outline are in view.
     let side = columns.max(rows) * 3 / 2;
     let begin =
@@ -127,11 +159,27 @@ fn window(observation: &Observation) -> [usize; 4] {
     ]
 }
 
-/// Copies `window` of one image into another, to column `column` of its top.
-fn copy(from: &RgbImage, [left, top, width, height]: [usize; 4], to: &mut RgbImage, column: usize) {
-    let row = to.width();
-    for y in 0..height {
-        let source = &from.pixels()[(top + y) * from.width() + left..][..width];
-        to.pixels_mut()[y * row + column..][..width].copy_from_slice(source);
+/// Left, top, width and height of what the image shows of an object \[px\].
+fn projected(
+    camera: &Camera,
+    object: &Object,
+    t_cam_object: &Isometry3<f64>,
+) -> Option<[usize; 4]> {
+    let size = Vector2::new(camera.width as f64, camera.height as f64);
+    let pixels = object.mesh.vertices.iter().filter_map(|v| {
+        let pixel = camera.project(&(t_cam_object * v))?;
+        Some(Vector2::new(pixel.x, pixel.y).sup(&Vector2::zeros()).inf(&size))
+    });
+    let both = pixels.map(|p| (p, p)).reduce(|(l, h), (p, q)| (l.inf(&p), h.sup(&q)))?;
+    let (low, side) = (both.0, both.1 - both.0);
+    (side.min() >= 1.0).then_some([low.x, low.y, side.x, side.y].map(|v| v as usize))
+}
+
+/// A window of an image.
+fn cut(image: &RgbImage, [left, top, width, height]: [usize; 4]) -> RgbImage {
+    let mut cut = RgbImage::filled(width, height, [1.0; 3]);
+    for (y, line) in cut.pixels_mut().chunks_mut(width.max(1)).enumerate() {
+        line.copy_from_slice(&image.pixels()[(top + y) * image.width() + left..][..width]);
     }
+    cut
 }

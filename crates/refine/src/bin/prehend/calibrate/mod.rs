@@ -60,7 +60,8 @@ impl Calibrate {
         }
         self.refined.as_deref().map(check_writable).transpose()?;
         limit_threads(self.threads)?;
-        let report = self.report.as_deref().map(Report::create).transpose()?;
+        let create = |folder| Report::create(folder, "Rig");
+        let report = self.report.as_deref().map(create).transpose()?;
         let dataset = self.input.selection.open()?;
         if canonical(&models) == canonical(dataset.models().dir()) {
             bail!("--models {}: has the models that are to be corrected", models.display());

@@ -10,6 +10,7 @@ use prehend_refine::rig::{
     Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, ObjectMass,
     Residuals, SensorResidual, SkinCalibration, TaxelCalibration, UnobservedDirection,
 };
+use prehend_render::RgbImage;
 
 use crate::terminal::progress;
 
@@ -120,41 +121,41 @@ pub(super) fn write(
     let rows: Vec<Vec<String>> = old.iter().map(row).collect();
     report.add_table(
         "Residuals by sensor, where all calibrations are believed: medians over frames of the frames' medians",
-        &["sensor", "size before", "size after", "offset before", "offset after"],
-        &rows,
+        ["sensor", "size before", "size after", "offset before", "offset after"],
+        rows,
     );
     let picture = depth_residual_picture(&before, &after, BRIGHTEST);
     let what = format!(
-        "Mean residual of depth over the image, of hand and object, before (left) and after: red is measured too far away, blue too near, by \
+        "Mean residual of depth over the image, of hand and object, before and after: red is measured too far away, blue too near, by \
          {:.0} mm where colors are full",
         BRIGHTEST * 1e3
     );
-    report.add_picture(&what, &picture, &[])?;
+    report.add_comparison(&what, &picture)?;
     let parameters: Vec<Vec<String>> =
         parameter_rows(&done.calibrator).into_iter().map(Vec::from).collect();
     report.add_table(
         "Parameters: lengths in meters, angles in radians, the principal point in focal lengths",
-        &["parameter", "value", "standard deviation", "beforehand"],
-        &parameters,
+        ["parameter", "value", "standard deviation", "beforehand"],
+        parameters,
     );
     let skin: Vec<Vec<String>> = skin_rows(&done.calibrator).into_iter().map(Vec::from).collect();
     if !skin.is_empty() {
-        report.add_table("Skin", &["what", "found"], &skin);
+        report.add_table("Skin", ["what", "found"], skin);
     }
     let open: Vec<Vec<String>> = unobserved.iter().map(|direction| vec![told(direction)]).collect();
     if !open.is_empty() {
-        report.add_table("Hardly determined by these frames", &["direction"], &open);
+        report.add_table("Hardly determined by these frames", ["direction"], open);
     }
     let left_out: Vec<Vec<String>> =
         done.left_out.values().map(|frame| vec![frame.clone()]).collect();
     if !left_out.is_empty() {
-        report.add_table("Left out", &["frame"], &left_out);
+        report.add_table("Left out", ["frame"], left_out);
     }
     for (&index, alone) in &drawn {
         let target = frames.poses[index].0;
-        let what = format!("{target}: outlines of object and hand (blue) before (left) and after");
+        let what = format!("{target}: outlines of object and hand (blue) before and after");
         match draw(frames, nominal, done, index, alone) {
-            Ok(picture) => report.add_picture(&what, &picture, &[])?,
+            Ok(pictures) => report.add_comparison(&what, &pictures)?,
             Err(error) => failures.push(format!("{target}: report: {error}")),
         }
     }
@@ -182,7 +183,7 @@ fn draw(
     done: &Calibrated,
     index: usize,
     alone: &Isometry3<f64>,
-) -> anyhow::Result<prehend_render::RgbImage> {
+) -> anyhow::Result<[RgbImage; 2]> {
     let frame = frames.load(index, &done.poses[&index])?;
     let after = done.calibrator.rig().corrected(&frame.observation)?;
     let [object, corrected] =

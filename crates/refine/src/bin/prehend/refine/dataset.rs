@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::bail;
+use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::data::{
-    Assets, FrameInput, Identity, Journal, PlainPose, Sensor, Times, Workers,
-};
-use prehend_refine::evaluate::report::{FrameReport, Report};
+use prehend_refine::data::{Assets, Identity, Journal, PlainPose, Sensor, Times, Workers};
+use prehend_refine::evaluate::Scorer;
+use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Trace};
 use prehend_refine::{Method, refine};
@@ -22,6 +22,7 @@ use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
 use crate::options::{Job, Selection, beside, open_rig, write_poses};
+use crate::report;
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 /// A refinement of a dataset's frames.
@@ -64,7 +65,8 @@ impl DatasetRun<'_> {
         let rig = open_rig(self.rig)?;
         let assets = Assets::new(&dataset, self.options.seed).with_cache(cache()).with_rig(rig);
         let assets = Mutex::new(assets);
-        let report = self.output.report.as_deref().map(Report::create).transpose()?;
+        let create = |folder| Report::create(folder, "Refined poses");
+        let report = self.output.report.as_deref().map(create).transpose()?;
         let journal = beside(self.out, "journal");
         let (mut journal, mut refined): (_, BTreeMap<usize, Refined>) =
             Journal::open(&journal, &self.identity(&dataset)?, self.output.restart)?;
@@ -121,7 +123,10 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
-            match report.map(|r| self.draw(r, &assets, &jobs, &refined, &mut failures)) {
+            let seconds = |index: usize| times.of(index, name);
+            let draw =
+                |r| self.draw(r, (&dataset, &assets), &jobs, (&refined, &seconds), &mut failures);
+            match report.map(draw) {
                 Some(Ok(page)) if !json => say(format!("report: open {}", page.display()))?,
                 Some(Err(error)) => failures.push(format!("report: {error}")),
                 _ => {}
@@ -190,33 +195,102 @@ impl DatasetRun<'_> {
         Ok((refined, seconds))
     }
 
-    /// Draws all refined frames in their order and returns the page; of frames that cannot be drawn `failures` hears.
+    /// Reports all refined frames in their order and returns the page; of frames that cannot be drawn `failures` hears.
     fn draw(
         &self,
         mut report: Report,
-        assets: &Mutex<Assets<'_>>,
+        (dataset, assets): (&Dataset, &Mutex<Assets<'_>>),
         jobs: &[Job],
-        refined: &BTreeMap<usize, Refined>,
+        (refined, seconds): (&BTreeMap<usize, Refined>, &dyn Fn(usize) -> Option<f64>),
         failures: &mut Vec<String>,
     ) -> Result<PathBuf, DatasetError> {
         let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
-        for (&index, refined) in refined {
+        let scorer = Scorer::new(dataset);
+        report.add_fact("dataset", dataset.split_dir().display().to_string());
+        report.add_fact("method", self.options.method().name);
+        report.add_fact("version", env!("CARGO_PKG_VERSION"));
+        let drawn = least_sure(refined);
+        if drawn.len() < refined.len() {
+            report.add_fact("drawn", format!("the {DRAWN} least sure frames"));
+        }
+        let bar = progress(refined.len(), "reporting");
+        for (&index, refined) in bar.wrap_iter(refined.iter()) {
             let job = &jobs[index];
-            let mut drawn = || -> anyhow::Result<()> {
+            let mut add = || -> anyhow::Result<()> {
+                let (frame, fault) = frame_report(&scorer, job, refined, seconds(index));
+                let t_cam_object = (&refined.pose).into();
                 let required = Sensor::required_by(&self.method);
-                let FrameInput { object, observation, .. } = assets.load(&job.target, &required)?;
-                let pose = (&(&refined.pose).into(), refined.iteration);
-                let trace = refined.trace.clone().unwrap_or_default();
-                let initial = &job.row.t_cam_model;
-                let frame = FrameReport::draw(&observation, &object, initial, pose, &trace);
-                Ok(report.add(&job.target.to_string(), &frame)?)
+                let load = || assets.load(&job.target, &required);
+                let input = drawn.contains(&index).then(load).transpose();
+                let drawing =
+                    input.as_ref().ok().and_then(Option::as_ref).map(|input| FrameDrawing {
+                        input,
+                        initial: Some(&job.row.t_cam_model),
+                        t_cam_object: &t_cam_object,
+                        covariance: refined.confidence.as_ref().map(|c| &c.covariance),
+                        trace: refined.trace.as_ref(),
+                    });
+                report.add_frame(frame, drawing.as_ref())?;
+                fault.map_or(Ok(()), Err)?;
+                input.map(drop)?;
+                Ok(())
             };
-            if let Err(error) = drawn() {
+            if let Err(error) = add() {
                 failures.push(format!("{}: report: {error}", job.target));
             }
         }
         report.finish()
     }
+}
+
+/// Frames that are drawn at most: pages stay small enough to be opened.
+const DRAWN: usize = 200;
+
+/// Frames that are drawn: all, or those whose poses are the least probable.
+fn least_sure(refined: &BTreeMap<usize, Refined>) -> BTreeSet<usize> {
+    let probability = |r: &Refined| r.confidence.as_ref().map_or(0.0, |c| c.probability);
+    let mut all: Vec<(f64, usize)> = refined.iter().map(|(k, r)| (probability(r), *k)).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all.into_iter().take(DRAWN).map(|(_, index)| index).collect()
+}
+
+/// A row of the report, and why its error is not known where that is a fault.
+fn frame_report(
+    scorer: &Scorer<'_>,
+    job: &Job,
+    refined: &Refined,
+    seconds: Option<f64>,
+) -> (FrameReport, Option<anyhow::Error>) {
+    let (initial, pose) = (job.row.t_cam_model, Isometry3::from(&refined.pose));
+    let errors = [pose, initial]
+        .map(|t_cam_model| scorer.pose_error(&ResultRow { t_cam_model, ..job.row.clone() }));
+    let mut fault = None;
+    let [error, initial_error] = errors.map(|error| {
+        error.unwrap_or_else(|e| {
+            fault = Some(e.into());
+            None
+        })
+    });
+    let confidence = refined.confidence.as_ref();
+    let mut figures = report::pose_figures(error, confidence);
+    figures.extend([
+        report::MOVED
+            .figure(Some(1e3 * (pose.translation.vector - initial.translation.vector).norm())),
+        report::TURNED.figure(Some(pose.rotation.angle_to(&initial.rotation).to_degrees())),
+        report::INITIAL_ERROR.figure(initial_error.map(|[meters, _]| 1e3 * meters)),
+        report::INITIAL_TURN.figure(initial_error.map(|[_, radians]| radians.to_degrees())),
+        report::SECONDS.figure(seconds),
+        report::ITERATION.figure(Some(refined.iteration as f64)),
+    ]);
+    let remarks: Vec<String> =
+        refined.object_warnings.iter().chain(&refined.warnings).cloned().collect();
+    let mut flags = confidence.map_or_else(Vec::new, report::flags);
+    if !remarks.is_empty() {
+        flags.push("warning".to_owned());
+    }
+    let posterior = refined.confidence.clone();
+    let (name, status) = (job.target.to_string(), String::new());
+    (FrameReport { name, status, flags, remarks, figures, posterior }, fault)
 }
 
 fn summary(job: &Job, refined: &Refined, seconds: Option<f64>) -> serde_json::Value {

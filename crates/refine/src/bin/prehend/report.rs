@@ -1,0 +1,59 @@
+//! What reports of several commands have in common.
+
+use prehend_refine::evaluate::report::{Column, Figure};
+use prehend_refine::strategy::PosteriorSummary;
+
+const fn column(
+    key: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    digits: usize,
+) -> Column {
+    Column { key, name, unit, digits }
+}
+
+const ERROR: Column = column("error", "error", "mm", 2);
+const TURN_ERROR: Column = column("turned-error", "turned wrong", "°", 2);
+const PROBABILITY: Column = column("probability", "probability", "", 3);
+const SIGMA: Column = column("sigma", "σ", "mm", 2);
+const TURN_SIGMA: Column = column("turned-sigma", "σ of rotation", "°", 2);
+pub(crate) const MOVED: Column = column("moved", "moved", "mm", 1);
+pub(crate) const TURNED: Column = column("turned", "turned", "°", 1);
+pub(crate) const INITIAL_ERROR: Column = column("initial-error", "error before", "mm", 1);
+pub(crate) const INITIAL_TURN: Column =
+    column("initial-turned-error", "turned wrong before", "°", 1);
+pub(crate) const SECONDS: Column = column("seconds", "time", "s", 3);
+pub(crate) const ITERATION: Column = column("iteration", "iterations", "", 0);
+pub(crate) const MILLISECONDS: Column = column("milliseconds", "time", "ms", 1);
+pub(crate) const MOMENT: Column = column("moment", "moment", "s", 2);
+
+/// What is known of a pose by its error \[m, rad\], where the truth is known, and by how sure it is.
+pub(crate) fn pose_figures(
+    error: Option<[f64; 2]>,
+    confidence: Option<&PosteriorSummary>,
+) -> Vec<Figure> {
+    let length = |sigmas: [f64; 3]| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt();
+    vec![
+        ERROR.figure(error.map(|[meters, _]| 1e3 * meters)),
+        TURN_ERROR.figure(error.map(|[_, radians]| radians.to_degrees())),
+        PROBABILITY.figure(confidence.map(|c| c.probability)),
+        SIGMA.figure(confidence.map(|c| length(c.deviation_mm))),
+        TURN_SIGMA.figure(confidence.map(|c| length(c.deviation_deg))),
+    ]
+}
+
+/// What speaks against a pose.
+pub(crate) fn flags(confidence: &PosteriorSummary) -> Vec<String> {
+    let rival = confidence.weights.iter().skip(1).any(|weight| *weight > 0.1);
+    let known = [
+        (confidence.probability < 0.5, "improbable"),
+        (!confidence.misfits.is_empty(), "misfit"),
+        (!confidence.disagreements.is_empty(), "disagreement"),
+        (rival, "ambiguous"),
+        (!confidence.unobserved_mm.is_empty(), "unobserved direction"),
+    ];
+    let mut flags: Vec<String> =
+        known.iter().filter(|(is, _)| *is).map(|(_, flag)| (*flag).to_owned()).collect();
+    flags.extend(confidence.let_off.iter().map(|what| format!("without {what}")));
+    flags
+}

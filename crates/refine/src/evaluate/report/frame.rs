@@ -1,0 +1,129 @@
+//! What a page shows of a frame.
+
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use super::document::{Chart, Figure, LabeledPicture, Series};
+use super::scene::EncodedScene;
+use crate::data::FrameInput;
+use crate::error::RefineError;
+use crate::rig::{FrameResiduals, SensorResidual};
+use crate::strategy::{PosteriorSummary, Trace};
+
+/// A frame: a row of the table, and words.
+#[derive(Clone, Debug, Default)]
+pub struct FrameReport {
+    /// Which frame.
+    pub name: String,
+    /// What became of it in a word or two; empty where there is nothing to say.
+    pub status: String,
+    /// What to look at, each in a word or two: filters know them.
+    pub flags: Vec<String>,
+    /// Sentences.
+    pub remarks: Vec<String>,
+    /// Its numbers.
+    pub figures: Vec<Figure>,
+    /// How sure the pose is, where that is known.
+    pub posterior: Option<PosteriorSummary>,
+}
+
+/// What there is to draw of a frame.
+pub struct FrameDrawing<'a> {
+    /// What was sensed.
+    pub input: &'a FrameInput,
+    /// Where the object was said to be, where that is known (object → camera) \[m\].
+    pub initial: Option<&'a Isometry3<f64>>,
+    /// Where it was found \[m\].
+    pub t_cam_object: &'a Isometry3<f64>,
+    /// Covariance of the latter: see [`PosteriorSummary::covariance`].
+    pub covariance: Option<&'a [[f64; 6]; 6]>,
+    /// How the search went, where that was kept.
+    pub trace: Option<&'a Trace>,
+}
+
+/// A frame as the page has it.
+#[derive(Serialize)]
+pub(super) struct FrameEntry {
+    pub(super) name: String,
+    pub(super) status: String,
+    pub(super) flags: Vec<String>,
+    pub(super) remarks: Vec<String>,
+    /// By the keys of columns.
+    pub(super) figures: serde_json::Map<String, serde_json::Value>,
+    pub(super) posterior: Option<PosteriorSummary>,
+    pub(super) drawing: Option<DrawingEntry>,
+}
+
+/// What is drawn of a frame, as the page has it.
+#[derive(Serialize)]
+pub(super) struct DrawingEntry {
+    pub(super) pictures: [LabeledPicture; 2],
+    pub(super) residuals: Vec<ResidualEntry>,
+    pub(super) chart: Option<Chart>,
+    pub(super) scene: EncodedScene,
+}
+
+/// Median residuals of a sensor.
+#[derive(Serialize)]
+pub(super) struct ResidualEntry {
+    sensor: &'static str,
+    unit: &'static str,
+    before: Option<f64>,
+    after: f64,
+}
+
+impl From<FrameReport> for FrameEntry {
+    fn from(frame: FrameReport) -> Self {
+        let FrameReport { name, status, flags, remarks, figures, posterior } = frame;
+        let known = figures.iter().filter_map(|figure| Some((figure.column.key, figure.value?)));
+        let figures = known.map(|(key, value)| (key.to_owned(), value.into())).collect();
+        Self { name, status, flags, remarks, figures, posterior, drawing: None }
+    }
+}
+
+/// Residuals at both poses, by sensor.
+pub(super) fn residuals(drawing: &FrameDrawing<'_>) -> Result<Vec<ResidualEntry>, RefineError> {
+    let frame = drawing.input.frame()?;
+    let at = |pose| Ok::<_, RefineError>(FrameResiduals::of(&frame, pose)?.sensors());
+    let before = drawing.initial.map_or(Ok(Vec::new()), at)?;
+    let entry = |SensorResidual { sensor, unit, size, .. }| {
+        let before = before.iter().find(|before| before.sensor == sensor).map(|before| before.size);
+        ResidualEntry { sensor, unit, before, after: size }
+    };
+    Ok(at(drawing.t_cam_object)?.into_iter().map(entry).collect())
+}
+
+/// Each term's value, relative to its first one.
+pub(super) fn loss_chart(trace: &Trace) -> Option<Chart> {
+    let first = trace.iterations.first()?;
+    let series = trace.terms.iter().enumerate().map(|(term, name)| {
+        let scale = 1.0 / first.values[term].max(f64::MIN_POSITIVE);
+        let point = |i: &crate::strategy::Iteration| [i.index as f64, i.values[term] * scale];
+        Series { name: name.clone(), points: trace.iterations.iter().map(point).collect() }
+    });
+    Some(Chart {
+        title: "Loss".into(),
+        axes: ["iteration".into(), "loss / initial loss".into()],
+        logarithmic: true,
+        series: series.collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::strategy::Iteration;
+
+    #[test]
+    fn losses_are_relative_to_the_first() {
+        assert!(loss_chart(&Trace::default()).is_none());
+        let mut trace = Trace::new(["depth", "tactile"].into_iter());
+        for index in 0..3 {
+            let values = vec![4.0 / (1.0 + index as f64), 0.0];
+            trace.iterations.push(Iteration { index, values, weights: vec![1.0, 0.0], step: 1e-3 });
+        }
+        let chart = loss_chart(&trace).unwrap();
+        assert_eq!(chart.series[0].points, [[0.0, 1.0], [1.0, 0.5], [2.0, 1.0 / 3.0]]);
+        assert_eq!(chart.series[1].points[2], [2.0, 0.0]);
+    }
+}
