@@ -66,6 +66,9 @@ struct Run {
     /// Write everything here
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
+    /// Write a web page here, with tables, plots and the errors of every frame
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    report: Option<PathBuf>,
     /// Discard what an interrupted run with other settings left, instead of refusing
     #[arg(long, help_heading = "Output")]
     restart: bool,
@@ -103,6 +106,9 @@ struct Merge {
     /// Write the whole study here
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Write a web page here, with tables, plots and the errors of every frame
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Replace the study that is there, instead of refusing
     #[arg(long)]
     restart: bool,
@@ -166,7 +172,7 @@ impl Run {
         )?;
         bar.finish_and_clear();
         journal.compact(&records)?;
-        finish(&self.out, &design, &records, &times)
+        finish((&self.out, self.report.as_deref()), &design, &records, &times)
     }
 
     fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Method)>> {
@@ -262,26 +268,28 @@ impl Merge {
         let parts: Vec<PathBuf> = self.shards.iter().map(|s| s.join(TIMES)).collect();
         let file = self.out.join(TIMES);
         join_times(&parts, &file)?;
-        finish(&self.out, &design, &records, &Times::open(&file, true)?)
+        finish((&self.out, self.report.as_deref()), &design, &records, &Times::open(&file, true)?)
     }
 }
 
 /// Writes the tables and says what was found.
 fn finish(
-    out: &Path,
+    (out, report): (&Path, Option<&Path>),
     design: &Design,
     records: &BTreeMap<usize, FrameRecord>,
     times: &Times,
 ) -> anyhow::Result<ExitCode> {
-    let (failures, files) = write_outputs(out, design, records)?;
+    let (failures, files) = write_outputs(out, design, records, report)?;
     say(std::fs::read_to_string(out.join("tables.txt"))?.trim_end())?;
     let means = times.means();
     if !means.is_empty() {
         let each = means.iter().map(|(method, (mean, n))| format!("{method} {mean:.2} ({n})"));
         say(format!("\nSeconds a frame (frames): {}", each.collect::<Vec<_>>().join(", ")))?;
     }
+    let (pages, files): (Vec<_>, Vec<_>) = files.iter().partition(|f| f.ends_with("index.html"));
     let names = files.iter().filter_map(|f| f.file_name()).map(|n| n.to_string_lossy());
     say(format!("{}: {}", out.display(), names.collect::<Vec<_>>().join(" ")))?;
+    pages.iter().try_for_each(|page| say(format!("report: open {}", page.display())))?;
     let done = records.values().filter(|r| !r.failed()).count();
     // What comes of a fault that the study itself makes is in its tables.
     let failures = failures.iter().filter(|failure| !failure.perturbed);

@@ -22,6 +22,12 @@ impl Table {
         self.rows.push(row);
     }
 
+    /// Headings and rows.
+    #[cfg(feature = "cli")]
+    pub(crate) fn into_parts(self) -> (Vec<String>, Vec<Vec<String>>) {
+        (self.header, self.rows)
+    }
+
     /// The table in Markdown.
     #[cfg(feature = "cli")]
     pub(crate) fn markdown(&self) -> String {

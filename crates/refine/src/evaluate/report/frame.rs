@@ -51,12 +51,12 @@ pub(super) struct FrameEntry {
     /// By the keys of columns.
     pub(super) figures: serde_json::Map<String, serde_json::Value>,
     pub(super) posterior: Option<PosteriorSummary>,
-    pub(super) drawing: Option<DrawingEntry>,
+    pub(super) drawing: Option<DrawnFrame>,
 }
 
-/// What is drawn of a frame, as the page has it.
+/// A frame that is drawn.
 #[derive(Serialize)]
-pub(super) struct DrawingEntry {
+pub struct DrawnFrame {
     pub(super) pictures: [LabeledPicture; 2],
     pub(super) residuals: Vec<ResidualEntry>,
     pub(super) chart: Option<Chart>,
@@ -72,12 +72,12 @@ pub(super) struct ResidualEntry {
     after: f64,
 }
 
-impl From<FrameReport> for FrameEntry {
-    fn from(frame: FrameReport) -> Self {
+impl FrameEntry {
+    pub(super) fn new(frame: FrameReport, drawing: Option<DrawnFrame>) -> Self {
         let FrameReport { name, status, flags, remarks, figures, posterior } = frame;
         let known = figures.iter().filter_map(|figure| Some((figure.column.key, figure.value?)));
         let figures = known.map(|(key, value)| (key.to_owned(), value.into())).collect();
-        Self { name, status, flags, remarks, figures, posterior, drawing: None }
+        Self { name, status, flags, remarks, figures, posterior, drawing }
     }
 }
 

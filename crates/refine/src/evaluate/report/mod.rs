@@ -13,7 +13,7 @@ mod scene;
 #[cfg(feature = "cli")]
 pub use document::{Chart, Column, Figure, Series};
 #[cfg(feature = "cli")]
-pub use frame::{FrameDrawing, FrameReport};
+pub use frame::{DrawnFrame, FrameDrawing, FrameReport};
 #[cfg(feature = "cli")]
 pub use page::Report;
 pub use picture::{before_and_after, depth_residual_picture, outline_picture, rig_picture};

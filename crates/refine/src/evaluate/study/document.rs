@@ -4,7 +4,7 @@ use super::calibration::Calibration;
 use super::comparison::{Comparison, Contrast};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::Published;
-use super::tables::{ERRORS, Estimate, Row, Table, Tables};
+use super::tables::{ERRORS, Estimate, Failure, Row, Table, Tables};
 use crate::evaluate::metrics::{COLUMNS, Table as TextTable};
 
 /// The metrics of the paper, and the orientation error up to symmetry; the others are in the CSV and JSON files.
@@ -23,30 +23,50 @@ pub(super) fn markdown(tables: &Tables) -> String {
 /// The document with `marks` before its title and its headings.
 fn document(tables: &Tables, marks: [&str; 2], print: fn(&TextTable) -> String) -> String {
     let mut out = format!("{}{}\n", marks[0], tables.study.title());
-    let mut add = |title: String, body: String| out += &format!("\n{}{title}\n\n{body}", marks[1]);
+    for (title, body) in sections(tables) {
+        let body = match body {
+            Body::Table(table) => print(&table),
+            Body::List(lines) => lines.iter().map(|line| format!("- {line}\n")).collect(),
+        };
+        out += &format!("\n{}{title}\n\n{body}", marks[1]);
+    }
+    out
+}
+
+/// What is below a heading.
+pub(super) enum Body {
+    Table(TextTable),
+    List(Vec<String>),
+}
+
+/// The parts of the document, with their headings.
+pub(super) fn sections(tables: &Tables) -> Vec<(String, Body)> {
+    let mut out = Vec::new();
+    let mut add = |title: String, body: Body| out.push((title, body));
     for table in tables.overall() {
         let objects: Vec<&Table> =
             tables.all.iter().filter(|b| b.level == table.level && b.object.is_some()).collect();
         for (title, body) in of_level(tables.study, table, &objects) {
-            add(format!("Noise {}: {title}", table.level), print(&body));
+            add(format!("Noise {}: {title}", table.level), Body::Table(body));
         }
     }
     for calibration in &tables.calibrations {
         let label = calibration.label();
-        let mut add = |title: &str, body: String| add(format!("{label}: {title}"), body);
+        let mut add = |title: &str, body| add(format!("{label}: {title}"), body);
         let poses = format!("% of {} true poses", calibration.n);
         add(
             &format!("{poses} within ellipsoids of the posterior [95 % confidence]"),
-            print(&coverage(calibration)),
+            Body::Table(coverage(calibration)),
         );
-        add("errors and what the information in the frames allows", print(&errors(calibration)));
-        add("predicted probabilities", print(&events(calibration)));
-        add("failures", format!("- {}\n", failures(calibration)));
+        let allowed = "errors and what the information in the frames allows";
+        add(allowed, Body::Table(errors(calibration)));
+        add("predicted probabilities", Body::Table(events(calibration)));
+        add("failures", Body::List(vec![failures(calibration)]));
     }
-    let failed: String = tables.failures.iter().map(|f| format!("- {}\n", f.sentence())).collect();
-    match tables.failures.len() {
-        0 => add("Failed".into(), "- nothing\n".into()),
-        count => add(format!("Failed: {count}"), failed),
+    let failed: Vec<String> = tables.failures.iter().map(Failure::sentence).collect();
+    match failed.len() {
+        0 => add("Failed".into(), Body::List(vec!["nothing".into()])),
+        count => add(format!("Failed: {count}"), Body::List(failed)),
     }
     out
 }

@@ -13,6 +13,7 @@ mod document;
 mod kind;
 mod merge;
 mod output;
+mod page;
 mod plot;
 mod posterior;
 mod prediction;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::csv::{calibration_csv, csv};
 use super::design::Design;
 use super::document::{markdown, text};
+use super::page::write_page;
 use super::plot::plots;
 use super::record::Records;
 use super::tables::{Failure, Tables};
@@ -15,7 +16,8 @@ pub const RECORDS: &str = "records.jsonl";
 /// Seconds by frame and method.
 pub const TIMES: &str = "times.csv";
 
-/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`, and `calibration.csv` where something was believed) and the plots (`*.svg`) of a study to a folder and returns what failed, and the files.
+/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`, and `calibration.csv` where something was believed) and the plots (`*.svg`) of a study to a folder, and all of
+/// it as a page to the folder `report` if that is given, and returns what failed, and the files.
 ///
 /// # Errors
 /// If a file cannot be written; each appears whole or not at all.
@@ -23,6 +25,7 @@ pub fn write_outputs(
     folder: &Path,
     design: &Design,
     records: &Records,
+    report: Option<&Path>,
 ) -> Result<(Vec<Failure>, Vec<PathBuf>), DatasetError> {
     let tables = Tables::new(design, records);
     let json = serde_json::to_string_pretty(&tables).map_err(|e| e.to_string());
@@ -36,8 +39,10 @@ pub fn write_outputs(
         let bytes = calibration_csv(&tables.calibrations).map_err(|e| e.to_string());
         outputs.push(("calibration.csv".into(), bytes));
     }
-    let plots = plots(design, &tables, records).into_iter();
-    outputs.extend(plots.map(|(name, svg)| (name, svg.map(String::into_bytes))));
+    let plots = plots(design, &tables, records);
+    let drawn = plots.iter().filter_map(|(name, svg)| Some((name.clone(), svg.clone().ok()?)));
+    let drawn: Vec<(String, String)> = drawn.collect();
+    outputs.extend(plots.into_iter().map(|(name, svg)| (name, svg.map(String::into_bytes))));
     let mut files = Vec::new();
     for (name, bytes) in outputs {
         let file = folder.join(name);
@@ -47,5 +52,9 @@ pub fn write_outputs(
     for (file, bytes) in &files {
         write_atomically(file, bytes)?;
     }
-    Ok((tables.failures, files.into_iter().map(|(file, _)| file).collect()))
+    let mut files: Vec<PathBuf> = files.into_iter().map(|(file, _)| file).collect();
+    if let Some(report) = report {
+        files.push(write_page(report, (design, records), &tables, &drawn)?);
+    }
+    Ok((tables.failures, files))
 }

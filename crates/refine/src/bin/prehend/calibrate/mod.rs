@@ -36,7 +36,7 @@ pub(crate) struct Calibrate {
     /// Write the frames' poses here, as a BOP results file without scores; with --window, as they were with the rig until then
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     refined: Option<PathBuf>,
-    /// Write residuals before and after, by sensor, with pictures to this folder; begin with its index.html
+    /// Write a web page here: residuals before and after, by sensor, with pictures
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     report: Option<PathBuf>,
     /// Passes over all frames, at most

@@ -10,7 +10,9 @@ use anyhow::bail;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::data::{Assets, Identity, Journal, PlainPose, Sensor, Times, Workers};
+use prehend_refine::data::{
+    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers,
+};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::scene::Warning;
@@ -209,6 +211,7 @@ impl DatasetRun<'_> {
         report.add_fact("dataset", dataset.split_dir().display().to_string());
         report.add_fact("method", self.options.method().name);
         report.add_fact("version", env!("CARGO_PKG_VERSION"));
+        let is_fused = matches!(self.method, Method::Fused(_));
         let drawn = least_sure(refined);
         if drawn.len() < refined.len() {
             report.add_fact("drawn", format!("the {DRAWN} least sure frames"));
@@ -216,28 +219,23 @@ impl DatasetRun<'_> {
         let bar = progress(refined.len(), "reporting");
         for (&index, refined) in bar.wrap_iter(refined.iter()) {
             let job = &jobs[index];
-            let mut add = || -> anyhow::Result<()> {
-                let (frame, fault) = frame_report(&scorer, job, refined, seconds(index));
-                let t_cam_object = (&refined.pose).into();
-                let required = Sensor::required_by(&self.method);
-                let load = || assets.load(&job.target, &required);
-                let input = drawn.contains(&index).then(load).transpose();
-                let drawing =
-                    input.as_ref().ok().and_then(Option::as_ref).map(|input| FrameDrawing {
-                        input,
-                        initial: Some(&job.row.t_cam_model),
-                        t_cam_object: &t_cam_object,
-                        covariance: refined.confidence.as_ref().map(|c| &c.covariance),
-                        trace: refined.trace.as_ref(),
-                    });
-                report.add_frame(frame, drawing.as_ref())?;
-                fault.map_or(Ok(()), Err)?;
-                input.map(drop)?;
-                Ok(())
+            let (frame, fault) = frame_report(&scorer, job, refined, seconds(index));
+            let t_cam_object = (&refined.pose).into();
+            let mut draw = || -> Result<_, AssetError> {
+                report.draw(&FrameDrawing {
+                    input: &assets.load(&job.target, &Sensor::required_by(&self.method))?,
+                    initial: Some(&job.row.t_cam_model),
+                    t_cam_object: &t_cam_object,
+                    covariance: refined.confidence.as_ref().map(|c| &c.covariance),
+                    // Stages of the fused method minimize other losses each.
+                    trace: refined.trace.as_ref().filter(|_| !is_fused),
+                })
             };
-            if let Err(error) = add() {
-                failures.push(format!("{}: report: {error}", job.target));
-            }
+            let mut failed = |e| failures.push(format!("{}: report: {e}", job.target));
+            let drawing = drawn.contains(&index).then(&mut draw).transpose();
+            let drawn = drawing.map_err(&mut failed).unwrap_or_default();
+            fault.map(failed);
+            report.add_frame(frame, drawn);
         }
         report.finish()
     }
@@ -260,14 +258,14 @@ fn frame_report(
     job: &Job,
     refined: &Refined,
     seconds: Option<f64>,
-) -> (FrameReport, Option<anyhow::Error>) {
+) -> (FrameReport, Option<AssetError>) {
     let (initial, pose) = (job.row.t_cam_model, Isometry3::from(&refined.pose));
     let errors = [pose, initial]
         .map(|t_cam_model| scorer.pose_error(&ResultRow { t_cam_model, ..job.row.clone() }));
     let mut fault = None;
     let [error, initial_error] = errors.map(|error| {
         error.unwrap_or_else(|e| {
-            fault = Some(e.into());
+            fault = Some(e);
             None
         })
     });

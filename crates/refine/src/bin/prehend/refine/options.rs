@@ -21,7 +21,9 @@ pub(super) struct OutputOptions {
     /// the same file. What frames took is in FILE.times.csv.
     #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     pub(super) out: Option<PathBuf>,
-    /// Write a web page here, with pictures of the poses before and after and loss curves
+    /// Write a web page here: frames in a table, outlines before and after, residuals, confidence, touch, and hand and object in three dimensions
+    ///
+    /// It needs nothing but itself. Errors are in it where the dataset has the truth; the poses do not depend on it.
     #[arg(long, value_name = "DIR")]
     pub(super) report: Option<PathBuf>,
     /// Print JSON on standard output: poses, times, loss curves and failures

@@ -5,6 +5,7 @@ mod film;
 mod images;
 #[cfg_attr(not(feature = "mcap"), path = "no_log.rs")]
 mod log;
+mod report;
 mod strip;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
+use prehend_refine::evaluate::Scorer;
 use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::strategy::Posterior;
@@ -36,6 +38,7 @@ use self::done::{Done, summary, told};
 use self::film::{Film, Moment, SceneFilm};
 use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
 use self::log::{Log, LogWriter};
+use self::report::FilmReport;
 use crate::options::{Rendering, Selection, Unit, limit_threads, open_rig, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
@@ -93,6 +96,9 @@ pub(crate) struct Track {
     /// Write a picture of eight frames here (PNG), with the object's outline, of the first object that is followed: green where it was seen, red where it was only expected
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     strip: Option<PathBuf>,
+    /// Write a web page here: frames in a table, outlines, hand and object in three dimensions, and curves over time
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    report: Option<PathBuf>,
     /// Print JSON on standard output: poses, how they came about, times and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -157,6 +163,7 @@ struct Outcome {
     rows: Option<ResultsWriter>,
     /// What was sensed and found, if that is recorded.
     log: Option<LogWriter>,
+    report: Option<FilmReport>,
 }
 
 /// How objects are followed.
@@ -214,7 +221,8 @@ impl Track {
         let following = Following { settings, backend, rig, stop: stop.transpose()? };
         let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
-        let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log };
+        let report = self.report.as_deref().map(FilmReport::create).transpose()?;
+        let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log, report };
         match (&self.log.mcap, &selection) {
             (Some(file), _) => self.track_log(file, &following, &mut outcome)?,
             (None, Some(selection)) => {
@@ -222,7 +230,7 @@ impl Track {
             }
             (None, None) => bail!("--dataset or --mcap: there is nothing to be tracked"),
         }
-        let Outcome { frames, mut failures, rows, log } = outcome;
+        let Outcome { frames, mut failures, rows, log, report } = outcome;
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
@@ -233,12 +241,23 @@ impl Track {
         if let Some(Err(error)) = log.map(LogWriter::finish) {
             failures.push(format!("--mcap-out: {error:#}"));
         }
+        let page = report.filter(|_| !frames.is_empty()).map(|report| {
+            // Of a dataset that is only coming into being, nobody knows the truth.
+            let finished = selection.as_ref().filter(|_| watched.is_none());
+            let dataset = finished.map(Selection::open).transpose()?;
+            report.finish(dataset.as_ref().map(Scorer::new).as_ref())
+        });
+        let page = page.transpose().unwrap_or_else(|error| {
+            failures.push(format!("--report: {error:#}"));
+            None
+        });
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
             let document = json!({ "frames": frames, "failures": failures });
             say(format!("{document:#}"))?;
         } else if !frames.is_empty() {
             say(format!("{}, written to {}", told(&frames), self.out.display()))?;
+            page.map_or(Ok(()), |page| say(format!("report: open {}", page.display())))?;
         }
         Ok(exit_code(frames.len(), &failures))
     }
@@ -387,12 +406,17 @@ impl Track {
         // With the hand, and what else there is, of the first image.
         let mut tracker: Option<(Tracker, Option<Arc<Hand>>)> = None;
         let stopped = || following.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if let Some(report) = &mut outcome.report {
+            report.begin(bar.length());
+        }
         while !stopped()
             && let Some(Moment { target, time, stamp, input }) = film.next()
         {
-            let Outcome { log, failures, .. } = outcome;
-            let frame = || -> anyhow::Result<Tracked> {
-                let FrameInput { observation, hand, .. } = input?;
+            let Outcome { log, failures, report, .. } = outcome;
+            // What was sensed is given back where it is asked for once more.
+            let frame = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
+                let input = input?;
+                let FrameInput { observation, hand, .. } = &input;
                 let tracker = match &mut tracker {
                     Some((tracker, first)) => {
                         require_same(first.as_ref(), hand.as_ref())?;
@@ -404,18 +428,22 @@ impl Track {
                         &mut none.insert((new, hand.clone())).0
                     }
                 };
-                let Some(writer) = log else { return Ok(tracker.push(observation, time)?) };
-                let tracked = tracker.track(&observation, time)?;
+                if log.is_none() && report.is_none() {
+                    return Ok((tracker.push(input.observation, time)?, None));
+                }
+                let tracked = tracker.track(observation, time)?;
                 let seen = (&**object, hand.as_deref());
-                if let Err(error) = writer.add((time, stamp), seen, &observation, &tracked) {
+                let written =
+                    log.as_mut().map(|w| w.add((time, stamp), seen, observation, &tracked));
+                if let Some(Err(error)) = written {
                     // Of a log with a gap nobody would know.
                     failures.push(format!("--mcap-out: {error:#}; it was given up"));
                     *log = None;
                 }
-                Ok(tracked)
+                Ok((tracked, Some(input)))
             };
             match frame() {
-                Ok(tracked) => {
+                Ok((tracked, input)) => {
                     bar.set_message(tracked.status.name());
                     if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
                         warn(bar, target, format!("lost: {doubt}"));
@@ -427,6 +455,12 @@ impl Track {
                     }
                     if let Some(rows) = &mut outcome.rows {
                         rows.add(&row)?;
+                    }
+                    if let Some((report, input)) = outcome.report.as_mut().zip(input)
+                        && let Err(error) =
+                            report.add((target, time), &input, &tracked, row.clone())
+                    {
+                        outcome.failures.push(format!("{target}: report: {error}"));
                     }
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
                     outcome.frames.push(Done {

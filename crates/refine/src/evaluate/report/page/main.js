@@ -60,7 +60,8 @@ function start() {
     "/": () => table?.query.focus(),
   };
   document.addEventListener("keydown", (e) => {
-    const writing = e.target.matches("input, select, textarea");
+    // A slider has the arrow keys to itself.
+    const writing = e.target.matches("input[type=search], select") || (e.target.matches("input[type=range]") && e.key.startsWith("Arrow"));
     if (e.target === table?.query && (e.key === "Escape" || e.key === "Enter")) return table.query.blur();
     if (writing || help.open || e.ctrlKey || e.metaKey || e.altKey || !keys[e.key]) return;
     e.preventDefault();

@@ -19,7 +19,7 @@ in vec3 seen; in vec3 tint; out vec4 pixel;
 void main() {
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
   float light = 0.35 + 0.65 * abs(dot(normal, normalize(vec3(0.25, 0.4, 1.0))));
-  vec3 color = mix(tint, paint.rgb, flat_color);
+  vec3 color = mix(tint, paint.rgb, min(flat_color, 1.0));
   pixel = vec4(color * mix(light, 1.0, step(1.5, flat_color)), paint.a) * vec4(vec3(paint.a), 1.0);
 }`;
 
@@ -142,7 +142,8 @@ class SceneView {
   reset() {
     this.turn = 0;
     this.tilt = 0;
-    this.distance = 0.32;
+    // The object and the fingers around it fill the view.
+    this.distance = Math.max(0.16, 1.2 * norm(this.data.meshes[this.scene.object].size));
     this.draw();
   }
 
