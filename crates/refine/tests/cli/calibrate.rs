@@ -25,7 +25,8 @@ fn a_rig_its_models_its_poses_and_a_report_are_written() {
     for what in ["Residuals by sensor", "depth on the hand [mm]", "touched skin", "outlines of"] {
         assert!(page.contains(what), "{what}");
     }
-    assert!(place.path("r/0002.png").is_file());
+    // The map of depth, and both frames, before and after.
+    assert_eq!(page.matches("data:image/jpeg").count(), 6);
     let truth = default_scene(1).unwrap().truth;
     let rows = place.poses("p.csv");
     assert_eq!(rows.len(), 2);

@@ -120,7 +120,7 @@ fn histories_and_pages_survive_too() {
     kill_midway(&place, &command, JOURNAL, "r.csv");
     assert_eq!(told(place.succeed(&command)), whole);
     assert_eq!(place.read("page/index.html"), page);
-    assert!(place.path("page/0005.png").is_file());
+    assert_eq!(page.matches("data:image/jpeg").count(), 12);
 }
 
 #[test]

@@ -125,7 +125,8 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
-            let seconds = |index: usize| times.of(index, name);
+            // Else a resumed run would not end with the same page.
+            let seconds = |index| seconds(index).filter(|_| self.output.time);
             let draw =
                 |r| self.draw(r, (&dataset, &assets), &jobs, (&refined, &seconds), &mut failures);
             match report.map(draw) {
