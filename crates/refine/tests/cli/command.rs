@@ -116,13 +116,19 @@ fn json_and_report_tell_the_whole_run() {
     for (frame, row) in frames.iter().zip(&rows) {
         let drawing = &frame["drawing"];
         assert_eq!(drawing["pictures"].as_array().unwrap().len(), 2);
-        assert_eq!(drawing["scene"]["pose"][11].as_f64().unwrap() as f32, row.t_cam_model.translation.z as f32);
+        assert_eq!(
+            drawing["scene"]["pose"][11].as_f64().unwrap() as f32,
+            row.t_cam_model.translation.z as f32
+        );
         assert_eq!(drawing["chart"]["series"].as_array().unwrap().len(), 4);
         let before = frame["figures"]["initial-error"].as_f64().unwrap();
         assert!(before > 1.0 && frame["figures"]["error"].as_f64().unwrap() < before);
         let sensors = drawing["residuals"].as_array().unwrap().iter();
         let sensors: Vec<&str> = sensors.map(|r| r["sensor"].as_str().unwrap()).collect();
-        assert_eq!(sensors, ["depth on the object", "depth on the hand", "outline", "touched skin"]);
+        assert_eq!(
+            sensors,
+            ["depth on the object", "depth on the hand", "outline", "touched skin"]
+        );
     }
     // Without the truth there is nothing to say of errors, and the rest is the same.
     place.remove("ds/test/000001/scene_gt.json");

@@ -136,10 +136,9 @@ impl Report {
                 ["initial", "refined"],
                 &compared(observation, object, initial, t_cam_object),
             ),
-            None => labeled(
-                ["image", "outline"],
-                &image_and_outline(observation, object, input.hand.as_deref(), t_cam_object),
-            ),
+            None => {
+                labeled(["image", "outline"], &image_and_outline(observation, object, t_cam_object))
+            }
         };
         let hand = input.hand.as_ref().map(|hand| self.hand(hand));
         let index = self.object(object);

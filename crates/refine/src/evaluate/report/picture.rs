@@ -39,16 +39,15 @@ pub(super) fn compared(
     })
 }
 
-/// The image around the object, and the same with the object's outline and the hand's.
+/// The image around the object, and the same with the object's outline.
 #[cfg(feature = "cli")]
 pub(super) fn image_and_outline(
     observation: &Observation,
     object: &Object,
-    hand: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> [RgbImage; 2] {
     let (image, window) = (brightened(observation), window(observation, object, t_cam_object));
-    let outlined = outlined(image.clone(), observation, object, hand, t_cam_object, AFTER);
+    let outlined = outlined(image.clone(), observation, object, None, t_cam_object, AFTER);
     [cut(&image, window), cut(&outlined, window)]
 }
 

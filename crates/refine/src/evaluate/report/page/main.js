@@ -35,7 +35,9 @@ function start() {
   document.title = `${data.title} – Prehend`;
   byId("title").textContent = data.title;
   byId("facts").append(...data.facts.map(([what, value]) => el("div", {}, el("dt", {}, what), el("dd", {}, value))));
-  byId("blocks").append(...data.blocks.map(drawBlock));
+  const [charts, others] = [true, false].map((is) => data.blocks.filter((b) => (b.kind === "chart") === is));
+  if (charts.length) byId("blocks").append(el("div.cards", {}, ...charts.map(drawBlock)));
+  byId("blocks").append(...others.map(drawBlock));
   const toggleTheme = theme();
   byId("theme").addEventListener("click", toggleTheme);
   const help = byId("help");

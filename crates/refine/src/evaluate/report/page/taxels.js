@@ -39,7 +39,7 @@ function drawTaxels(hand, forces) {
     const places = flattened(members.map((k) => hand.taxels[k]));
     const [xs, ys] = [0, 1].map((i) => places.map((p) => p[i]));
     const [x0, x1, y0, y1] = [Math.min(...xs) - 3, Math.max(...xs) + 3, Math.min(...ys) - 3, Math.max(...ys) + 3];
-    const svg = el("svg", { viewBox: `${x0} ${y0} ${x1 - x0} ${y1 - y0}`, width: 3.2 * (x1 - x0), height: 3.2 * (y1 - y0) });
+    const svg = el("svg", { viewBox: `${x0} ${y0} ${x1 - x0} ${y1 - y0}`, width: 2.6 * (x1 - x0), height: 2.6 * (y1 - y0) });
     members.forEach((k, i) => {
       const force = forces[k];
       const known = Array.isArray(force);
@@ -52,7 +52,7 @@ function drawTaxels(hand, forces) {
     figures.push(el("figure", {}, svg, el("figcaption", {}, `${name}: ${short(total)} N`)));
   }
   return el(
-    "section.card", {}, el("h3", {}, "Touch"),
+    "section.card.wide", {}, el("h3", {}, "Touch"),
     el("div.scale", {}, "0.01 N", strip(FORCE), "10 N"),
     el("div.patches", {}, ...figures),
   );
