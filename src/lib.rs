@@ -12,6 +12,8 @@
 //!
 //! Other features: `gpu` renders on graphics devices, `faer` solves sparse linear systems. [`nalgebra`] is the version that all of them speak.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 #[cfg(feature = "refine")]
 pub mod guide;
 

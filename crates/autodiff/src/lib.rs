@@ -69,6 +69,8 @@
 //! number. At singular points the derivative is documented (in [`Scalar`] and at each function), and a
 //! branch that is not taken contributes nothing, not even a NaN.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod arena;
 mod arithmetic;
 pub mod check;

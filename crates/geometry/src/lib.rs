@@ -1,5 +1,7 @@
 //! Meshes, closest points, signed distance grids, kinematics, descriptions of robots and exact volumes.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod box_tree;
 mod clean;
 pub mod closest;

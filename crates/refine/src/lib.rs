@@ -29,6 +29,8 @@
 //! | [`evaluate`] | metrics, reports, studies |
 //! | [`synth`] | made-up datasets whose truth is known |
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 pub mod data;
 mod error;
 pub mod evaluate;

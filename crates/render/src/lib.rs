@@ -10,6 +10,8 @@
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centers at integers); lengths are in meters; colors
 //! are in 0..=1 as stored in files. Poses and cameras of graphics engines, in glam's types, are converted by [`graphics`].
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod backend;
 pub mod camera;
 mod contour;

@@ -15,6 +15,8 @@
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
 //! center of mass, velocities are those of the center of mass, in the world frame.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod adjoint;
 pub mod articulated;
 mod audit;
