@@ -8,6 +8,7 @@ pub mod bop;
 mod cache;
 mod contact;
 mod depth_camera;
+pub mod details;
 mod frame_file;
 pub mod identity;
 mod journal;

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use anyhow::bail;
 use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
+use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{
     Assets, FrameInput, Identity, Journal, PlainPose, Sensor, Times, Workers,
@@ -121,6 +122,14 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
+            if let Some(Err(error)) = self.output.details.as_deref().map(|file| {
+                let details = |(&i, r): (&usize, &Refined)| {
+                    details(&jobs[i], r, seconds(i).filter(|_| self.output.time))
+                };
+                write_details(file, &refined.iter().map(details).collect::<Vec<_>>())
+            }) {
+                failures.push(format!("--details: {error}"));
+            }
             match report.map(|r| self.draw(r, &assets, &jobs, &refined, &mut failures)) {
                 Some(Ok(page)) if !json => say(format!("report: open {}", page.display()))?,
                 Some(Err(error)) => failures.push(format!("report: {error}")),
@@ -216,6 +225,20 @@ impl DatasetRun<'_> {
             }
         }
         report.finish()
+    }
+}
+
+/// What the table has of a frame.
+fn details(job: &Job, refined: &Refined, seconds: Option<f64>) -> FrameDetails {
+    FrameDetails {
+        target: job.target,
+        t_cam_model: (&refined.pose).into(),
+        initial: Some(job.row.t_cam_model),
+        posterior: refined.confidence.clone(),
+        iterations: refined.iterations,
+        seconds,
+        warnings: refined.object_warnings.iter().chain(&refined.warnings).cloned().collect(),
+        track: None,
     }
 }
 

@@ -23,6 +23,7 @@ use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
     Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
 };
+use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::rig::Rig;
@@ -36,7 +37,9 @@ use self::done::{Done, summary, told};
 use self::film::{Film, Moment, SceneFilm};
 use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
 use self::log::{Log, LogWriter};
-use crate::options::{Rendering, Selection, Unit, limit_threads, open_rig, row, write_poses};
+use crate::options::{
+    Rendering, Selection, Unit, check_details, limit_threads, open_rig, row, write_poses,
+};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -93,6 +96,10 @@ pub(crate) struct Track {
     /// Write a picture of eight frames here (PNG), with the object's outline, of the first object that is followed: green where it was seen, red where it was only expected
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     strip: Option<PathBuf>,
+    /// Write all that is known of each frame here, as a table: poses, covariances, how they came about and others (docs/EXPORT.md lists the columns);
+    /// a NumPy archive (.npz), or .parquet in builds with the feature parquet
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    details: Option<PathBuf>,
     /// Print JSON on standard output: poses, how they came about, times and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -152,6 +159,8 @@ type Start = (Target, Option<Isometry3<f64>>);
 /// What becomes of the frames.
 struct Outcome {
     frames: Vec<Done>,
+    /// What the table has of them, if one is written.
+    details: Option<Vec<FrameDetails>>,
     failures: Vec<String>,
     /// The poses as they come, if they are written so.
     rows: Option<ResultsWriter>,
@@ -193,6 +202,7 @@ impl Track {
         {
             bail!("--mcap-out {written}: is another of the files, too");
         }
+        self.details.as_deref().map(check_details).transpose()?;
         let mut selection = self.selection.take();
         let watched = self.watch.as_ref().zip(selection.as_mut());
         let watched = watched.map(|(folder, selection)| select_scene(selection, folder));
@@ -214,7 +224,13 @@ impl Track {
         let following = Following { settings, backend, rig, stop: stop.transpose()? };
         let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
-        let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log };
+        let mut outcome = Outcome {
+            frames: Vec::new(),
+            details: self.details.is_some().then(Vec::new),
+            failures: Vec::new(),
+            rows,
+            log,
+        };
         match (&self.log.mcap, &selection) {
             (Some(file), _) => self.track_log(file, &following, &mut outcome)?,
             (None, Some(selection)) => {
@@ -222,12 +238,16 @@ impl Track {
             }
             (None, None) => bail!("--dataset or --mcap: there is nothing to be tracked"),
         }
-        let Outcome { frames, mut failures, rows, log } = outcome;
+        let Outcome { frames, details, mut failures, rows, log } = outcome;
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
+        }
+        let table = self.details.as_ref().zip(details).filter(|_| !frames.is_empty());
+        if let Some(Err(error)) = table.map(|(file, rows)| write_details(file, &rows)) {
+            failures.push(format!("--details: {error}"));
         }
         let log = log.filter(|_| !frames.is_empty());
         if let Some(Err(error)) = log.map(LogWriter::finish) {
@@ -427,6 +447,9 @@ impl Track {
                     }
                     if let Some(rows) = &mut outcome.rows {
                         rows.add(&row)?;
+                    }
+                    if let Some(details) = &mut outcome.details {
+                        details.push(done::details(target, &tracked, stamp, self.time));
                     }
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
                     outcome.frames.push(Done {
