@@ -30,7 +30,7 @@ pub struct ContactPoint {
     pub link: String,
     /// Where it is \[m\]: on the hand, or for [`ContactKind::Shape`] on the object.
     pub position: Point3<f64>,
-    /// Unit normal out of the hand; of a sensor that has none in its layout, and of [`ContactKind::Shape`], into the object.
+    /// Unit normal out of the hand; of [`ContactKind::Touched`] and [`ContactKind::Shape`] that of the object there, inward, and zero where it is beyond 5 cm.
     pub normal: Vector3<f64>,
     /// Force of the object on the hand \[N\], NaN where it is not known.
     pub force: Vector3<f64>,

@@ -66,14 +66,12 @@ impl SceneFilm {
         let mut links = Vec::new();
         if let Some((hand, measured)) = hand.zip(observation.hand.as_ref()) {
             let posed = hand.posed(&measured.t_cam_hand, &measured.joints)?;
-            let bodies = match &mut self.hand {
-                Some((known, bodies)) if names(known).eq(names(hand)) => bodies,
-                Some(_) => {
-                    let problem = "are others than in the images before".to_owned();
-                    return Err(RefineError::Setting { name: "bodies", problem });
-                }
-                none => &mut none.insert((Arc::clone(hand), bodies_of(hand))).1,
-            };
+            let (known, bodies) =
+                self.hand.get_or_insert_with(|| (Arc::clone(hand), bodies_of(hand)));
+            if !names(known).eq(names(hand)) {
+                let problem = "are others than in the images before".to_owned();
+                return Err(RefineError::Setting { name: "bodies", problem });
+            }
             let shown = shown(hand).map(|link| posed.t_world_links()[link]);
             links.extend(bodies.iter_mut().zip(shown));
         }

@@ -112,16 +112,17 @@ impl Export {
     }
 }
 
-/// World → camera of each image, by its id, if that is known of all.
+/// World → camera of each image that there is, by its id, if that is known of all.
 fn world(
     dataset: &Dataset,
     images: &Images<'_>,
 ) -> Result<Option<BTreeMap<u32, Isometry3<f64>>>, DatasetError> {
-    let place = |&(scene_id, im_id): &(u32, u32)| {
-        let known = dataset.frame(scene_id, im_id).and_then(|frame| frame.t_cam_world());
-        known.map(|known| known.map(|t_cam_world| (im_id, t_cam_world))).transpose()
-    };
-    let known: BTreeMap<u32, Isometry3<f64>> =
-        images.keys().filter_map(place).collect::<Result<_, _>>()?;
-    Ok(Some(known).filter(|known| known.len() == images.len()))
+    let mut known = BTreeMap::new();
+    for &(scene_id, im_id) in images.keys() {
+        // One that is not there is told of when its turn comes.
+        let Ok(frame) = dataset.frame(scene_id, im_id) else { continue };
+        let Some(t_cam_world) = frame.t_cam_world()? else { return Ok(None) };
+        known.insert(im_id, t_cam_world);
+    }
+    Ok(Some(known))
 }
