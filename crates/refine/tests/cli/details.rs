@@ -43,7 +43,7 @@ fn archive(path: &Path) -> BTreeMap<String, Array> {
     let mut arrays = BTreeMap::new();
     for k in 0..archive.len() {
         let mut entry = archive.by_index(k).unwrap();
-        let name = entry.name().strip_suffix(".npy").unwrap().to_owned();
+        let name = entry.name().unwrap().strip_suffix(".npy").unwrap().to_owned();
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).unwrap();
         let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));

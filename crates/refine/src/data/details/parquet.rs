@@ -50,7 +50,7 @@ fn write(column: &Column, writer: &mut SerializedColumnWriter<'_>) -> Result<(),
     // Within a list, all but the first element of a row repeat, and none is absent.
     let levels = (!column.shape.is_empty()).then(|| {
         let count = column.values.len();
-        let repeats = |k: usize| i16::from(k % column.width() != 0);
+        let repeats = |k: usize| i16::from(!k.is_multiple_of(column.width()));
         (vec![1; count], (0..count).map(repeats).collect::<Vec<i16>>())
     });
     let (definition, repetition) = match &levels {
