@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use serde_json::{Value, json};
 
 use super::chunk::Chunk;
 use super::primitive::{ColorSpace, Parts};
+use super::tracks::{Tracks, quaternion};
 use crate::io::MeshError;
-use crate::io::save::invalid;
 use crate::mesh::TriMesh;
 
 /// Where something is at a moment.
@@ -90,9 +90,7 @@ impl GlbFilm {
             // Half a turn about x: cameras of glTF look against z, with y up.
             let turned = |key: &FilmKey| {
                 let t_base_body = key.t_base_body
-                    * UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
-                        0.0, 1.0, 0.0, 0.0,
-                    ));
+                    * UnitQuaternion::from_quaternion(Quaternion::new(0.0, 1.0, 0.0, 0.0));
                 FilmKey { t_base_body, ..*key }
             };
             let keys: Vec<FilmKey> = keys.iter().map(turned).collect();
@@ -117,79 +115,6 @@ impl GlbFilm {
         parts.describe(&mut document);
         chunk.save(document, path)
     }
-}
-
-/// What moves.
-#[derive(Default)]
-struct Tracks {
-    samplers: Vec<Value>,
-    channels: Vec<Value>,
-}
-
-impl Tracks {
-    /// Gives `node`, of that index, its first place, and a track of all of them where they differ.
-    fn place(
-        &mut self,
-        node: &mut Value,
-        index: usize,
-        name: &str,
-        keys: &[FilmKey],
-        chunk: &mut Chunk,
-        path: &Path,
-    ) -> Result<(), MeshError> {
-        let fault = |what: &str| invalid(path, format!("{name}: {what}"));
-        let times: Vec<[f32; 1]> = keys.iter().map(|key| [key.time as f32]).collect();
-        if !times.is_sorted_by(|a, b| a[0] < b[0]) || times.iter().any(|t| t[0] < 0.0) {
-            return Err(fault("times do not ascend from zero on"));
-        }
-        let places: Vec<[f32; 3]> = keys
-            .iter()
-            .map(|key| key.t_base_body.translation.vector.map(|c| c as f32).into())
-            .collect();
-        let mut turns: Vec<[f32; 4]> = Vec::with_capacity(keys.len());
-        for key in keys {
-            let turn = quaternion(&key.t_base_body.rotation);
-            let before = turns.last().copied().unwrap_or(turn);
-            let dot: f32 = turn.iter().zip(before).map(|(a, b)| a * b).sum();
-            turns.push(if dot < 0.0 { turn.map(|c| -c) } else { turn });
-        }
-        let numbers = times.iter().flatten().chain(places.iter().flatten());
-        if !numbers.chain(turns.iter().flatten()).all(|n| n.is_finite()) {
-            return Err(fault("a key is not finite"));
-        }
-        let (Some(place), Some(turn)) = (places.first(), turns.first()) else {
-            return Err(fault("it is nowhere: there is no key"));
-        };
-        node["translation"] = json!(place);
-        node["rotation"] = json!(turn);
-        let moves = places.iter().any(|p| p != place);
-        let turns_over = turns.iter().any(|q| q != turn);
-        if moves || turns_over {
-            let input = chunk.bounded(&times, "SCALAR");
-            if moves {
-                let output = chunk.floats(&places, "VEC3");
-                self.add(index, "translation", input, output);
-            }
-            if turns_over {
-                let output = chunk.floats(&turns, "VEC4");
-                self.add(index, "rotation", input, output);
-            }
-        }
-        Ok(())
-    }
-
-    fn add(&mut self, node: usize, moved: &str, input: usize, output: usize) {
-        let sampler = self.samplers.len();
-        self.samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
-        let target = json!({ "node": node, "path": moved });
-        self.channels.push(json!({ "sampler": sampler, "target": target }));
-    }
-}
-
-/// The real part last, of unit length in single precision.
-fn quaternion(rotation: &UnitQuaternion<f64>) -> [f32; 4] {
-    let q = rotation.quaternion();
-    [q.i, q.j, q.k, q.w].map(|c| c as f32)
 }
 
 #[cfg(test)]
@@ -256,8 +181,7 @@ mod tests {
                     }
                     for (q, key) in turns.iter().zip(&keys) {
                         let [i, j, k, w] = q.map(f64::from);
-                        let q =
-                            UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k));
+                        let q = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
                         assert!(q.angle_to(&key.t_base_body.rotation) < 1e-6);
                     }
                 }

@@ -3,6 +3,7 @@
 mod chunk;
 mod film;
 mod primitive;
+mod tracks;
 
 use std::path::Path;
 
