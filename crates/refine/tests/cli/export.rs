@@ -44,6 +44,12 @@ fn keys(film: &gltf::Gltf, name: &str) -> ([Isometry3<f64>; 2], Option<Vec<f32>>
 #[test]
 fn nodes_of_a_film_are_where_the_poses_are() {
     let place = Workplace::new();
+    place.edit_json("ds/test/000001/scene_camera.json", |cameras| {
+        for image in ["0", "1"] {
+            let camera = cameras[image].as_object_mut().unwrap();
+            camera.retain(|name, _| !name.ends_with("_w2c"));
+        }
+    });
     let told = place.succeed(
         "export --dataset ds --poses ds/init.csv --glb film.glb --rate 4 --contacts c.ply",
     );
@@ -199,7 +205,7 @@ fn what_cannot_be_exported_is_told() {
     let place = Workplace::new();
     let export = "export --dataset ds --poses ds/init.csv";
     for (more, code, why) in [
-        ("", 2, "--glb"),
+        ("", 1, "--glb"),
         ("--glb no/film.glb", 1, "no/film.glb"),
         ("--glb film.glb --rate 0", 1, "rate 0"),
         ("--glb film.glb --scene 7", 1, "no pose"),
