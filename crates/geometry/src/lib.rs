@@ -39,7 +39,7 @@ pub use cloud::{KdTree, PointCloud};
 pub use contact_area::contact_area;
 pub use field::{DistanceField, FieldSample};
 pub use inertial::Inertial;
-pub use io::{MeshError, limits, write_atomic};
+pub use io::{FilmBody, FilmCamera, FilmKey, GlbFilm, MeshError, limits, write_atomic};
 pub use mass::{MassError, MassProperties};
 pub use mesh::{Texture, TriMesh};
 pub use moments::Moments;

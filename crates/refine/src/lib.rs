@@ -25,6 +25,7 @@
 //! | [`search`] | poses to start from, by sensors alone |
 //! | [`tracker`] | an object followed through frames |
 //! | [`data`] | BOP datasets and other files |
+//! | [`export`] | poses for other programs: films, contacts |
 //! | [`info`] | what a file or folder is and holds |
 //! | [`evaluate`] | metrics, reports, studies |
 //! | [`synth`] | made-up datasets whose truth is known |
@@ -34,6 +35,7 @@
 pub mod data;
 mod error;
 pub mod evaluate;
+pub mod export;
 pub mod factor;
 pub mod info;
 mod method;

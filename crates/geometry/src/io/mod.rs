@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 use crate::mesh::TriMesh;
 pub use atomic::write_atomic;
 pub use error::MeshError;
+pub use save::{FilmBody, FilmCamera, FilmKey, GlbFilm};
 
 impl TriMesh {
     /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf` or `.glb`, in the file's unit.

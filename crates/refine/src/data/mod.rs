@@ -8,6 +8,7 @@ pub mod bop;
 mod cache;
 mod contact;
 mod depth_camera;
+pub mod details;
 mod frame_file;
 pub mod identity;
 mod journal;
@@ -24,6 +25,7 @@ mod workers;
 pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
+pub(crate) use contact::CONTACT_DISTANCE;
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;

@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::fixture::Workplace;
 
-const REFINE: &str =
-    "refine --dataset ds --poses init.csv --method combined --iterations 3 --out r.csv";
+const REFINE: &str = "refine --dataset ds --poses init.csv --method combined --iterations 3 --out r.csv --details r.npz";
 const JOURNAL: &str = "r.csv.journal";
 
 /// Six initial poses of two images.
@@ -53,6 +52,7 @@ fn a_killed_refinement_resumes_wherever_its_journal_ends() {
     let place = workplace();
     place.succeed(REFINE);
     let whole = place.read("r.csv");
+    let table = std::fs::read(place.path("r.npz")).unwrap();
     assert!(!place.path(JOURNAL).exists());
     assert_eq!(place.read("r.csv.times.csv").lines().count(), 7);
     assert!(place.poses("r.csv").iter().all(|row| row.time == -1.0));
@@ -76,6 +76,7 @@ fn a_killed_refinement_resumes_wherever_its_journal_ends() {
         place.write(JOURNAL, &journal[..end]);
         place.succeed(&format!("{REFINE} --threads {threads}"));
         assert_eq!(place.read("r.csv"), whole, "cut at {end}");
+        assert!(std::fs::read(place.path("r.npz")).unwrap() == table, "cut at {end}");
         assert!(!place.path(JOURNAL).exists());
     }
     // Frames that are in the journal are not refined again.

@@ -4,6 +4,8 @@ mod glb;
 mod obj;
 mod ply;
 
+pub use glb::{FilmBody, FilmCamera, FilmKey, GlbFilm};
+
 use std::io;
 use std::path::{Path, PathBuf};
 

@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod config;
 mod eval;
+mod export;
 mod global;
 mod info;
 mod initial;
@@ -78,6 +79,10 @@ enum Command {
     /// With --bop, it prints BOP's average recall over all targets of the dataset instead.
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Eval),
+    /// Write poses for other programs: hand and object as a film (GLB), and where they touch (PLY)
+    ///
+    /// docs/EXPORT.md describes the files.
+    Export(export::Export),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator
     Study(Box<study::Study>),
     /// Learn a rig from its own frames: what is wrong with camera, hand and models in the same way in all of them
@@ -130,6 +135,7 @@ fn run(matches: &clap::ArgMatches, command: clap::Command) -> anyhow::Result<Exi
         Command::Initial(initial) => initial.run(),
         Command::Track(track) => track.run(),
         Command::Eval(eval) => eval.run(),
+        Command::Export(export) => export.run(),
         Command::Study(study) => study.run(),
         Command::Calibrate(calibrate) => calibrate.run(),
         Command::Check(check) => check.run(),

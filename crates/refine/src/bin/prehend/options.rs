@@ -10,9 +10,10 @@ use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, ReadResults, ResultRow, read_results, read_rivals, share_image_times,
-    write_results,
+    Dataset, DatasetError, ReadResults, ResultRow, check_writable, read_results, read_rivals,
+    share_image_times, write_results,
 };
+use prehend_refine::data::details::DetailsFormat;
 use prehend_refine::data::{Target, find_targets};
 use prehend_refine::rig::Rig;
 use prehend_render::{Backend, Device};
@@ -178,6 +179,12 @@ pub(crate) fn write_poses(
     }
     share_image_times(&mut rows);
     write_results(out, &rows)
+}
+
+/// Refuses a table that could not be written: where there is no such folder, or of a format that this build does not write.
+pub(crate) fn check_details(file: &Path) -> anyhow::Result<()> {
+    DetailsFormat::of(file).map_err(|error| anyhow!("--details {error}"))?;
+    Ok(check_writable(file)?)
 }
 
 /// The row of a results file that says where a target is, of unknown time.

@@ -52,7 +52,7 @@ struct CameraEntry {
     depth_translation: Option<Numbers<3>>,
 }
 
-/// What places the camera of an image beside others that took theirs at the same moment. Of other images it is never read.
+/// What places the camera of an image beside others that took theirs at the same moment. Of other images the estimator never reads it.
 #[derive(Deserialize)]
 struct PlaceEntry {
     #[serde(rename = "cam_R_w2c")]
@@ -338,6 +338,17 @@ impl Frame<'_> {
             seen.push((view, t_cam_other));
         }
         Ok(seen)
+    }
+
+    /// World → camera \[m\], where the dataset says so: for whatever shows images in one frame. The estimator asks of images alone that a rig took together.
+    ///
+    /// # Errors
+    /// If what is said is broken, or one of rotation and translation is absent.
+    pub fn t_cam_world(&self) -> Result<Option<Isometry3<f64>>, DatasetError> {
+        match self.scene.camera.entry(self.im_id)? {
+            PlaceEntry { rotation: None, translation: None } => Ok(None),
+            _ => self.place().map(Some),
+        }
     }
 
     /// World → camera \[m\].

@@ -157,6 +157,11 @@ impl Posterior {
         moves * self.covariance() * moves.transpose()
     }
 
+    /// The center of the object, about which twists turn (camera frame) \[m\].
+    pub fn center(&self) -> Vector3<f64> {
+        self.center
+    }
+
     /// Standard deviation along the direction that is known least \[m of surface motion\]; `radius` turns radians into that.
     pub(crate) fn widest(&self, radius: f64) -> f64 {
         directions(&self.covariance(), radius)[0].1

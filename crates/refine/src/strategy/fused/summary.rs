@@ -18,8 +18,10 @@ pub struct PosteriorSummary {
     pub deviation_mm: [f64; 3],
     /// Standard deviations of the rotation about the axes of the camera frame \[°\].
     pub deviation_deg: [f64; 3],
-    /// Covariance of a left twist about the object's center, in the camera frame: translation, then rotation \[m², m rad, rad²\].
+    /// Covariance of a left twist about the object's center in the camera frame, translation first \[m², m rad, rad²\].
     pub covariance: [[f64; 6]; 6],
+    /// The center of the object, about which that twist turns (camera frame) \[m\].
+    pub center_m: [f64; 3],
     /// Standard deviations of surface motion along directions that the evidence says hardly anything of \[mm\].
     pub unobserved_mm: Vec<f64>,
     /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
@@ -50,6 +52,7 @@ impl From<&Posterior> for PosteriorSummary {
             deviation_mm: (deviation(0) * 1e3).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             covariance: std::array::from_fn(|r| std::array::from_fn(|c| covariance[(r, c)])),
+            center_m: posterior.center().into(),
             unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),
             disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
             let_off: posterior.let_off.map(str::to_owned),

@@ -9,6 +9,7 @@ use std::time::Instant;
 use anyhow::bail;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
+use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{
     AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers,
@@ -125,8 +126,14 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
-            // Else a resumed run would not end with the same page.
+            // Else a resumed run would not end with the same files.
             let seconds = |index| seconds(index).filter(|_| self.output.time);
+            if let Some(Err(error)) = self.output.details.as_deref().map(|file| {
+                let details = |(&i, r): (&usize, &Refined)| details(&jobs[i], r, seconds(i));
+                write_details(file, &refined.iter().map(details).collect::<Vec<_>>())
+            }) {
+                failures.push(format!("--details: {error}"));
+            }
             let draw =
                 |r| self.draw(r, (&dataset, &assets), &jobs, (&refined, &seconds), &mut failures);
             match report.map(draw) {
@@ -290,6 +297,20 @@ fn frame_report(
     let posterior = refined.confidence.clone();
     let (name, status) = (job.target.to_string(), String::new());
     (FrameReport { name, status, flags, remarks, figures, posterior }, fault)
+}
+
+/// What the table has of a frame.
+fn details(job: &Job, refined: &Refined, seconds: Option<f64>) -> FrameDetails {
+    FrameDetails {
+        target: job.target,
+        t_cam_model: (&refined.pose).into(),
+        initial: Some(job.row.t_cam_model),
+        posterior: refined.confidence.clone(),
+        iterations: refined.iterations,
+        seconds,
+        warnings: refined.object_warnings.iter().chain(&refined.warnings).cloned().collect(),
+        track: None,
+    }
 }
 
 fn summary(job: &Job, refined: &Refined, seconds: Option<f64>) -> serde_json::Value {

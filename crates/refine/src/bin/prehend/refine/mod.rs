@@ -14,7 +14,7 @@ use prehend_refine::data::bop::check_writable;
 use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{RIVALS, Rendering, Selection, beside, limit_threads};
+use crate::options::{RIVALS, Rendering, Selection, beside, check_details, limit_threads};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -54,6 +54,7 @@ impl Refine {
         if let Some(out) = &output.out {
             check_writable(out)?;
         }
+        output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
         let backend = rendering.open()?;
         match (frame, selection, poses, &output.out) {

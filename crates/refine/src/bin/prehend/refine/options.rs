@@ -26,6 +26,12 @@ pub(super) struct OutputOptions {
     /// It needs nothing but itself. Errors are in it where the dataset has the truth; the poses do not depend on it.
     #[arg(long, value_name = "DIR")]
     pub(super) report: Option<PathBuf>,
+    /// Write all that is known of each frame here, as a table: poses before and after, covariances, warnings and others (docs/EXPORT.md lists the columns);
+    /// a NumPy archive (.npz), or .parquet in builds with the feature parquet
+    ///
+    /// Times are in it with --time alone: without, resumed runs end with the same bytes.
+    #[arg(long, value_name = "FILE", conflicts_with = "frame")]
+    pub(super) details: Option<PathBuf>,
     /// Print JSON on standard output: poses, times, loss curves and failures
     #[arg(long)]
     pub(super) json: bool,

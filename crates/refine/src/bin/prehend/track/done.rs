@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
-use prehend_refine::data::PlainPose;
 use prehend_refine::data::bop::ResultRow;
-use prehend_refine::tracker::{Rejection, Timing, TrackStatus};
+use prehend_refine::data::details::{FrameDetails, TrackDetails};
+use prehend_refine::data::{PlainPose, Target};
+use prehend_refine::strategy::PosteriorSummary;
+use prehend_refine::tracker::{Rejection, Timing, TrackStatus, Tracked};
 use serde_json::json;
 
 /// A frame that is done, without what nobody asks for afterwards: there may be many.
@@ -44,6 +46,30 @@ pub(super) fn told(frames: &[Done]) -> String {
     };
     let counts: Vec<String> = all.into_iter().filter_map(count).collect();
     format!("{text}: {}", counts.join(", "))
+}
+
+/// What the table has of a frame, its time among it if that is `timed`.
+pub(super) fn details(
+    target: Target,
+    tracked: &Tracked,
+    stamp: Option<i64>,
+    timed: bool,
+) -> FrameDetails {
+    FrameDetails {
+        target,
+        t_cam_model: tracked.t_cam_object,
+        initial: None,
+        posterior: tracked.posterior.as_ref().map(PosteriorSummary::from),
+        iterations: tracked.iterations,
+        seconds: timed.then(|| tracked.timing.total().as_secs_f64()),
+        warnings: Vec::new(),
+        track: Some(TrackDetails {
+            status: tracked.status.name(),
+            rejection: tracked.rejection.map(|doubt| doubt.to_string()),
+            cost: tracked.cost,
+            stamp,
+        }),
+    }
 }
 
 /// A frame as JSON.

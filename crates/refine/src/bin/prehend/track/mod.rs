@@ -24,6 +24,7 @@ use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
     Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
 };
+use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
@@ -39,7 +40,9 @@ use self::film::{Film, Moment, SceneFilm};
 use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
 use self::log::{Log, LogWriter};
 use self::report::FilmReport;
-use crate::options::{Rendering, Selection, Unit, limit_threads, open_rig, row, write_poses};
+use crate::options::{
+    Rendering, Selection, Unit, check_details, limit_threads, open_rig, row, write_poses,
+};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -99,6 +102,10 @@ pub(crate) struct Track {
     /// Write a web page here: frames in a table, outlines, hand and object in three dimensions, and curves over time
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     report: Option<PathBuf>,
+    /// Write all that is known of each frame here, as a table: poses, covariances, how they came about and others (docs/EXPORT.md lists the columns);
+    /// a NumPy archive (.npz), or .parquet in builds with the feature parquet
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    details: Option<PathBuf>,
     /// Print JSON on standard output: poses, how they came about, times and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -158,6 +165,8 @@ type Start = (Target, Option<Isometry3<f64>>);
 /// What becomes of the frames.
 struct Outcome {
     frames: Vec<Done>,
+    /// What the table has of them, if one is written.
+    details: Option<Vec<FrameDetails>>,
     failures: Vec<String>,
     /// The poses as they come, if they are written so.
     rows: Option<ResultsWriter>,
@@ -200,6 +209,7 @@ impl Track {
         {
             bail!("--mcap-out {written}: is another of the files, too");
         }
+        self.details.as_deref().map(check_details).transpose()?;
         let mut selection = self.selection.take();
         let watched = self.watch.as_ref().zip(selection.as_mut());
         let watched = watched.map(|(folder, selection)| select_scene(selection, folder));
@@ -222,7 +232,14 @@ impl Track {
         let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
         let report = self.report.as_deref().map(FilmReport::create).transpose()?;
-        let mut outcome = Outcome { frames: Vec::new(), failures: Vec::new(), rows, log, report };
+        let mut outcome = Outcome {
+            frames: Vec::new(),
+            details: self.details.is_some().then(Vec::new),
+            failures: Vec::new(),
+            rows,
+            log,
+            report,
+        };
         match (&self.log.mcap, &selection) {
             (Some(file), _) => self.track_log(file, &following, &mut outcome)?,
             (None, Some(selection)) => {
@@ -230,12 +247,16 @@ impl Track {
             }
             (None, None) => bail!("--dataset or --mcap: there is nothing to be tracked"),
         }
-        let Outcome { frames, mut failures, rows, log, report } = outcome;
+        let Outcome { frames, details, mut failures, rows, log, report } = outcome;
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
+        }
+        let table = self.details.as_ref().zip(details).filter(|_| !frames.is_empty());
+        if let Some(Err(error)) = table.map(|(file, rows)| write_details(file, &rows)) {
+            failures.push(format!("--details: {error}"));
         }
         let log = log.filter(|_| !frames.is_empty());
         if let Some(Err(error)) = log.map(LogWriter::finish) {
@@ -461,6 +482,9 @@ impl Track {
                             report.add((target, time), &input, &tracked, row.clone())
                     {
                         outcome.failures.push(format!("{target}: report: {error}"));
+                    }
+                    if let Some(details) = &mut outcome.details {
+                        details.push(done::details(target, &tracked, stamp, self.time));
                     }
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
                     outcome.frames.push(Done {

@@ -1,0 +1,73 @@
+//! A column of a table.
+
+/// What a column holds, all rows one after the other, each row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Whole numbers.
+    Integers(Vec<i64>),
+    /// Numbers, NaN where one is not known.
+    Numbers(Vec<f64>),
+    /// Whether something is so.
+    Flags(Vec<bool>),
+    /// Texts, empty where there is none.
+    Texts(Vec<String>),
+}
+
+impl Values {
+    /// How many there are, of all rows together.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Integers(values) => values.len(),
+            Self::Numbers(values) => values.len(),
+            Self::Flags(values) => values.len(),
+            Self::Texts(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A named column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Its name.
+    pub name: &'static str,
+    /// Shape of what it has in a row: empty for a single value.
+    pub shape: Vec<usize>,
+    /// What it has.
+    pub values: Values,
+}
+
+impl Column {
+    /// How many values it has in a row.
+    pub fn width(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// A column of a value a row.
+    pub(super) fn new<T>(
+        name: &'static str,
+        values: impl IntoIterator<Item = T>,
+        kind: fn(Vec<T>) -> Values,
+    ) -> Self {
+        Self { name, shape: Vec::new(), values: kind(values.into_iter().collect()) }
+    }
+
+    /// A column of an array of that shape a row; NaN where a row has none, or less.
+    pub(super) fn arrays(
+        name: &'static str,
+        shape: &[usize],
+        rows: impl Iterator<Item = Option<Vec<f64>>>,
+    ) -> Self {
+        let width: usize = shape.iter().product();
+        let mut values = Vec::new();
+        for (k, row) in rows.enumerate() {
+            values.extend(row.unwrap_or_default().into_iter().take(width));
+            values.resize((k + 1) * width, f64::NAN);
+        }
+        Self { name, shape: shape.to_vec(), values: Values::Numbers(values) }
+    }
+}
