@@ -78,14 +78,14 @@ fn refined_frames_are_rows_of_a_numpy_archive() {
     assert_eq!(column("scene_id").integers(), [1, 1]);
     assert_eq!(column("im_id").integers(), [0, 1]);
     assert_eq!(column("obj_id").integers(), [5, 5]);
-    assert_eq!(column("t_cam_model").shape, "2, 4, 4,");
+    assert_eq!(column("t_cam_model").shape, "2, 4, 4");
     assert!(are_poses(&column("t_cam_model").numbers(), &rows));
     let initial = place.poses("ds/init.csv");
     assert!(are_poses(&column("initial_t_cam_model").numbers(), &initial));
     // BOP's file has fewer digits of the score.
     let probability = column("probability").numbers();
     assert!(probability.iter().zip(&rows).all(|(p, row)| (p - row.score).abs() < 1e-6));
-    assert_eq!(column("covariance").shape, "2, 6, 6,");
+    assert_eq!(column("covariance").shape, "2, 6, 6");
     let centers = column("center").numbers();
     for (k, matrix) in column("covariance").numbers().chunks(36).enumerate() {
         let covariance = nalgebra::Matrix6::from_row_slice(matrix);

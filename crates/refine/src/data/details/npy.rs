@@ -19,8 +19,9 @@ pub(super) fn array(column: &Column) -> Vec<u8> {
     };
     // A column without anything in a row has as many rows as nobody can tell: it is not written.
     let rows = column.values.len() / column.width().max(1);
-    let mut shape = format!("{rows},");
-    column.shape.iter().for_each(|n| shape += &format!(" {n},"));
+    // A tuple of one number has a comma behind it.
+    let mut shape = format!("{rows}{}", if column.shape.is_empty() { "," } else { "" });
+    column.shape.iter().for_each(|n| shape += &format!(", {n}"));
     let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     // Magic, version and length are 10 bytes; all together, with the line break, end at a multiple of 64.
     let padded = (10 + header.len() + 1).next_multiple_of(64) - 10;
