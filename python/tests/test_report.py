@@ -88,7 +88,7 @@ def column(page, number):
 
 def test_frames_are_sorted_and_filtered(opened):
     page = opened("refine")
-    assert page.locator("#count").inner_text() == "8 frames"
+    assert page.locator("#count").inner_text() == "8 rows"
     headings = page.locator("#table th").all_inner_texts()
     errors = 1 + next(k for k, text in enumerate(headings) if text.startswith("error mm"))
     unsorted = column(page, errors)
@@ -101,7 +101,7 @@ def test_frames_are_sorted_and_filtered(opened):
     middle = sorted(map(float, unsorted))[4]
     page.fill("#query", f"error<{middle}")
     assert all(float(error) < middle + 0.01 for error in column(page, errors))
-    assert page.locator("#count").inner_text().endswith(" of 8")
+    assert page.locator("#count").inner_text().endswith(" of 8 rows")
     page.fill("#query", "")
     # Words of a name: those of a scene, which has one object.
     page.fill("#query", column(page, 1)[0].partition(" image")[0])

@@ -73,7 +73,9 @@ impl<'a> Scorer<'a> {
     /// If a file with the truth is broken, or the image shows no such object.
     pub fn pose_error(&self, row: &ResultRow) -> Result<Option<[f64; 2]>, AssetError> {
         let truth = match self.true_pose(row) {
-            Err(AssetError::Dataset(DatasetError::Missing { .. })) => return Ok(None),
+            Err(AssetError::Dataset(
+                DatasetError::Missing { .. } | DatasetError::NoEntry { .. },
+            )) => return Ok(None),
             found => found?,
         };
         let info = model_info(self.truth.models(), row.obj_id)?;

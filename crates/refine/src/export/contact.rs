@@ -42,7 +42,7 @@ pub struct ContactPoint {
 const REACH: f64 = 0.05;
 
 /// The contacts that an observation knows of, and those that the pose `t_cam_object` of `object` \[m\] makes: samples of its surface within 5 mm of the hand.
-/// Taxels count as touched from 0.1 N on. None without a hand.
+/// Taxels count as touched above 0.1 N. None without a hand.
 ///
 /// # Errors
 /// If joints, forces or links do not fit the hand.

@@ -23,7 +23,7 @@ pub(crate) const INITIAL_ERROR: Column = column("initial-error", "error before",
 pub(crate) const INITIAL_TURN: Column =
     column("initial-turned-error", "turned wrong before", "°", 1);
 pub(crate) const SECONDS: Column = column("seconds", "time", "s", 3);
-pub(crate) const ITERATION: Column = column("iteration", "iterations", "", 0);
+pub(crate) const ITERATIONS: Column = column("iterations", "iterations", "", 0);
 pub(crate) const MILLISECONDS: Column = column("milliseconds", "time", "ms", 1);
 pub(crate) const MOMENT: Column = column("moment", "moment", "s", 2);
 

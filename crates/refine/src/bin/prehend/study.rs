@@ -142,6 +142,7 @@ impl Run {
         let (design, mut frames) = self.design(kind, &dataset, &methods, sweeps)?;
         let rig = open_rig(self.rig.as_deref())?;
         create_folder(&self.out)?;
+        self.report.as_deref().map(create_folder).transpose()?;
         let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
             Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
         let mut times = Times::open(&self.out.join(TIMES), !records.is_empty())?;
@@ -260,6 +261,7 @@ impl Merge {
     fn run(&self) -> anyhow::Result<ExitCode> {
         let (design, records) = merge(&self.shards)?;
         create_folder(&self.out)?;
+        self.report.as_deref().map(create_folder).transpose()?;
         let own = self.out.join(RECORDS);
         if own.exists() && !self.restart {
             bail!("{}: there is a study already (--restart replaces it)", own.display());

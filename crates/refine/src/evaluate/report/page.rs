@@ -185,8 +185,8 @@ impl Report {
             file: file.clone(),
             problem: e.to_string(),
         };
-        // Nothing in it may end the element that it is in.
-        let data = serde_json::to_string(&self.document).map_err(fail)?.replace("</", "<\\/");
+        // Nothing in it may end the element that it is in, or begin a comment there.
+        let data = serde_json::to_string(&self.document).map_err(fail)?.replace('<', "\\u003c");
         let mut page = String::with_capacity(data.len() + 100_000);
         let mut rest = SKELETON;
         for (mark, content) in
@@ -226,11 +226,11 @@ mod tests {
     #[test]
     fn the_page_is_whole_and_nothing_in_its_data_ends_them() {
         let dir = tempfile::tempdir().unwrap();
-        let mut report = Report::create(dir.path(), "a </script> in a title").unwrap();
+        let mut report = Report::create(dir.path(), "a <!--<script></script> in a title").unwrap();
         report.add_fact("frames", "1");
         let page = std::fs::read_to_string(report.finish().unwrap()).unwrap();
         assert!(page.ends_with("</html>\n") && !page.contains("{{"));
-        assert!(page.contains(r"a <\/script> in a title"));
+        assert!(page.contains(r"a \u003c!--\u003cscript>\u003c/script> in a title"));
         // The data's element and the scripts'.
         assert_eq!(page.matches("</script>").count(), 2);
         let fetched = ["src=\"http", "href=\"http", "@import", "fetch("];

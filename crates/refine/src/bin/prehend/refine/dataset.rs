@@ -286,7 +286,7 @@ fn frame_report(
         report::INITIAL_ERROR.figure(initial_error.map(|[meters, _]| 1e3 * meters)),
         report::INITIAL_TURN.figure(initial_error.map(|[_, radians]| radians.to_degrees())),
         report::SECONDS.figure(seconds),
-        report::ITERATION.figure(Some(refined.iteration as f64)),
+        report::ITERATIONS.figure(Some(refined.iterations as f64)),
     ]);
     let remarks: Vec<String> =
         refined.object_warnings.iter().chain(&refined.warnings).cloned().collect();

@@ -202,9 +202,10 @@ impl Track {
         outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
         let log = &self.log;
         if let Some(written) = log.mcap_out.as_deref().map(canonical)
-            && [Some(&self.out), self.strip.as_ref(), log.mcap.as_ref(), self.poses.as_ref()]
+            && [&self.strip, &self.details, &log.mcap, &self.poses]
                 .into_iter()
                 .flatten()
+                .chain([&self.out])
                 .any(|other| canonical(other) == written)
         {
             bail!("--mcap-out {written}: is another of the files, too");
@@ -266,7 +267,8 @@ impl Track {
             // Of a dataset that is only coming into being, nobody knows the truth.
             let finished = selection.as_ref().filter(|_| watched.is_none());
             let dataset = finished.map(Selection::open).transpose()?;
-            report.finish(dataset.as_ref().map(Scorer::new).as_ref())
+            let scorer = dataset.as_ref().map(Scorer::new);
+            anyhow::Ok(report.finish(scorer.as_ref(), &mut failures)?)
         });
         let page = page.transpose().unwrap_or_else(|error| {
             failures.push(format!("--report: {error:#}"));
@@ -300,6 +302,9 @@ impl Track {
                 "--mcap-out has one object, not {}: --scene and --object say which",
                 starts.len()
             );
+        }
+        if let Some(report) = &mut outcome.report {
+            report.share(starts.len());
         }
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         assets = assets.with_rig(following.rig.clone()).with_optional_masks();

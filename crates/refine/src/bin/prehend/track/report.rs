@@ -15,9 +15,10 @@ use prehend_refine::tracker::{TrackStatus, Tracked};
 
 use crate::report::{self, MILLISECONDS, MOMENT};
 
-/// Frames of a film that are drawn, and of all films at most: pages stay small enough to be opened.
-const OF_A_FILM: usize = 60;
+/// Frames that are drawn at most of all films, and of one: pages stay small enough to be opened. Of each film half are drawn as time passes, and half
+/// where something has happened.
 const DRAWN: usize = 200;
+const OF_A_FILM: usize = 120;
 
 /// Of a film whose length nobody knows, every so manieth frame is drawn.
 const EVERY: usize = 30;
@@ -26,10 +27,11 @@ const EVERY: usize = 30;
 pub(super) struct FilmReport {
     report: Report,
     frames: Vec<Reported>,
-    drawn: usize,
-    /// Of the film that is followed now, every so manieth frame is drawn, and so many have come.
+    /// Of the film that is followed now: every so manieth frame is drawn, at most so many; so many have come, and so many were drawn.
     every: usize,
+    most: usize,
     come: usize,
+    drawn: usize,
 }
 
 /// A frame that was followed.
@@ -47,14 +49,19 @@ struct Reported {
 impl FilmReport {
     pub(super) fn create(folder: &Path) -> Result<Self, DatasetError> {
         let report = Report::create(folder, "Tracked objects")?;
-        Ok(Self { report, frames: Vec::new(), drawn: 0, every: EVERY, come: 0 })
+        Ok(Self { report, frames: Vec::new(), every: EVERY, most: OF_A_FILM, come: 0, drawn: 0 })
+    }
+
+    /// Says how many films will come.
+    pub(super) fn share(&mut self, films: usize) {
+        self.most = (DRAWN / films.max(1)).clamp(2, OF_A_FILM);
     }
 
     /// Goes on with a film of so many frames, if their number is known.
     pub(super) fn begin(&mut self, count: Option<u64>) {
         let count = count.and_then(|count| usize::try_from(count).ok()).filter(|count| *count > 0);
-        self.every = count.map_or(EVERY, |count| count.div_ceil(OF_A_FILM));
-        self.come = 0;
+        self.every = count.map_or(EVERY, |count| count.div_ceil(self.most / 2));
+        (self.come, self.drawn) = (0, 0);
     }
 
     /// Adds a frame: drawn if it is its turn, or if something has happened.
@@ -68,8 +75,9 @@ impl FilmReport {
         tracked: &Tracked,
         row: ResultRow,
     ) -> Result<(), AssetError> {
-        let calm = self.frames.last().is_some_and(|last| last.status == tracked.status);
-        let wanted = (self.come.is_multiple_of(self.every) || !calm) && self.drawn < DRAWN;
+        let last = self.frames.last().filter(|_| self.come > 0);
+        let calm = last.is_some_and(|last| last.status == tracked.status);
+        let wanted = (self.come.is_multiple_of(self.every) || !calm) && self.drawn < self.most;
         self.come += 1;
         let posterior = tracked.posterior.as_ref().map(PosteriorSummary::from);
         self.drawn += usize::from(wanted);
@@ -100,16 +108,36 @@ impl FilmReport {
     }
 
     /// Writes the page and returns its path; errors of poses are in it if `scorer` knows the truth.
-    pub(super) fn finish(self, scorer: Option<&Scorer<'_>>) -> anyhow::Result<PathBuf> {
-        let Self { mut report, frames, drawn, .. } = self;
+    /// Of truth that is broken `failures` hears.
+    ///
+    /// # Errors
+    /// If the page cannot be written.
+    pub(super) fn finish(
+        self,
+        scorer: Option<&Scorer<'_>>,
+        failures: &mut Vec<String>,
+    ) -> Result<PathBuf, DatasetError> {
+        let Self { mut report, frames, .. } = self;
+        let drawn = frames.iter().filter(|frame| frame.drawing.is_some()).count();
         report.add_fact("version", env!("CARGO_PKG_VERSION"));
         report.add_fact("drawn", format!("{drawn} of {} frames", frames.len()));
         let mut curves: BTreeMap<String, [Vec<[f64; 2]>; 3]> = BTreeMap::new();
         for frame in frames {
             let Reported { target, row, moment, seconds, status, doubt, posterior, drawing } =
                 frame;
-            let error = scorer.map(|s| s.pose_error(&row)).transpose()?.flatten();
-            let film = format!("scene {} object {}", target.scene_id, target.obj_id);
+            let error = scorer.and_then(|scorer| {
+                scorer.pose_error(&row).unwrap_or_else(|error| {
+                    failures.push(format!("{target}: report: {error}"));
+                    None
+                })
+            });
+            let mut film = format!("scene {} object {}", target.scene_id, target.obj_id);
+            let mut name = target.to_string();
+            if target.instance > 0 {
+                let instance = format!(" instance {}", target.instance);
+                film += &instance;
+                name += &instance;
+            }
             let values =
                 [row.score, error.map_or(f64::NAN, |[meters, _]| 1e3 * meters), 1e3 * seconds];
             for (curve, value) in curves.entry(film).or_default().iter_mut().zip(values) {
@@ -118,7 +146,7 @@ impl FilmReport {
             let mut figures = report::pose_figures(error, posterior.as_ref());
             figures.extend([MOMENT.figure(Some(moment)), MILLISECONDS.figure(Some(1e3 * seconds))]);
             let frame = FrameReport {
-                name: target.to_string(),
+                name,
                 status: status.name().to_owned(),
                 flags: posterior.as_ref().map_or_else(Vec::new, report::flags),
                 remarks: doubt.into_iter().collect(),
@@ -149,6 +177,6 @@ impl FilmReport {
                 });
             }
         }
-        Ok(report.finish()?)
+        report.finish()
     }
 }

@@ -26,9 +26,6 @@ function short(value) {
   return size < 1e-3 || size >= 1e5 ? value.toExponential(0) : String(Number(value.toPrecision(2)));
 }
 
-/** What a variable of the style is now. */
-const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
 /** Bytes of base64. */
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 

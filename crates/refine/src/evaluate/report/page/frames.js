@@ -61,7 +61,7 @@ class FrameTable {
       });
     }
     this.shown = order;
-    byId("count").textContent = order.length === frames.length ? `${frames.length} frames` : `${order.length} of ${frames.length}`;
+    byId("count").textContent = order.length === frames.length ? `${frames.length} rows` : `${order.length} of ${frames.length} rows`;
     this.draw();
   }
 
@@ -111,8 +111,9 @@ class FrameTable {
     if (row && (row.offsetTop < box.scrollTop + 30 || row.offsetTop + row.offsetHeight > box.scrollTop + box.clientHeight)) {
       box.scrollTop = row.offsetTop - box.clientHeight / 2;
     }
-    history.replaceState(null, "", `#${k}`);
     this.choose(this.data.frames[k]);
+    // Pages within other pages may have no address of their own.
+    try { history.replaceState(null, "", `#${k}`); } catch { /* It is not kept, then. */ }
   }
 
   /** The frame so many rows further. */

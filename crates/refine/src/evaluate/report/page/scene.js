@@ -20,7 +20,8 @@ void main() {
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
   float light = 0.35 + 0.65 * abs(dot(normal, normalize(vec3(0.25, 0.4, 1.0))));
   vec3 color = mix(tint, paint.rgb, min(flat_color, 1.0));
-  pixel = vec4(color * mix(light, 1.0, step(1.5, flat_color)), paint.a) * vec4(vec3(paint.a), 1.0);
+  // Lines have no normal.
+  pixel = vec4(color * (flat_color > 1.5 ? 1.0 : light) * paint.a, paint.a);
 }`;
 
 /** Column-major product of two 4×4 matrices. */
@@ -93,13 +94,21 @@ class SceneView {
       gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
       return made;
     };
-    buffer(0, positions);
+    const positionBuffer = buffer(0, positions);
     const colorBuffer = buffer(1, colors);
     if (faces) {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
     }
-    return { array, colorBuffer, colors, count: faces ? faces.length : positions.length / 3 };
+    return { array, positionBuffer, colorBuffer, colors, count: faces ? faces.length : positions.length / 3 };
+  }
+
+  /** Frees what was uploaded without faces. */
+  discard(mesh) {
+    if (!mesh) return;
+    this.gl.deleteVertexArray(mesh.array);
+    this.gl.deleteBuffer(mesh.positionBuffer);
+    this.gl.deleteBuffer(mesh.colorBuffer);
   }
 
   mesh(index) {
@@ -109,6 +118,7 @@ class SceneView {
 
   /** Turns to the scene of a frame. */
   show(scene) {
+    const same = this.scene?.object === scene.object;
     this.scene = scene;
     const axes = scene.ellipsoid && [0, 3, 6].map((k) => scene.ellipsoid.slice(k, k + 3));
     // An accurate pose has an ellipsoid that nobody would see.
@@ -120,8 +130,11 @@ class SceneView {
       this.ellipsoid = columns([a[0], b[0], c[0], o[0], a[1], b[1], c[1], o[1], a[2], b[2], c[2], o[2]]);
     }
     const hand = scene.hand === null ? null : this.data.hands[scene.hand];
+    this.discard(this.arrows);
     this.arrows = hand && this.forceLines(hand, scene);
-    this.reset();
+    // Who has turned one frame looks at the next from there, too.
+    if (same) this.draw();
+    else this.reset();
   }
 
   /** Lines from taxels along the forces that press the skin, 10 mm for 1 N. */
@@ -149,13 +162,16 @@ class SceneView {
 
   /** Where the viewer stands: right, down, forward as rows, and its place. */
   viewpoint() {
-    const { center, up } = this.scene;
+    const { center } = this.scene;
     const forward0 = unit(center);
+    // A camera that looks up or down has the picture's up.
+    const up = Math.abs(dot(forward0, this.scene.up)) > 0.95 ? unit(cross(cross(forward0, [0, -1, 0]), forward0)) : this.scene.up;
     const right0 = unit(cross(forward0, up));
     const level = unit(cross(up, right0));
     // Angles about the vertical, and above the horizon.
-    const height = Math.asin(Math.max(-1, Math.min(1, dot(forward0, up)))) - this.tilt;
-    const bounded = Math.max(-1.55, Math.min(1.55, height));
+    const height = Math.asin(Math.max(-1, Math.min(1, dot(forward0, up))));
+    this.tilt = Math.max(height - 1.55, Math.min(height + 1.55, this.tilt));
+    const bounded = height - this.tilt;
     const heading = plus(scaled(level, Math.cos(this.turn)), scaled(right0, Math.sin(this.turn)));
     const forward = plus(scaled(heading, Math.cos(bounded)), scaled(up, Math.sin(bounded)));
     const right = unit(cross(forward, up));
@@ -247,7 +263,7 @@ class SceneView {
 
   rotate(x, y) {
     this.turn -= x;
-    this.tilt = Math.max(-3, Math.min(3, this.tilt - y));
+    this.tilt -= y;
     this.draw();
   }
 

@@ -48,8 +48,10 @@ function drawTaxels(hand, forces) {
       const paint = known ? { fill: css(forceColor(norm(force))) } : { fill: "none", "stroke-dasharray": "0.6 0.6" };
       svg.append(el("circle", { cx, cy, r: 1.9, stroke: "currentColor", "stroke-width": 0.15, ...paint }, el("title", {}, said)));
     });
-    const total = norm(members.map((k) => forces[k]).filter(Array.isArray).reduce(plus, [0, 0, 0]));
-    figures.push(el("figure", {}, svg, el("figcaption", {}, `${name}: ${short(total)} N`)));
+    const known = members.map((k) => forces[k]).filter(Array.isArray);
+    const total = known.length ? `${short(norm(known.reduce(plus, [0, 0, 0])))} N` : "unknown";
+    const part = known.length && known.length < members.length ? ` (${known.length} of ${members.length} taxels)` : "";
+    figures.push(el("figure", {}, svg, el("figcaption", {}, `${name}: ${total}${part}`)));
   }
   return el(
     "section.card.wide", {}, el("h3", {}, "Touch"),
