@@ -109,11 +109,13 @@ impl DatasetRun<'_> {
         bar.finish_and_clear();
         failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}", jobs[i].target)));
         let seconds = |index: usize| times.of(index, name);
+        // Files have no times unless asked: a resumed run would not end with the same ones.
+        let timed = |index| seconds(index).filter(|_| self.output.time);
         let row = |(&index, refined): (&usize, &Refined)| ResultRow {
             t_cam_model: (&refined.pose).into(),
             // BOP leaves open what a score is; here it is the probability of being right, where the method knows it.
             score: refined.confidence.as_ref().map_or(-1.0, |c| c.probability),
-            time: seconds(index).filter(|_| self.output.time).unwrap_or(-1.0),
+            time: timed(index).unwrap_or(-1.0),
             ..jobs[index].row.clone()
         };
         let rows: Vec<ResultRow> = refined.iter().map(row).collect();
@@ -126,16 +128,14 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
-            // Else a resumed run would not end with the same files.
-            let seconds = |index| seconds(index).filter(|_| self.output.time);
             if let Some(Err(error)) = self.output.details.as_deref().map(|file| {
-                let details = |(&i, r): (&usize, &Refined)| details(&jobs[i], r, seconds(i));
+                let details = |(&i, r): (&usize, &Refined)| details(&jobs[i], r, timed(i));
                 write_details(file, &refined.iter().map(details).collect::<Vec<_>>())
             }) {
                 failures.push(format!("--details: {error}"));
             }
             let draw =
-                |r| self.draw(r, (&dataset, &assets), &jobs, (&refined, &seconds), &mut failures);
+                |r| self.draw(r, (&dataset, &assets), &jobs, (&refined, &timed), &mut failures);
             match report.map(draw) {
                 Some(Ok(page)) if !json => say(format!("report: open {}", page.display()))?,
                 Some(Err(error)) => failures.push(format!("report: {error}")),

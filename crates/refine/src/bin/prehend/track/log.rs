@@ -15,8 +15,8 @@ use prehend_refine::scene::{Hand, Object, Observation};
 use prehend_refine::tracker::Tracked;
 use prehend_render::{RenderModel, draw_outline};
 
-use super::LogOptions;
 use super::film::{Film, Moment};
+use super::log_options::LogOptions;
 use super::strip::{LINE, color_of};
 use crate::terminal::cache;
 

@@ -5,6 +5,7 @@ mod film;
 mod images;
 #[cfg_attr(not(feature = "mcap"), path = "no_log.rs")]
 mod log;
+mod log_options;
 mod report;
 mod strip;
 
@@ -39,9 +40,10 @@ use self::done::{Done, summary, told};
 use self::film::{Film, Moment, SceneFilm};
 use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
 use self::log::{Log, LogWriter};
+use self::log_options::LogOptions;
 use self::report::FilmReport;
 use crate::options::{
-    Rendering, Selection, Unit, check_details, limit_threads, open_rig, row, write_poses,
+    Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
 };
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
@@ -124,39 +126,6 @@ pub(crate) struct Track {
     threads: Option<NonZeroUsize>,
     #[command(flatten)]
     rendering: Rendering,
-}
-
-/// A robot's log, and what is tracked in it.
-#[derive(Args)]
-#[command(next_help_heading = "Robot's log")]
-pub(crate) struct LogOptions {
-    /// Instead of a dataset, follow one object through the images of this recording: an MCAP file of ROS 2 messages (docs/LOGS.md lists the topics that are read)
-    #[arg(long, value_name = "LOG", conflicts_with_all = ["dataset", "watch", "strip", "targets"])]
-    mcap: Option<PathBuf>,
-    /// The object's mesh (PLY, OBJ, STL, glTF)
-    #[arg(long, value_name = "FILE", requires = "mcap")]
-    mesh: Option<PathBuf>,
-    /// Unit of the mesh
-    #[arg(long, value_name = "UNIT", default_value = "m", requires = "mcap")]
-    mesh_unit: Unit,
-    /// Mass of the object [default: 500 kg/m³]
-    #[arg(long, value_name = "KG", requires = "mcap")]
-    mass: Option<f64>,
-    /// The hand as URDF: its joints are in the log, and its root link is a frame of the log's transforms
-    #[arg(long, value_name = "URDF", requires = "mcap")]
-    hand: Option<PathBuf>,
-    /// Taxels of that hand (see docs/DATASET.md): the log has their forces
-    #[arg(long, value_name = "CSV", requires = "hand")]
-    taxels: Option<PathBuf>,
-    /// Which topic has what, where several could: color=NAME, depth=NAME or mask=NAME; may be repeated
-    #[arg(long, value_name = "WHAT=NAME", requires = "mcap")]
-    topic: Vec<String>,
-    /// The frame of the log whose z-axis points up
-    #[arg(long, value_name = "FRAME", default_value = "world", requires = "mcap")]
-    world: String,
-    /// Write what was sensed and found to this MCAP file, which viewers (Foxglove, Rerun) open and --mcap reads again
-    #[arg(long, value_name = "LOG", help_heading = "Output")]
-    mcap_out: Option<PathBuf>,
 }
 
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.

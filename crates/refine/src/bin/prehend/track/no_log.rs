@@ -10,8 +10,8 @@ use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object, Observation};
 use prehend_refine::tracker::Tracked;
 
-use super::LogOptions;
 use super::film::{Film, Moment};
+use super::log_options::LogOptions;
 
 const NONE: &str =
     "this build reads and writes no logs: cargo install --path crates/refine --features mcap";
