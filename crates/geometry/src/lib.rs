@@ -39,7 +39,10 @@ pub use cloud::{KdTree, PointCloud};
 pub use contact_area::contact_area;
 pub use field::{DistanceField, FieldSample};
 pub use inertial::Inertial;
-pub use io::{FilmBody, FilmCamera, FilmKey, GlbFilm, MeshError, limits, write_atomic};
+pub use io::{
+    AtomicFile, FilmBody, FilmCamera, FilmKey, GlbFilm, MeshError, limits, open_plain,
+    plain_target, read_plain, write_atomic,
+};
 pub use mass::{MassError, MassProperties};
 pub use mesh::{Texture, TriMesh};
 pub use moments::Moments;

@@ -3,6 +3,8 @@
 use prehend_geometry::robot::RobotError;
 use thiserror::Error;
 
+use crate::data::Panicked;
+
 /// Why a pose could not be refined.
 #[derive(Debug, Error)]
 pub enum RefineError {
@@ -71,6 +73,9 @@ pub enum RefineError {
     /// Kinematics failed.
     #[error(transparent)]
     Robot(#[from] RobotError),
+    /// The program is at fault.
+    #[error(transparent)]
+    Panicked(#[from] Panicked),
     /// The images of the observation do not fit each other, or their camera is impossible.
     #[error("the images of the observation cannot be used: {0}")]
     Images(String),

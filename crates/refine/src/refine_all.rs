@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use nalgebra::Isometry3;
 
-use crate::data::{FrameInput, Workers};
+use crate::data::{FrameInput, Workers, guard};
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::refine::refine;
@@ -57,7 +57,7 @@ impl RefineJob<'_> {
 /// nor on the number of threads.
 ///
 /// # Errors
-/// If the system gives no threads; what is wrong with a frame is in its place.
+/// If the system gives no threads; what is wrong with a frame is in its place, panics too.
 pub fn refine_all(
     jobs: &[RefineJob<'_>],
     method: &Method,
@@ -72,8 +72,8 @@ pub fn refine_all(
         done[index] = Some(outcome);
         Ok(())
     };
-    workers.run(&indices, || |&index: &usize| jobs[index].run(method), keep)?;
-    // None is missing: a panic of a worker comes through.
+    workers.run(&indices, || |&index: &usize| guard(|| jobs[index].run(method)), keep)?;
+    // None is missing.
     Ok(done.into_iter().flatten().collect())
 }
 

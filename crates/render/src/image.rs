@@ -1,12 +1,12 @@
 //! Color, depth and mask images, and their files.
 
-use std::fs;
-use std::io::Cursor;
+use std::io::{BufReader, Cursor};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageFormat};
-use prehend_geometry::write_atomic;
+use prehend_geometry::limits::{MAX_FILE_BYTES, MAX_PIXELS};
+use prehend_geometry::{open_plain, read_plain, write_atomic};
 
 use crate::projected::Region;
 
@@ -50,7 +50,7 @@ pub enum ImageError {
         found: usize,
     },
     /// The file says that it has more pixels than are read.
-    #[error("{}: {width} x {height} pixels, at most {MOST_PIXELS} are read", path.display())]
+    #[error("{}: {width} x {height} pixels, at most {MAX_PIXELS} are read", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -165,9 +165,16 @@ impl RgbImage {
     /// # Errors
     /// When they cannot be decoded.
     pub fn decode(bytes: &[u8], name: &Path) -> Result<Self, ImageError> {
-        let image = decode(bytes, name)?.into_rgb32f();
+        let image = decode(bytes, name)?;
         let (width, height) = (image.width() as usize, image.height() as usize);
-        Self::new(width, height, image.pixels().map(|p| p.0).collect())
+        let pixels = match image {
+            // Without a second copy of 12 bytes a pixel.
+            DynamicImage::ImageRgb8(image) => {
+                image.pixels().map(|p| p.0.map(|c| f32::from(c) / 255.0)).collect()
+            }
+            other => other.into_rgb32f().pixels().map(|p| p.0).collect(),
+        };
+        Self::new(width, height, pixels)
     }
 
     /// Writes 8 bits a channel as PNG or JPEG, by the extension, atomically; values are clamped to 0..=1.
@@ -382,21 +389,32 @@ fn check_scale(path: &Path, scale: f64) -> Result<(), ImageError> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
-    fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })
+    read_plain(path, MAX_FILE_BYTES).map_err(|source| ImageError::Io { path: path.into(), source })
 }
-
-/// An image file may have so many pixels: 8192 x 8192. A few bytes can claim more than fits into memory.
-const MOST_PIXELS: u64 = 1 << 26;
 
 fn decode(bytes: &[u8], name: &Path) -> Result<DynamicImage, ImageError> {
     let io = |source| ImageError::Io { path: name.into(), source };
     let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(io);
     let codec = |source| ImageError::Codec { path: name.into(), source };
+    // The size stands in the header: a few bytes may claim, and compress, any number of pixels.
     let (width, height) = reader()?.into_dimensions().map_err(codec)?;
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+    if u64::from(width) * u64::from(height) > MAX_PIXELS as u64 {
         return Err(ImageError::TooLarge { path: name.into(), width, height });
     }
     reader()?.decode().map_err(codec)
+}
+
+/// Columns and rows of the image in a PNG or JPEG file, of which no more than the header is read.
+///
+/// # Errors
+/// When the file cannot be read, is no plain file or no image.
+pub fn image_size(path: &Path) -> Result<(usize, usize), ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let file = BufReader::new(open_plain(path).map_err(io)?);
+    let reader = image::ImageReader::new(file).with_guessed_format().map_err(io)?;
+    let size = reader.into_dimensions();
+    let (width, height) = size.map_err(|source| ImageError::Codec { path: path.into(), source })?;
+    Ok((width as usize, height as usize))
 }
 
 /// Encodes in memory, to write the file atomically.

@@ -47,7 +47,7 @@ pub use backend::{
 pub use camera::{Camera, CameraError};
 pub use distortion::{BrownConrady, Distortion, DistortionError, KannalaBrandt, Remap};
 pub use graphics::{MatrixError, ModelView};
-pub use image::{DepthImage, ImageError, Mask, RgbImage};
+pub use image::{DepthImage, ImageError, Mask, RgbImage, image_size};
 pub use light::{Light, LightError, LightSample};
 pub use look_at::look_at;
 pub use mode::{ContourOptions, Mode, SoftRasOptions};

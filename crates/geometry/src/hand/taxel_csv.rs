@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 
 use super::Taxel;
+use crate::io::limits::{MAX_NUMBER, MAX_TEXT_BYTES};
+use crate::io::read_plain;
 
 /// Why a taxel list could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -48,8 +50,8 @@ const COLUMNS: [&str; 9] = ["idx", "patch", "link", "x_m", "y_m", "z_m", "nx", "
 /// columns are ignored.
 pub fn load_taxels(path: &Path) -> Result<Vec<Taxel>, TaxelError> {
     let wrap = |source| TaxelError::Csv { path: path.to_owned(), source };
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(wrap)?;
+    let text = read_plain(path, MAX_TEXT_BYTES).map_err(|e| wrap(e.into()))?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_slice());
     let header = reader.headers().map_err(wrap)?.clone();
     let mut places = [0; COLUMNS.len()];
     for (place, column) in places.iter_mut().zip(COLUMNS) {
@@ -68,8 +70,8 @@ pub fn load_taxels(path: &Path) -> Result<Vec<Taxel>, TaxelError> {
             found: text(k).to_owned(),
         };
         let number = |k: usize| match text(k).parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(fail(k, "a finite number")),
+            Ok(value) if value.abs() <= MAX_NUMBER => Ok(value),
+            _ => Err(fail(k, "a number within ±1e9")),
         };
         if text(0).parse() != Ok(taxels.len()) {
             return Err(fail(0, "the taxel's place in the list, from 0"));

@@ -1,7 +1,5 @@
 //! Files named by other files: read from the folder of the file that names them, and from nowhere else.
 
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
 /// What an error says about a name that leads elsewhere.
@@ -26,32 +24,6 @@ pub(crate) fn inside(folder: &Path, name: &str) -> Result<PathBuf, &'static str>
         (Ok(file), Ok(root)) if !file.starts_with(&root) => Err(OUTSIDE),
         _ => Ok(path),
     }
-}
-
-/// The content of a plain file of at most `limit` bytes: neither a pipe, which may never end, nor a device.
-///
-/// # Errors
-/// The error of the operating system; [`io::ErrorKind::FileTooLarge`] beyond the limit.
-pub(crate) fn read_limited(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
-    let too_large = |size: u64| {
-        let message = format!("{size} bytes, more than the limit of {limit}");
-        io::Error::new(io::ErrorKind::FileTooLarge, message)
-    };
-    // Asked before opening, since opening a pipe waits for its other end.
-    let size = std::fs::metadata(path)?;
-    if !size.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a plain file"));
-    }
-    if size.len() > limit as u64 {
-        return Err(too_large(size.len()));
-    }
-    let mut content = Vec::new();
-    // The file may grow in the meantime.
-    File::open(path)?.take(limit as u64 + 1).read_to_end(&mut content)?;
-    if content.len() > limit {
-        return Err(too_large(content.len() as u64));
-    }
-    Ok(content)
 }
 
 #[cfg(test)]
@@ -87,17 +59,5 @@ mod tests {
         // A folder that is itself reached through a link is one like any other.
         symlink(&folder, root.path().join("link")).unwrap();
         assert!(inside(&root.path().join("link"), "own").is_ok());
-    }
-
-    #[test]
-    fn only_plain_files_of_limited_size_are_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("f");
-        std::fs::write(&path, b"12345").unwrap();
-        assert_eq!(read_limited(&path, 5).unwrap(), b"12345");
-        assert_eq!(read_limited(&path, 4).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
-        assert!(read_limited(folder.path(), 100).is_err());
-        #[cfg(unix)]
-        assert!(read_limited(Path::new("/dev/zero"), 100).is_err());
     }
 }

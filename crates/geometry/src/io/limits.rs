@@ -1,11 +1,17 @@
-//! How much a mesh file may ask for.
+//! How much a file may ask for.
 //!
-//! A file beyond a limit is refused with [`MeshError::TooLarge`](crate::MeshError::TooLarge). Whatever a header claims, memory
+//! A mesh beyond a limit is refused with [`MeshError::TooLarge`](crate::MeshError::TooLarge). Whatever a header claims, memory
 //! is taken for what has been read, so that a small file costs little: counts are checked first, and nothing is
 //! reserved on their word.
 
 /// Largest file, and largest sum of the buffers that a glTF file draws in \[bytes\].
 pub const MAX_FILE_BYTES: usize = 1 << 30;
+
+/// Largest file of JSON, TOML or a table in text \[bytes\]: what is read of it takes some ten times as much.
+pub const MAX_TEXT_BYTES: usize = 1 << 28;
+
+/// No number that describes a scene is as large, in any unit that a format has: squares of such fit into single precision.
+pub const MAX_NUMBER: f64 = 1e9;
 
 /// Most vertices of a mesh, and most triangles.
 pub const MAX_ELEMENTS: usize = 50_000_000;

@@ -13,6 +13,7 @@ pub mod limits;
 mod mtl;
 mod obj;
 mod parts;
+mod plain;
 mod ply;
 mod save;
 mod stl;
@@ -21,8 +22,9 @@ mod texture;
 use std::path::{Path, PathBuf};
 
 use crate::mesh::TriMesh;
-pub use atomic::write_atomic;
+pub use atomic::{AtomicFile, write_atomic};
 pub use error::MeshError;
+pub use plain::{open_plain, plain_target, read_plain};
 pub use save::{FilmBody, FilmCamera, FilmKey, GlbFilm};
 
 impl TriMesh {
@@ -76,7 +78,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
-    folder::read_limited(path, limits::MAX_FILE_BYTES)
+    read_plain(path, limits::MAX_FILE_BYTES)
         .map_err(|source| MeshError::Read { path: path.into(), source })
 }
 

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use image::{ImageFormat, ImageReader, RgbImage};
 
-use super::folder::read_limited;
 use super::limits::{MAX_FILE_BYTES, MAX_PIXELS};
+use super::read_plain;
 use super::{MeshError, companion};
 use crate::mesh::Texture;
 
@@ -18,7 +18,7 @@ impl Texture {
     pub fn load(path: &Path) -> Result<Texture, MeshError> {
         let name = path.display().to_string();
         let bytes =
-            read_limited(path, MAX_FILE_BYTES).map_err(|e| MeshError::texture(path, &name, e))?;
+            read_plain(path, MAX_FILE_BYTES).map_err(|e| MeshError::texture(path, &name, e))?;
         decode(&bytes, path, &name, MAX_PIXELS)
     }
 
@@ -39,7 +39,7 @@ impl Texture {
 /// The content of the file `name` in the folder of the mesh at `path`.
 pub(super) fn beside(path: &Path, name: &str) -> Result<Vec<u8>, String> {
     let file = companion(path, name)?;
-    read_limited(&file, MAX_FILE_BYTES).map_err(|e| e.to_string())
+    read_plain(&file, MAX_FILE_BYTES).map_err(|e| e.to_string())
 }
 
 /// Decodes an image of at most `limit` pixels that is embedded in, or named by, the mesh at `path`.

@@ -7,13 +7,14 @@ use std::sync::Arc;
 
 use super::element::Element;
 use super::error::MjcfError;
-use crate::io::folder::{inside, read_limited};
+use crate::io::folder::inside;
+use crate::io::read_plain;
 use crate::limits::{MAX_MJCF_BYTES, MAX_MJCF_DEPTH, MAX_MJCF_ELEMENTS};
 
 /// The text of `path`.
 pub(super) fn read(path: &Path) -> Result<String, MjcfError> {
     let error = |source| MjcfError::Read { path: path.into(), source };
-    let bytes = read_limited(path, MAX_MJCF_BYTES).map_err(error)?;
+    let bytes = read_plain(path, MAX_MJCF_BYTES).map_err(error)?;
     String::from_utf8(bytes).map_err(|e| error(io::Error::new(io::ErrorKind::InvalidData, e)))
 }
 

@@ -11,7 +11,7 @@ use super::origin::{finite, isometry};
 use super::{
     Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, dynamics, limits, tree,
 };
-use crate::io::folder::read_limited;
+use crate::io::read_plain;
 use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
 
 impl KinematicTree {
@@ -22,7 +22,7 @@ impl KinematicTree {
     pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
         let path = path.as_ref();
         let read_error = |source| RobotError::Read { path: path.into(), source };
-        let bytes = read_limited(path, MAX_URDF_BYTES).map_err(read_error)?;
+        let bytes = read_plain(path, MAX_URDF_BYTES).map_err(read_error)?;
         let text = String::from_utf8(bytes)
             .map_err(|e| read_error(io::Error::new(io::ErrorKind::InvalidData, e)))?;
         let folder = match path.parent() {

@@ -10,7 +10,7 @@ use std::path::Path;
 use nalgebra::Point3;
 
 use super::{Lattice, MAX_SAMPLES, SdfGrid};
-use crate::io::folder::read_limited;
+use crate::io::read_plain;
 use crate::io::{MeshError, write_atomic};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
@@ -34,7 +34,7 @@ impl SdfGrid {
     /// # Errors
     /// [`MeshError::Read`], or [`MeshError::Malformed`] with the field that is wrong.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
-        let bytes = read_limited(path, MAX_BYTES)
+        let bytes = read_plain(path, MAX_BYTES)
             .map_err(|source| MeshError::Read { path: path.into(), source })?;
         Self::from_bytes(&bytes)
             .map_err(|(field, reason)| MeshError::malformed(path, field, reason))

@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 use prehend_geometry::{GridCache, TriMesh};
 
 use crate::data::bop::{BodyKind, Dataset, DatasetError, Frame, Models, SceneBodies};
+use crate::data::guard::Panicked;
 use crate::data::robots::Robots;
 use crate::data::targets::Target;
 use crate::error::RefineError;
@@ -43,6 +44,9 @@ pub enum AssetError {
     /// The refinement itself.
     #[error(transparent)]
     Refine(#[from] RefineError),
+    /// The program is at fault.
+    #[error(transparent)]
+    Panicked(#[from] Panicked),
     /// A rig is of a camera and a hand.
     #[error("nothing is known of a hand, which is part of the rig")]
     NoHand,
@@ -266,8 +270,11 @@ impl<'a> Assets<'a> {
             return Ok((observation, None));
         };
         let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
-        check_gravity(&gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
-        observation.gravity = Some(gravity);
+        gravity.iter().try_for_each(check_gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
+        if gravity.is_none() && required.contains(&Sensor::Hand) {
+            return Err(frame.bodies_fault("gravity", "is missing").into());
+        }
+        observation.gravity = gravity;
         for body in &bodies {
             if let BodyKind::Object { obj_id } = body.kind {
                 self.object(obj_id)?;

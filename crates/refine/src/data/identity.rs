@@ -1,12 +1,14 @@
 //! The settings and inputs that determine the results of a run, as facts to be compared.
 
 use std::fs;
+use std::io::{self, Read};
 use std::path::Path;
 
+use prehend_geometry::open_plain;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::data::bop::{Dataset, DatasetError};
+use crate::data::bop::{Dataset, DatasetError, read_bytes};
 
 /// Facts by name. Two runs with equal facts have equal results.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,7 +85,15 @@ fn hash(seed: u64, bytes: &[u8]) -> u64 {
 /// # Errors
 /// If it cannot be read.
 pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
-    Ok(fingerprint(&fs::read(file).map_err(|e| DatasetError::reading(file, &e))?))
+    let fault = |error: io::Error| DatasetError::reading(file, &error);
+    let mut opened = open_plain(file).map_err(fault)?;
+    let (mut sum, mut part) = (OFFSET, vec![0; 1 << 16]);
+    loop {
+        match opened.read(&mut part).map_err(fault)? {
+            0 => return Ok(format!("{sum:016x}")),
+            read => sum = hash(sum, &part[..read]),
+        }
+    }
 }
 
 /// JSON files of a scene that estimators read.
@@ -103,12 +113,10 @@ pub fn dataset_fingerprint(dataset: &Dataset, names: &[&str]) -> Result<String, 
     for file in scenes.chain([models]) {
         let name = file.strip_prefix(dataset.root()).unwrap_or(&file);
         sum = hash(sum, name.to_string_lossy().as_bytes());
-        match fs::read(&file) {
+        match read_bytes(&file) {
             Ok(bytes) => sum = hash(sum, &bytes),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                sum = hash(sum, b"absent")
-            }
-            Err(error) => return Err(DatasetError::reading(&file, &error)),
+            Err(DatasetError::Missing { .. }) => sum = hash(sum, b"absent"),
+            Err(error) => return Err(error),
         }
     }
     Ok(format!("{sum:016x}"))

@@ -4,14 +4,15 @@
 //! is whole: what a killed process left of its last line is cut off when the journal is opened again.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use prehend_geometry::{open_plain, plain_target};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, lock, write_atomically};
 use crate::data::identity::Identity;
 
 /// A journal that is open for writing, by this process alone.
@@ -43,23 +44,17 @@ impl Journal {
         let fault = |error: io::Error| DatasetError::unusable(path, error);
         let mut options = OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false);
-        let mut file = options.open(path).map_err(fault)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                return Err(DatasetError::unusable(path, "another process is at work on it"));
-            }
-            // Some network file systems have no locks.
-            Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => {
-                return Err(fault(e));
-            }
-            _ => {}
-        }
+        let mut file = plain_target(path).and_then(|path| options.open(path)).map_err(fault)?;
+        lock(path, &file)?;
         let mut bytes = Vec::new();
         if !restart {
             file.read_to_end(&mut bytes).map_err(fault)?;
         }
         let own = header(path, identity)?;
-        let Parsed { header, entries, length } = parse(path, &bytes, &own)?;
+        let Parsed { header, entries, length } = parse(&bytes, &own).map_err(|fault| {
+            let advice = fault.is_damage().then_some(" (--restart discards the whole journal)");
+            DatasetError::unusable(path, fault.to_string() + advice.unwrap_or_default())
+        })?;
         let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity, &[]));
         if !differences.is_empty() {
             let problem = format!(
@@ -84,9 +79,16 @@ impl Journal {
     pub fn read<E: DeserializeOwned>(
         path: &Path,
     ) -> Result<(Identity, BTreeMap<usize, E>), DatasetError> {
-        let bytes = std::fs::read(path).map_err(|e| DatasetError::unusable(path, e))?;
-        let Parsed { header, entries, .. } = parse(path, &bytes, "")?;
-        Ok((header.ok_or_else(|| foreign(path))?, entries))
+        let bytes = open_plain(path).and_then(|mut file| {
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map(|_| bytes)
+        });
+        let bytes = bytes.map_err(|e| DatasetError::unusable(path, e))?;
+        let Parsed { header, entries, .. } = parse(&bytes, "").map_err(|fault| {
+            let advice = fault.is_damage().then_some(": the run that wrote it must be repeated");
+            DatasetError::unusable(path, fault.to_string() + advice.unwrap_or_default())
+        })?;
+        Ok((header.ok_or_else(|| DatasetError::unusable(path, Fault::Foreign))?, entries))
     }
 
     /// Records a finished frame on disk and returns it as a resumed run would read it.
@@ -163,8 +165,19 @@ fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetErr
     DatasetError::unusable(path, format!("frame {index} cannot be recorded: {error}"))
 }
 
-fn foreign(path: &Path) -> DatasetError {
-    DatasetError::unusable(path, "is no journal of this program")
+/// Why a file cannot be read as a journal.
+#[derive(Debug, thiserror::Error)]
+enum Fault {
+    #[error("is no journal of this program")]
+    Foreign,
+    #[error("line {0} is damaged")]
+    Damaged(usize),
+}
+
+impl Fault {
+    fn is_damage(&self) -> bool {
+        matches!(self, Self::Damaged(_))
+    }
 }
 
 /// What is whole in a journal.
@@ -177,28 +190,21 @@ struct Parsed<E> {
 }
 
 /// `own` is the first line that this run would write: of a file without a whole line, what may be overwritten is a part of it.
-fn parse<E: DeserializeOwned>(
-    path: &Path,
-    bytes: &[u8],
-    own: &str,
-) -> Result<Parsed<E>, DatasetError> {
+fn parse<E: DeserializeOwned>(bytes: &[u8], own: &str) -> Result<Parsed<E>, Fault> {
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
     let Some(first) = lines.next() else {
         return if own.as_bytes().starts_with(bytes) {
             Ok(Parsed { header: None, entries, length: 0 })
         } else {
-            Err(foreign(path))
+            Err(Fault::Foreign)
         };
     };
-    let header = serde_json::from_slice(first).map_err(|_| foreign(path))?;
+    let header = serde_json::from_slice(first).map_err(|_| Fault::Foreign)?;
     let mut length = first.len();
     for (number, line) in (2..).zip(lines) {
-        let Line { index, entry } = serde_json::from_slice(line).map_err(|_| {
-            let problem =
-                format!("line {number} is damaged (--restart discards the whole journal)");
-            DatasetError::unusable(path, problem)
-        })?;
+        let Line { index, entry } =
+            serde_json::from_slice(line).map_err(|_| Fault::Damaged(number))?;
         entries.insert(index, entry);
         length += line.len();
     }

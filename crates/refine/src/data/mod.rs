@@ -10,6 +10,7 @@ mod contact;
 mod depth_camera;
 pub mod details;
 mod frame_file;
+mod guard;
 pub mod identity;
 mod journal;
 #[cfg(feature = "mcap")]
@@ -29,6 +30,7 @@ pub(crate) use contact::CONTACT_DISTANCE;
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
+pub use guard::{Panicked, guard};
 pub use identity::Identity;
 pub use journal::Journal;
 pub use noise::NoiseLevel;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use crate::data::bop::rotation_from_row_major;
+use crate::data::bop::{require_in_range, rotation_from_row_major};
 
 /// A pose for serialization: reading restores every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,8 +48,8 @@ pub fn pose_from_matrix(m: &[f64; 16]) -> Result<Isometry3<f64>, String> {
         return Err("the matrix's last row must be 0 0 0 1".into());
     }
     let translation = [m[3], m[7], m[11]];
-    if !translation.iter().all(|v| v.is_finite()) {
-        return Err("the translation is not finite".into());
+    for value in translation {
+        require_in_range(value).map_err(|problem| format!("the translation {problem}"))?;
     }
     let row_major = std::array::from_fn(|i| m[4 * (i / 3) + i % 3]);
     let rotation = rotation_from_row_major(&row_major)?;

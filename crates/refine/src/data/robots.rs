@@ -147,7 +147,8 @@ impl Robots {
         let hand = match known {
             Some(hand) => hand,
             None => {
-                let hand = Arc::new(Hand::cached(all.tree()?, skin, self.cache.as_ref())?);
+                let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
+                let hand = Arc::new(made.map_err(|e| frame.bodies_fault("bodies", e))?);
                 self.hands.insert(key, Arc::clone(&hand));
                 hand
             }

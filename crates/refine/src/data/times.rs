@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, read_text, write_atomically};
 
 const HEADER: &str = "index,frame,method,seconds\n";
 
@@ -27,7 +27,7 @@ impl Times {
         if !path.exists() {
             return Ok(times);
         }
-        let text = if keep { fs::read_to_string(path).map_err(fault)? } else { String::new() };
+        let text = if keep { read_text(path)? } else { String::new() };
         if !text.starts_with(HEADER) {
             fs::remove_file(path).map_err(fault)?;
             return Ok(times);
@@ -43,7 +43,7 @@ impl Times {
 
     /// The methods that the file at `path` has times of; none where there is no such file.
     pub fn methods(path: &Path) -> Vec<String> {
-        let text = fs::read_to_string(path).unwrap_or_default();
+        let text = read_text(path).unwrap_or_default();
         let Some(rows) = text.strip_prefix(HEADER) else { return Vec::new() };
         let method = |row: &str| row.split(',').nth(2).map(str::to_owned);
         let methods: BTreeSet<String> = rows.lines().filter_map(method).collect();
@@ -93,7 +93,7 @@ impl Times {
 /// If the new one cannot be written; files that are absent are left out.
 pub fn join_times(files: &[PathBuf], out: &Path) -> Result<(), DatasetError> {
     let mut lines: Vec<String> = Vec::new();
-    for text in files.iter().filter_map(|file| fs::read_to_string(file).ok()) {
+    for text in files.iter().filter_map(|file| read_text(file).ok()) {
         lines.extend(text.lines().skip(1).map(str::to_owned));
     }
     lines.sort_by_key(|line| line.split(',').next().and_then(|i| i.parse::<usize>().ok()));

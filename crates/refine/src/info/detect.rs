@@ -1,14 +1,14 @@
 //! Which kind a thing is.
 
-use std::fs;
 use std::path::Path;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use super::{
     Content, DatasetInfo, DescribeOptions, FrameInfo, ImageInfo, InfoError, MeshInfo, PosesInfo,
     RigInfo, RobotInfo,
 };
+use crate::data::bop::{parse_json, read_bytes, read_text};
 
 /// A file is known by its extension, and where that leaves it open by its outermost element or its fields.
 pub(super) fn content(
@@ -34,8 +34,11 @@ pub(super) fn content(
             _ => Err(InfoError::unknown(path, "the outermost element is neither robot nor mujoco")),
         },
         "json" => {
-            let fields: Map<String, Value> = serde_json::from_str(&text(path)?)
-                .map_err(|e| InfoError::unknown(path, format!("is no JSON object: {e}")))?;
+            let fields = match parse_json(&read_bytes(path)?) {
+                Ok(Value::Object(fields)) => fields,
+                Ok(_) => return Err(InfoError::unknown(path, "is no JSON object")),
+                Err(e) => return Err(InfoError::unknown(path, format!("is no JSON object: {e}"))),
+            };
             let has = |names: &[&str]| names.iter().all(|name| fields.contains_key(*name));
             if has(&["image_size", "camera", "hand"]) {
                 return RigInfo::read(path).map(Content::Rig);
@@ -53,7 +56,7 @@ pub(super) fn content(
 }
 
 fn text(path: &Path) -> Result<String, InfoError> {
-    fs::read_to_string(path).map_err(|e| InfoError::unknown(path, format!("cannot be read: {e}")))
+    Ok(read_text(path)?)
 }
 
 /// The name of the outermost element of XML.
@@ -71,6 +74,8 @@ fn outermost(xml: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::info::describe;
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::deviation::SurfaceDeviation;
 use super::parameters::{Play, Rig};
 use super::skin::{SkinCalibration, SkinLayout};
-use crate::data::bop::{DatasetError, read_json, write_atomically};
+use crate::data::bop::{DatasetError, read_json_in_range, write_atomically};
 use crate::problem::{DepthField, ImageWarp, ModelErrorSettings, RADIAL};
 use crate::scene::CameraCalibrationError;
 
@@ -80,7 +80,7 @@ impl Rig {
     /// # Errors
     /// If the file is missing or broken, naming the field.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
-        let layout: Layout = read_json(file)?;
+        let layout: Layout = read_json_in_range(file)?;
         let field = |name: &str, problem: &dyn std::fmt::Display| {
             Err(DatasetError::field(file, name, problem))
         };

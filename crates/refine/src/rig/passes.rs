@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use super::calibrator::Calibrator;
 use super::frames::CalibrationFrames;
 use super::pass::{Pass, Visit};
-use crate::data::{AssetError, Workers};
+use crate::data::{AssetError, Workers, guard};
 
 /// Parameters that change by fewer of their deviations are found.
 const SETTLED: f64 = 0.05;
@@ -134,9 +134,11 @@ impl<'a> Passes<'a> {
         let first = indices.first().copied().unwrap_or(0);
         let visit = |index: usize| {
             let told = self.frames.poses[index].1;
-            let mut frame = self.frames.load(index, &starts[index - first].unwrap_or(told))?;
-            frame.is_refined = is_refined && starts[index - first].is_some();
-            Ok(known.calibrator.visit(&frame)?)
+            guard(|| {
+                let mut frame = self.frames.load(index, &starts[index - first].unwrap_or(told))?;
+                frame.is_refined = is_refined && starts[index - first].is_some();
+                Ok(known.calibrator.visit(&frame)?)
+            })
         };
         Workers::new(indices.len(), rayon::current_num_threads())?
             .run_in_order(&indices, visit, each);

@@ -24,6 +24,9 @@ pub struct Hand {
     bodies: Vec<(usize, RenderModel)>,
 }
 
+/// Beyond this no position of a joint is one \[rad or m\]: its sine would be noise.
+const FARTHEST_JOINT: f64 = 1e6;
+
 impl Hand {
     /// Prepares the shape of `tree`; this builds a distance grid for every link.
     ///
@@ -83,13 +86,24 @@ impl Hand {
         ArticulatedRobot::new(&self.tree, Arc::clone(&self.shape), t_cam_hand, joints)
     }
 
-    /// Whether `joints` has one position for each of [`joint_names`](KinematicTree::joint_names).
+    /// Whether `joints` has one position for each of [`joint_names`](KinematicTree::joint_names), and each is a number that a joint may have.
     ///
     /// # Errors
-    /// [`RobotError::JointCount`].
+    /// [`RobotError::JointCount`] or [`RobotError::Number`].
     pub fn check_joints(&self, joints: &[f64]) -> Result<(), RobotError> {
         let (given, expected) = (joints.len(), self.tree.joint_names().len());
-        if given == expected { Ok(()) } else { Err(RobotError::JointCount { given, expected }) }
+        if given != expected {
+            return Err(RobotError::JointCount { given, expected });
+        }
+        // NaN is no such number, either.
+        let wrong = joints.iter().position(|position| !(position.abs() <= FARTHEST_JOINT));
+        wrong.map_or(Ok(()), |at| {
+            Err(RobotError::Number {
+                owner: format!("joint '{}'", self.tree.joint_names()[at]),
+                field: "position",
+                requirement: "a number within ±1e6",
+            })
+        })
     }
 
     /// Whether `forces` has one for each taxel.

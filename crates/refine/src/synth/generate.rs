@@ -1,6 +1,7 @@
 //! Generates whole datasets frame by frame; an interrupted run is resumed.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -18,7 +19,8 @@ use super::hand_files::HandFiles;
 use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
 use super::sensor::{Lens, Rig};
 use crate::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, write_atomically, write_results,
+    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, write_atomically,
+    write_results,
 };
 use crate::data::{Identity, Journal, NoiseLevel};
 
@@ -61,7 +63,7 @@ const FAILURES: &str = "synth_failures.json";
 /// ([`NoiseLevel`]); `synth.json` keeps the settings, and `rig_gt.json` what is wrong with the rig where that is the same in all frames.
 ///
 /// # Errors
-/// If the folder holds something else or a dataset of other settings, a file cannot be written, or an object cannot be
+/// If the folder holds something else or a dataset of other settings, another process is at work on it, a file cannot be written, or an object cannot be
 /// prepared. What has been made stays and will be gone on with.
 pub fn generate<'s, G>(
     dir: &Path,
@@ -76,6 +78,9 @@ where
 {
     check(subjects)?;
     create_folder(dir)?;
+    // Held to the end. Where folders cannot be opened they cannot be locked.
+    let folder = File::open(dir);
+    folder.iter().try_for_each(|folder| lock(dir, folder))?;
     check_plan(dir, hand, subjects, settings)?;
     remove_temporary(dir)?;
     hand.write(dir)?;

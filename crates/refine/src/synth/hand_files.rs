@@ -1,14 +1,13 @@
 //! A hand with the files that describe it.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, create_folder, write_atomically};
+use crate::data::bop::{DatasetError, create_folder, read_bytes, read_text, write_atomically};
 use crate::scene::Hand;
 
 /// The hand's files, relative to the dataset.
@@ -45,19 +44,23 @@ impl HandFiles {
     pub fn load(urdf: &Path, taxels: Option<&Path>) -> Result<Self, AssetError> {
         let tree = KinematicTree::from_urdf_file(urdf)?;
         let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
-        let text = fs::read_to_string(urdf).map_err(|e| DatasetError::reading(urdf, &e))?;
+        let text = read_text(urdf)?;
         let folder = urdf.parent().unwrap_or(Path::new(""));
         let mut meshes: Vec<(PathBuf, Vec<u8>)> = Vec::new();
         for name in named_files(&text) {
             let Some(relative) = within(folder, name) else { continue };
             let file = folder.join(&relative);
             if !meshes.iter().any(|(known, _)| *known == relative) {
-                let content = fs::read(&file).map_err(|e| DatasetError::reading(&file, &e))?;
-                meshes.push((relative, content));
+                meshes.push((relative, read_bytes(&file)?));
             }
         }
-        let robot = Hand::new(tree, skin)?;
-        robot.taxels.iter().try_for_each(|taxel| robot.link_of(taxel).map(|_| ()))?;
+        let robot = Hand::new(tree, skin).map_err(|e| DatasetError::unusable(urdf, e))?;
+        let table = taxels.unwrap_or(urdf);
+        robot
+            .taxels
+            .iter()
+            .try_for_each(|taxel| robot.link_of(taxel).map(|_| ()))
+            .map_err(|e| DatasetError::unusable(table, e))?;
         Ok(Self { robot, urdf: text, meshes })
     }
 
@@ -128,6 +131,8 @@ fn taxel_table(taxels: &[Taxel]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -153,3 +153,53 @@ fn a_killed_study_resumes() {
     let said = place.prehend(&study("part").replace("--iterations 2", "--iterations 3"));
     assert!(said.code == 1 && said.err.contains("another run"), "{}", said.err);
 }
+
+#[test]
+fn a_killed_search_resumes() {
+    let place = workplace();
+    place.remove("init.csv");
+    let search = |out: &str| format!("initial --dataset ds --search --out {out}");
+    place.succeed(&search("whole.csv"));
+    assert!(!place.path("whole.csv.journal").exists());
+    let journal = kill_midway(&place, &search("part.csv"), "part.csv.journal", "part.csv");
+    assert!(!place.path("part.csv").exists());
+    let said = place.prehend(&format!("{} --scene 1", search("part.csv")));
+    assert!(said.code == 1 && said.err.contains("another run"), "{}", said.err);
+    assert_eq!(place.read("part.csv.journal"), journal);
+    place.succeed(&search("part.csv"));
+    for file in ["", ".rivals.csv"] {
+        assert_eq!(place.read(&format!("part.csv{file}")), place.read(&format!("whole.csv{file}")));
+    }
+    assert!(!place.path("part.csv.journal").exists());
+}
+
+#[test]
+fn a_damaged_shard_is_to_be_made_again() {
+    let place = workplace();
+    for shard in [0, 1] {
+        place.succeed(&format!(
+            "study noise --dataset ds --poses low=init.csv --iterations 2 --shard {shard}/2 --out s{shard}"
+        ));
+    }
+    place.replace("s1/records.jsonl", "\n{\"index\":", "\n{\"index:");
+    let said = place.prehend("study merge s1 s2 --out whole");
+    let expected = "s1/records.jsonl: line 2 is damaged: the run that wrote it must be repeated";
+    assert!(said.code == 1 && said.err.contains(expected), "{}", said.err);
+}
+
+#[test]
+fn two_that_make_one_dataset_are_kept_apart() {
+    let place = Workplace::empty();
+    std::fs::create_dir(place.path("made")).unwrap();
+    let held = std::fs::File::open(place.path("made")).unwrap();
+    held.try_lock().unwrap();
+    let synth = "synth --objects 061_foam_brick --frames 1 --out made";
+    let said = place.prehend(synth);
+    assert!(
+        said.code == 1 && said.err.contains("made: another process is at work on it"),
+        "{}",
+        said.err
+    );
+    drop(held);
+    place.succeed(synth);
+}

@@ -120,7 +120,7 @@ fn reads_everything_in_meters_and_newtons() {
     assert_eq!(seen.depth.pixels(), [0.5; 12]);
     assert_eq!(seen.mask.count(), 1);
     let bodies: SceneBodies = frame.bodies().unwrap();
-    assert_eq!(bodies.gravity, Vector3::new(0.0, 9.81, 0.0));
+    assert_eq!(bodies.gravity, Some(Vector3::new(0.0, 9.81, 0.0)));
     let hand = bodies.body("hand").unwrap();
     let (urdf, joints) = hand.as_hand().unwrap();
     assert_eq!(urdf, fixture.root().join("hand/hand.urdf"));

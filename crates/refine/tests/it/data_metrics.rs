@@ -102,7 +102,7 @@ fn every_frame_of_both_grasp_sets_reads() {
                 let mean = f64::from(under.iter().sum::<f32>() / under.len() as f32);
                 assert!((mean - row.t_cam_model.translation.vector.z).abs() < 0.15, "{mean}");
                 let bodies = frame.bodies().unwrap();
-                assert!((bodies.gravity.norm() - 9.81).abs() < 0.02);
+                assert!((bodies.gravity.unwrap().norm() - 9.81).abs() < 0.02);
                 let hand = bodies.body("hand").unwrap();
                 let (urdf, joints) = hand.as_hand().unwrap();
                 assert!(urdf.is_file() && joints.len() == 16);

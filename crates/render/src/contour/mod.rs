@@ -15,6 +15,7 @@ mod footprint;
 mod inner;
 mod interior;
 mod lanes;
+mod layers;
 mod near;
 mod outline;
 mod pixel;

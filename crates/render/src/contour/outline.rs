@@ -2,6 +2,7 @@
 
 use glam::{Vec2, vec2};
 
+use super::layers::{Layers, Segment};
 use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region};
 
@@ -50,15 +51,6 @@ impl Piece {
     pub(crate) fn at(&self, t: f32) -> Vec2 {
         self.a + t * (self.b - self.a)
     }
-}
-
-/// A silhouette edge: where the number of surface layers changes.
-#[derive(Clone, Copy, Default)]
-struct Segment {
-    a: Vec2,
-    b: Vec2,
-    /// Layers gained by crossing from the side where a→b runs up the rows.
-    layers: f32,
 }
 
 /// Pieces of silhouette edges.
@@ -144,70 +136,6 @@ pub(super) fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2
         end = end.min(t0.max(t1));
     }
     (start < end).then_some([start, end])
-}
-
-/// Counts surface layers at image points, from the silhouette sorted into strips of rows.
-struct Layers {
-    first_row: f32,
-    /// Where each strip's segments begin, and where the last one's end.
-    starts: Vec<u32>,
-    segments: Vec<Segment>,
-}
-
-/// Strips a row: fine meshes have edges much shorter than a pixel.
-const STRIPS: f32 = 4.0;
-
-impl Layers {
-    fn new(segments: &[Segment], region: &Region, margin: f32) -> Self {
-        let first_row = (region.y0 as f32 - margin).floor();
-        let rows = (region.y1 as f32 + margin).ceil() - first_row;
-        let count = (rows * STRIPS) as usize + 1;
-        let strips = |s: &Segment| {
-            let strip = |y: f32| ((y - first_row) * STRIPS).floor();
-            let (low, high) = (strip(s.a.y.min(s.b.y)), strip(s.a.y.max(s.b.y)));
-            if high < 0.0 || low >= count as f32 {
-                return 0..0;
-            }
-            low.max(0.0) as usize..(high as usize).min(count - 1) + 1
-        };
-        let mut starts = vec![0u32; count + 1];
-        for strip in segments.iter().flat_map(strips) {
-            starts[strip + 1] += 1;
-        }
-        for strip in 0..count {
-            starts[strip + 1] += starts[strip];
-        }
-        let mut next = starts.clone();
-        let mut sorted = vec![Segment::default(); starts[count] as usize];
-        for segment in segments {
-            for strip in strips(segment) {
-                sorted[next[strip] as usize] = *segment;
-                next[strip] += 1;
-            }
-        }
-        Self { first_row, starts, segments: sorted }
-    }
-
-    fn at(&self, Vec2 { x, y }: Vec2) -> f32 {
-        let strip = ((y - self.first_row) * STRIPS).floor();
-        if strip < 0.0 || strip >= (self.starts.len() - 1) as f32 {
-            return 0.0;
-        }
-        let strip = strip as usize;
-        let mut layers = 0.0;
-        for s in &self.segments[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
-            // Half-open in y, so that a shared vertex counts once.
-            let up = s.a.y <= y;
-            if up == (s.b.y <= y) {
-                continue;
-            }
-            let crossing = s.a.x + (y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x);
-            if crossing > x {
-                layers += if up { s.layers } else { -s.layers };
-            }
-        }
-        layers
-    }
 }
 
 /// For each pixel of some rows, the nearest piece of the outline, if within the band.

@@ -8,8 +8,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
+use ::gltf::json::validation::Checked::Valid;
 use ::gltf::mesh::Mode;
-use ::gltf::{Gltf, Node, Primitive, Semantic, buffer, image};
+use ::gltf::{Document, Gltf, Node, Primitive, Semantic, buffer, image};
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -30,11 +31,7 @@ const DATA_URI: GeneralPurpose = GeneralPurpose::new(
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
-    // The crate's validation indexes what it is about to validate: a panic there is a malformed document.
-    let mut gltf = std::panic::catch_unwind(|| Gltf::from_slice(bytes))
-        .map_err(|_| "an index refers to nothing".to_owned())
-        .and_then(|read| read.map_err(|e| e.to_string()))
-        .map_err(|e| MeshError::malformed(path, "document", e))?;
+    let mut gltf = document(bytes).map_err(|e| MeshError::malformed(path, "document", e))?;
     if let Some(required) = gltf.extensions_required().find(|e| !e.starts_with("KHR_materials_")) {
         return Err(MeshError::Unsupported {
             path: path.into(),
@@ -80,6 +77,21 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
         pending[first..].reverse();
     }
     join(reader.parts, path)
+}
+
+/// The document, validated.
+fn document(bytes: &[u8]) -> Result<Gltf, String> {
+    let Gltf { document, blob } =
+        Gltf::from_slice_without_validation(bytes).map_err(|e| e.to_string())?;
+    let json = document.into_json();
+    // The crate's validation takes for granted that accessors of positions are there.
+    let primitives = json.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut positions = primitives.filter_map(|p| p.attributes.get(&Valid(Semantic::Positions)));
+    if positions.any(|accessor| accessor.value() >= json.accessors.len()) {
+        return Err("an accessor of positions is not there".into());
+    }
+    let document = Document::from_json(json).map_err(|e| e.to_string())?;
+    Ok(Gltf { document, blob })
 }
 
 /// The crate trusts the length field of a GLB header to be at least that of the header.

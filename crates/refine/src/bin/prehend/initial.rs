@@ -13,9 +13,14 @@ use clap::Args;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
-use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
+use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
+use prehend_refine::data::{
+    AssetError, Assets, Identity, Journal, NoiseLevel, PlainPose, Target, guard,
+};
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_render::Backend;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::options::{RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
@@ -57,6 +62,9 @@ pub(crate) struct Initial {
     /// Write the poses here, as a BOP results file; an existing one is replaced
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
+    /// Discard what an interrupted search with other settings left, instead of refusing
+    #[arg(long, requires = "search")]
+    restart: bool,
     /// Worker threads of the search; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -73,6 +81,21 @@ struct Found {
     failures: Vec<String>,
 }
 
+/// A pose that a search ended with, as the journal has it.
+#[derive(Serialize, Deserialize)]
+struct Candidate {
+    pose: PlainPose,
+    cost: f64,
+    weight: f64,
+}
+
+impl From<&PoseCandidate> for Candidate {
+    fn from(found: &PoseCandidate) -> Self {
+        let pose = PlainPose::from(&found.t_cam_object);
+        Self { pose, cost: found.cost, weight: found.weight }
+    }
+}
+
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
@@ -82,11 +105,13 @@ impl Initial {
         }
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
-        let Found { rows, rivals, mut failures } = match self.noise {
-            Some(level) => self.perturbed(&dataset, level)?,
-            None => self.found(&dataset)?,
+        let (found, journal) = match self.noise {
+            Some(level) => (self.perturbed(&dataset, level)?, None),
+            None => self.found(&dataset).map(|(found, journal)| (found, Some(journal)))?,
         };
+        let Found { rows, rivals, mut failures } = found;
         if rows.is_empty() && failures.is_empty() {
+            journal.map(Journal::discard).transpose()?;
             bail!("nothing is of the scenes, images and objects asked for");
         }
         let count = rows.len();
@@ -100,6 +125,7 @@ impl Initial {
         if count > 0 {
             say(format!("{count} poses written to {}", self.out.display()))?;
         }
+        journal.map(Journal::discard).transpose()?;
         Ok(exit_code(count, &failures))
     }
 
@@ -128,25 +154,48 @@ impl Initial {
         Ok(found)
     }
 
-    /// The poses that the search finds.
-    fn found(&self, dataset: &Dataset) -> anyhow::Result<Found> {
+    /// The poses that the search finds, and the journal that holds them until they are written.
+    fn found(&self, dataset: &Dataset) -> anyhow::Result<(Found, Journal)> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets = Assets::new(dataset, 0).with_cache(cache());
         let backend = self.rendering.open()?;
+        let identity = self.identity(dataset, backend.name())?;
+        let (mut journal, mut searched): (_, BTreeMap<usize, Vec<Candidate>>) =
+            Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
         let mut searches = BTreeMap::new();
         let mut all = Found::default();
         let bar = progress(targets.len(), "searching");
-        for target in bar.wrap_iter(targets.iter()) {
-            match search_one(&mut assets, &mut searches, target, &backend) {
+        for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
+            if searched.contains_key(&index) {
+                continue;
+            }
+            let found = guard(|| search_one(&mut assets, &mut searches, target, &backend));
+            match found {
                 Ok(found) => {
-                    // Of a results file's scores the higher is the better.
-                    all.rows.extend(found.first().map(|c| row(target, c.t_cam_object, -c.cost)));
-                    all.rivals.extend(found.iter().map(|c| row(target, c.t_cam_object, c.weight)));
+                    let found: Vec<Candidate> = found.iter().map(Candidate::from).collect();
+                    searched.insert(index, journal.append(index, &found)?);
                 }
                 Err(error) => all.failures.push(format!("{target}: {error}")),
             }
         }
-        Ok(all)
+        for (index, found) in searched {
+            let pose = |c: &Candidate, score| row(&targets[index], (&c.pose).into(), score);
+            // Of a results file's scores the higher is the better.
+            all.rows.extend(found.first().map(|c| pose(c, -c.cost)));
+            all.rivals.extend(found.iter().map(|c| pose(c, c.weight)));
+        }
+        Ok((all, journal))
+    }
+
+    fn identity(&self, dataset: &Dataset, backend: &str) -> anyhow::Result<Identity> {
+        Ok(Identity::of(&json!({
+            "command": "initial --search",
+            "dataset": canonical(dataset.split_dir()),
+            "annotations": dataset_fingerprint(dataset, &SENSED)?,
+            "targets": self.targets.as_deref().map(file_fingerprint).transpose()?,
+            "filters": self.selection.filters(),
+            "backend": backend,
+        })))
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Rotation};
+use super::json::{JsonFile, Numbers, Real, Rotation};
 use super::pose::translation_from_mm;
 use crate::data::bodies::check_name;
 
@@ -56,15 +56,15 @@ impl Body {
 /// One image's entry of `scene_bodies.json`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneBodies {
-    /// Gravity in the camera frame \[m/s²\].
-    pub gravity: Vector3<f64>,
+    /// Gravity in the camera frame \[m/s²\], where it is said.
+    pub gravity: Option<Vector3<f64>>,
     /// The bodies in view.
     pub bodies: Vec<Body>,
 }
 
 #[derive(Deserialize)]
 struct BodiesEntry {
-    gravity: Numbers<3>,
+    gravity: Option<Numbers<3>>,
     bodies: Vec<BodyEntry>,
 }
 
@@ -78,10 +78,10 @@ struct BodyEntry {
     rotation: Rotation,
     #[serde(rename = "cam_t_b2c")]
     translation: Numbers<3>,
-    sigma_mm: Option<f64>,
-    sigma_deg: Option<f64>,
+    sigma_mm: Option<Real>,
+    sigma_deg: Option<Real>,
     urdf: Option<String>,
-    joints: Option<BTreeMap<String, f64>>,
+    joints: Option<BTreeMap<String, Real>>,
     obj_id: Option<u32>,
 }
 
@@ -98,14 +98,19 @@ pub(crate) enum KindName {
 /// Standard deviations \[m, rad\] of what is said in millimeters and degrees.
 ///
 /// # Errors
-/// If one is negative or not finite.
-pub(crate) fn body_sigmas(mm: Option<f64>, deg: Option<f64>) -> Result<[Option<f64>; 2], String> {
+/// If one is negative.
+pub(crate) fn body_sigmas(mm: Option<Real>, deg: Option<Real>) -> Result<[Option<f64>; 2], String> {
     for (name, sigma) in [("sigma_mm", mm), ("sigma_deg", deg)] {
-        if let Some(sigma) = sigma.filter(|sigma| !sigma.is_finite() || *sigma < 0.0) {
+        if let Some(Real(sigma)) = sigma.filter(|sigma| sigma.0 < 0.0) {
             return Err(format!("{name} is {sigma}, not zero or above"));
         }
     }
-    Ok([mm.map(|mm| mm * 1e-3), deg.map(f64::to_radians)])
+    Ok([mm.map(|mm| mm.0 * 1e-3), deg.map(|deg| deg.0.to_radians())])
+}
+
+/// Joint positions by name.
+pub(crate) fn positions(joints: BTreeMap<String, Real>) -> BTreeMap<String, f64> {
+    joints.into_iter().map(|(name, position)| (name, position.0)).collect()
 }
 
 /// What is said of a field that is not there, as serde has it.
@@ -118,7 +123,7 @@ impl BodyEntry {
         let kind = match self.kind {
             KindName::Hand => BodyKind::Hand {
                 urdf: root.join(self.urdf.ok_or_else(|| missing("urdf"))?),
-                joints: self.joints.ok_or_else(|| missing("joints"))?,
+                joints: positions(self.joints.ok_or_else(|| missing("joints"))?),
             },
             KindName::Plane => BodyKind::Plane,
             KindName::Object => {
@@ -149,7 +154,7 @@ impl SceneBodies {
             }
             read.push(body);
         }
-        Ok(Self { gravity: gravity.0.into(), bodies: read })
+        Ok(Self { gravity: gravity.map(|g| g.0.into()), bodies: read })
     }
 
     /// The body called `name`.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 use prehend_render::{
-    Camera, CameraError, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage,
+    Camera, CameraError, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage, image_size,
 };
 use serde::Deserialize;
 
@@ -258,9 +258,9 @@ impl Frame<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Observation, file: &Path) -> Result<(), DatasetError> {
-        let mask = self.read_mask(file)?;
-        self.check_size(file, (mask.width(), mask.height()), observation)?;
-        observation.mask = mask;
+        let color = &observation.color;
+        self.check_size(file, image_size(file)?, (color.width(), color.height()))?;
+        observation.mask = self.read_mask(file)?;
         Ok(())
     }
 
@@ -280,10 +280,16 @@ impl Frame<'_> {
     /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
     pub(crate) fn unsegmented(&self) -> Result<Observation, DatasetError> {
         let color = match self.has_color() || !self.has_depth() {
-            true => Some(self.rgb()?),
+            true => Some(self.rgb_path()?),
             false => None,
         };
-        let size = color.as_ref().map(|color| (color.width(), color.height()));
+        // Before anything is decoded.
+        let size = color.as_deref().map(image_size).transpose()?;
+        if let Some(size) = size.filter(|_| self.has_depth() && self.depth_camera.is_none()) {
+            let file = self.depth_path();
+            self.check_size(&file, image_size(&file)?, size)?;
+        }
+        let color = color.map(|_| self.rgb()).transpose()?;
         if self.depth_camera.is_some() && color.is_none() {
             let problem = "is of a camera beside the color camera, and the scene has no rgb";
             return Err(self.fault(&self.scene.camera, "depth_K", problem));
@@ -294,13 +300,10 @@ impl Frame<'_> {
             let (width, height) = size.unwrap_or_default();
             DepthImage::filled(width, height, 0.0)
         };
-        let depth_size = (depth.width(), depth.height());
-        let (width, height) = size.unwrap_or(depth_size);
+        let (width, height) = (depth.width(), depth.height());
         let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));
-        let observation = Observation::new(camera, color, depth, mask);
-        self.check_size(&self.depth_path(), depth_size, &observation)?;
-        Ok(observation)
+        Ok(Observation::new(camera, color, depth, mask))
     }
 
     /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
@@ -360,14 +363,13 @@ impl Frame<'_> {
         Ok(Isometry3::from_parts(translation_from_mm(&translation.0), rotation.0))
     }
 
-    /// Refuses an image in `file` of another size than the color image.
+    /// Refuses an image in `file` of `w` by `h` pixels where the color image, or depth without one, has `width` by `height`.
     fn check_size(
         &self,
         file: &Path,
         (w, h): (usize, usize),
-        Observation { color, .. }: &Observation,
+        (width, height): (usize, usize),
     ) -> Result<(), DatasetError> {
-        let (width, height) = (color.width(), color.height());
         if (w, h) == (width, height) {
             return Ok(());
         }

@@ -3,7 +3,6 @@
 //! Entries are converted one by one: a fault in the entry of one image leaves the others usable. That includes `NaN` and
 //! `Infinity`, which other writers emit and JSON does not know.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -13,7 +12,9 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::error::DatasetError;
-use super::pose::{exactly, rotation_from_row_major};
+use super::files::read_bytes;
+use super::pose::{exactly, require_in_range, rotation_from_row_major};
+use super::unique::parse_json;
 
 /// A JSON file whose top level is an object; it is read once, when something of it is first asked for.
 #[derive(Debug)]
@@ -107,9 +108,41 @@ pub(crate) fn field_fault(file: &Path, field: &str, problem: &str) -> DatasetErr
 /// When the file is absent, cannot be read or is not JSON, and [`DatasetError::Field`] for the first field that is absent or
 /// not of its type.
 pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
-    let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
-    let value = serde_json::from_slice(&bytes).map_err(|e| DatasetError::unusable(file, e))?;
+    convert(file, String::new(), &read_value(file)?)
+}
+
+/// The same of a file in which every number is within range.
+///
+/// # Errors
+/// Those of [`read_json`], and [`DatasetError::Field`] for the first number that is not.
+pub(crate) fn read_json_in_range<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
+    let value = read_value(file)?;
+    check_range(&value, String::new())
+        .map_err(|(field, problem)| DatasetError::field(file, &field, problem))?;
     convert(file, String::new(), &value)
+}
+
+fn read_value(file: &Path) -> Result<Value, DatasetError> {
+    parse_json(&read_bytes(file)?).map_err(|e| DatasetError::unusable(file, e))
+}
+
+/// Finds a number that is out of range, in what is called `name`: its own name, and what is wrong with it.
+fn check_range(value: &Value, name: String) -> Result<(), (String, String)> {
+    match value {
+        Value::Number(number) => {
+            let checked = require_in_range(number.as_f64().unwrap_or(f64::INFINITY));
+            checked.map(|_| ()).map_err(|problem| (name, problem))
+        }
+        Value::Array(list) => {
+            let mut named = list.iter().enumerate();
+            named.try_for_each(|(k, inner)| check_range(inner, format!("{name}[{k}]")))
+        }
+        Value::Object(map) => map.iter().try_for_each(|(key, inner)| {
+            let dot = if name.is_empty() { "" } else { "." };
+            check_range(inner, format!("{name}{dot}{key}"))
+        }),
+        Value::Null | Value::Bool(_) | Value::String(_) => Ok(()),
+    }
 }
 
 /// A part of a file, which is called `field` there.
@@ -155,10 +188,10 @@ fn plain(problem: &str) -> (Option<&str>, String) {
 }
 
 fn read(path: &Path) -> Result<Map<String, Value>, DatasetError> {
-    let bytes = fs::read(path).map_err(|e| DatasetError::reading(path, &e))?;
-    let parsed = serde_json::from_slice(&bytes).or_else(|error| {
+    let bytes = read_bytes(path)?;
+    let parsed = parse_json(&bytes).or_else(|error| {
         // Report the strict parser's complaint unless non-finite numbers were all that stopped it.
-        serde_json::from_slice(&false_for_non_finite(&bytes)).map_err(|_| error)
+        parse_json(&false_for_non_finite(&bytes)).map_err(|_| error)
     });
     match parsed {
         Ok(Value::Object(root)) => Ok(root),
@@ -215,7 +248,21 @@ impl<const N: usize> TryFrom<Vec<NumberOrRow>> for Numbers<N> {
             NumberOrRow::Number(value) => vec![value],
             NumberOrRow::Row(values) => values,
         });
-        exactly(flat.collect()).map(Self)
+        let flat: Vec<f64> = flat.map(require_in_range).collect::<Result<_, _>>()?;
+        exactly(flat).map(Self)
+    }
+}
+
+/// A number within range.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "f64")]
+pub(crate) struct Real(pub(crate) f64);
+
+impl TryFrom<f64> for Real {
+    type Error = String;
+
+    fn try_from(value: f64) -> Result<Self, String> {
+        require_in_range(value).map(Self)
     }
 }
 
@@ -225,10 +272,13 @@ impl<const N: usize> TryFrom<Vec<NumberOrRow>> for Numbers<N> {
 pub(crate) struct Positive(pub(crate) f64);
 
 impl TryFrom<f64> for Positive {
-    type Error = &'static str;
+    type Error = String;
 
-    fn try_from(value: f64) -> Result<Self, &'static str> {
-        if value > 0.0 { Ok(Self(value)) } else { Err("must be above zero") }
+    fn try_from(value: f64) -> Result<Self, String> {
+        match require_in_range(value)? {
+            value if value > 0.0 => Ok(Self(value)),
+            _ => Err("must be above zero".into()),
+        }
     }
 }
 
@@ -254,7 +304,7 @@ mod tests {
     fn file(text: &str) -> JsonFile {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("scene.json");
-        fs::write(&path, text).unwrap();
+        std::fs::write(&path, text).unwrap();
         let file = JsonFile::new(path);
         let _ = file.root();
         file

@@ -7,10 +7,10 @@
 //! a missing or broken one disturbs only what needs it.
 
 mod arrival;
-mod atomic;
 mod bodies;
 mod dataset;
 mod error;
+mod files;
 mod frame;
 mod ground_truth;
 mod json;
@@ -21,23 +21,28 @@ mod pose;
 mod results;
 mod rivals;
 mod touch;
+mod unique;
 mod visibility;
 
 pub use arrival::Stamp;
-pub use atomic::{check_writable, create_folder, write_atomically};
 pub use bodies::{Body, BodyKind, SceneBodies};
-pub(crate) use bodies::{KindName, body_sigmas};
+pub(crate) use bodies::{KindName, body_sigmas, positions};
 pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
+pub use files::{check_writable, create_folder, write_atomically};
+pub(crate) use files::{lock, read_bytes, read_text};
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
-pub(crate) use json::{Numbers, Positive, Rotation, field_fault, read_json};
+pub(crate) use json::{
+    Numbers, Positive, Real, Rotation, field_fault, read_json, read_json_in_range,
+};
 pub(crate) use lens::{Lens, RemapCache};
 pub use models::{ModelInfo, Models};
 pub use models_info::write_symmetries;
 pub(crate) use models_info::{diameter, extent_to_bop};
 pub(crate) use pose::{
-    rotation_from_row_major, rotation_to_row_major, translation_from_mm, translation_to_mm,
+    require_in_range, rotation_from_row_major, rotation_to_row_major, translation_from_mm,
+    translation_to_mm,
 };
 pub use results::{
     ReadResults, ResultRow, ResultsWriter, read_results, share_image_times, write_results,
@@ -45,3 +50,4 @@ pub use results::{
 pub use rivals::read_rivals;
 pub(crate) use touch::TactileEntry;
 pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};
+pub(crate) use unique::parse_json;

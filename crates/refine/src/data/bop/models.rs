@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive};
+use super::json::{JsonFile, Numbers, Positive, Real};
 use super::pose::pose_from_bop;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
@@ -86,12 +86,12 @@ impl Models {
 #[derive(Deserialize)]
 struct InfoEntry {
     diameter: Positive,
-    min_x: Option<f64>,
-    min_y: Option<f64>,
-    min_z: Option<f64>,
-    size_x: Option<f64>,
-    size_y: Option<f64>,
-    size_z: Option<f64>,
+    min_x: Option<Real>,
+    min_y: Option<Real>,
+    min_z: Option<Real>,
+    size_x: Option<Real>,
+    size_y: Option<Real>,
+    size_z: Option<Real>,
     mass_kg: Option<Positive>,
     com_mm: Option<Numbers<3>>,
     inertia_kg_m2: Option<Inertia>,
@@ -107,7 +107,8 @@ impl From<InfoEntry> for ModelInfo {
             axis: entry.axis.0,
             point: entry.offset.map_or_else(Point3::origin, point),
         };
-        let coordinates = |[x, y, z]: [Option<f64>; 3]| Some(Vector3::new(x?, y?, z?) / 1000.0);
+        let coordinates =
+            |[x, y, z]: [Option<Real>; 3]| Some(Vector3::new(x?.0, y?.0, z?.0) / 1000.0);
         let low = coordinates([entry.min_x, entry.min_y, entry.min_z]).map(Point3::from);
         let size = coordinates([entry.size_x, entry.size_y, entry.size_z]);
         let bounds = low.zip(size).map(|(low, size)| (low, low + size));

@@ -1,14 +1,13 @@
 //! Writes `models_info.json`.
 
-use std::fs;
-
 use nalgebra::{Isometry3, Point3};
 use serde_json::{Map, Value, json};
 
-use super::atomic::write_atomically;
 use super::error::DatasetError;
+use super::files::{read_bytes, write_atomically};
 use super::models::Models;
 use super::pose::{rotation_to_row_major, translation_to_mm};
+use super::unique::parse_json;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// Largest distance between two of `points`; 0 without two.
@@ -46,12 +45,17 @@ pub fn write_symmetries(
     symmetries: &Symmetries,
 ) -> Result<(), DatasetError> {
     let file = models.dir().join("models_info.json");
-    let mut list: Map<String, Value> = match fs::read(&file) {
+    let mut list: Map<String, Value> = match read_bytes(&file) {
         // Strictly: numbers that JSON does not know could not be written back.
-        Ok(bytes) => serde_json::from_slice(&bytes)
-            .map_err(|e| DatasetError::unusable(&file, format!("not valid JSON: {e}")))?,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Map::new(),
-        Err(e) => return Err(DatasetError::reading(&file, &e)),
+        Ok(bytes) => match parse_json(&bytes) {
+            Ok(Value::Object(list)) => list,
+            Ok(_) => return Err(DatasetError::unusable(&file, "the top level is no JSON object")),
+            Err(e) => {
+                return Err(DatasetError::unusable(&file, format!("not valid JSON: {e}")));
+            }
+        },
+        Err(DatasetError::Missing { .. }) => Map::new(),
+        Err(e) => return Err(e),
     };
     let entry =
         list.entry(obj_id.to_string()).or_insert_with(|| Value::Object(extent_to_bop(vertices)));
@@ -92,6 +96,8 @@ impl Symmetries {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -1,6 +1,7 @@
 //! Poses as BOP writes them: nine row-major rotation entries and a translation in millimeters.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use prehend_geometry::limits::MAX_NUMBER;
 
 /// Largest entry of RᵀR − I that still counts as rounding; beyond it the matrix is refused.
 const ROTATION_TOLERANCE: f64 = 1e-3;
@@ -10,7 +11,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// # Errors
 /// What is wrong with entries that are not finite, not orthonormal, or a reflection.
 pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, String> {
-    require_finite(r)?;
+    require_all_in_range(r)?;
     let matrix = Matrix3::from_row_slice(r);
     let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
     if deviation > ROTATION_TOLERANCE {
@@ -64,7 +65,7 @@ pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f
 pub(crate) fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is not a number"));
     let values = exactly(text.split_whitespace().map(number).collect::<Result<_, _>>()?)?;
-    require_finite(&values)?;
+    require_all_in_range(&values)?;
     Ok(values)
 }
 
@@ -73,11 +74,23 @@ pub(super) fn exactly<const N: usize>(values: Vec<f64>) -> Result<[f64; N], Stri
     values.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
 }
 
-fn require_finite(values: &[f64]) -> Result<(), String> {
-    match values.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(format!("value {index} is not finite")),
-        None => Ok(()),
+/// Refuses a number that is not finite or beyond [`MAX_NUMBER`].
+///
+/// # Errors
+/// What is wrong with it.
+pub(crate) fn require_in_range(value: f64) -> Result<f64, String> {
+    match value.abs() {
+        _ if !value.is_finite() => Err("is not finite".into()),
+        size if size > MAX_NUMBER => Err(format!("is {value:e}, beyond ±{MAX_NUMBER:e}")),
+        _ => Ok(value),
     }
+}
+
+fn require_all_in_range(values: &[f64]) -> Result<(), String> {
+    values.iter().enumerate().try_for_each(|(index, value)| {
+        let checked = require_in_range(*value);
+        checked.map(|_| ()).map_err(|problem| format!("value {index} {problem}"))
+    })
 }
 
 #[cfg(test)]
@@ -135,6 +148,7 @@ mod tests {
             ("1 2 3 4", "expected 3 numbers, found 4"),
             ("1 2x 3", "\"2x\" is not a number"),
             ("nan 2 3", "value 0 is not finite"),
+            ("1 2 -1e308", "value 2 is -1e308, beyond ±1e9"),
         ] {
             assert_eq!(parse_numbers::<3>(text).unwrap_err(), expected);
         }

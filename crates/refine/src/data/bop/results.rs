@@ -1,14 +1,15 @@
 //! Results files of the BOP challenge: one estimated pose a row.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
+use prehend_geometry::plain_target;
 
-use super::atomic::write_atomically;
 use super::error::DatasetError;
+use super::files::{read_bytes, write_atomically};
 use super::pose::{parse_numbers, pose_from_bop, rotation_to_row_major, translation_to_mm};
 
 const COLUMNS: [&str; 7] = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"];
@@ -52,7 +53,7 @@ pub struct ReadResults {
 /// When the file cannot be read at all or is empty; malformed rows are listed in [`ReadResults::errors`] and the
 /// others still returned.
 pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
-    let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
+    let bytes = read_bytes(file)?;
     let text = String::from_utf8_lossy(&bytes);
     if text.trim().is_empty() {
         return Err(DatasetError::unusable(file, "the file is empty"));
@@ -155,7 +156,8 @@ impl ResultsWriter {
     /// # Errors
     /// [`DatasetError::Write`].
     pub fn create(path: &Path) -> Result<Self, DatasetError> {
-        let file = File::create(path).map_err(|e| DatasetError::writing(path, e))?;
+        let file = plain_target(path).and_then(File::create);
+        let file = file.map_err(|e| DatasetError::writing(path, e))?;
         let mut writer = Self { path: path.to_owned(), file, rows: 0 };
         writer.write(&header())?;
         Ok(writer)

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::bodies::missing;
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers};
+use super::json::{JsonFile, Numbers, Real};
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
@@ -77,7 +77,7 @@ pub(crate) struct TactileEntry {
     taxels: Option<PathBuf>,
     force: Option<Vec<Numbers<3>>>,
     contact: Option<Vec<Option<Flag>>>,
-    distance: Option<Vec<Option<f64>>>,
+    distance: Option<Vec<Option<Real>>>,
     link: Option<String>,
     points: Option<Vec<Numbers<3>>>,
     normals: Option<Vec<Numbers<3>>>,
@@ -136,11 +136,10 @@ impl TactileEntry {
             }
             KindName::Proximity => {
                 let distance = self.distance.ok_or_else(missing("distance"))?;
-                if let Some(wrong) = distance.iter().flatten().find(|mm| **mm < 0.0 || mm.is_nan())
-                {
-                    return Err(format!("distance: {wrong} is below zero"));
+                if let Some(wrong) = distance.iter().flatten().find(|mm| mm.0 < 0.0) {
+                    return Err(format!("distance: {} is below zero", wrong.0));
                 }
-                let meters = distance.into_iter().map(|mm| mm.map(|mm| mm * 1e-3)).collect();
+                let meters = distance.into_iter().map(|mm| mm.map(|mm| mm.0 * 1e-3)).collect();
                 let taxels = taxels.ok_or_else(missing("taxels"))?;
                 TactileReading::Proximity { taxels, distance: meters }
             }

@@ -1,8 +1,8 @@
 //! Images of one camera.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage};
+use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage, image_size};
 
 use super::layout::ImagesLayout;
 use crate::data::bop::{DatasetError, Lens, RemapCache};
@@ -20,8 +20,30 @@ impl ImagesLayout<'_> {
         };
         let folder = file.parent().unwrap_or(Path::new("."));
         let broken = |error: prehend_render::ImageError| DatasetError::unusable(file, error);
-        let load = |path| RgbImage::load(&folder.join(path)).map_err(broken);
-        let color = self.rgb.map(load).transpose()?;
+        // Of all images before one is decoded.
+        let size = |path: &PathBuf| image_size(&folder.join(path)).map_err(broken);
+        let color_size = self.rgb.map(size).transpose()?;
+        let depth_size = self.depth.map(size).transpose()?;
+        let Some((w, h)) = color_size.or(depth_size) else {
+            return Err(field("rgb", "is missing, and so is depth".to_owned()));
+        };
+        let own = self.depth_camera(field)?;
+        if own.is_some() && (self.rgb.is_none() || self.depth.is_none()) {
+            // It is beside the color camera.
+            let lacks = if self.rgb.is_none() { "rgb" } else { "depth" };
+            return Err(field(lacks, "is missing".to_owned()));
+        }
+        let of = if self.rgb.is_some() { "rgb" } else { "depth" };
+        let others =
+            [("depth", depth_size.filter(|_| own.is_none())), ("mask", Some(size(self.mask)?))];
+        for (name, size) in others {
+            if let Some((width, height)) = size.filter(|size| *size != (w, h)) {
+                let problem = format!("the image is {width}x{height} pixels, {of} is {w}x{h}");
+                return Err(field(name, problem));
+            }
+        }
+        let color = self.rgb.map(|path| RgbImage::load(&folder.join(path)).map_err(broken));
+        let color = color.transpose()?;
         let depth = match (self.depth, self.depth_unit_m) {
             (None, _) => None,
             (Some(_), None) => return Err(field("depth_unit_m", "is missing".to_owned())),
@@ -30,29 +52,9 @@ impl ImagesLayout<'_> {
             }
         };
         let mut mask = Mask::load(&folder.join(self.mask)).map_err(broken)?;
-        let (color_size, depth_size) = (
-            color.as_ref().map(|image| (image.width(), image.height())),
-            depth.as_ref().map(|image| (image.width(), image.height())),
-        );
-        let Some((w, h)) = color_size.or(depth_size) else {
-            return Err(field("rgb", "is missing, and so is depth".to_owned()));
-        };
-        let own = self.depth_camera(field)?;
-        if own.is_some() && (color.is_none() || depth.is_none()) {
-            // It is beside the color camera.
-            let lacks = if color.is_none() { "rgb" } else { "depth" };
-            return Err(field(lacks, "is missing".to_owned()));
-        }
-        let of = if color.is_some() { "rgb" } else { "depth" };
-        let others = [
-            ("depth", depth_size.filter(|_| own.is_none())),
-            ("mask", Some((mask.width(), mask.height()))),
-        ];
-        for (name, size) in others {
-            if let Some((width, height)) = size.filter(|size| *size != (w, h)) {
-                let problem = format!("the image is {width}x{height} pixels, {of} is {w}x{h}");
-                return Err(field(name, problem));
-            }
+        if prefix.is_empty() && mask.count() == 0 {
+            // Of other cameras those are left out that do not see the object.
+            return Err(field("mask", "the mask is empty".to_owned()));
         }
         let camera = Camera::from_k(self.k, w, h).map_err(|e| field("K", e.to_string()))?;
         let fault = |e: prehend_render::DistortionError| DatasetError::unusable(file, e);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
-use crate::data::bop::{KindName, Lens, Numbers, Positive, Rotation, TactileEntry};
+use crate::data::bop::{KindName, Lens, Numbers, Positive, Real, Rotation, TactileEntry};
 use crate::data::pose::pose_from_matrix;
 
 /// The file's layout.
@@ -37,7 +37,7 @@ pub(super) struct Layout {
     pub(super) cameras: Vec<CameraLayout>,
     pub(super) mesh: PathBuf,
     pub(super) mesh_unit: Unit,
-    pub(super) mass_kg: Option<f64>,
+    pub(super) mass_kg: Option<Positive>,
     /// The object's number in a rig.
     pub(super) obj_id: Option<u32>,
     pub(super) pose: Pose,
@@ -150,9 +150,9 @@ struct PoseLayout {
 pub(super) struct RobotLayout {
     pub(super) urdf: PathBuf,
     pub(super) base_pose: Pose,
-    pub(super) joints: BTreeMap<String, f64>,
-    pub(super) sigma_mm: Option<f64>,
-    pub(super) sigma_deg: Option<f64>,
+    pub(super) joints: BTreeMap<String, Real>,
+    pub(super) sigma_mm: Option<Real>,
+    pub(super) sigma_deg: Option<Real>,
     pub(super) taxels: Option<PathBuf>,
     /// Force of the object on each taxel, in its link's frame \[N\].
     pub(super) forces: Option<Vec<Numbers<3>>>,
@@ -169,10 +169,10 @@ pub(super) struct BodyLayout {
     #[serde(default)]
     pub(super) kind: KindName,
     pub(super) pose: Pose,
-    pub(super) sigma_mm: Option<f64>,
-    pub(super) sigma_deg: Option<f64>,
+    pub(super) sigma_mm: Option<Real>,
+    pub(super) sigma_deg: Option<Real>,
     pub(super) urdf: Option<PathBuf>,
-    pub(super) joints: Option<BTreeMap<String, f64>>,
+    pub(super) joints: Option<BTreeMap<String, Real>>,
     pub(super) mesh: Option<PathBuf>,
     pub(super) mesh_unit: Option<Unit>,
 }

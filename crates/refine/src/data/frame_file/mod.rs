@@ -37,7 +37,8 @@ pub fn load_frame_file(
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
     let FrameParts { mut observation, mesh, mesh_file, robot, layout } = FrameParts::read(file)?;
     let name = mesh_file.display().to_string();
-    let mut object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
+    let mut object = Object::with_mass(&name, mesh, layout.mass_kg.map(|mass| mass.0), seed)
+        .map_err(|e| fault(&e))?;
     if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
         match rig.corrected_object(id, &object).map_err(|e| fault(&e))? {
             Some(corrected) => object = corrected,
@@ -101,7 +102,7 @@ impl FrameParts {
 
     /// Mass of the object \[kg\], where the file says it.
     pub(crate) fn mass(&self) -> Option<f64> {
-        self.layout.mass_kg
+        self.layout.mass_kg.map(|mass| mass.0)
     }
 
     /// Whether the images were taken through a lens.

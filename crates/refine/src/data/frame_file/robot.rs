@@ -10,7 +10,9 @@ use prehend_geometry::robot::KinematicTree;
 
 use super::layout::{BodyLayout, Layout, RobotLayout};
 use crate::data::bodies::{Bodies, PlacedBody, check_name, plane, solid};
-use crate::data::bop::{DatasetError, KindName, TactileReading, body_sigmas, field_fault};
+use crate::data::bop::{
+    DatasetError, KindName, TactileReading, body_sigmas, field_fault, positions,
+};
 use crate::scene::HandMeasurement;
 
 /// What the robot of a frame file is called beside other bodies.
@@ -80,7 +82,7 @@ impl RobotLayout {
     fn placed(&self, file: &Path, folder: &Path) -> Result<PlacedBody, DatasetError> {
         let tree = KinematicTree::from_urdf_file(folder.join(&self.urdf))
             .map_err(|e| DatasetError::unusable(file, e))?;
-        let joints = tree.joint_vector(&self.joints);
+        let joints = tree.joint_vector(&positions(self.joints.clone()));
         Ok(PlacedBody {
             name: ROBOT.to_owned(),
             joints: joints.map_err(|e| DatasetError::field(file, "robot.joints", e))?,
@@ -108,7 +110,8 @@ impl BodyLayout {
                 let tree = KinematicTree::from_urdf_file(folder.join(urdf))
                     .map_err(|e| broken(e.to_string()))?;
                 let said = self.joints.as_ref().ok_or_else(needed("joints"))?;
-                joints = tree.joint_vector(said).map_err(|e| field("joints", e.to_string()))?;
+                let said = positions(said.clone());
+                joints = tree.joint_vector(&said).map_err(|e| field("joints", e.to_string()))?;
                 tree
             }
             KindName::Plane => plane(),

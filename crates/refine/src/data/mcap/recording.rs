@@ -9,6 +9,7 @@ use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
+use prehend_geometry::open_plain;
 
 use super::camera::Lensed;
 use super::error::RecordingError;
@@ -225,7 +226,7 @@ pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
 
 /// The messages of `file`, in its order.
 pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
-    let opened = File::open(file);
+    let opened = open_plain(file);
     let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
     let options = LinearReaderOptions::default()
         .with_record_length_limit(LONGEST)

@@ -1,15 +1,12 @@
 //! Recordings of what was sensed and found.
 
 use std::collections::{BTreeMap, HashMap};
-use std::ffi::OsString;
-use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
-use std::process;
 
 use mcap::records::MessageHeader;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use prehend_geometry::TriMesh;
+use prehend_geometry::{AtomicFile, TriMesh};
 use prehend_render::{Camera, RgbImage};
 use serde::Serialize;
 
@@ -37,8 +34,7 @@ const QUALITY: u8 = 85;
 /// lists both. The file appears once it is [finished](Self::finish), whole.
 pub struct RecordingWriter {
     file: PathBuf,
-    temporary: PathBuf,
-    writer: mcap::Writer<BufWriter<File>>,
+    writer: mcap::Writer<BufWriter<AtomicFile>>,
     /// By topic: its number, and how many messages it has.
     channels: HashMap<String, (u16, u32)>,
 }
@@ -50,20 +46,12 @@ impl RecordingWriter {
     /// If it cannot be written.
     pub fn create(file: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { file: file.to_owned(), source };
-        let name = file.file_name().ok_or_else(|| io(io::ErrorKind::InvalidInput.into()))?;
-        if file.exists() && !file.is_file() {
-            return Err(io(io::Error::other("is there, and no regular file")));
-        }
-        let mut hidden = OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{}.tmp", process::id()));
-        let temporary = file.with_file_name(hidden);
-        let opened = File::create(&temporary).map_err(io)?;
+        let opened = AtomicFile::create(file).map_err(io)?;
         let options = mcap::WriteOptions::new().profile("ros2").library("prehend");
         let writer = options.create(BufWriter::new(opened));
         let writer =
             writer.map_err(|source| RecordingError::Format { file: file.to_owned(), source })?;
-        Ok(Self { file: file.to_owned(), temporary, writer, channels: HashMap::new() })
+        Ok(Self { file: file.to_owned(), writer, channels: HashMap::new() })
     }
 
     /// Ends the recording and puts it in its place.
@@ -73,8 +61,10 @@ impl RecordingWriter {
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let format = |source| RecordingError::Format { file: self.file.clone(), source };
         self.writer.finish().map_err(format)?;
-        fs::rename(&self.temporary, &self.file)
-            .map_err(|source| RecordingError::Io { file: self.file.clone(), source })
+        let written = self.writer.into_inner().into_inner().map_err(|e| e.into_error());
+        written
+            .and_then(AtomicFile::commit)
+            .map_err(|source| RecordingError::Io { file: self.file, source })
     }
 
     /// What was sensed at the moment `at` \[ns\]; of which `hand`, if there is one.
@@ -278,13 +268,6 @@ impl RecordingWriter {
 
     fn io(&self, source: io::Error) -> RecordingError {
         RecordingError::Io { file: self.file.clone(), source }
-    }
-}
-
-impl Drop for RecordingWriter {
-    fn drop(&mut self) {
-        // Renamed if it is finished; else half a recording helps nobody, and if it cannot be removed nobody can be told.
-        let _ = fs::remove_file(&self.temporary);
     }
 }
 

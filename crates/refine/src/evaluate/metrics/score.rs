@@ -51,7 +51,7 @@ pub struct PoseScore {
     pub adi_mm: Option<f64>,
     /// Maximum surface distance up to symmetry \[mm\].
     pub mssd_mm: Option<f64>,
-    /// Maximum projected distance up to symmetry \[px\].
+    /// Maximum projected distance up to symmetry \[px\]; none where part of the object is behind the camera.
     pub mspd_px: Option<f64>,
     /// Contact area \[cm²\].
     pub ca_cm2: Option<f64>,
@@ -91,9 +91,11 @@ impl PoseScore {
         width: usize,
     ) -> Self {
         self.vsd = Some(vsd.iter().sum::<f64>() / vsd.len() as f64);
-        self.recall = self.mssd_mm.zip(self.mspd_px).map(|(mssd, mspd)| {
-            NormalizedErrors::new(vsd, 1e-3 * mssd, diameter, mspd, width).recall()
-        });
+        // What is behind the camera is missed.
+        let mspd = self.mspd_px.unwrap_or(f64::INFINITY);
+        self.recall = self
+            .mssd_mm
+            .map(|mssd| NormalizedErrors::new(vsd, 1e-3 * mssd, diameter, mspd, width).recall());
         self
     }
 }

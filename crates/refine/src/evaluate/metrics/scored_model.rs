@@ -42,7 +42,7 @@ impl ScoredModel {
             add_mm: Some(1e3 * self.add(estimate, truth)),
             adi_mm: Some(1e3 * self.adi(estimate, truth)),
             mssd_mm: Some(1e3 * self.mssd(estimate, truth)),
-            mspd_px: Some(self.mspd(estimate, truth, camera)),
+            mspd_px: Some(self.mspd(estimate, truth, camera)).filter(|mspd| mspd.is_finite()),
             ..PoseScore::default()
         }
     }

@@ -100,7 +100,18 @@ impl Summary {
     pub fn text(&self, name: impl Fn(u32) -> String) -> String {
         let (means, medians) =
             (self.table("means", |s| s.mean, &name), self.table("medians", |s| s.median, &name));
-        format!("{means}\n{medians}")
+        format!("{means}\n{medians}{}", self.remarks())
+    }
+
+    /// Which averages are of fewer poses than the others.
+    fn remarks(&self) -> String {
+        let all = self.overall.iter().flatten().map(|s| s.count).max().unwrap_or(0);
+        let known = COLUMNS
+            .iter()
+            .zip(&self.overall)
+            .filter_map(|(name, s)| Some((name, s.as_ref()?.count)));
+        let fewer = known.filter(|(_, count)| *count < all);
+        fewer.map(|(name, count)| format!("{name}: known of {count} of {all} poses\n")).collect()
     }
 }
 
@@ -140,6 +151,7 @@ mod tests {
         assert_eq!(lines[4], ["all", "4", "4.250", "0.500"]);
         assert_eq!(lines[6], ["medians", "n", "PE", "cm", "IV", "cm³"]);
         assert_eq!(lines[10], ["all", "4", "3.500", "0.500"]);
+        assert!(text.ends_with("IV cm³: known of 1 of 4 poses\n"));
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json["per_object"]["7"][0]["mean"], 1.5);
         assert_eq!(json["columns"][0], "PE cm");

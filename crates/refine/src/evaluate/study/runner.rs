@@ -13,7 +13,7 @@ use super::posterior::PredictedPosterior;
 use super::record::{FrameRecord, RowOutcome};
 use super::sweep::Sweep;
 use crate::data::bop::{Dataset, ResultRow};
-use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
+use crate::data::{AssetError, Assets, PlainPose, Sensor, Target, guard};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
 use crate::problem::State;
@@ -101,7 +101,8 @@ impl<'a> Runner<'a> {
     fn run_trial(&mut self, frame: &Frame, trial: &Trial) -> (Vec<RowOutcome>, Option<f64>) {
         let refined = match self.methods.iter().find(|(name, _)| *name == trial.method) {
             Some((_, method)) => {
-                self.refine(frame, method, trial.fault).map_err(|error| error.to_string())
+                let refined = guard(|| self.refine(frame, method, trial.fault));
+                refined.map_err(|error| error.to_string())
             }
             None => Err(format!("there is no method {}", trial.method)),
         };

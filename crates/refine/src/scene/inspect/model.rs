@@ -33,6 +33,17 @@ pub(super) fn inspect(object: &Object) -> Vec<Warning> {
             format!("the object's mass is unknown: {mass:.3} kg was assumed from 500 kg/m³");
         warnings.push(Warning::new(Subject::Model, mass, "kg").found(finding));
     }
+    let inverted = object.report.inverted_shells;
+    if inverted > 0 {
+        let of = object.report.components;
+        warnings.push(
+            Warning::new(Subject::Model, inverted as f64, "shells")
+                .found(format!(
+                    "{inverted} of {of} shells of the mesh faced inward and were turned over"
+                ))
+                .hint("is the mesh mirrored?"),
+        );
+    }
     if !object.report.watertight {
         let edges = object.report.open_edges;
         let finding =

@@ -1,6 +1,7 @@
 //! Every fault is named, costs only the frames it is in, and leaves no half-written file.
 
 mod dataset;
+mod extremes;
 mod models;
 mod runs;
 

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs;
+use std::io;
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
+use prehend_geometry::limits::MAX_TEXT_BYTES;
+use prehend_geometry::read_plain;
 use toml::{Table, Value};
 
 use super::words::spelled;
@@ -30,7 +32,8 @@ impl ConfigFile {
         command: &Command,
         given: &ArgMatches,
     ) -> Result<Self, ConfigError> {
-        let text = fs::read_to_string(&path)
+        let text = read_plain(&path, MAX_TEXT_BYTES)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other))
             .map_err(|source| ConfigError::Read { file: path.clone(), source })?;
         let table: Table = text.parse().map_err(|error: toml::de::Error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();

@@ -12,7 +12,7 @@ use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{
-    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers,
+    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers, guard,
 };
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
@@ -85,7 +85,7 @@ impl DatasetRun<'_> {
         let workers = if self.output.time { 1 } else { open.len() };
         Workers::new(workers, rayon::current_num_threads())?.run(
             &open,
-            || |(_, job): &(usize, &Job)| self.refine(&assets, job),
+            || |(_, job): &(usize, &Job)| guard(|| self.refine(&assets, job)),
             |&(index, job), outcome| -> anyhow::Result<()> {
                 match outcome {
                     Ok((done, seconds)) => {

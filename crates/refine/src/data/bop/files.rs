@@ -1,8 +1,30 @@
-//! Files that appear whole or not at all.
+//! Files that are read whole, and appear whole or not at all.
 
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::ErrorKind;
 use std::path::Path;
 
+use prehend_geometry::limits::MAX_TEXT_BYTES;
+use prehend_geometry::{plain_target, read_plain};
+
 use super::error::DatasetError;
+
+/// The content of a plain file of at most [`MAX_TEXT_BYTES`].
+///
+/// # Errors
+/// [`DatasetError::Missing`], or [`DatasetError::Unusable`] for what cannot be read, is no plain file or too large.
+pub(crate) fn read_bytes(file: &Path) -> Result<Vec<u8>, DatasetError> {
+    read_plain(file, MAX_TEXT_BYTES).map_err(|e| DatasetError::reading(file, &e))
+}
+
+/// The same of a file of text.
+///
+/// # Errors
+/// Those of [`read_bytes`]; what is not UTF-8.
+pub(crate) fn read_text(file: &Path) -> Result<String, DatasetError> {
+    String::from_utf8(read_bytes(file)?)
+        .map_err(|_| DatasetError::unusable(file, "is no text in UTF-8"))
+}
 
 /// Writes `contents` to a new file beside `path` and renames it to `path`, replacing what was there.
 ///
@@ -21,6 +43,7 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
     if path.is_dir() {
         return Err(fault(&"is a folder"));
     }
+    let path = &plain_target(path).map_err(|e| fault(&e))?;
     let name = path.file_name().ok_or_else(|| fault(&"the path names no file"))?;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|p| !p.is_dir()) {
@@ -30,7 +53,8 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
     hidden.push(name);
     hidden.push(format!(".{}.probe", std::process::id()));
     let probe = path.with_file_name(hidden);
-    std::fs::write(&probe, []).and_then(|()| std::fs::remove_file(&probe)).map_err(|e| fault(&e))
+    let made = OpenOptions::new().write(true).create_new(true).open(&probe);
+    made.and_then(|_| fs::remove_file(&probe)).map_err(|e| fault(&e))
 }
 
 /// Makes the folder and those above it, where they are absent.
@@ -38,7 +62,23 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
 /// # Errors
 /// [`DatasetError::Write`] naming `folder`.
 pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
-    std::fs::create_dir_all(folder).map_err(|e| DatasetError::writing(folder, e))
+    fs::create_dir_all(folder).map_err(|e| DatasetError::writing(folder, e))
+}
+
+/// Keeps other processes from a file or folder, which errors call `path`, until it is closed.
+///
+/// # Errors
+/// If another process has it. Where the file system knows no locks, nobody is kept away.
+pub(crate) fn lock(path: &Path, opened: &File) -> Result<(), DatasetError> {
+    match opened.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(DatasetError::unusable(path, "another process is at work on it"))
+        }
+        Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => {
+            Err(DatasetError::unusable(path, e))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -55,6 +95,6 @@ mod tests {
         assert!(matches!(write_atomically(dir.path(), b"x"), Err(DatasetError::Write { .. })));
         assert!(check_writable(&path).is_err() && check_writable(dir.path()).is_err());
         assert_eq!(check_writable(&dir.path().join("new.csv")), Ok(()));
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 }

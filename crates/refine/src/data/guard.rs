@@ -1,0 +1,38 @@
+//! Faults of the program, held to the frame in which they show.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// A part of the program panicked: a fault of its own, which the panic's message tells.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the program is at fault: {0}")]
+pub struct Panicked(String);
+
+/// What `work` returns, or its panic as an error: of many frames one fails, and the others go on.
+///
+/// What `work` shares with others must stand being left in the middle: caches do, to which only whole things are added.
+///
+/// # Errors
+/// Those of `work`, and [`Panicked`].
+pub fn guard<T, E: From<Panicked>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
+        let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+        Err(Panicked(text.unwrap_or_else(|| "a panic without a message".to_owned())).into())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::RefineError;
+
+    #[test]
+    fn a_panic_is_an_error_with_its_message() {
+        let number = |work: fn() -> u8| guard(|| Ok::<_, RefineError>(work()));
+        assert!(matches!(number(|| 7), Ok(7)));
+        let said = |work: fn() -> u8| number(work).unwrap_err().to_string();
+        assert_eq!(said(|| panic!("in the {}", "dark")), "the program is at fault: in the dark");
+        assert_eq!(said(|| panic!("plainly")), "the program is at fault: plainly");
+        assert!(matches!(guard(|| Err::<(), _>(RefineError::NoDepth)), Err(RefineError::NoDepth)));
+    }
+}

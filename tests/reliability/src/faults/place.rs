@@ -1,0 +1,156 @@
+//! A folder with a dataset, and the commands that take long on it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use super::run::{Ended, Run};
+
+/// A command that takes long.
+pub struct LongCommand {
+    /// Its name.
+    pub name: &'static str,
+    /// Its words.
+    pub words: &'static str,
+    /// What it writes: files and folders.
+    pub outputs: &'static [&'static str],
+    /// What else it leaves while it is at work, and its endings: journals, times, images that are there before the list of them is.
+    pub growing: &'static [&'static str],
+}
+
+/// Those of them that write files.
+pub const COMMANDS: &[LongCommand] = &[
+    LongCommand {
+        name: "refine",
+        words: "refine --dataset ds --poses ds/init_low.csv --out r.csv --details r.npz --report page",
+        outputs: &["r.csv", "r.npz", "page"],
+        growing: &["r.csv.journal", "r.csv.times.csv"],
+    },
+    LongCommand {
+        name: "initial",
+        words: "initial --dataset ds --search --out i.csv",
+        outputs: &["i.csv", "i.csv.rivals.csv"],
+        growing: &["i.csv.journal"],
+    },
+    LongCommand {
+        name: "track",
+        words: "track --dataset ds --scene 21 --poses first.csv --out t.csv --report film",
+        outputs: &["t.csv", "film"],
+        growing: &[],
+    },
+    LongCommand {
+        name: "study",
+        words: "study noise --dataset ds --iterations 2 --out st",
+        outputs: &["st"],
+        growing: &["st/records.jsonl", "st/times.csv"],
+    },
+    LongCommand {
+        name: "calibrate",
+        words: "calibrate --dataset ds --poses ds/init_low.csv --out rig.json",
+        outputs: &["rig.json", "rig.models"],
+        growing: &[],
+    },
+    LongCommand {
+        name: "synth",
+        words: "synth --objects 061_foam_brick --frames 4 --out made",
+        outputs: &["made"],
+        growing: &["made/test/000021/journal.jsonl"],
+    },
+    LongCommand {
+        name: "export",
+        words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb --contacts c.ply",
+        outputs: &["f.glb", "c.ply"],
+        growing: &[],
+    },
+];
+
+/// Files by their paths in a folder.
+pub(super) type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// The folder.
+pub struct Place {
+    folder: tempfile::TempDir,
+    program: PathBuf,
+}
+
+impl Place {
+    /// With a dataset that `program`, the command `prehend`, makes.
+    ///
+    /// # Errors
+    /// If it cannot.
+    pub fn new(program: &Path) -> Result<Self> {
+        let folder = tempfile::tempdir()?;
+        let program = fs::canonicalize(program).with_context(|| program.display().to_string())?;
+        let place = Self { folder, program };
+        let made = place
+            .run("synth --objects 061_foam_brick,006_mustard_bottle --frames 3 --out ds")
+            .end()?;
+        ensure!(made.code == Some(0), "no dataset: {}", made.error);
+        let poses = fs::read_to_string(place.path("ds/init_low.csv"))?;
+        let first: Vec<&str> = poses
+            .lines()
+            .filter(|line| line.starts_with("scene") || line.starts_with("21,0,"))
+            .collect();
+        fs::write(place.path("first.csv"), first.join("\n") + "\n")?;
+        Ok(place)
+    }
+
+    /// A file or folder in it.
+    pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The program with these words, to be run here.
+    pub(super) fn run(&self, words: &str) -> Run {
+        Run::new(&self.program, words, self.folder.path())
+    }
+
+    /// Removes what `command` wrote.
+    pub(super) fn clear(&self, command: &LongCommand) -> Result<()> {
+        for name in command.outputs.iter().chain(command.growing) {
+            let path = self.path(name);
+            match fs::symlink_metadata(&path) {
+                Ok(there) if there.is_dir() => fs::remove_dir_all(path)?,
+                Ok(_) => fs::remove_file(path)?,
+                Err(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// What `command` has written, what grows left out; hidden files are not seen.
+    pub(super) fn written(&self, command: &LongCommand) -> Result<Files> {
+        let mut files = Files::new();
+        for name in command.outputs {
+            gather(&self.path(name), Path::new(name), &mut files)?;
+        }
+        files.retain(|path, _| !command.growing.iter().any(|name| path == Path::new(name)));
+        Ok(files)
+    }
+
+    /// Runs `command` from nothing to its end: what it writes, and what it said.
+    pub(super) fn reference(&self, command: &LongCommand) -> Result<(Files, Ended)> {
+        self.clear(command)?;
+        let ended = self.run(command.words).end()?;
+        ensure!(ended.code == Some(0), "{}: {}", command.name, ended.error);
+        Ok((self.written(command)?, ended))
+    }
+}
+
+fn gather(path: &Path, name: &Path, files: &mut Files) -> Result<()> {
+    let is_hidden = name.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+    if is_hidden || !path.exists() {
+        return Ok(());
+    }
+    if path.is_dir() {
+        for entry in fs::read_dir(path)? {
+            let entry = entry?;
+            gather(&entry.path(), &name.join(entry.file_name()), files)?;
+        }
+    } else {
+        files.insert(name.to_owned(), fs::read(path)?);
+    }
+    Ok(())
+}

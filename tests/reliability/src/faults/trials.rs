@@ -1,0 +1,173 @@
+//! Faults at random moments.
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::Result;
+
+use super::place::{Files, LongCommand, Place};
+use super::run::Ended;
+use crate::mutate::Dice;
+
+/// What may befall a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It is killed, and run again.
+    Killed,
+    /// The disk is full at some file, and then there is room.
+    FullDisk,
+    /// An input is removed, cut or overwritten while it is read, and is there again.
+    BrokenInput,
+    /// A folder is in the way of an output.
+    BlockedOutput,
+    /// It runs with another number of threads.
+    Threads,
+}
+
+/// All of them.
+pub const FAULTS: [Fault; 5] =
+    [Fault::Killed, Fault::FullDisk, Fault::BrokenInput, Fault::BlockedOutput, Fault::Threads];
+
+/// What came of faults.
+#[derive(Debug, Default)]
+pub struct Befallen {
+    /// How many there were.
+    pub injected: usize,
+    /// What went wrong, each with its command and fault.
+    pub failures: Vec<String>,
+}
+
+impl Befallen {
+    /// Lets `fault` befall `command` `count` times, drawn by `dice`.
+    ///
+    /// # Errors
+    /// If the program cannot be run at all, or does not do undisturbed what it is asked.
+    pub fn add(
+        &mut self,
+        place: &Place,
+        command: &LongCommand,
+        fault: Fault,
+        (count, dice): (usize, &mut Dice),
+    ) -> Result<()> {
+        let (expected, undisturbed) = place.reference(command)?;
+        for _ in 0..count {
+            place.clear(command)?;
+            self.injected += 1;
+            let trial = Trial { place, command, expected: &expected, took: undisturbed.took };
+            if let Err(problem) = trial.run(fault, dice) {
+                self.failures.push(format!("{} {fault:?}: {problem:#}", command.name));
+            }
+        }
+        place.clear(command)
+    }
+}
+
+struct Trial<'a> {
+    place: &'a Place,
+    command: &'a LongCommand,
+    /// What it writes undisturbed.
+    expected: &'a Files,
+    took: Duration,
+}
+
+impl Trial<'_> {
+    fn run(&self, fault: Fault, dice: &mut Dice) -> Result<()> {
+        let run = || self.place.run(self.command.words);
+        let moment = self.took.mul_f64(1.1 * dice.below(1000) as f64 / 1000.0);
+        match fault {
+            Fault::Killed => drop(run().interrupted(moment, |child| Ok(child.kill()?))?),
+            Fault::FullDisk => {
+                let longest = self.expected.values().map(Vec::len).max().unwrap_or(0);
+                let ended = run().with_blocks(dice.below(longest / 512 + 2)).end()?;
+                orderly(&ended)?;
+            }
+            Fault::BrokenInput => {
+                let file = self.an_input(dice)?;
+                let whole = fs::read(&file)?;
+                let ended = run().interrupted(moment, |_| {
+                    match dice.below(3) {
+                        0 => fs::remove_file(&file)?,
+                        1 => fs::write(&file, &whole[..dice.below(whole.len())])?,
+                        _ => fs::write(&file, b"{\"0\": [\xff")?,
+                    }
+                    Ok(())
+                });
+                fs::write(&file, &whole)?;
+                orderly(&ended?)?;
+                // Results may be of fewer frames, or of what the file said; and journals of a run with another input.
+                return self.place.clear(self.command).and_then(|()| self.finished());
+            }
+            Fault::BlockedOutput => {
+                let output =
+                    self.place.path(self.command.outputs[dice.below(self.command.outputs.len())]);
+                let made = |_: &mut std::process::Child| {
+                    // Where the output is there already, or is a folder, nothing is in its way.
+                    let _ = fs::create_dir(&output);
+                    Ok(())
+                };
+                orderly(&run().interrupted(moment, made)?)?;
+                if fs::read_dir(&output).is_ok_and(|mut inside| inside.next().is_none()) {
+                    fs::remove_dir(&output)?;
+                }
+            }
+            Fault::Threads => {
+                if self.command.name != "export" {
+                    let ended = run().with_threads([1, 2, 4, 8][dice.below(4)]).end()?;
+                    orderly(&ended)?;
+                }
+            }
+        }
+        self.nothing_half_written()?;
+        self.finished()
+    }
+
+    /// One of the files that the dataset is made of.
+    fn an_input(&self, dice: &mut Dice) -> Result<PathBuf> {
+        let mut files = Vec::new();
+        let mut folders = vec![self.place.path("ds")];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder)? {
+                let path = entry?.path();
+                if path.is_dir() { folders.push(path) } else { files.push(path) }
+            }
+        }
+        files.sort();
+        Ok(files.swap_remove(dice.below(files.len())))
+    }
+
+    /// What can be seen is as it will be in the end.
+    fn nothing_half_written(&self) -> Result<()> {
+        for (path, content) in self.place.written(self.command)? {
+            let is_right = self.expected.get(&path) == Some(&content);
+            anyhow::ensure!(is_right, "{} is half-written", path.display());
+        }
+        Ok(())
+    }
+
+    /// Run again, it ends as if nothing had happened.
+    fn finished(&self) -> Result<()> {
+        let ended = self.place.run(self.command.words).end()?;
+        orderly(&ended)?;
+        anyhow::ensure!(ended.code == Some(0), "run again: {}", ended.error);
+        let written = self.place.written(self.command)?;
+        for path in self.expected.keys().chain(written.keys()) {
+            let is_same = self.expected.get(path) == written.get(path);
+            anyhow::ensure!(is_same, "{} is another in the end", path.display());
+        }
+        Ok(())
+    }
+}
+
+/// It ended by itself, in time, and told its faults in its own words.
+fn orderly(ended: &Ended) -> Result<()> {
+    anyhow::ensure!(!ended.hung, "did not end");
+    anyhow::ensure!(!ended.error.contains("panicked"), "panicked: {}", ended.error);
+    anyhow::ensure!(
+        matches!(ended.code, Some(0..=2)),
+        "ended with {:?}: {}",
+        ended.code,
+        ended.error
+    );
+    Ok(())
+}

@@ -1,0 +1,263 @@
+//! All that reads files, as functions of bytes. What is read must be finite and whole.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Result;
+use nalgebra::{Isometry3, Point3};
+use prehend_geometry::hand::load_taxels;
+use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
+use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
+use prehend_refine::data::{Assets, Target, find_targets, load_frame_file};
+use prehend_refine::rig::Rig;
+use prehend_render::{DepthImage, RgbImage};
+
+use crate::site::Site;
+
+/// How the content of a file is built, for changes that keep most of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Lines of words and numbers.
+    Text,
+    /// JSON.
+    Json,
+    /// A header of lines, and bytes after one that begins with `end_header`.
+    HeaderAndBytes,
+    /// Chunks of PNG, with checksums.
+    Png,
+    /// JSON and bytes in chunks of GLB.
+    Glb,
+    /// Records of MCAP.
+    Mcap,
+    /// Bytes.
+    Bytes,
+}
+
+/// What reads a kind of file.
+pub struct Parser {
+    /// Its name: that of the folder of its corpus.
+    pub name: &'static str,
+    /// What its files are made of.
+    pub form: Form,
+    /// Reads `bytes`. Whether they are right does not matter; what comes of them is checked.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub read: fn(&Site, &[u8]) -> Result<()>,
+}
+
+/// All parsers.
+pub const PARSERS: &[Parser] = &[
+    Parser { name: "ply", form: Form::HeaderAndBytes, read: |s, b| mesh(s, b, "m.ply") },
+    Parser { name: "obj", form: Form::Text, read: |s, b| mesh(s, b, "m.obj") },
+    Parser { name: "mtl", form: Form::Text, read: mtl },
+    Parser { name: "stl", form: Form::Bytes, read: |s, b| mesh(s, b, "m.stl") },
+    Parser { name: "gltf", form: Form::Json, read: |s, b| mesh(s, b, "m.gltf") },
+    Parser { name: "glb", form: Form::Glb, read: |s, b| mesh(s, b, "m.glb") },
+    Parser { name: "urdf", form: Form::Text, read: urdf },
+    Parser { name: "mjcf", form: Form::Text, read: mjcf },
+    Parser { name: "taxels", form: Form::Text, read: taxels },
+    Parser { name: "grid", form: Form::Bytes, read: grid },
+    Parser { name: "png", form: Form::Png, read: image },
+    Parser { name: "jpeg", form: Form::Bytes, read: image },
+    Parser {
+        name: "bop_camera",
+        form: Form::Json,
+        read: |s, b| scene(s, b, "test/000001/scene_camera.json"),
+    },
+    Parser {
+        name: "bop_bodies",
+        form: Form::Json,
+        read: |s, b| scene(s, b, "test/000001/scene_bodies.json"),
+    },
+    Parser {
+        name: "bop_tactile",
+        form: Form::Json,
+        read: |s, b| scene(s, b, "test/000001/scene_tactile.json"),
+    },
+    Parser {
+        name: "bop_models",
+        form: Form::Json,
+        read: |s, b| scene(s, b, "models/models_info.json"),
+    },
+    Parser {
+        name: "bop_truth",
+        form: Form::Json,
+        read: |s, b| scene(s, b, "test/000001/scene_gt.json"),
+    },
+    Parser { name: "bop_targets", form: Form::Json, read: targets },
+    Parser { name: "results", form: Form::Text, read: results },
+    Parser { name: "frame", form: Form::Json, read: frame },
+    Parser { name: "rig", form: Form::Json, read: rig },
+    #[cfg(feature = "mcap")]
+    Parser { name: "mcap", form: Form::Mcap, read: log },
+];
+
+/// The parser of that name.
+pub fn find(name: &str) -> Option<&'static Parser> {
+    PARSERS.iter().find(|parser| parser.name == name)
+}
+
+fn mesh(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
+    whole(&TriMesh::from_bytes(bytes, &site.path(name))?);
+    Ok(())
+}
+
+/// A mesh as it must be after reading, and after cleaning.
+fn whole(mesh: &TriMesh) {
+    let count = mesh.vertices.len();
+    assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
+    assert!(mesh.faces.iter().flatten().all(|v| (*v as usize) < count));
+    let lengths = [
+        mesh.normals.as_ref().map(Vec::len),
+        mesh.uvs.as_ref().map(Vec::len),
+        mesh.colors.as_ref().map(Vec::len),
+    ];
+    assert!(lengths.into_iter().flatten().all(|length| length == count));
+    // Cleaning takes more than linear time, and large ones are few.
+    if mesh.faces.len() < 2000 {
+        let (clean, _) = mesh.cleaned();
+        assert!(clean.faces.len() <= mesh.faces.len());
+    }
+}
+
+fn mtl(site: &Site, bytes: &[u8]) -> Result<()> {
+    fs::write(site.path("m.mtl"), bytes)?;
+    let text = "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    mesh(site, text.as_bytes(), "m.obj")
+}
+
+fn urdf(site: &Site, bytes: &[u8]) -> Result<()> {
+    let tree = KinematicTree::from_urdf_str(std::str::from_utf8(bytes)?, Some(&site.path("hand")))?;
+    let rest: Vec<f64> = tree.joint_names().iter().map(|_| 0.0).collect();
+    let poses = tree.forward_kinematics(&rest);
+    assert_eq!(poses.len(), tree.links().len());
+    poses.iter().for_each(finite);
+    Ok(())
+}
+
+fn finite(pose: &Isometry3<f64>) {
+    let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+    assert!({ numbers }.all(|v| v.is_finite()), "{pose}");
+}
+
+fn mjcf(site: &Site, bytes: &[u8]) -> Result<()> {
+    let model = mjcf::Model::from_str(std::str::from_utf8(bytes)?, Some(&site.path("hand")))?;
+    model.reference_poses().iter().for_each(finite);
+    assert!(model.reference_positions().iter().all(|q| q.is_finite()));
+    Ok(())
+}
+
+fn taxels(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("broken.csv");
+    fs::write(&file, bytes)?;
+    for taxel in load_taxels(&file)? {
+        assert!(
+            (taxel.normal.norm() - 1.0).abs() < 1e-6
+                && taxel.position.iter().all(|c| c.is_finite())
+        );
+    }
+    Ok(())
+}
+
+fn grid(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("grid");
+    fs::write(&file, bytes)?;
+    let grid = SdfGrid::load(&file)?;
+    for point in [Point3::origin(), Point3::new(0.01, -0.02, 0.03)] {
+        if let Some(sample) = grid.sample(&point, 0.01) {
+            assert!(sample.distance.is_finite(), "{sample:?}");
+        }
+    }
+    Ok(())
+}
+
+fn image(_: &Site, bytes: &[u8]) -> Result<()> {
+    let name = Path::new("image");
+    let color = RgbImage::decode(bytes, name).map(|image| {
+        assert!(image.pixels().iter().flatten().all(|c| (0.0..=1.0).contains(c)));
+        (image.width(), image.height())
+    });
+    let depth = DepthImage::decode(bytes, 1e-3, name);
+    if let (Ok(size), Ok(depth)) = (&color, &depth) {
+        assert_eq!(*size, (depth.width(), depth.height()));
+    }
+    color?;
+    Ok(())
+}
+
+/// Puts `bytes` into the dataset in place of the file `name`, takes all that it says, and puts the right file back.
+fn scene(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
+    let file = site.path(name);
+    let right = fs::read(&file)?;
+    fs::write(&file, bytes)?;
+    let outcome = dataset(site);
+    fs::write(&file, right)?;
+    outcome
+}
+
+fn dataset(site: &Site) -> Result<()> {
+    let dataset = Dataset::open(&site.path(""))?;
+    let truth = GroundTruth::new(&dataset);
+    let objects = truth.objects(1, 0).map(|objects| {
+        objects.iter().for_each(|object| finite(&object.t_cam_model));
+    });
+    let target = Target { scene_id: 1, im_id: 0, obj_id: 1, instance: 0 };
+    // Distance grids are made once.
+    let cache = Some(GridCache::new(site.path("cache")));
+    let input = Assets::new(&dataset, 0).with_cache(cache).load(&target, &[])?;
+    let pose = Isometry3::translation(0.0, 0.0, 0.3);
+    // Warnings look at everything.
+    let _ = input.warnings(&pose);
+    input.frame()?;
+    Ok(objects?)
+}
+
+fn targets(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("targets.json");
+    fs::write(&file, bytes)?;
+    find_targets(&Dataset::open(&site.path(""))?, Some(&file))?;
+    Ok(())
+}
+
+fn results(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("broken.csv");
+    fs::write(&file, bytes)?;
+    for row in read_results(&file)?.rows {
+        finite(&row.t_cam_model);
+    }
+    Ok(())
+}
+
+fn frame(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("broken.json");
+    fs::write(&file, bytes)?;
+    let cache = GridCache::new(site.path("cache"));
+    let (input, pose) = load_frame_file(&file, 0, Some(&cache), None)?;
+    finite(&pose);
+    let _ = input.warnings(&pose);
+    input.frame()?;
+    Ok(())
+}
+
+fn rig(site: &Site, bytes: &[u8]) -> Result<()> {
+    let file = site.path("rig.json");
+    fs::write(&file, bytes)?;
+    let rig = Rig::load(&file)?;
+    assert!(rig.parameters().iter().all(|(_, value)| value.is_finite()));
+    rig.save(&file)?;
+    Rig::load(&file)?;
+    Ok(())
+}
+
+#[cfg(feature = "mcap")]
+fn log(site: &Site, bytes: &[u8]) -> Result<()> {
+    use prehend_refine::data::mcap::{ImageTopics, Recording};
+    let file = site.path("log.mcap");
+    fs::write(&file, bytes)?;
+    let recording = Recording::open(&file, &ImageTopics::default(), "world")?;
+    for frame in recording.frames(None)?.take(8) {
+        frame.observation?;
+    }
+    Ok(())
+}

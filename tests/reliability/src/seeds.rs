@@ -1,0 +1,95 @@
+//! Right files of every kind, to begin a corpus with.
+
+use std::fs;
+
+use anyhow::{Context, Result};
+use nalgebra::{Point3, Vector3};
+use prehend_geometry::{ClosestPoints, SdfGrid, Texture, TriMesh};
+use prehend_render::RgbImage;
+
+use crate::corpus;
+use crate::site::{FILES, FRAME, HAND, POSES, Site, TAXELS};
+
+/// Writes them into the folders of the corpus.
+///
+/// # Errors
+/// If one cannot be made or written.
+pub fn write() -> Result<()> {
+    let site = Site::new()?;
+    let keep = |parser: &str, name: &str, bytes: &[u8]| -> Result<()> {
+        let folder = corpus::folder().join(parser);
+        fs::create_dir_all(&folder)?;
+        fs::write(folder.join(name), bytes).with_context(|| format!("{parser}/{name}"))
+    };
+    for (parser, name, saved) in
+        [("ply", "binary.ply", "m.ply"), ("glb", "box.glb", "m.glb"), ("obj", "box.obj", "m.obj")]
+    {
+        textured().save(&site.path(saved))?;
+        keep(parser, name, &fs::read(site.path(saved))?)?;
+    }
+    keep("mtl", "box.mtl", &fs::read(site.path("m.mtl"))?)?;
+    keep("ply", "ascii.ply", include_bytes!("seeds/ascii.ply"))?;
+    keep("obj", "quads.obj", include_bytes!("seeds/quads.obj"))?;
+    keep("gltf", "triangle.gltf", include_bytes!("seeds/triangle.gltf"))?;
+    keep("stl", "ascii.stl", include_bytes!("seeds/ascii.stl"))?;
+    keep("stl", "binary.stl", &stl(&Site::object()))?;
+    keep("urdf", "hand.urdf", HAND.as_bytes())?;
+    keep("mjcf", "arm.xml", include_bytes!("seeds/arm.xml"))?;
+    keep("taxels", "two.csv", TAXELS.as_bytes())?;
+    let grid = SdfGrid::build(&ClosestPoints::new(&Site::object())?, 0.01, 0.01)?;
+    grid.save(&site.path("grid"))?;
+    keep("grid", "box", &fs::read(site.path("grid"))?)?;
+    let color = RgbImage::load(&site.path("test/000001/rgb/000000.png"))?;
+    keep("png", "color.png", &fs::read(site.path("test/000001/rgb/000000.png"))?)?;
+    keep("png", "depth.png", &fs::read(site.path("test/000001/depth/000000.png"))?)?;
+    keep("png", "mask.png", &fs::read(site.path("test/000001/mask_visib/000000_000000.png"))?)?;
+    keep("jpeg", "color.jpg", &color.to_jpeg(80)?)?;
+    let names =
+        ["bop_camera", "bop_bodies", "bop_tactile", "bop_truth", "bop_models", "bop_targets"];
+    for (parser, (_, text)) in names.into_iter().zip(FILES) {
+        keep(parser, "right.json", text.as_bytes())?;
+    }
+    keep("results", "pose.csv", POSES.as_bytes())?;
+    keep("frame", "right.json", FRAME.as_bytes())?;
+    keep("rig", "rig.json", include_bytes!("seeds/rig.json"))?;
+    #[cfg(feature = "mcap")]
+    keep("mcap", "frames.mcap", &log(&site)?)?;
+    Ok(())
+}
+
+fn textured() -> TriMesh {
+    let mut mesh = Site::object();
+    let uv = |v: &Point3<f64>| [10.0 * v.x + 0.5, 10.0 * v.y + 0.5];
+    mesh.uvs = Some(mesh.vertices.iter().map(|v| uv(v).map(|c| c as f32).into()).collect());
+    let pixels = (0..4).map(|k| [60 * k, 255 - 60 * k, 128]).collect();
+    mesh.texture = Some(Texture { width: 2, height: 2, pixels }.into());
+    mesh
+}
+
+/// As binary STL.
+fn stl(mesh: &TriMesh) -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((mesh.faces.len() as u32).to_le_bytes());
+    for face in 0..mesh.faces.len() {
+        let corners = mesh.triangle(face).map(|corner| corner.coords);
+        for vector in [Vector3::zeros()].into_iter().chain(corners) {
+            vector.iter().for_each(|c| bytes.extend((*c as f32).to_le_bytes()));
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+#[cfg(feature = "mcap")]
+fn log(site: &Site) -> Result<Vec<u8>> {
+    use prehend_refine::data::load_frame_file;
+    use prehend_refine::data::mcap::RecordingWriter;
+    let (input, _) = load_frame_file(&site.path("frame.json"), 0, None, None)?;
+    let file = site.path("log.mcap");
+    let mut writer = RecordingWriter::create(&file)?;
+    for at in [1_000_000_000, 1_033_000_000] {
+        writer.sensed(at, &input.observation, input.hand.as_deref())?;
+    }
+    writer.finish()?;
+    Ok(fs::read(file)?)
+}
