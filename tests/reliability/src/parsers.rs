@@ -122,8 +122,8 @@ fn whole(mesh: &TriMesh) {
 }
 
 fn mtl(site: &Site, bytes: &[u8]) -> Result<()> {
-    fs::write(site.path("m.mtl"), bytes)?;
-    let text = "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    fs::write(site.path("n.mtl"), bytes)?;
+    let text = "mtllib n.mtl\nusemtl textured\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
     mesh(site, text.as_bytes(), "m.obj")
 }
 

@@ -3,8 +3,8 @@
 use std::fs;
 
 use anyhow::{Context, Result};
-use nalgebra::{Point3, Vector3};
-use prehend_geometry::{ClosestPoints, SdfGrid, Texture, TriMesh};
+use nalgebra::Vector3;
+use prehend_geometry::{ClosestPoints, SdfGrid, TriMesh};
 use prehend_render::RgbImage;
 
 use crate::corpus;
@@ -24,7 +24,7 @@ pub fn write() -> Result<()> {
     for (parser, name, saved) in
         [("ply", "binary.ply", "m.ply"), ("glb", "box.glb", "m.glb"), ("obj", "box.obj", "m.obj")]
     {
-        textured().save(&site.path(saved))?;
+        Site::textured().save(&site.path(saved))?;
         keep(parser, name, &fs::read(site.path(saved))?)?;
     }
     keep("mtl", "box.mtl", &fs::read(site.path("m.mtl"))?)?;
@@ -55,15 +55,6 @@ pub fn write() -> Result<()> {
     #[cfg(feature = "mcap")]
     keep("mcap", "frames.mcap", &log(&site)?)?;
     Ok(())
-}
-
-fn textured() -> TriMesh {
-    let mut mesh = Site::object();
-    let uv = |v: &Point3<f64>| [10.0 * v.x + 0.5, 10.0 * v.y + 0.5];
-    mesh.uvs = Some(mesh.vertices.iter().map(|v| uv(v).map(|c| c as f32).into()).collect());
-    let pixels = (0..4).map(|k| [60 * k, 255 - 60 * k, 128]).collect();
-    mesh.texture = Some(Texture { width: 2, height: 2, pixels }.into());
-    mesh
 }
 
 /// As binary STL.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::{TriMesh, shapes};
+use prehend_geometry::{Texture, TriMesh, shapes};
 use prehend_render::{DepthImage, Mask, RgbImage};
 
 /// Columns and rows of its images.
@@ -60,6 +60,8 @@ impl Site {
         fs::write(site.path("hand/taxels.csv"), TAXELS)?;
         fs::write(site.path("poses.csv"), POSES)?;
         Self::object().scaled(1e3).save(&site.path("models/obj_000001.ply"))?;
+        // Materials and image of the meshes that are put beside them.
+        Self::textured().save(&site.path("m.obj"))?;
         let (width, height) = SIZE;
         let color = (0..width * height).map(|k| [k % 7, k % 5, k % 3].map(|c| c as f32 / 7.0));
         let color = RgbImage::new(width, height, color.collect())?;
@@ -75,6 +77,16 @@ impl Site {
     /// A file or folder in it.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// The same box with an image around it.
+    pub fn textured() -> TriMesh {
+        let mut mesh = Self::object();
+        let uv = |v: &Point3<f64>| [10.0 * v.x + 0.5, 10.0 * v.y + 0.5];
+        mesh.uvs = Some(mesh.vertices.iter().map(|v| uv(v).map(|c| c as f32).into()).collect());
+        let pixels = (0..4).map(|k| [60 * k, 255 - 60 * k, 128]).collect();
+        mesh.texture = Some(Texture { width: 2, height: 2, pixels }.into());
+        mesh
     }
 
     /// The box that is its object \[m\], with a color at each vertex.

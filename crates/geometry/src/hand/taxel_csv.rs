@@ -123,7 +123,7 @@ mod tests {
         for (text, expected) in [
             (
                 format!("{HEADER}palm,0,51,1,0.01,abc,0,0,0,1\n"),
-                "line 2: column `y_m`: expected a finite number",
+                "line 2: column `y_m`: expected a number within ±1e9",
             ),
             (format!("{HEADER}palm,0,51,1,0.01,NaN,0,0,0,1\n"), "line 2: column `y_m`"),
             (
@@ -134,6 +134,7 @@ mod tests {
                 format!("{HEADER}palm,0,51,1,0,0,0,0,0,0\n"),
                 "line 2: column `nx`: expected a normal",
             ),
+            (format!("{HEADER}palm,0,51,1,0,0,0,1e308,0,1\n"), "line 2: column `nx`"),
             (format!("{HEADER},0,51,1,0,0,0,0,0,1\n"), "line 2: column `link`"),
             (format!("{HEADER}palm,0,51\n"), "line: 2"),
             ("idx,patch\n".to_owned(), "line 1: no column `link`"),

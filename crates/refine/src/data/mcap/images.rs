@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::{DepthImage, Mask, RgbImage};
 
 use super::messages::{CompressedImage, Header, Image, Named, decode};
@@ -125,6 +126,9 @@ fn rows<'a>(image: &Image<'a>, bytes: usize) -> Result<impl Iterator<Item = &'a 
         ));
     }
     let height = image.height as usize;
+    if height.saturating_mul(image.width as usize) > MAX_PIXELS {
+        return Err(format!("{}x{height} pixels, at most {MAX_PIXELS} are read", image.width));
+    }
     Ok(image.data.chunks(step).take(height).map(move |row| &row[..width]))
 }
 

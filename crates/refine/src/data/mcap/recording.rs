@@ -63,6 +63,8 @@ struct Found {
     forces: HashMap<String, Series<Vector3<f64>>>,
     /// With its frame.
     gravity: Option<(String, Series<Vector3<f64>>)>,
+    /// Length of the messages of readings \[bytes\].
+    kept: usize,
     /// By topic: the first fault, and how many there are.
     faults: BTreeMap<String, (String, usize)>,
 }
@@ -76,8 +78,14 @@ impl Recording {
     pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, RecordingError> {
         let mut found = Found::default();
         for message in messages(file)? {
+            if found.kept > MOST_KEPT {
+                let problem = format!("more than {MOST_KEPT} bytes, which all would be kept");
+                let (file, topic) = (file.to_owned(), "readings".to_owned());
+                return Err(RecordingError::Topic { file, topic, problem });
+            }
             match message {
                 Ok(message) => found.take(&message),
+
                 Err(source) if found.images.is_empty() => {
                     return Err(RecordingError::Format { file: file.to_owned(), source });
                 }
@@ -87,6 +95,7 @@ impl Recording {
                 }
             }
         }
+        found.sort();
         let fault =
             |(topic, problem)| RecordingError::Topic { file: file.to_owned(), topic, problem };
         let topics = Chosen::new(&found.images, topics).map_err(fault)?;
@@ -234,7 +243,18 @@ pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, Re
     Ok(MessageReader::new_with_options(BufReader::with_capacity(1 << 20, opened), options))
 }
 
+/// So many bytes of messages that are not images are read \[bytes\]: chunks of a small file may expand to any number.
+const MOST_KEPT: usize = 4 << 30;
+
 impl Found {
+    /// To be called when all messages have been taken over.
+    fn sort(&mut self) {
+        self.joints.values_mut().for_each(Series::sort);
+        self.forces.values_mut().for_each(Series::sort);
+        self.gravity.iter_mut().for_each(|(_, series)| series.sort());
+        self.transforms.sort();
+    }
+
     /// Takes over what a message says.
     fn take(&mut self, message: &mcap::Message<'_>) {
         let topic = &message.channel.topic;
@@ -258,7 +278,10 @@ impl Found {
                 let (header, content) = describe(kind, data)?;
                 self.images.insert(topic.to_owned(), (kind.to_owned(), header, content));
             }
-        } else if kind == CameraInfo::TYPE {
+            return Ok(());
+        }
+        self.kept += data.len();
+        if kind == CameraInfo::TYPE {
             if !self.cameras.contains_key(topic) {
                 self.cameras.insert(topic.to_owned(), decode(data)?);
             }

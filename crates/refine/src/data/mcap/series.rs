@@ -14,14 +14,21 @@ impl<T> Default for Series<T> {
 }
 
 impl<T: Copy> Series<T> {
-    /// Keeps `value`. Of several at one moment the last counts.
+    /// Keeps `value`, in whatever order they come: see [`sort`](Self::sort).
     pub(super) fn push(&mut self, at: i64, value: T) {
-        // Messages come nearly in order.
-        let place = self.0.partition_point(|(known, _)| *known <= at);
-        match place.checked_sub(1) {
-            Some(before) if self.0[before].0 == at => self.0[before].1 = value,
-            _ => self.0.insert(place, (at, value)),
-        }
+        self.0.push((at, value));
+    }
+
+    /// Makes what was kept ready to be asked for. Of several values at one moment the last counts.
+    pub(super) fn sort(&mut self) {
+        self.0.sort_by_key(|(at, _)| *at);
+        self.0.dedup_by(|next, kept| {
+            let is_same = next.0 == kept.0;
+            if is_same {
+                kept.1 = next.1;
+            }
+            is_same
+        });
     }
 
     /// The value at the moment `at`: between two that are near by `mix`, which is given how far from the first to the second it is, else the
@@ -59,6 +66,7 @@ mod tests {
         for (at, value) in [(20, 2.0), (10, 1.0), (430, 7.0), (430, 3.0)] {
             series.push(at * ms, value);
         }
+        series.sort();
         let at = |at| series.at(at * ms, |a, b, part| a + (b - a) * part);
         assert_eq!([-91, -89, 10, 15].map(at), [None, Some(1.0), Some(1.0), Some(1.5)]);
         // Nothing is known in a gap.

@@ -60,6 +60,11 @@ impl Transforms {
         Ok(())
     }
 
+    /// To be called when all has been taken over.
+    pub(super) fn sort(&mut self) {
+        self.frames.iter_mut().for_each(|motion| motion.moving.sort());
+    }
+
     fn number(&mut self, name: &str) -> usize {
         if let Some(known) = self.numbers.get(name) {
             return *known;

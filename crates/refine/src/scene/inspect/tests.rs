@@ -242,7 +242,12 @@ fn models_that_are_not_of_their_size() {
 
 #[test]
 fn what_is_no_number() {
-    named(Subject::Hand, "is no number", |scene| hand(scene).joints[3] = f64::NAN);
+    named(Subject::Hand, "joint 'joint_3.0': position is not valid", |scene| {
+        hand(scene).joints[3] = f64::NAN;
+    });
+    named(Subject::Hand, "is no number", |scene| {
+        hand(scene).t_cam_hand.translation.vector.y = f64::NAN;
+    });
     named(Subject::Pose, "(z = NaN m)", |scene| scene.truth.translation.vector.z = f64::NAN);
 }
 
