@@ -80,11 +80,7 @@ pub const PARSERS: &[Parser] = &[
         form: Form::Json,
         read: |s, b| scene(s, b, "models/models_info.json"),
     },
-    Parser {
-        name: "bop_truth",
-        form: Form::Json,
-        read: |s, b| scene(s, b, "test/000001/scene_gt.json"),
-    },
+    Parser { name: "bop_truth", form: Form::Json, read: truth },
     Parser { name: "bop_targets", form: Form::Json, read: targets },
     Parser { name: "results", form: Form::Text, read: results },
     Parser { name: "frame", form: Form::Json, read: frame },
@@ -186,31 +182,40 @@ fn image(_: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Puts `bytes` into the dataset in place of the file `name`, takes all that it says, and puts the right file back.
-fn scene(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
+/// Puts `bytes` into the dataset in place of the file `name`, takes what it says, and puts the right file back.
+fn instead(
+    site: &Site,
+    bytes: &[u8],
+    name: &str,
+    take: fn(&Dataset, &Site) -> Result<()>,
+) -> Result<()> {
     let file = site.path(name);
     let right = fs::read(&file)?;
     fs::write(&file, bytes)?;
-    let outcome = dataset(site);
+    let outcome = Dataset::open(&site.path("")).map_err(Into::into).and_then(|d| take(&d, site));
     fs::write(&file, right)?;
     outcome
 }
 
-fn dataset(site: &Site) -> Result<()> {
-    let dataset = Dataset::open(&site.path(""))?;
-    let truth = GroundTruth::new(&dataset);
-    let objects = truth.objects(1, 0).map(|objects| {
+fn scene(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
+    instead(site, bytes, name, |dataset, site| {
+        let target = Target { scene_id: 1, im_id: 0, obj_id: 1, instance: 0 };
+        // Distance grids are made once.
+        let cache = Some(GridCache::new(site.path("cache")));
+        let input = Assets::new(dataset, 0).with_cache(cache).load(&target, &[])?;
+        // Warnings look at everything.
+        let _ = input.warnings(&Isometry3::translation(0.0, 0.0, 0.3));
+        input.frame()?;
+        Ok(())
+    })
+}
+
+fn truth(site: &Site, bytes: &[u8]) -> Result<()> {
+    instead(site, bytes, "test/000001/scene_gt.json", |dataset, _| {
+        let objects = GroundTruth::new(dataset).objects(1, 0)?;
         objects.iter().for_each(|object| finite(&object.t_cam_model));
-    });
-    let target = Target { scene_id: 1, im_id: 0, obj_id: 1, instance: 0 };
-    // Distance grids are made once.
-    let cache = Some(GridCache::new(site.path("cache")));
-    let input = Assets::new(&dataset, 0).with_cache(cache).load(&target, &[])?;
-    let pose = Isometry3::translation(0.0, 0.0, 0.3);
-    // Warnings look at everything.
-    let _ = input.warnings(&pose);
-    input.frame()?;
-    Ok(objects?)
+        Ok(())
+    })
 }
 
 fn targets(site: &Site, bytes: &[u8]) -> Result<()> {

@@ -178,10 +178,7 @@ fn frame_files_name_file_and_field() {
             "error: ds/f.json: mask: the image is 3x2 pixels, rgb is 640x480",
         ),
         (with("mesh", json!("none.ply")), "error: ds/f.json: ds/none.ply: "),
-        (
-            with("mass_kg", json!(-1)),
-            "error: ds/f.json: object ds/models/obj_000005.ply: mass must be",
-        ),
+        (with("mass_kg", json!(-1)), "error: ds/f.json: mass_kg: must be above zero"),
         (
             pose("quaternion_wxyz", json!([1, 1, 0, 0])),
             "error: ds/f.json: pose: the quaternion has norm",
