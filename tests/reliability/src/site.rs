@@ -83,7 +83,7 @@ impl Site {
     pub fn textured() -> TriMesh {
         let mut mesh = Self::object();
         let uv = |v: &Point3<f64>| [10.0 * v.x + 0.5, 10.0 * v.y + 0.5];
-        mesh.uvs = Some(mesh.vertices.iter().map(|v| uv(v).map(|c| c as f32).into()).collect());
+        mesh.uvs = Some(mesh.vertices.iter().map(|v| uv(v).map(|c| c as f32)).collect());
         let pixels = (0..4).map(|k| [60 * k, 255 - 60 * k, 128]).collect();
         mesh.texture = Some(Texture { width: 2, height: 2, pixels }.into());
         mesh

@@ -95,8 +95,8 @@ impl Hand {
         if given != expected {
             return Err(RobotError::JointCount { given, expected });
         }
-        // NaN is no such number, either.
-        let wrong = joints.iter().position(|position| !(position.abs() <= FARTHEST_JOINT));
+        let is_wrong = |position: &f64| position.is_nan() || position.abs() > FARTHEST_JOINT;
+        let wrong = joints.iter().position(is_wrong);
         wrong.map_or(Ok(()), |at| {
             Err(RobotError::Number {
                 owner: format!("joint '{}'", self.tree.joint_names()[at]),
