@@ -30,3 +30,8 @@ pub use prehend_sim as sim;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// That of the format of frames.
+#[cfg(all(doctest, feature = "refine"))]
+#[doc = include_str!("../docs/FRAME.md")]
+struct FrameFiles;
