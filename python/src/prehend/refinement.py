@@ -38,7 +38,7 @@ class Estimate:
     disagreements: list[tuple[str, float]] = field(default_factory=list)
     """Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance."""
     let_off: str | None = None
-    """Evidence that did not fit, "color", "depth", "touch" or "views" (other cameras): the pose is found without it."""
+    """Evidence that did not fit, "color", "depth", "touch", "views" (other cameras) or the name of a factor from outside: the pose is found without it."""
     unobserved: list[float] = field(default_factory=list)
     """Standard deviations of surface motion along directions that the evidence says hardly anything of [m]."""
     exact: bool = False

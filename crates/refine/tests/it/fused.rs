@@ -272,7 +272,26 @@ fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
     let (error, agreeing) = pull(0.0, 1e-5);
     let (hinted, alone) = (place(&agreeing), place(&plain));
     assert!(error < 0.02 && hinted < 0.7 * alone, "{error} cm, {hinted} m instead of {alone} m");
-    // Surer of a wrong place than all else is of the right one.
-    let (error, _) = pull(0.02, 2e-4);
+    // Surer of a wrong place than all else is of the right one: let off by its name, unless nothing may be.
+    let (error, posterior) = pull(0.02, 2e-4);
+    assert!(
+        error < 0.1 && posterior.let_off == Some("pull"),
+        "{error} cm, {:?}",
+        posterior.let_off
+    );
+    let mut kept = Fused::default();
+    kept.settings.let_off = false;
+    let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * 0.02;
+    let kept = kept.with(Pull { place, noise: NoiseModel::gaussian(2e-4) });
+    let found = refine(&frame, &turned(&OFF), &kept).unwrap();
+    let error = errors(found.t_cam_object()).0;
     assert!(error > 0.3, "{error} cm");
+    // Without a hand, depth could be let off in its stead: it is not.
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, None).unwrap();
+    let center = (SCENE.truth * SCENE.object.center).coords;
+    let place = center + 0.01 * center.normalize();
+    let pulled = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(2e-4) });
+    let found = refine(&frame, &turned(&OFF), &pulled).unwrap();
+    let (error, let_off) = (errors(found.t_cam_object()).0, found.posterior.unwrap().let_off);
+    assert!(error < 0.2 && let_off == Some("pull"), "{error} cm, {let_off:?}");
 }

@@ -15,7 +15,7 @@ const FITS: f64 = 0.5;
 const CONVINCES: f64 = 0.75;
 
 /// What may be let off: colors of another texture or under odd lights, depth of what shines or lets light through, a skin that feels what is not
-/// there, cameras that are elsewhere. Outlines, and that things are not in the same place, always count.
+/// there, cameras that are elsewhere; and each factor from outside. Outlines, and that things are not in the same place, always count.
 const KINDS: [Kind; 4] = [Kind::Color, Kind::Depth, Kind::Touch, Kind::Views];
 
 #[derive(Clone, Copy, PartialEq, Eq, IntoStaticStr)]
@@ -57,6 +57,16 @@ fn probability(found: &Estimate) -> f64 {
     found.posterior.as_ref().map_or(0.0, Posterior::probability)
 }
 
+/// Takes what was found without `name` in place of `best`, if it is convincing.
+fn take_if_better(best: &mut Estimate, mut other: Estimate, name: &'static str) {
+    if probability(&other) > probability(best).max(CONVINCES) {
+        if let Some(posterior) = &mut other.posterior {
+            posterior.let_off = Some(name);
+        }
+        *best = other;
+    }
+}
+
 impl Fused {
     /// `found` in `frame` from `initial`, or, if something does not fit there, the best that is found without one kind of evidence, if that fits.
     pub(super) fn without_misfits(
@@ -72,22 +82,30 @@ impl Fused {
             return Ok(found);
         }
         let mut best = found;
+        // First a factor from outside: where all that was sensed fits without it, no sensor is let off in its stead.
+        for k in 0..self.factors.len() {
+            let mut fused = self.clone();
+            let name = fused.factors.remove(k).name();
+            let other = fused.run_from(frame, initial, frame.rivals(), observe)?;
+            if fit(&other).is_none() {
+                return Ok(best);
+            }
+            take_if_better(&mut best, other, name);
+        }
+        if best.posterior.as_ref().is_some_and(|posterior| posterior.let_off.is_some()) {
+            return Ok(best);
+        }
         for kind in KINDS.into_iter().filter(|kind| kind.is_in(frame, &self.settings)) {
             let mut fused = self.clone();
             fused.settings.modalities.retain(|modality| !kind.modalities().contains(modality));
             fused.settings.views &= kind != Kind::Views;
             // What only colors tell apart is not known without them, wherever the start was.
             let rivals = frame.rivals().or_else(|| (kind == Kind::Color).then_some(&[]));
-            let mut other = fused.run_from(frame, initial, rivals, observe)?;
+            let other = fused.run_from(frame, initial, rivals, observe)?;
             if fit(&other).is_none() {
                 break;
             }
-            if probability(&other) > probability(&best).max(CONVINCES) {
-                if let Some(posterior) = &mut other.posterior {
-                    posterior.let_off = Some(kind.into());
-                }
-                best = other;
-            }
+            take_if_better(&mut best, other, kind.into());
         }
         Ok(best)
     }

@@ -52,7 +52,7 @@ pub struct Posterior {
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
     pub inconsistencies: Vec<Inconsistency>,
-    /// Evidence that did not fit and was let off, `color`, `depth`, `touch` or `views`: the pose is found without it.
+    /// Evidence that did not fit and was let off, `color`, `depth`, `touch`, `views` or the name of a factor from outside: the pose is found without it.
     pub let_off: Option<&'static str>,
     /// Whether the best pose fits as right ones do, where that was asked.
     pub fit: Option<Fit>,

@@ -26,7 +26,8 @@ pub struct PosteriorSummary {
     pub unobserved_mm: Vec<f64>,
     /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
     pub disagreements: Vec<(String, f64)>,
-    /// Evidence that did not fit and was let off: `color`, `depth`, `touch` or `views` (other cameras).
+    /// Evidence that did not fit and was let off: `color`, `depth`, `touch`, `views` (other cameras) or the name of a
+    /// factor from outside.
     #[serde(default)]
     pub let_off: Option<String>,
     /// Shares of the posterior that the poses found have, the best first.
