@@ -404,14 +404,18 @@ fn decode(bytes: &[u8], name: &Path) -> Result<DynamicImage, ImageError> {
     reader()?.decode().map_err(codec)
 }
 
-/// Columns and rows of the image in a PNG or JPEG file, of which no more than the header is read.
+/// Columns and rows of the image in a PNG or JPEG file, by its header: nothing is decoded.
 ///
 /// # Errors
 /// When the file cannot be read, is no plain file or no image.
 pub fn image_size(path: &Path) -> Result<(usize, usize), ImageError> {
     let io = |source| ImageError::Io { path: path.into(), source };
-    let file = BufReader::new(open_plain(path).map_err(io)?);
-    let reader = image::ImageReader::new(file).with_guessed_format().map_err(io)?;
+    let file = open_plain(path).map_err(io)?;
+    if file.metadata().map_err(io)?.len() > MAX_FILE_BYTES as u64 {
+        // The decoder of JPEG reads all of it.
+        return Err(io(std::io::ErrorKind::FileTooLarge.into()));
+    }
+    let reader = image::ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(io)?;
     let size = reader.into_dimensions();
     let (width, height) = size.map_err(|source| ImageError::Codec { path: path.into(), source })?;
     Ok((width as usize, height as usize))

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::{Parser, Subcommand};
 use prehend_reliability::faults::{Befallen, COMMANDS, FAULTS, Place};
 use prehend_reliability::mutate::Dice;
@@ -61,6 +61,7 @@ fn main() -> Result<ExitCode> {
 }
 
 fn parsers(duration: Duration, only: &[String], seed: u64) -> Result<ExitCode> {
+    known(only, PARSERS.iter().map(|parser| parser.name))?;
     let mut broken = 0;
     println!("{:<12} {:>8} {:>8} {:>8} {:>6}", "parser", "files", "read", "crashes", "hangs");
     for parser in
@@ -83,6 +84,7 @@ fn parsers(duration: Duration, only: &[String], seed: u64) -> Result<ExitCode> {
 }
 
 fn faults(program: &Path, count: usize, only: &[String], seed: u64) -> Result<ExitCode> {
+    known(only, COMMANDS.iter().map(|command| command.name))?;
     let place = Place::new(program)?;
     let mut dice = Dice::new(seed);
     let mut failed = 0;
@@ -106,4 +108,13 @@ fn faults(program: &Path, count: usize, only: &[String], seed: u64) -> Result<Ex
         }
     }
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Refuses names that are none of `all`.
+fn known<'a>(names: &[String], all: impl Iterator<Item = &'a str>) -> Result<()> {
+    let all: Vec<&str> = all.collect();
+    match names.iter().find(|name| !all.contains(&name.as_str())) {
+        Some(name) => bail!("{name} is none of {}", all.join(", ")),
+        None => Ok(()),
+    }
 }

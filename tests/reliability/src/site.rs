@@ -42,10 +42,7 @@ impl Site {
     /// If they cannot be written.
     pub fn new() -> anyhow::Result<Self> {
         let memory = Path::new("/dev/shm");
-        let folder = match memory.is_dir() {
-            true => tempfile::tempdir_in(memory)?,
-            false => tempfile::tempdir()?,
-        };
+        let folder = tempfile::tempdir_in(memory).or_else(|_| tempfile::tempdir())?;
         let site = Self { folder };
         for name in
             ["test/000001/rgb", "test/000001/depth", "test/000001/mask_visib", "models", "hand"]

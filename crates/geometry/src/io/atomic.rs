@@ -36,20 +36,24 @@ impl AtomicFile {
     pub fn create(path: &Path) -> io::Result<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let target = plain_target(path)?;
-        let mut hidden = OsString::from(".");
-        hidden.push(target.file_name().unwrap_or_default());
-        hidden.push(format!(
-            ".{}-{}.tmp",
-            std::process::id(),
-            NEXT.fetch_add(1, Ordering::Relaxed)
-        ));
-        let temporary = target.with_file_name(hidden);
-        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-        let whole = Self { temporary, target, file };
-        if let Ok(replaced) = fs::metadata(&whole.target) {
-            whole.file.set_permissions(replaced.permissions())?;
+        loop {
+            let mut hidden = OsString::from(".");
+            hidden.push(target.file_name().unwrap_or_default());
+            let number = NEXT.fetch_add(1, Ordering::Relaxed);
+            hidden.push(format!(".{}-{number}.tmp", std::process::id()));
+            let temporary = target.with_file_name(hidden);
+            let file = match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+                // Of a process of the same number that was killed.
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
+                opened => opened?,
+            };
+            // Where there are no permissions, or others, the file is as good.
+            #[cfg(unix)]
+            if let Ok(replaced) = fs::metadata(&target) {
+                let _ = file.set_permissions(replaced.permissions());
+            }
+            return Ok(Self { temporary, target, file });
         }
-        Ok(whole)
     }
 
     /// A file with that content, all of it.
@@ -59,7 +63,6 @@ impl AtomicFile {
     pub(super) fn write(path: &Path, content: &[u8]) -> io::Result<Self> {
         let mut whole = Self::create(path)?;
         whole.file.write_all(content)?;
-        whole.file.sync_all()?;
         Ok(whole)
     }
 

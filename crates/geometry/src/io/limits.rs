@@ -8,7 +8,7 @@
 pub const MAX_FILE_BYTES: usize = 1 << 30;
 
 /// Largest file of JSON, TOML or a table in text \[bytes\]: what is read of it takes some ten times as much.
-pub const MAX_TEXT_BYTES: usize = 1 << 28;
+pub const MAX_TEXT_BYTES: usize = 1 << 30;
 
 /// No number that describes a scene is as large, in any unit that a format has: squares of such fit into single precision.
 pub const MAX_NUMBER: f64 = 1e9;

@@ -48,6 +48,10 @@ pub fn read_plain(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
 /// [`io::ErrorKind::InvalidInput`] where something other than a plain file is in the way, or `path` names no file;
 /// [`io::ErrorKind::TooManyLinks`] for links in a circle.
 pub fn plain_target(path: &Path) -> io::Result<PathBuf> {
+    // Where links lead that are no paths, as those of pipes, too.
+    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return Err(not_plain());
+    }
     let mut target = path.to_owned();
     for _ in 0..MOST_LINKS {
         match fs::symlink_metadata(&target) {

@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
+use prehend_geometry::limits::MAX_FILE_BYTES;
+use prehend_geometry::read_plain;
 use prehend_geometry::robot::KinematicTree;
 
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, create_folder, read_bytes, read_text, write_atomically};
+use crate::data::bop::{DatasetError, create_folder, read_text, write_atomically};
 use crate::scene::Hand;
 
 /// The hand's files, relative to the dataset.
@@ -51,7 +53,9 @@ impl HandFiles {
             let Some(relative) = within(folder, name) else { continue };
             let file = folder.join(&relative);
             if !meshes.iter().any(|(known, _)| *known == relative) {
-                meshes.push((relative, read_bytes(&file)?));
+                let content = read_plain(&file, MAX_FILE_BYTES);
+                let content = content.map_err(|e| DatasetError::reading(&file, &e))?;
+                meshes.push((relative, content));
             }
         }
         let robot = Hand::new(tree, skin).map_err(|e| DatasetError::unusable(urdf, e))?;

@@ -158,6 +158,7 @@ fn a_killed_study_resumes() {
 fn a_killed_search_resumes() {
     let place = workplace();
     place.remove("init.csv");
+    place.remove("ds/test/000003");
     let search = |out: &str| format!("initial --dataset ds --search --out {out}");
     place.succeed(&search("whole.csv"));
     assert!(!place.path("whole.csv.journal").exists());
@@ -187,6 +188,7 @@ fn a_damaged_shard_is_to_be_made_again() {
     assert!(said.code == 1 && said.err.contains(expected), "{}", said.err);
 }
 
+#[cfg(unix)]
 #[test]
 fn two_that_make_one_dataset_are_kept_apart() {
     let place = Workplace::empty();

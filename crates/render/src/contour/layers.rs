@@ -52,7 +52,7 @@ const STRIPS: f32 = 4.0;
 /// Segments from which on a strip is [`Crowded`].
 const CROWD: usize = 48;
 
-/// The segments of a strip, of which those come first, by their left ends, that go through all its height and hardly sideways.
+/// The segments of a strip: first those that cross its whole height nearly upright, sorted by their left ends; then the rest, in any order.
 struct Crowded {
     /// Left ends of those.
     lefts: Vec<f32>,

@@ -13,7 +13,7 @@ use clap::Args;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
-use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
+use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint};
 use prehend_refine::data::{
     AssetError, Assets, Identity, Journal, NoiseLevel, PlainPose, Target, guard,
 };
@@ -159,7 +159,7 @@ impl Initial {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets = Assets::new(dataset, 0).with_cache(cache());
         let backend = self.rendering.open()?;
-        let identity = self.identity(dataset, backend.name())?;
+        let identity = self.identity(dataset, &targets, backend.name())?;
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<Candidate>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
         let mut searches = BTreeMap::new();
@@ -179,7 +179,8 @@ impl Initial {
             }
         }
         for (index, found) in searched {
-            let pose = |c: &Candidate, score| row(&targets[index], (&c.pose).into(), score);
+            let Some(target) = targets.get(index) else { continue };
+            let pose = |c: &Candidate, score| row(target, (&c.pose).into(), score);
             // Of a results file's scores the higher is the better.
             all.rows.extend(found.first().map(|c| pose(c, -c.cost)));
             all.rivals.extend(found.iter().map(|c| pose(c, c.weight)));
@@ -187,12 +188,17 @@ impl Initial {
         Ok((all, journal))
     }
 
-    fn identity(&self, dataset: &Dataset, backend: &str) -> anyhow::Result<Identity> {
+    fn identity(
+        &self,
+        dataset: &Dataset,
+        targets: &[Target],
+        backend: &str,
+    ) -> anyhow::Result<Identity> {
         Ok(Identity::of(&json!({
             "command": "initial --search",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
-            "targets": self.targets.as_deref().map(file_fingerprint).transpose()?,
+            "targets": targets.iter().map(Target::to_string).collect::<Vec<_>>(),
             "filters": self.selection.filters(),
             "backend": backend,
         })))

@@ -1,11 +1,11 @@
 //! Files that are read whole, and appear whole or not at all.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::Path;
 
 use prehend_geometry::limits::MAX_TEXT_BYTES;
-use prehend_geometry::{plain_target, read_plain};
+use prehend_geometry::{AtomicFile, read_plain};
 
 use super::error::DatasetError;
 
@@ -43,18 +43,11 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
     if path.is_dir() {
         return Err(fault(&"is a folder"));
     }
-    let path = &plain_target(path).map_err(|e| fault(&e))?;
-    let name = path.file_name().ok_or_else(|| fault(&"the path names no file"))?;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|p| !p.is_dir()) {
         return Err(fault(&format!("there is no folder {}", folder.display())));
     }
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}.probe", std::process::id()));
-    let probe = path.with_file_name(hidden);
-    let made = OpenOptions::new().write(true).create_new(true).open(&probe);
-    made.and_then(|_| fs::remove_file(&probe)).map_err(|e| fault(&e))
+    AtomicFile::create(path).map(drop).map_err(|e| fault(&e))
 }
 
 /// Makes the folder and those above it, where they are absent.

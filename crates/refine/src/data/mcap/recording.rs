@@ -64,7 +64,7 @@ struct Found {
     /// With its frame.
     gravity: Option<(String, Series<Vector3<f64>>)>,
     /// Length of the messages of readings \[bytes\].
-    kept: usize,
+    kept: u64,
     /// By topic: the first fault, and how many there are.
     faults: BTreeMap<String, (String, usize)>,
 }
@@ -243,8 +243,8 @@ pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, Re
     Ok(MessageReader::new_with_options(BufReader::with_capacity(1 << 20, opened), options))
 }
 
-/// So many bytes of messages that are not images are read \[bytes\]: chunks of a small file may expand to any number.
-const MOST_KEPT: usize = 4 << 30;
+/// So many bytes of messages of what is kept are read \[bytes\]: chunks of a small file may expand to any number.
+const MOST_KEPT: u64 = 4 << 30;
 
 impl Found {
     /// To be called when all messages have been taken over.
@@ -280,24 +280,26 @@ impl Found {
             }
             return Ok(());
         }
-        self.kept += data.len();
         if kind == CameraInfo::TYPE {
             if !self.cameras.contains_key(topic) {
                 self.cameras.insert(topic.to_owned(), decode(data)?);
             }
         } else if kind == JointState::TYPE {
+            self.kept += data.len() as u64;
             let JointState { header, name, position, .. } = decode(data)?;
             for (name, position) in name.into_iter().zip(position) {
                 let series = self.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);
             }
         } else if kind == TransformMessage::TYPE {
+            self.kept += data.len() as u64;
             let fixed = topic.ends_with("tf_static");
             let TransformMessage { transforms } = decode(data)?;
             for transform in &transforms {
                 self.transforms.add(transform, moment(&transform.header, message), fixed)?;
             }
         } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
+            self.kept += data.len() as u64;
             let Vector3Stamped { header, vector } = decode(data)?;
             let (at, vector) = (moment(&header, message), Vector3::from(vector));
             check_gravity(&vector).map_err(|e| e.to_string())?;
@@ -307,6 +309,7 @@ impl Found {
                 series.push(at, vector);
             }
         } else if kind == WrenchStamped::TYPE {
+            self.kept += data.len() as u64;
             let WrenchStamped { header, force, .. } = decode(data)?;
             let at = moment(&header, message);
             let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();

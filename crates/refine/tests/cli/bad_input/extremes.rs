@@ -117,7 +117,7 @@ fn a_mirrored_mesh_is_told() {
 #[test]
 fn sizes_of_images_are_compared_before_they_are_decoded() {
     let place = workplace();
-    // 14 % of the 33 million pixels that may be: with 4 bytes each in the image and 12 in ours, they would take 0.5 GB.
+    // Half of the pixels that may be: decoded, they would take 0.5 GB. Where the system does not tell, the messages are what is tested.
     for (file, name) in [(DEPTH, "depth/000000.png"), (MASK, "mask_visib/000000_000000.png")] {
         let whole = fs::read(place.path(file)).unwrap();
         DepthImage::filled(6000, 5500, 0.0).save(&place.path(file), 1e-4).unwrap();
