@@ -61,12 +61,10 @@ fn main() -> Result<ExitCode> {
 }
 
 fn parsers(duration: Duration, only: &[String], seed: u64) -> Result<ExitCode> {
-    known(only, PARSERS.iter().map(|parser| parser.name))?;
+    let chosen = chosen(PARSERS, |parser| parser.name, only)?;
     let mut broken = 0;
     println!("{:<12} {:>8} {:>8} {:>8} {:>6}", "parser", "files", "read", "crashes", "hangs");
-    for parser in
-        PARSERS.iter().filter(|p| only.is_empty() || only.iter().any(|name| name == p.name))
-    {
+    for parser in chosen {
         let tried = fuzz::run(parser, seed, duration)?;
         let (crashes, hangs) = (&tried.crashes, &tried.hangs);
         println!(
@@ -84,14 +82,12 @@ fn parsers(duration: Duration, only: &[String], seed: u64) -> Result<ExitCode> {
 }
 
 fn faults(program: &Path, count: usize, only: &[String], seed: u64) -> Result<ExitCode> {
-    known(only, COMMANDS.iter().map(|command| command.name))?;
+    let chosen = chosen(COMMANDS, |command| command.name, only)?;
     let place = Place::new(program)?;
     let mut dice = Dice::new(seed);
     let mut failed = 0;
     println!("{:<12} {:<14} {:>8} {:>8}", "command", "fault", "injected", "survived");
-    for command in
-        COMMANDS.iter().filter(|c| only.is_empty() || only.iter().any(|name| name == c.name))
-    {
+    for command in chosen {
         for fault in FAULTS {
             let mut befallen = Befallen::default();
             befallen.add(&place, command, fault, (count, &mut dice))?;
@@ -110,11 +106,11 @@ fn faults(program: &Path, count: usize, only: &[String], seed: u64) -> Result<Ex
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Refuses names that are none of `all`.
-fn known<'a>(names: &[String], all: impl Iterator<Item = &'a str>) -> Result<()> {
-    let all: Vec<&str> = all.collect();
-    match names.iter().find(|name| !all.contains(&name.as_str())) {
-        Some(name) => bail!("{name} is none of {}", all.join(", ")),
-        None => Ok(()),
+/// Those of `all` that are named, or all without names.
+fn chosen<'a, T>(all: &'a [T], name: fn(&T) -> &str, only: &[String]) -> Result<Vec<&'a T>> {
+    if let Some(unknown) = only.iter().find(|only| !all.iter().any(|one| name(one) == **only)) {
+        bail!("{unknown} is none of {}", all.iter().map(name).collect::<Vec<_>>().join(", "));
     }
+    let is_chosen = |one: &&T| only.is_empty() || only.iter().any(|only| only == name(one));
+    Ok(all.iter().filter(is_chosen).collect())
 }

@@ -54,18 +54,15 @@ pub fn plain_target(path: &Path) -> io::Result<PathBuf> {
     }
     let mut target = path.to_owned();
     for _ in 0..MOST_LINKS {
-        match fs::symlink_metadata(&target) {
-            Ok(there) if there.is_symlink() => {
-                let next = fs::read_link(&target)?;
-                // Joining an absolute path replaces what is joined to.
-                target = target.parent().unwrap_or(Path::new("")).join(next);
-            }
-            Ok(there) if !there.is_file() => return Err(not_plain()),
-            _ if target.file_name().is_none() => {
-                return Err(io::Error::new(io::ErrorKind::InvalidInput, "names no file"));
-            }
-            _ => return Ok(target),
+        if !target.is_symlink() {
+            return match target.file_name() {
+                Some(_) => Ok(target),
+                None => Err(io::Error::new(io::ErrorKind::InvalidInput, "names no file")),
+            };
         }
+        let next = fs::read_link(&target)?;
+        // Joining an absolute path replaces what is joined to.
+        target = target.parent().unwrap_or(Path::new("")).join(next);
     }
     Err(io::Error::new(io::ErrorKind::TooManyLinks, "symbolic links in a circle"))
 }

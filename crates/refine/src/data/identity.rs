@@ -1,10 +1,8 @@
 //! The settings and inputs that determine the results of a run, as facts to be compared.
 
 use std::fs;
-use std::io::{self, Read};
 use std::path::Path;
 
-use prehend_geometry::open_plain;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -85,15 +83,7 @@ fn hash(seed: u64, bytes: &[u8]) -> u64 {
 /// # Errors
 /// If it cannot be read.
 pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
-    let fault = |error: io::Error| DatasetError::reading(file, &error);
-    let mut opened = open_plain(file).map_err(fault)?;
-    let (mut sum, mut part) = (OFFSET, vec![0; 1 << 16]);
-    loop {
-        match opened.read(&mut part).map_err(fault)? {
-            0 => return Ok(format!("{sum:016x}")),
-            read => sum = hash(sum, &part[..read]),
-        }
-    }
+    read_bytes(file).map(|bytes| fingerprint(&bytes))
 }
 
 /// JSON files of a scene that estimators read.

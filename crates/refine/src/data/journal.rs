@@ -51,10 +51,8 @@ impl Journal {
             file.read_to_end(&mut bytes).map_err(fault)?;
         }
         let own = header(path, identity)?;
-        let Parsed { header, entries, length } = parse(&bytes, &own).map_err(|fault| {
-            let advice = fault.is_damage().then_some(" (--restart discards the whole journal)");
-            DatasetError::unusable(path, fault.to_string() + advice.unwrap_or_default())
-        })?;
+        let advice = " (--restart discards the whole journal)";
+        let Parsed { header, entries, length } = parse(path, &bytes, &own, advice)?;
         let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity, &[]));
         if !differences.is_empty() {
             let problem = format!(
@@ -84,11 +82,9 @@ impl Journal {
             file.read_to_end(&mut bytes).map(|_| bytes)
         });
         let bytes = bytes.map_err(|e| DatasetError::unusable(path, e))?;
-        let Parsed { header, entries, .. } = parse(&bytes, "").map_err(|fault| {
-            let advice = fault.is_damage().then_some(": the run that wrote it must be repeated");
-            DatasetError::unusable(path, fault.to_string() + advice.unwrap_or_default())
-        })?;
-        Ok((header.ok_or_else(|| DatasetError::unusable(path, Fault::Foreign))?, entries))
+        let advice = ": the run that wrote it must be repeated";
+        let Parsed { header, entries, .. } = parse(path, &bytes, "", advice)?;
+        Ok((header.ok_or_else(|| foreign(path))?, entries))
     }
 
     /// Records a finished frame on disk and returns it as a resumed run would read it.
@@ -165,19 +161,8 @@ fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetErr
     DatasetError::unusable(path, format!("frame {index} cannot be recorded: {error}"))
 }
 
-/// Why a file cannot be read as a journal.
-#[derive(Debug, thiserror::Error)]
-enum Fault {
-    #[error("is no journal of this program")]
-    Foreign,
-    #[error("line {0} is damaged")]
-    Damaged(usize),
-}
-
-impl Fault {
-    fn is_damage(&self) -> bool {
-        matches!(self, Self::Damaged(_))
-    }
+fn foreign(path: &Path) -> DatasetError {
+    DatasetError::unusable(path, "is no journal of this program")
 }
 
 /// What is whole in a journal.
@@ -190,21 +175,28 @@ struct Parsed<E> {
 }
 
 /// `own` is the first line that this run would write: of a file without a whole line, what may be overwritten is a part of it.
-fn parse<E: DeserializeOwned>(bytes: &[u8], own: &str) -> Result<Parsed<E>, Fault> {
+/// `advice` is what to do about damage.
+fn parse<E: DeserializeOwned>(
+    path: &Path,
+    bytes: &[u8],
+    own: &str,
+    advice: &str,
+) -> Result<Parsed<E>, DatasetError> {
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
     let Some(first) = lines.next() else {
         return if own.as_bytes().starts_with(bytes) {
             Ok(Parsed { header: None, entries, length: 0 })
         } else {
-            Err(Fault::Foreign)
+            Err(foreign(path))
         };
     };
-    let header = serde_json::from_slice(first).map_err(|_| Fault::Foreign)?;
+    let header = serde_json::from_slice(first).map_err(|_| foreign(path))?;
     let mut length = first.len();
     for (number, line) in (2..).zip(lines) {
-        let Line { index, entry } =
-            serde_json::from_slice(line).map_err(|_| Fault::Damaged(number))?;
+        let Line { index, entry } = serde_json::from_slice(line).map_err(|_| {
+            DatasetError::unusable(path, format!("line {number} is damaged{advice}"))
+        })?;
         entries.insert(index, entry);
         length += line.len();
     }

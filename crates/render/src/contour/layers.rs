@@ -204,6 +204,7 @@ mod tests {
             }
         }
     }
+
     /// A heap of a thousand triangles once took time by the square of their number.
     #[test]
     fn of_a_crowd_few_segments_are_asked() {

@@ -109,8 +109,8 @@ pub(crate) fn body_sigmas(mm: Option<Real>, deg: Option<Real>) -> Result<[Option
 }
 
 /// Joint positions by name.
-pub(crate) fn positions(joints: BTreeMap<String, Real>) -> BTreeMap<String, f64> {
-    joints.into_iter().map(|(name, position)| (name, position.0)).collect()
+pub(crate) fn positions(joints: &BTreeMap<String, Real>) -> BTreeMap<String, f64> {
+    joints.iter().map(|(name, position)| (name.clone(), position.0)).collect()
 }
 
 /// What is said of a field that is not there, as serde has it.
@@ -123,7 +123,7 @@ impl BodyEntry {
         let kind = match self.kind {
             KindName::Hand => BodyKind::Hand {
                 urdf: root.join(self.urdf.ok_or_else(|| missing("urdf"))?),
-                joints: positions(self.joints.ok_or_else(|| missing("joints"))?),
+                joints: positions(&self.joints.ok_or_else(|| missing("joints"))?),
             },
             KindName::Plane => BodyKind::Plane,
             KindName::Object => {

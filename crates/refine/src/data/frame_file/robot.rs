@@ -82,7 +82,7 @@ impl RobotLayout {
     fn placed(&self, file: &Path, folder: &Path) -> Result<PlacedBody, DatasetError> {
         let tree = KinematicTree::from_urdf_file(folder.join(&self.urdf))
             .map_err(|e| DatasetError::unusable(file, e))?;
-        let joints = tree.joint_vector(&positions(self.joints.clone()));
+        let joints = tree.joint_vector(&positions(&self.joints));
         Ok(PlacedBody {
             name: ROBOT.to_owned(),
             joints: joints.map_err(|e| DatasetError::field(file, "robot.joints", e))?,
@@ -110,8 +110,9 @@ impl BodyLayout {
                 let tree = KinematicTree::from_urdf_file(folder.join(urdf))
                     .map_err(|e| broken(e.to_string()))?;
                 let said = self.joints.as_ref().ok_or_else(needed("joints"))?;
-                let said = positions(said.clone());
-                joints = tree.joint_vector(&said).map_err(|e| field("joints", e.to_string()))?;
+                joints = tree
+                    .joint_vector(&positions(said))
+                    .map_err(|e| field("joints", e.to_string()))?;
                 tree
             }
             KindName::Plane => plane(),

@@ -10,6 +10,7 @@ use mcap::sans_io::LinearReaderOptions;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::open_plain;
+use serde::Deserialize;
 
 use super::camera::Lensed;
 use super::error::RecordingError;
@@ -85,7 +86,6 @@ impl Recording {
             }
             match message {
                 Ok(message) => found.take(&message),
-
                 Err(source) if found.images.is_empty() => {
                     return Err(RecordingError::Format { file: file.to_owned(), source });
                 }
@@ -278,29 +278,24 @@ impl Found {
                 let (header, content) = describe(kind, data)?;
                 self.images.insert(topic.to_owned(), (kind.to_owned(), header, content));
             }
-            return Ok(());
-        }
-        if kind == CameraInfo::TYPE {
+        } else if kind == CameraInfo::TYPE {
             if !self.cameras.contains_key(topic) {
                 self.cameras.insert(topic.to_owned(), decode(data)?);
             }
         } else if kind == JointState::TYPE {
-            self.kept += data.len() as u64;
-            let JointState { header, name, position, .. } = decode(data)?;
+            let JointState { header, name, position, .. } = self.keep(data)?;
             for (name, position) in name.into_iter().zip(position) {
                 let series = self.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);
             }
         } else if kind == TransformMessage::TYPE {
-            self.kept += data.len() as u64;
             let fixed = topic.ends_with("tf_static");
-            let TransformMessage { transforms } = decode(data)?;
+            let TransformMessage { transforms } = self.keep(data)?;
             for transform in &transforms {
                 self.transforms.add(transform, moment(&transform.header, message), fixed)?;
             }
         } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
-            self.kept += data.len() as u64;
-            let Vector3Stamped { header, vector } = decode(data)?;
+            let Vector3Stamped { header, vector } = self.keep(data)?;
             let (at, vector) = (moment(&header, message), Vector3::from(vector));
             check_gravity(&vector).map_err(|e| e.to_string())?;
             let first = || (header.frame_id.clone(), Series::default());
@@ -309,13 +304,18 @@ impl Found {
                 series.push(at, vector);
             }
         } else if kind == WrenchStamped::TYPE {
-            self.kept += data.len() as u64;
-            let WrenchStamped { header, force, .. } = decode(data)?;
+            let WrenchStamped { header, force, .. } = self.keep(data)?;
             let at = moment(&header, message);
             let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();
             series.push(at, force.into());
         }
         Ok(())
+    }
+
+    /// A message of readings, which stay in memory.
+    fn keep<'a, T: Deserialize<'a>>(&mut self, data: &'a [u8]) -> Result<T, String> {
+        self.kept += data.len() as u64;
+        decode(data)
     }
 
     /// The camera of the images of `topic`, if anything is said of it.
