@@ -1,0 +1,92 @@
+//! Loads: long films, many frames, large meshes, images and worlds. Results must be right, and memory must not grow with time.
+
+mod commands;
+mod library;
+mod memory;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Result, ensure};
+
+use crate::table::Row;
+use memory::Memory;
+
+/// One of them.
+pub struct Load {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is, at its full size.
+    pub what: &'static str,
+    run: fn(&Site<'_>) -> Result<Carried>,
+}
+
+/// All of them.
+pub const LOADS: &[Load] = &[
+    Load { name: "frames", what: "`refine` of 10 000 frames, 640 × 480", run: commands::frames },
+    Load { name: "mesh", what: "`synth` and `refine` of a mesh of 10⁶ faces", run: commands::mesh },
+    Load { name: "images", what: "`synth` and `refine` of images of 3840 × 2160", run: commands::images },
+    Load { name: "contacts", what: "10 000 contact points, 10 000 steps and their gradient", run: library::contacts },
+    Load { name: "tracker", what: "an hour of tracking at 30 Hz, 640 × 480", run: library::tracker },
+];
+
+/// Where and how loads are carried.
+struct Site<'a> {
+    /// The command `prehend`.
+    program: &'a Path,
+    folder: PathBuf,
+    /// Of the full size.
+    scale: f64,
+}
+
+impl Site<'_> {
+    /// So many of `full`, at least one.
+    fn scaled(&self, full: usize) -> usize {
+        ((full as f64 * self.scale) as usize).max(1)
+    }
+}
+
+/// What carrying a load took.
+struct Carried {
+    memory: Memory,
+    /// Whether memory must stay as it is once work goes on evenly.
+    is_even: bool,
+    /// What to say of the result.
+    note: String,
+}
+
+/// Carries `load` at `scale` of its size with `program`, and draws its memory over time into `folder`, if there is one.
+///
+/// # Errors
+/// If there is no room for it, or its curve cannot be written.
+pub fn carry(load: &Load, program: &Path, scale: f64, curves: Option<&Path>) -> Result<Row> {
+    let folder = tempfile::tempdir()?;
+    let site = Site { program, folder: folder.path().to_owned(), scale };
+    let start = Instant::now();
+    let carried = (load.run)(&site);
+    let seconds = start.elapsed().as_secs_f64();
+    let mut row = Row { tried: 1, ..Row::new(load.what) };
+    row.note = match carried.and_then(|carried| judged(load, carried, curves)) {
+        Ok(note) => format!("{seconds:.0} s, {note}"),
+        Err(problem) => {
+            row.wrong = 1;
+            format!("{seconds:.0} s, {problem:#}")
+        }
+    };
+    if scale != 1.0 {
+        row.what += &format!(", times {scale}");
+    }
+    Ok(row)
+}
+
+fn judged(load: &Load, carried: Carried, curves: Option<&Path>) -> Result<String> {
+    let Carried { memory, is_even, note } = carried;
+    if let Some(folder) = curves {
+        memory.draw(&folder.join(format!("{}.svg", load.name)), load.what)?;
+    }
+    let growth = memory.growth();
+    let said = format!("{note}; {:.0} MB at most, {growth:+.1} MB at the end", memory.peak());
+    let allowed = 4.0 + 0.05 * memory.peak();
+    ensure!(!is_even || growth <= allowed, "memory grows: {said}");
+    Ok(said)
+}
