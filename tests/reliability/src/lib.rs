@@ -4,7 +4,10 @@
 pub mod corpus;
 pub mod faults;
 pub mod fuzz;
+pub mod loads;
 pub mod mutate;
 pub mod parsers;
 pub mod seeds;
 pub mod site;
+pub mod table;
+pub mod tools;

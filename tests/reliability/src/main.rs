@@ -1,14 +1,17 @@
 //! `cargo reliability`: attacks on Prehend, and a table of what came of them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Result, bail};
-use clap::{Parser, Subcommand};
-use prehend_reliability::faults::{Befallen, COMMANDS, FAULTS, Place};
+use anyhow::{Context, Result, bail};
+use clap::{Args, Parser, Subcommand};
+use prehend_reliability::faults::{self, COMMANDS, FAULTS, Place};
+use prehend_reliability::loads::{self, LOADS};
 use prehend_reliability::mutate::Dice;
 use prehend_reliability::parsers::PARSERS;
+use prehend_reliability::table::{Row, Table};
+use prehend_reliability::tools::{self, MUTANTS};
 use prehend_reliability::{fuzz, seeds};
 
 #[derive(Parser)]
@@ -21,96 +24,193 @@ struct Arguments {
 enum Command {
     /// Give every parser broken files
     Parsers {
-        /// Seconds for each
-        #[arg(long, default_value_t = 5)]
+        #[command(flatten)]
+        parsers: Parsers,
+        #[command(flatten)]
+        chosen: Chosen,
+    },
+    /// The same, guided by coverage, with AddressSanitizer (installs cargo-fuzz)
+    Fuzz {
+        /// Seconds for each parser
+        #[arg(long, default_value_t = 600)]
         seconds: u64,
-        /// Of these parsers only
-        #[arg(long)]
-        only: Vec<String>,
-        /// Seed of the changes
-        #[arg(long, default_value_t = 0)]
-        seed: u64,
+        #[command(flatten)]
+        chosen: Chosen,
     },
     /// Kill long commands, fill the disk, break inputs, at random moments
     Faults {
-        /// The command `prehend`
-        #[arg(long, default_value = "target/release/prehend")]
-        program: PathBuf,
-        /// Of each fault, for each command
-        #[arg(long, default_value_t = 2)]
+        #[command(flatten)]
+        faults: Faults,
+        #[command(flatten)]
+        chosen: Chosen,
+    },
+    /// Carry loads: long films, many frames, large meshes, images and worlds
+    Loads {
+        #[command(flatten)]
+        loads: Loads,
+        #[command(flatten)]
+        chosen: Chosen,
+    },
+    /// Run the tests of numbers: finite ones from finite inputs, and the same ones on other instruction sets (with qemu-user)
+    Numbers,
+    /// Change the code here and there, and see whether a test fails (installs cargo-mutants)
+    Mutants {
+        /// Changes of each part of the code, drawn evenly
+        #[arg(long, default_value_t = 100)]
         count: usize,
-        /// Of these commands only
+        #[command(flatten)]
+        chosen: Chosen,
+    },
+    /// All of it at full size, and one table in the end: takes a night
+    All {
+        /// The command `prehend` [default: built]
         #[arg(long)]
-        only: Vec<String>,
-        /// Seed of the moments
-        #[arg(long, default_value_t = 0)]
-        seed: u64,
+        program: Option<PathBuf>,
+        /// Folder for the curves of memory over time
+        #[arg(long)]
+        curves: Option<PathBuf>,
     },
     /// Write the right files of every kind, with which corpora begin
     Seeds,
 }
 
+#[derive(Args)]
+struct Chosen {
+    /// Of these alone; may be repeated
+    #[arg(long)]
+    only: Vec<String>,
+}
+
+#[derive(Args)]
+struct Parsers {
+    /// Seconds for each parser
+    #[arg(long, default_value_t = 5)]
+    seconds: u64,
+    /// Seed of the changes
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Args)]
+struct Faults {
+    /// The command `prehend` [default: built]
+    #[arg(long)]
+    program: Option<PathBuf>,
+    /// Of each fault, for each command
+    #[arg(long, default_value_t = 6)]
+    count: usize,
+    /// Seed of the moments
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Args)]
+struct Loads {
+    /// The command `prehend` [default: built]
+    #[arg(long)]
+    program: Option<PathBuf>,
+    /// Of their full size
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Folder for the curves of memory over time
+    #[arg(long)]
+    curves: Option<PathBuf>,
+}
+
 fn main() -> Result<ExitCode> {
-    match Arguments::parse().command {
-        Command::Parsers { seconds, only, seed } => {
-            parsers(Duration::from_secs(seconds), &only, seed)
+    let rows = match Arguments::parse().command {
+        Command::Parsers { parsers, chosen } => parsers.run(&chosen)?,
+        Command::Fuzz { seconds, chosen } => {
+            let names: Vec<&str> = chosen
+                .of(PARSERS, |parser| parser.name)?
+                .iter()
+                .map(|parser| parser.name)
+                .collect();
+            tools::fuzz(seconds, &names)?
         }
-        Command::Faults { program, count, only, seed } => faults(&program, count, &only, seed),
-        Command::Seeds => seeds::write().map(|()| ExitCode::SUCCESS),
+        Command::Faults { faults, chosen } => faults.run(&chosen)?,
+        Command::Loads { loads, chosen } => loads.run(&chosen)?,
+        Command::Numbers => tools::numbers()?,
+        Command::Mutants { count, chosen } => mutants(count, &chosen)?,
+        Command::All { program, curves } => all(program, curves)?,
+        Command::Seeds => return seeds::write().map(|()| ExitCode::SUCCESS),
+    };
+    println!("{}", Table(&rows));
+    Ok(if rows.iter().all(Row::is_good) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Everything at the sizes of docs/RELIABILITY.md.
+fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
+    let program = Some(program.map_or_else(tools::program, Ok)?);
+    let everything = Chosen { only: Vec::new() };
+    let mut rows = Parsers { seconds: 60, seed: 0 }.run(&everything)?;
+    rows.extend(tools::fuzz(600, &[])?);
+    rows.extend(Faults { program: program.clone(), count: 6, seed: 0 }.run(&everything)?);
+    rows.extend(Loads { program, scale: 1.0, curves }.run(&everything)?);
+    rows.extend(tools::numbers()?);
+    rows.extend(mutants(100, &everything)?);
+    Ok(rows)
+}
+
+impl Parsers {
+    fn run(&self, chosen: &Chosen) -> Result<Vec<Row>> {
+        let duration = Duration::from_secs(self.seconds);
+        let parsers = chosen.of(PARSERS, |parser| parser.name)?;
+        parsers.into_iter().map(|parser| told(fuzz::run(parser, self.seed, duration)?)).collect()
     }
 }
 
-fn parsers(duration: Duration, only: &[String], seed: u64) -> Result<ExitCode> {
-    let chosen = chosen(PARSERS, |parser| parser.name, only)?;
-    let mut broken = 0;
-    println!("{:<12} {:>8} {:>8} {:>8} {:>6}", "parser", "files", "read", "crashes", "hangs");
-    for parser in chosen {
-        let tried = fuzz::run(parser, seed, duration)?;
-        let (crashes, hangs) = (&tried.crashes, &tried.hangs);
-        println!(
-            "{:<12} {:>8} {:>8} {:>8} {:>6}",
-            parser.name,
-            tried.files,
-            tried.read,
-            crashes.len(),
-            hangs.len()
-        );
-        crashes.iter().chain(hangs).take(3).for_each(|file| println!("  {}", file.display()));
-        broken += crashes.len() + hangs.len();
-    }
-    Ok(if broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-fn faults(program: &Path, count: usize, only: &[String], seed: u64) -> Result<ExitCode> {
-    let chosen = chosen(COMMANDS, |command| command.name, only)?;
-    let place = Place::new(program)?;
-    let mut dice = Dice::new(seed);
-    let mut failed = 0;
-    println!("{:<12} {:<14} {:>8} {:>8}", "command", "fault", "injected", "survived");
-    for command in chosen {
-        for fault in FAULTS {
-            let mut befallen = Befallen::default();
-            befallen.add(&place, command, fault, (count, &mut dice))?;
-            let survived = befallen.injected - befallen.failures.len();
-            println!(
-                "{:<12} {:<14} {:>8} {:>8}",
-                command.name,
-                format!("{fault:?}"),
-                befallen.injected,
-                survived
-            );
-            befallen.failures.iter().take(3).for_each(|failure| println!("  {failure}"));
-            failed += befallen.failures.len();
+impl Faults {
+    fn run(self, chosen: &Chosen) -> Result<Vec<Row>> {
+        let chosen = chosen.of(COMMANDS, |command| command.name)?;
+        let place = Place::new(&self.program.map_or_else(tools::program, Ok)?)?;
+        let mut dice = Dice::new(self.seed);
+        let mut rows = Vec::new();
+        for command in chosen {
+            for fault in FAULTS {
+                let row = faults::befall(&place, command, fault, (self.count, &mut dice))?;
+                rows.extend(row.map(told).transpose()?);
+            }
         }
+        Ok(rows)
     }
-    Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Those of `all` that are named, or all without names.
-fn chosen<'a, T>(all: &'a [T], name: fn(&T) -> &str, only: &[String]) -> Result<Vec<&'a T>> {
-    if let Some(unknown) = only.iter().find(|only| !all.iter().any(|one| name(one) == **only)) {
-        bail!("{unknown} is none of {}", all.iter().map(name).collect::<Vec<_>>().join(", "));
+impl Loads {
+    fn run(self, chosen: &Chosen) -> Result<Vec<Row>> {
+        let chosen = chosen.of(LOADS, |load| load.name)?;
+        let program = self.program.map_or_else(tools::program, Ok)?;
+        let program =
+            std::fs::canonicalize(&program).with_context(|| program.display().to_string())?;
+        let curves = self.curves.as_deref();
+        chosen
+            .into_iter()
+            .map(|load| told(loads::carry(load, &program, self.scale, curves)?))
+            .collect()
     }
-    let is_chosen = |one: &&T| only.is_empty() || only.iter().any(|only| only == name(one));
-    Ok(all.iter().filter(is_chosen).collect())
+}
+
+fn mutants(count: usize, chosen: &Chosen) -> Result<Vec<Row>> {
+    let parts = chosen.of(MUTANTS, |part| part.name)?;
+    parts.into_iter().map(|part| told(tools::mutants(part, count)?)).collect()
+}
+
+/// Says at once what came of one attack: all of them take long.
+fn told(row: Row) -> Result<Row> {
+    eprintln!("{}: {} of {} held {}", row.what, row.held(), row.tried, row.note);
+    Ok(row)
+}
+
+impl Chosen {
+    /// Those of `all` that are named, or all without names.
+    fn of<'a, T>(&self, all: &'a [T], name: fn(&T) -> &str) -> Result<Vec<&'a T>> {
+        if let Some(unknown) =
+            self.only.iter().find(|only| !all.iter().any(|one| name(one) == **only))
+        {
+            bail!("{unknown} is none of {}", all.iter().map(name).collect::<Vec<_>>().join(", "));
+        }
+        let is_chosen =
+            |one: &&T| self.only.is_empty() || self.only.iter().any(|only| only == name(one));
+        Ok(all.iter().filter(is_chosen).collect())
+    }
 }

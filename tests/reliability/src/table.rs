@@ -59,7 +59,11 @@ impl fmt::Display for Table<'_> {
         for (index, line) in lines.iter().enumerate() {
             for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
                 let is_text = column == 0 || column == 6;
-                if is_text { write!(f, "| {cell:<width$} ")? } else { write!(f, "| {cell:>width$} ")? }
+                if is_text {
+                    write!(f, "| {cell:<width$} ")?
+                } else {
+                    write!(f, "| {cell:>width$} ")?
+                }
             }
             writeln!(f, "|")?;
             if index == 0 {

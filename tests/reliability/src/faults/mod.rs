@@ -6,4 +6,4 @@ mod run;
 mod trials;
 
 pub use place::{COMMANDS, LongCommand, Place};
-pub use trials::{Befallen, FAULTS, Fault};
+pub use trials::{FAULTS, Fault, befall};

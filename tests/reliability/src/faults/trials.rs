@@ -9,19 +9,25 @@ use anyhow::Result;
 use super::place::{Files, LongCommand, Place};
 use super::run::Ended;
 use crate::mutate::Dice;
+use crate::table::Row;
 
 /// What may befall a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
 pub enum Fault {
     /// It is killed, and run again.
+    #[strum(serialize = "killed")]
     Killed,
     /// The disk is full at some file, and then there is room.
+    #[strum(serialize = "full disk")]
     FullDisk,
     /// An input is removed, cut or overwritten while it is read, and is there again.
+    #[strum(serialize = "broken input")]
     BrokenInput,
     /// A folder is in the way of an output.
+    #[strum(serialize = "blocked output")]
     BlockedOutput,
     /// It runs with another number of threads.
+    #[strum(serialize = "threads")]
     Threads,
 }
 
@@ -29,46 +35,50 @@ pub enum Fault {
 pub const FAULTS: [Fault; 5] =
     [Fault::Killed, Fault::FullDisk, Fault::BrokenInput, Fault::BlockedOutput, Fault::Threads];
 
-/// What came of faults.
-#[derive(Debug, Default)]
-pub struct Befallen {
-    /// How many there were.
-    pub injected: usize,
-    /// What went wrong, each with its command and fault.
-    pub failures: Vec<String>,
+/// How a run that is not as it should be ended, other than with wrong files.
+#[derive(Debug, thiserror::Error)]
+enum Disorder {
+    #[error("did not end")]
+    Hang,
+    #[error("{0}")]
+    Crash(String),
 }
 
-impl Befallen {
-    /// Lets `fault` befall `command` `count` times, drawn by `dice`.
-    ///
-    /// # Errors
-    /// If the program cannot be run at all, or does not do undisturbed what it is asked.
-    pub fn add(
-        &mut self,
-        place: &Place,
-        command: &LongCommand,
-        fault: Fault,
-        (count, dice): (usize, &mut Dice),
-    ) -> Result<()> {
-        let nothing = match fault {
-            Fault::Threads => command.name == "export",
-            Fault::BrokenInput => command.name == "synth",
-            _ => false,
-        };
-        if nothing {
-            return Ok(());
-        }
-        let (expected, undisturbed) = place.reference(command)?;
-        for _ in 0..count {
-            place.clear(command)?;
-            self.injected += 1;
-            let trial = Trial { place, command, expected: &expected, took: undisturbed.took };
-            if let Err(problem) = trial.run(fault, dice) {
-                self.failures.push(format!("{} {fault:?}: {problem:#}", command.name));
+/// Lets `fault` befall `command` `count` times, drawn by `dice`; what goes wrong is printed. None where it does not apply.
+///
+/// # Errors
+/// If the program cannot be run at all, or does not do undisturbed what it is asked.
+pub fn befall(
+    place: &Place,
+    command: &LongCommand,
+    fault: Fault,
+    (count, dice): (usize, &mut Dice),
+) -> Result<Option<Row>> {
+    let nothing = match fault {
+        Fault::Threads => command.name == "export",
+        Fault::BrokenInput => command.name == "synth",
+        _ => false,
+    };
+    if nothing {
+        return Ok(None);
+    }
+    let (expected, undisturbed) = place.reference(command)?;
+    let mut row = Row::new(format!("`{}`, {fault}", command.name));
+    for _ in 0..count {
+        place.clear(command)?;
+        row.tried += 1;
+        let trial = Trial { place, command, expected: &expected, took: undisturbed.took };
+        if let Err(problem) = trial.run(fault, dice) {
+            eprintln!("{} {fault}: {problem:#}", command.name);
+            match problem.downcast_ref() {
+                Some(Disorder::Hang) => row.hangs += 1,
+                Some(Disorder::Crash(_)) => row.crashes += 1,
+                None => row.wrong += 1,
             }
         }
-        place.clear(command)
     }
+    place.clear(command)?;
+    Ok(Some(row))
 }
 
 struct Trial<'a> {
@@ -166,14 +176,12 @@ impl Trial<'_> {
 }
 
 /// It ended by itself, in time, and told its faults in its own words.
-fn orderly(ended: &Ended) -> Result<()> {
-    anyhow::ensure!(!ended.hung, "did not end");
-    anyhow::ensure!(!ended.error.contains("panicked"), "panicked: {}", ended.error);
-    anyhow::ensure!(
-        matches!(ended.code, Some(0..=2)),
-        "ended with {:?}: {}",
-        ended.code,
-        ended.error
-    );
+fn orderly(ended: &Ended) -> Result<(), Disorder> {
+    if ended.hung {
+        return Err(Disorder::Hang);
+    }
+    if ended.error.contains("panicked") || !matches!(ended.code, Some(0..=2)) {
+        return Err(Disorder::Crash(format!("ended with {:?}: {}", ended.code, ended.error)));
+    }
     Ok(())
 }

@@ -12,18 +12,14 @@ use prehend_refine::scene::default_sequence;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
 use prehend_sim::{
     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
 use super::memory::Memory;
 use super::{Carried, Site};
 
 /// Where a body of `points` contact points is after `steps` steps, thrown onto a floor with a velocity of `push`.
-fn slid<S: Scalar>(
-    points: usize,
-    steps: usize,
-    push: [S; 3],
-) -> Result<Vector3<S>, SimulationError> {
+fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<S>> {
     // A body of n segments has n²/2 vertices, about.
     let mesh = shapes::superellipsoid([0.04, 0.03, 0.05], [0.8, 0.8], (2 * points).isqrt() + 1);
     let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin())?;

@@ -24,10 +24,24 @@ pub struct Load {
 /// All of them.
 pub const LOADS: &[Load] = &[
     Load { name: "frames", what: "`refine` of 10 000 frames, 640 × 480", run: commands::frames },
-    Load { name: "mesh", what: "`synth` and `refine` of a mesh of 10⁶ faces", run: commands::mesh },
-    Load { name: "images", what: "`synth` and `refine` of images of 3840 × 2160", run: commands::images },
-    Load { name: "contacts", what: "10 000 contact points, 10 000 steps and their gradient", run: library::contacts },
-    Load { name: "tracker", what: "an hour of tracking at 30 Hz, 640 × 480", run: library::tracker },
+    Load {
+        name: "mesh", what: "`synth` and `refine` of a mesh of 10⁶ faces", run: commands::mesh
+    },
+    Load {
+        name: "images",
+        what: "`synth` and `refine` of images of 3840 × 2160",
+        run: commands::images,
+    },
+    Load {
+        name: "contacts",
+        what: "10 000 contact points, 10 000 steps and their gradient",
+        run: library::contacts,
+    },
+    Load {
+        name: "tracker",
+        what: "an hour of tracking at 30 Hz, 640 × 480",
+        run: library::tracker,
+    },
 ];
 
 /// Where and how loads are carried.

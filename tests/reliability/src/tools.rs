@@ -1,0 +1,180 @@
+//! Attacks that other programs carry out: cargo's tests, libFuzzer and cargo-mutants.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+
+use crate::table::Row;
+
+/// A part of the code that is changed here and there.
+pub struct Mutated {
+    /// Its name.
+    pub name: &'static str,
+    package: &'static str,
+    /// Its files, from the root of the repository.
+    files: &'static str,
+    /// Which tests have to notice: arguments of `cargo test`.
+    tests: &'static [&'static str],
+}
+
+/// All parts.
+pub const MUTANTS: &[Mutated] = &[
+    Mutated {
+        name: "autodiff",
+        package: "prehend-autodiff",
+        files: "crates/autodiff/src/**/*.rs",
+        tests: &["--lib", "--tests"],
+    },
+    Mutated {
+        name: "sim",
+        package: "prehend-sim",
+        files: "crates/sim/src/**/*.rs",
+        tests: &["--lib", "--tests"],
+    },
+    Mutated {
+        name: "metrics",
+        package: "prehend-refine",
+        files: "crates/refine/src/evaluate/metrics/*.rs",
+        tests: &["--lib", "--test", "it"],
+    },
+    Mutated {
+        name: "factors",
+        package: "prehend-refine",
+        files: "crates/refine/src/factor/**/*.rs",
+        tests: &["--lib", "--test", "it"],
+    },
+];
+
+/// The share of mutants that tests have to notice.
+const NOTICED: f64 = 0.9;
+
+fn root() -> PathBuf {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.ancestors().nth(2).unwrap_or(package).to_owned()
+}
+
+fn cargo(words: &[&str]) -> Command {
+    let mut command = Command::new("cargo");
+    command.args(words).current_dir(root()).stdin(Stdio::null());
+    command
+}
+
+fn install(package: &str) -> Result<()> {
+    let is_there = cargo(&[package.trim_start_matches("cargo-"), "--version"]);
+    let is_there = { is_there }.stdout(Stdio::null()).stderr(Stdio::null()).status()?.success();
+    if !is_there {
+        let status = cargo(&["install", package, "--locked"]).status()?;
+        ensure!(status.success(), "{package} is not to be had: {status}");
+    }
+    Ok(())
+}
+
+/// The command `prehend` beside this program, built as users have it.
+///
+/// # Errors
+/// If it does not compile.
+pub fn program() -> Result<PathBuf> {
+    let words = ["build", "--release", "--package", "prehend-refine", "--features", "mcap"];
+    let status = cargo(&words).status().context("cargo")?;
+    ensure!(status.success(), "the command was not built: {status}");
+    let folder = std::env::current_exe()?;
+    Ok(folder.parent().context("no folder of programs")?.join("prehend"))
+}
+
+/// Runs libFuzzer for `seconds` on each parser of `only`, or on all of them.
+///
+/// # Errors
+/// If it cannot be built, or does not run.
+pub fn fuzz(seconds: u64, only: &[&str]) -> Result<Vec<Row>> {
+    let mut command = Command::new(root().join("fuzz/run"));
+    command.arg(seconds.to_string()).args(only).stdin(Stdio::null()).stdout(Stdio::piped());
+    let mut child = command.spawn().context("fuzz/run")?;
+    let output = child.stdout.take().context("no output")?;
+    let mut rows = Vec::new();
+    for line in BufReader::new(output).lines() {
+        let line = line?;
+        eprintln!("{line}");
+        let cells: Vec<&str> = line.split_whitespace().collect();
+        if let [parser, files, coverage, found] = cells[..]
+            && let (Ok(tried), Ok(crashes)) = (files.parse(), found.parse())
+        {
+            let note = format!("{seconds} s, {coverage} edges");
+            let row = Row::new(format!("files of `{parser}`, by coverage"));
+            rows.push(Row { tried, crashes, note, ..row });
+        }
+    }
+    child.wait()?;
+    ensure!(!rows.is_empty(), "fuzz/run tried nothing");
+    Ok(rows)
+}
+
+/// Runs the tests of numbers here, and those of golden numbers on an old processor that qemu-user plays, if it is installed.
+///
+/// # Errors
+/// If cargo cannot be run.
+pub fn numbers() -> Result<Vec<Row>> {
+    let golden = ["test", "--release", "--package", "prehend-reliability", "--test", "golden"];
+    let mut rows = vec![
+        tested(
+            cargo(&["test", "--release", "--workspace", "--tests", "finite"]),
+            "finite numbers",
+        )?,
+        tested(cargo(&golden), "golden numbers, to the bit")?,
+    ];
+    let old = Command::new("qemu-x86_64").arg("--version").stdout(Stdio::null()).status();
+    if cfg!(target_arch = "x86_64") && old.is_ok() {
+        let mut command = cargo(&golden);
+        // Without vector instructions beyond SSE4.2, and without fused products.
+        let runner = "qemu-x86_64 -cpu Nehalem";
+        command.env("CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER", runner);
+        rows.push(tested(command, "golden numbers on a processor without AVX, to 10⁻⁹")?);
+    }
+    Ok(rows)
+}
+
+/// What `cargo test` says.
+fn tested(mut command: Command, what: &str) -> Result<Row> {
+    let output = command.stderr(Stdio::inherit()).output().context("cargo")?;
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let count = |word: &str| -> usize {
+        let results = said.lines().filter(|line| line.starts_with("test result"));
+        let number =
+            |line: &str| line.split(word).next()?.rsplit(' ').next()?.parse::<usize>().ok();
+        results.filter_map(number).sum()
+    };
+    let (passed, failed) = (count(" passed"), count(" failed"));
+    if failed > 0 || !output.status.success() {
+        eprintln!("{said}");
+    }
+    let wrong = failed.max(usize::from(!output.status.success()));
+    Ok(Row { tried: passed + wrong, wrong, note: "tests".into(), ..Row::new(what) })
+}
+
+/// Changes `part` in about `count` places, one after the other, and counts how often a test fails. `target/mutants` has the details.
+///
+/// # Errors
+/// If cargo-mutants cannot be run, or its tests fail without a change.
+pub fn mutants(part: &Mutated, count: usize) -> Result<Row> {
+    install("cargo-mutants")?;
+    let chosen = ["mutants", "--package", part.package, "--file", part.files];
+    let all = cargo(&chosen).args(["--list", "--json"]).output()?;
+    ensure!(all.status.success(), "{}", String::from_utf8_lossy(&all.stderr));
+    let all: Vec<Value> = serde_json::from_slice(&all.stdout)?;
+    let every = (all.len() / count.max(1)).max(1);
+    let output = root().join("target/mutants").join(part.name);
+    std::fs::create_dir_all(&output)?;
+    let mut command = cargo(&chosen);
+    command.args(["--shard", &format!("0/{every}"), "--sharding", "round-robin"]);
+    command.args(["--no-times", "--colors", "never", "--output"]).arg(&output);
+    command.arg("--").args(part.tests).status()?;
+    let outcomes = std::fs::read_to_string(output.join("mutants.out/outcomes.json"))?;
+    let outcomes: Value = serde_json::from_str(&outcomes)?;
+    let number = |name: &str| outcomes[name].as_u64().unwrap_or(0) as usize;
+    let (caught, missed) = (number("caught") + number("timeout"), number("missed"));
+    let note = format!("of {} places; {} do not compile", all.len(), number("unviable"));
+    let row = Row::new(format!("mutants of {}", part.name));
+    Ok(Row { tried: caught + missed, wrong: missed, required: NOTICED, note, ..row })
+}
