@@ -44,6 +44,12 @@ impl Bounds {
             && (1..3).all(|k| self.low[k] <= point[k] && point[k] <= self.high[k])
     }
 
+    /// The square of the longest distance from a point of it to one of the other.
+    fn span_squared(&self, other: &Self) -> f64 {
+        let longest = |k: usize| (self.high[k] - other.low[k]).max(other.high[k] - self.low[k]);
+        (0..3).map(|k| longest(k).powi(2)).sum()
+    }
+
     fn size(&self) -> f64 {
         let d = self.high - self.low;
         d.x + d.y + d.z
@@ -190,6 +196,44 @@ impl BoxTree {
                 open.extend([(i, first), (i, first + 1)]);
             }
         }
+    }
+}
+
+impl BoxTree {
+    /// The longest distance between points of its boxes; 0 without boxes.
+    pub(crate) fn diameter(&self) -> f64 {
+        let mut longest = 0.0;
+        // The pair that may be farthest apart is looked at first: it spares most others.
+        let mut open = vec![(f64::INFINITY, 0, 0)];
+        while let Some((most, i, j)) = open.pop() {
+            if most <= longest {
+                continue;
+            }
+            let (a, b): (&Node, &Node) = (&self.nodes[i], &self.nodes[j]);
+            if a.is_leaf() && b.is_leaf() {
+                for x in a.places() {
+                    for y in b.places() {
+                        longest = self.boxes[x].span_squared(&self.boxes[y]).max(longest);
+                    }
+                }
+                continue;
+            }
+            let halves = |node: &Node| [node.children as usize, node.children as usize + 1];
+            let bound = |i: usize, j: usize| {
+                (self.nodes[i].bounds.span_squared(&self.nodes[j].bounds), i, j)
+            };
+            let begun = open.len();
+            if i == j {
+                let [first, second] = halves(a);
+                open.extend([bound(first, first), bound(second, second), bound(first, second)]);
+            } else if b.is_leaf() || (!a.is_leaf() && a.bounds.size() >= b.bounds.size()) {
+                open.extend(halves(a).map(|half| bound(half, j)));
+            } else {
+                open.extend(halves(b).map(|half| bound(i, half)));
+            }
+            open[begun..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        longest.sqrt()
     }
 }
 

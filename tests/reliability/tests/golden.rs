@@ -137,7 +137,8 @@ fn a_refinement() {
     let strategies: [(&str, &dyn Strategy); 2] = [("fused", &fused), ("combined", &short)];
     for (name, strategy) in strategies {
         let estimate = refine(&frame, &scene.initial, strategy).unwrap();
-        let covariance = estimate.posterior.as_ref().map(|p| p.covariance().iter().copied().collect());
+        let covariance =
+            estimate.posterior.as_ref().map(|p| p.covariance().iter().copied().collect());
         let mut found = vec![("pose", pose(estimate.t_cam_object()))];
         found.extend(covariance.map(|numbers: Vec<f64>| ("covariance", numbers)));
         compare(name, &found);

@@ -1,10 +1,12 @@
 //! Point clouds: neighbors and normals.
 
+mod diameter;
 mod kd_tree;
 mod normals;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+pub use diameter::diameter;
 pub use kd_tree::{KdTree, Neighbor};
 pub use normals::estimate_normals;
 

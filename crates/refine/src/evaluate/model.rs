@@ -2,10 +2,11 @@
 
 use nalgebra::Isometry3;
 use prehend_geometry::TriMesh;
+use prehend_geometry::cloud::diameter;
 use prehend_render::{Camera, DepthImage, ModelError, RenderModel, depth_map};
 
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, ModelInfo, Models, diameter};
+use crate::data::bop::{DatasetError, ModelInfo, Models};
 use crate::error::RefineError;
 use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
 

@@ -38,8 +38,8 @@ pub(crate) use json::{
 };
 pub(crate) use lens::{Lens, RemapCache};
 pub use models::{ModelInfo, Models};
+pub(crate) use models_info::extent_to_bop;
 pub use models_info::write_symmetries;
-pub(crate) use models_info::{diameter, extent_to_bop};
 pub(crate) use pose::{
     require_in_range, rotation_from_row_major, rotation_to_row_major, translation_from_mm,
     translation_to_mm,

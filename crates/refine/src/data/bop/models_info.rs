@@ -1,6 +1,7 @@
 //! Writes `models_info.json`.
 
 use nalgebra::{Isometry3, Point3};
+use prehend_geometry::cloud::diameter;
 use serde_json::{Map, Value, json};
 
 use super::error::DatasetError;
@@ -9,14 +10,6 @@ use super::models::Models;
 use super::pose::{rotation_to_row_major, translation_to_mm};
 use super::unique::parse_json;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
-
-/// Largest distance between two of `points`; 0 without two.
-pub(crate) fn diameter(points: &[Point3<f64>]) -> f64 {
-    let from = |(i, p): (usize, &Point3<f64>)| {
-        points[i + 1..].iter().map(|q| (q - p).norm_squared()).fold(0.0, f64::max)
-    };
-    points.iter().enumerate().map(from).fold(0.0, f64::max).sqrt()
-}
 
 /// Diameter and bounds of a model of these `vertices` \[m\], as `models_info.json` has them, in millimeters.
 pub(crate) fn extent_to_bop(vertices: &[Point3<f64>]) -> Map<String, Value> {
@@ -99,13 +92,6 @@ mod tests {
     use std::fs;
 
     use super::*;
-
-    #[test]
-    fn the_diameter_is_the_longest_distance() {
-        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-2.0, 4.0, 0.0], [0.0, 0.0, 3.0]];
-        assert_eq!(diameter(&points.map(Point3::from)), 29f64.sqrt());
-        assert_eq!(diameter(&[]), 0.0);
-    }
 
     #[test]
     fn other_objects_and_fields_stay_and_absent_ones_begin() {

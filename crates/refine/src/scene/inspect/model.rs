@@ -1,6 +1,7 @@
 //! The object's mesh: its unit, what the dataset says of its size, and what was assumed.
 
 use nalgebra::{Point3, Vector3};
+use prehend_geometry::cloud::diameter;
 
 use super::warning::{Subject, Warning};
 use crate::scene::{Object, StatedSize};
@@ -105,25 +106,4 @@ fn size(vertices: &[Point3<f64>], stated: &StatedSize) -> Option<Warning> {
             "is its origin that of the dataset's poses?",
         )
     })
-}
-
-/// Largest distance between two of `points`, or up to a hundredth less: between those that lie farthest in many directions.
-fn diameter(points: &[Point3<f64>]) -> f64 {
-    let steps = || -3..=3_i32;
-    let directions = steps().flat_map(|x| steps().map(move |y| (x, y)));
-    // Of a direction and its opposite, one will do.
-    let directions = directions.flat_map(|(x, y)| (0..=3).map(move |z| [z, y, x]));
-    let mut extremes: Vec<&Point3<f64>> = Vec::new();
-    for direction in directions.filter(|d| *d > [0; 3]) {
-        let direction = Vector3::from(direction.map(f64::from));
-        let along = points.iter().map(|p| (p.coords.dot(&direction), p));
-        let ends = along.map(|end| [end, end]).reduce(|[low, high], [end, _]| {
-            [if end.0 < low.0 { end } else { low }, if end.0 > high.0 { end } else { high }]
-        });
-        extremes.extend(ends.into_iter().flatten().map(|(_, point)| point));
-    }
-    let from = |a: &Point3<f64>| {
-        extremes.iter().map(|b| nalgebra::distance_squared(a, b)).fold(0.0, f64::max)
-    };
-    extremes.iter().map(|a| from(a)).fold(0.0, f64::max).sqrt()
 }
