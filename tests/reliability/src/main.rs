@@ -55,9 +55,12 @@ enum Command {
     Numbers,
     /// Change the code here and there, and see whether a test fails (installs cargo-mutants)
     Mutants {
-        /// Changes of each part of the code, drawn evenly
+        /// Changes of each part of the code at least, drawn evenly
         #[arg(long, default_value_t = 100)]
         count: usize,
+        /// Which of them
+        #[arg(long, default_value_t = 0)]
+        seed: usize,
         #[command(flatten)]
         chosen: Chosen,
     },
@@ -131,7 +134,7 @@ fn main() -> Result<ExitCode> {
         Command::Faults { faults, chosen } => faults.run(&chosen)?,
         Command::Loads { loads, chosen } => loads.run(&chosen)?,
         Command::Numbers => tools::numbers()?,
-        Command::Mutants { count, chosen } => mutants(count, &chosen)?,
+        Command::Mutants { count, seed, chosen } => mutants(count, seed, &chosen)?,
         Command::All { program, curves } => all(program, curves)?,
         Command::Seeds => return seeds::write().map(|()| ExitCode::SUCCESS),
     };
@@ -148,7 +151,7 @@ fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
     rows.extend(Faults { program: program.clone(), count: 6, seed: 0 }.run(&everything)?);
     rows.extend(Loads { program, scale: 1.0, curves }.run(&everything)?);
     rows.extend(tools::numbers()?);
-    rows.extend(mutants(100, &everything)?);
+    rows.extend(mutants(100, 0, &everything)?);
     Ok(rows)
 }
 
@@ -190,9 +193,9 @@ impl Loads {
     }
 }
 
-fn mutants(count: usize, chosen: &Chosen) -> Result<Vec<Row>> {
+fn mutants(count: usize, seed: usize, chosen: &Chosen) -> Result<Vec<Row>> {
     let parts = chosen.of(MUTANTS, |part| part.name)?;
-    parts.into_iter().map(|part| told(tools::mutants(part, count)?)).collect()
+    parts.into_iter().map(|part| told(tools::mutants(part, count, seed)?)).collect()
 }
 
 /// Says at once what came of one attack: all of them take long.

@@ -153,11 +153,11 @@ fn tested(mut command: Command, what: &str) -> Result<Row> {
     Ok(Row { tried: passed + wrong, wrong, note: "tests".into(), ..Row::new(what) })
 }
 
-/// Changes `part` in about `count` places, one after the other, and counts how often a test fails. `target/mutants` has the details.
+/// Changes `part` in at least `count` places, one after the other, and counts how often a test fails. `seed` says which, `target/mutants` has the details.
 ///
 /// # Errors
 /// If cargo-mutants cannot be run, or its tests fail without a change.
-pub fn mutants(part: &Mutated, count: usize) -> Result<Row> {
+pub fn mutants(part: &Mutated, count: usize, seed: usize) -> Result<Row> {
     install("cargo-mutants")?;
     let chosen = ["mutants", "--package", part.package, "--file", part.files];
     let all = cargo(&chosen).args(["--list", "--json"]).output()?;
@@ -167,7 +167,7 @@ pub fn mutants(part: &Mutated, count: usize) -> Result<Row> {
     let output = root().join("target/mutants").join(part.name);
     std::fs::create_dir_all(&output)?;
     let mut command = cargo(&chosen);
-    command.args(["--shard", &format!("0/{every}"), "--sharding", "round-robin"]);
+    command.args(["--shard", &format!("{}/{every}", seed % every), "--sharding", "round-robin"]);
     command.args(["--no-times", "--colors", "never", "--output"]).arg(&output);
     command.arg("--").args(part.tests).status()?;
     let outcomes = std::fs::read_to_string(output.join("mutants.out/outcomes.json"))?;
