@@ -1,12 +1,12 @@
-//! Draws the scenes of meshes that touch meshes whose derivatives `cargo test -p prehend-sim --test mesh_contact` compares with
+//! Draws the scenes of meshes that touch meshes whose derivatives `cargo test -p prehend-sim --test it mesh_contact` compares with
 //! differences: a mug on a hook, crossed bars, a nut on a bolt, and, with `PREHEND_DATA`, two scans.
 //!
 //! `cargo run --release --example mesh_contacts [picture.png]` writes a row for each scene (`target/mesh_contacts.png` unless given).
 
-#[path = "../crates/sim/tests/mesh_contact/meshes.rs"]
+#[path = "../crates/sim/tests/it/mesh_contact/meshes.rs"]
 mod meshes;
 #[allow(dead_code)] // what is differentiated is not drawn
-#[path = "../crates/sim/tests/mesh_contact/scenes.rs"]
+#[path = "../crates/sim/tests/it/mesh_contact/scenes.rs"]
 mod scenes;
 
 use std::path::{Path, PathBuf};

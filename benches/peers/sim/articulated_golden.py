@@ -1,7 +1,7 @@
-"""Golden values of articulated bodies by Pinocchio, for crates/sim/tests/articulated_golden.rs.
+"""Golden values of articulated bodies by Pinocchio, for crates/sim/tests/it/articulated/golden.rs.
 
     pip install pin
-    python articulated_golden.py > ../../../crates/sim/tests/golden/articulated.json
+    python articulated_golden.py > ../../../crates/sim/tests/it/golden/articulated.json
 
 Trees are drawn at random: joints of all kinds, floating bases, branches. Matrices are told by their products with random vectors.
 """

@@ -1,6 +1,6 @@
 """Two crossed bars, edge on edge, in MJX: are derivatives by place, velocity and law those of the motion?
 
-The scene is that of `crates/sim/tests/mesh_contact`. Needs `pip install mujoco-mjx`; prints for each group the derivative of where
+The scene is that of `crates/sim/tests/it/mesh_contact`. Needs `pip install mujoco-mjx`; prints for each group the derivative of where
 the end of the bar is after 60 ms along a fixed direction, by forward mode and by central differences of the same program.
 """
 

@@ -1,7 +1,7 @@
-"""Motion of the closed loops of a gripper by MuJoCo, for crates/sim/tests/robots/gripper.rs.
+"""Motion of the closed loops of a gripper by MuJoCo, for crates/sim/tests/it/robots/gripper.rs.
 
     pip install mujoco
-    python gripper_golden.py DATA_FOLDER > crates/sim/tests/golden/gripper.json
+    python gripper_golden.py DATA_FOLDER > crates/sim/tests/it/golden/gripper.json
 
 The gripper closes with its control at 200, and opens with 40 from half of the time on. Contacts are left out, steps are short.
 """

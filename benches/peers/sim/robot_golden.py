@@ -1,10 +1,10 @@
-"""Values of robots in MJCF and URDF at random states, for crates/sim/tests/robots/golden.rs.
+"""Values of robots in MJCF and URDF at random states, for crates/sim/tests/it/robots/golden.rs.
 
 MuJoCo gives the poses of bodies, the mass matrix, inverse and forward dynamics of the MJCF files; Pinocchio the same of the URDF file, and all
 derivatives. Where both have a value they are compared here. Loops, contacts, springs, dampers and actuators are left out: all robots are open trees.
 
     pip install pin mujoco
-    python robot_golden.py DATA_FOLDER > crates/sim/tests/golden/robots.json
+    python robot_golden.py DATA_FOLDER > crates/sim/tests/it/golden/robots.json
 """
 
 import json

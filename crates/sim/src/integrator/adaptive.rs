@@ -28,7 +28,7 @@ use crate::world::World;
 /// the part or a damper that stops pulling, so that parts shrink until what is left of the kink is tolerated.
 ///
 /// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.05 % of converged ones;
-/// `cargo test -p prehend-sim --test defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
+/// `cargo test -p prehend-sim --test it defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
 /// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
 /// their derivatives.
 ///

@@ -1,0 +1,76 @@
+//! Fields and worlds that the problems share.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_sim::{Body, ContactBodies, GapSmoothing, HalfSpace, RigidBody, State, Surface, World};
+
+use super::laws::{G, Law, Spec};
+
+/// Number of the free body in [`on_floor`].
+pub(crate) const BODY: usize = 1;
+
+/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a kinematic floor.
+pub(crate) fn on_floor(
+    law: &Law,
+    spec: &Spec,
+    smoothing: GapSmoothing,
+    gravity: Vector3<f64>,
+    points: &[Point3<f64>],
+    inertia: f64,
+) -> World {
+    let mut world = World::new(gravity);
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let rigid = rigid(spec.mass, inertia);
+    let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
+    let samples = world.add(Body::free("body", rigid).with_surface(surface));
+    let bodies = ContactBodies { samples, field };
+    world.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
+    world
+}
+
+/// A body of isotropic inertia \[kg m²\] about the origin.
+pub(crate) fn rigid(mass: f64, inertia: f64) -> RigidBody {
+    RigidBody::new(mass, Matrix3::identity() * inertia, Point3::origin()).unwrap()
+}
+
+/// Four feet in the plane of the center of mass, so that friction tips nothing.
+pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> World {
+    let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+    let feet = feet.map(|(x, y)| Point3::new(0.05 * x, 0.05 * y, 0.0));
+    on_floor(law, spec, GapSmoothing::Hard, gravity, &feet, 1e-3)
+}
+
+/// What carries the slab: it sinks in by half a millimeter under gravity.
+pub(crate) const SLAB: Spec = Spec {
+    mass: 0.3,
+    depth: 5e-4,
+    samples: 4,
+    area: 1e-4,
+    damping: 0.0,
+    friction: 0.0,
+    slip_scale: 1e-3,
+};
+
+/// Gravity straight down.
+pub(crate) fn down() -> Vector3<f64> {
+    Vector3::new(0.0, 0.0, -G)
+}
+
+/// States of the floor and of a body at `height` that moves with `linear`.
+pub(crate) fn above_floor(height: f64, linear: Vector3<f64>) -> [State; 2] {
+    let body = State { linear, ..State::at_rest(Isometry3::translation(0.0, 0.0, height)) };
+    [State::at_rest(Isometry3::identity()), body]
+}
+
+/// Height at which a body from [`on_floor`] at rest carries `load` \[N\], between `lowest`, where it
+/// carries more, and `highest`.
+pub(crate) fn carrying_height(world: &World, load: f64, lowest: f64, highest: f64) -> f64 {
+    let carried = |height: f64| world.wrenches(&above_floor(height, Vector3::zeros()), 0)[BODY].z;
+    let (mut low, mut high) = (lowest, highest);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if carried(middle) > load { low = middle } else { high = middle }
+    }
+    low
+}

@@ -1,0 +1,276 @@
+//! What went wrong without a word once.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_autodiff::{Recording, Scalar};
+use prehend_sim::{
+    Adaptive, Body, Contact, ContactBodies, ContactLaw, Cuboid, DynContactLaw, GapSmoothing,
+    HalfSpace, Response, RungeKutta4, SemiImplicitEuler, SimulationError, Sphere, State,
+    StepCheckpointed, Surface, TimeSteps, World,
+};
+
+use super::scenes::{
+    HARD, SMOOTH, at, body, corners, cube, down, hunt_crossley, kelvin_voigt, on, state,
+};
+
+fn pebble() -> Body {
+    body("pebble", 0.1, 1e-5, &[Point3::origin()], 4e-4)
+}
+
+#[test]
+fn a_finger_that_starts_from_rest_does_not_pass_through() {
+    let finger = |duration: f64| {
+        move |time: f64| {
+            // Minimum jerk over 0.6 m.
+            let t = (time / duration).min(1.0);
+            let (place, rate) =
+                (t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 30.0 * t * t * (1.0 - t) * (1.0 - t));
+            let mut state = State::at_rest(Isometry3::translation(0.6 * place - 0.3, 0.0, 0.0));
+            state.linear.x = 0.6 * rate / duration;
+            state
+        }
+    };
+    for duration in [0.2, 0.5, 1.0, 2.0] {
+        let mut world = World::new(Vector3::zeros());
+        let tip = Arc::new(Sphere { center: Point3::origin(), radius: 0.03 });
+        let field = world.add(Body::driven("finger", finger(duration)).with_field(tip));
+        let samples = world.add(pebble());
+        let bodies = ContactBodies { samples, field };
+        world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
+        let start = [State::at_rest(Isometry3::identity()); 2];
+        let end = world.simulate(&start, duration).unwrap();
+        assert!(end[samples].linear.x > 1.0 / duration, "{duration}: {}", end[samples].linear.x);
+    }
+}
+
+/// A state that rests at `z` \[m\] but for a stroke up and back by `stroke` \[m\] within `duration` \[s\] from 0.5 s on.
+fn tapping(stroke: f64, duration: f64) -> impl Fn(f64) -> State {
+    move |time: f64| {
+        let phase = (time - 0.5) / duration;
+        let mut state = State::at_rest(Isometry3::identity());
+        if (0.0..1.0).contains(&phase) {
+            state.pose.translation.z = stroke * (PI * phase).sin().powi(2);
+            state.linear.z = stroke * PI / duration * (2.0 * PI * phase).sin();
+        }
+        state
+    }
+}
+
+#[test]
+fn a_paddle_that_waits_is_not_passed_over() {
+    let radius = 0.03;
+    let ball = || {
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(radius);
+        body("ball", 0.1, 4e-5, &[Point3::origin()], 1e-4).with_surface(surface.unwrap())
+    };
+    // A ball that floats 2 mm above it; one that rests on it, on which a tenth of a millimeter is enough.
+    for (gravity, height, stroke) in [(0.0, 2e-3, 5e-3), (-9.81, -2.07e-4, 1e-4)] {
+        for duration in [0.2, 0.05, 0.02, 0.005] {
+            let mut world = World::new(Vector3::new(0.0, 0.0, gravity));
+            let paddle = Body::driven("paddle", tapping(stroke, duration));
+            let field = world.add(paddle.with_field(Arc::new(HalfSpace::floor())));
+            let samples = world.add(ball());
+            let bodies = ContactBodies { samples, field };
+            world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), SMOOTH).unwrap();
+            let above = State::at_rest(at(0.0, 0.0, radius + height));
+            let start = [State::at_rest(Isometry3::identity()), above];
+            let end = world.simulate(&start, 1.0).unwrap()[samples];
+            let run = world.rollout(&start, TimeSteps { dt: 1e-3, steps: 1000 }).unwrap();
+            let fine = run[1000][samples];
+            let speed = run.iter().map(|states| states[samples].linear.z.abs());
+            let speed = speed.fold(0.0, f64::max);
+            let off = (end.linear.z - fine.linear.z).abs();
+            assert!(speed > 1e-4 && off < 1e-3 * speed, "{stroke} {duration}: {off} of {speed}");
+        }
+    }
+}
+
+#[test]
+fn what_is_pushed_does_not_pass_through() {
+    for place in 0..40 {
+        let ball =
+            Sphere { center: Point3::new(0.5 + 0.01 * f64::from(place), 0.0, 0.0), radius: 0.02 };
+        let law = (hunt_crossley(0.1, 0.3, 1e-2), HARD);
+        let (mut world, start) = on(
+            ball,
+            Vector3::zeros(),
+            pebble(),
+            law,
+            state(at(0.0, 1e-3, 0.0), [0.0; 3], [0.0; 3]),
+        );
+        world.bodies[1].external_wrench.x = 1.0;
+        let end = world.simulate(&start, 0.5).unwrap()[1];
+        let reached = end.pose.translation.vector;
+        assert!(reached.x < ball.center.x || reached.y > 0.01, "{place}: {reached:?}");
+    }
+}
+
+#[test]
+fn thin_bodies_are_not_passed_over() {
+    let down_at = |place: f64| state(at(0.0, 0.0, 0.2 + place), [0.0; 3], [0.0; 3]);
+    let stiff = || (hunt_crossley(5e4, 0.3, 1e-2), HARD);
+    let wall = |half: f64| Cuboid { half_extents: Vector3::new(0.5, 0.5, half), rounding: 1e-4 };
+    let plate: Vec<Point3<f64>> = (0..25)
+        .map(|i| Point3::new(0.2 * f64::from(i % 5) - 0.4, 0.2 * f64::from(i / 5) - 0.4, 0.0))
+        .collect();
+    let plate = body("plate", 1.0, 0.1, &plate, 4e-4);
+    let pin = Sphere { center: Point3::origin(), radius: 4e-3 };
+    for place in (0..20).map(|i| 1e-3 * f64::from(i)) {
+        let fallen = |(mut world, mut start): (World, Vec<State>)| {
+            world.gravity = Vector3::zeros();
+            start[1].linear.z = -1.0;
+            world.simulate(&start, 0.5).unwrap()[1].linear.z
+        };
+        for half in [2.5e-4, 1e-3] {
+            let rises = fallen(on(wall(half), down(), cube(), stiff(), down_at(place)));
+            assert!(rises > 0.0, "a wall of {half} m, from {place} m: {rises}");
+        }
+        let rises = fallen(on(pin, down(), plate.clone(), stiff(), down_at(place)));
+        assert!(rises > 0.0, "a pin, from {place} m: {rises}");
+    }
+}
+
+#[test]
+fn what_contacts_cannot_stop_is_told_to_pass_through() {
+    let ball = |radius: f64| {
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(radius);
+        body("ball", 0.01, 4e-7, &[Point3::origin()], 1e-4).with_surface(surface.unwrap())
+    };
+    let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 5e-3), rounding: 1e-3 };
+    for (radius, speed, passes) in
+        [(0.0, 0.3, false), (0.0, 10.0, true), (0.01, 1.0, false), (0.01, 20.0, true)]
+    {
+        let start = state(at(0.0, 0.0, 0.1), [0.0, 0.0, -speed], [0.0; 3]);
+        let (world, start) =
+            on(plate, down(), ball(radius), (kelvin_voigt(0.3, 1e-2), SMOOTH), start);
+        let run = world.simulate(&start, 0.2);
+        match passes {
+            false => assert!(run.unwrap()[1].pose.translation.z > 0.0),
+            true => assert!(
+                matches!(run, Err(SimulationError::PassedThrough { contact, .. }) if contact == "ground")
+            ),
+        }
+    }
+}
+
+/// Friction that drives.
+struct Belt([f64; 2]);
+
+impl ContactLaw for Belt {
+    fn params(&self) -> &[f64] {
+        &self.0
+    }
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let normal = (-p[0] * contact.gap).times(contact.area);
+        Response { normal, tangential: contact.slip * (p[1] * normal) }
+    }
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
+
+#[test]
+fn energy_from_nowhere_is_an_error_by_default() {
+    let start = state(at(0.0, 0.0, -2.5e-4), [0.1, 0.0, 0.0], [0.0; 3]);
+    let law = (Arc::new(Belt([1e7, 0.5])) as Arc<dyn DynContactLaw>, HARD);
+    let (world, start) = on(HalfSpace::floor(), down(), pebble(), law, start);
+    let made = |error| matches!(error, SimulationError::Energy { .. });
+    assert!(made(world.simulate(&start, 1.0).unwrap_err()));
+    assert!(made(world.rollout(&start, TimeSteps { dt: 0.1, steps: 10 }).unwrap_err()));
+}
+
+#[test]
+fn bad_settings_and_bad_states_are_told_as_such() {
+    let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), pebble(), (hunt_crossley(0.1, 0.3, 1e-2), HARD), start);
+    let once = TimeSteps { dt: 0.1, steps: 1 };
+    for value in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
+        let loose = Adaptive { sensitivity_tolerance: value, ..Adaptive::default() };
+        let refused = world.simulate_with(&loose, &start, once, |_, _| ()).unwrap_err();
+        let refused = refused.to_string();
+        assert!(
+            refused.starts_with("Adaptive::sensitivity_tolerance must be positive"),
+            "{refused}"
+        );
+    }
+    let mut lost = start.clone();
+    lost[1].linear.x = f64::NAN;
+    let step = prehend_sim::Step::new(15, 0.1);
+    let refused = world.step(&Adaptive::default(), &lost, step).unwrap_err();
+    assert!(matches!(refused, SimulationError::NotFinite { time, .. } if time == 1.5));
+}
+
+#[test]
+fn forces_that_jump_are_refused_before_anything_is_recorded() {
+    let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), pebble(), (kelvin_voigt(0.3, 1e-2), HARD), start);
+    assert!(world.simulate(&start, 0.2).is_ok());
+    let recording = Recording::start();
+    let mut lifted: Vec<_> = start.iter().map(State::lift).collect();
+    lifted[1].linear.x = recording.variable(0.0);
+    let world = world.lift();
+    let (adaptive, once) = (Adaptive::default(), TimeSteps { dt: 0.2, steps: 1 });
+    let compact = StepCheckpointed::new(adaptive, &world).unwrap();
+    let refused = [
+        world.simulate(&lifted, 0.2).unwrap_err(),
+        world.simulate_with(&compact, &lifted, once, |_, _| ()).unwrap_err(),
+        world.simulate_checkpointed(adaptive, &lifted, once, 2).unwrap_err(),
+    ];
+    assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
+}
+
+#[test]
+fn smooth_contacts_may_give_back_what_they_stored() {
+    for height in [0.0, -1e-5, 1e-4] {
+        for (gravity, width) in [(Vector3::zeros(), 5e-5), (down(), 1e-3)] {
+            let law = (kelvin_voigt(0.0, 1e-2), GapSmoothing::Softplus { width });
+            let start = state(at(0.0, 0.0, height), [0.0; 3], [0.0; 3]);
+            let (world, start) = on(HalfSpace::floor(), gravity, pebble(), law, start);
+            let time_steps = TimeSteps { dt: 1e-5, steps: 3000 };
+            world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn without_contacts_nothing_is_rough() {
+    let law = || (kelvin_voigt(0.3, 1e-2), SMOOTH);
+    let falling = state(at(0.0, 0.0, 100.0), [0.0; 3], [0.0; 3]);
+    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), falling);
+    let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    assert_eq!((run.resolution.roughness, run.resolution.roughest), (Some(0.0), None));
+    let tumbling = state(at(0.0, 0.0, 100.0), [0.0; 3], [5.0, 1.0, 0.0]);
+    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), tumbling);
+    let time_steps = TimeSteps { dt: 1e-2, steps: 100 };
+    let run = world.simulate_with(&RungeKutta4, &start, time_steps, |_, _| ()).unwrap();
+    assert_eq!(run.resolution.roughness, Some(0.0));
+}
+
+#[test]
+fn a_short_run_that_begins_in_contact_may_be_fine() {
+    let feet = corners([0.05; 3]);
+    let block = body("block", 0.3, 5e-4, &feet, 8e-4);
+    // Four feet of 1 cm² carry it 0.7 mm deep.
+    let depth = 0.3 * 9.81 / (4e-4 * 1e7);
+    let resting = state(at(0.0, 0.0, 0.05 - depth), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), block, (kelvin_voigt(0.3, 1e-2), HARD), resting);
+    let time_steps = TimeSteps { dt: 1e-5, steps: 50 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    assert!(run.resolution.is_fine(), "{}", run.resolution);
+}
+
+#[test]
+fn too_many_parts_are_told_as_such() {
+    let start = state(at(0.0, 0.0, 0.05), [0.3, 0.0, 0.0], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), cube(), (kelvin_voigt(0.3, 1e-5), SMOOTH), start);
+    let few = Adaptive { max_parts: 50, ..Adaptive::default() };
+    let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 }, |_, _| ());
+    assert!(matches!(run, Err(SimulationError::TooManyParts { max_parts: 50, .. })));
+}

@@ -1,0 +1,8 @@
+//! Rollouts of whole worlds: what every integrator must do, and gradients over random scenes.
+
+mod batch;
+mod driven;
+mod functions;
+mod gradients;
+mod groups;
+mod integrators;
