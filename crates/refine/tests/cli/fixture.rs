@@ -22,6 +22,16 @@ fn sample() -> &'static Path {
     })
 }
 
+/// Where all runs of this test run keep what a hand needs: to prepare it takes longer than most of them.
+fn kept() -> &'static Path {
+    static KEPT: OnceLock<PathBuf> = OnceLock::new();
+    KEPT.get_or_init(|| {
+        let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli-kept");
+        let _ = fs::remove_dir_all(&dir);
+        dir
+    })
+}
+
 /// A folder to work in, with the sample as `ds/`.
 pub(crate) struct Workplace {
     dir: tempfile::TempDir,
@@ -109,7 +119,7 @@ impl Workplace {
     pub(crate) fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_prehend"));
         command.args(arguments.split_whitespace()).current_dir(self.dir.path());
-        command.env("PREHEND_CACHE", "").env_remove("PREHEND_LOG").env_remove("CLICOLOR_FORCE");
+        command.env("PREHEND_CACHE", kept()).env_remove("PREHEND_LOG").env_remove("CLICOLOR_FORCE");
         command
     }
 

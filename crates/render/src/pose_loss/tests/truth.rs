@@ -196,7 +196,8 @@ fn data_gradients_of_scans_are_true() {
             let [truth, guess] = pair(&model, &camera, 70);
             let scene = Scene { model: &model, light: lamp(), camera };
             let limits = [(1, 0.998, 0.12), (4, 0.999, 0.02), (8, 0.999, 0.02)];
-            let found = scene.compare(&truth, &guess, limits.map(|limit| (contour(0.645), limit.0)));
+            let found =
+                scene.compare(&truth, &guess, limits.map(|limit| (contour(0.645), limit.0)));
             for ((samples, least, most), (cosine, error)) in limits.into_iter().zip(found) {
                 println!("{object} {} px, {samples}²: {cosine:.5} {error:.4}", camera.width);
                 assert!(cosine > least && error < most, "{object}: {cosine} {error}");
