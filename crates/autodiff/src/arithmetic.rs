@@ -33,7 +33,10 @@ macro_rules! impl_arithmetic {
             fn div(self, o: Self) -> Self {
                 let inverse = o.primal().recip();
                 let value = self.primal() / o.primal();
-                self.binary(o, value, [inverse, -value * inverse])
+                // The reciprocal of a subnormal number overflows, and a zero over it would have the slope 0 · ∞.
+                let by_divisor =
+                    if value.value() == 0.0 { -value / o.primal() } else { -value * inverse };
+                self.binary(o, value, [inverse, by_divisor])
             }
         }
         impl<$($generics)*> std::ops::Rem for $t {

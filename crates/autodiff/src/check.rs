@@ -37,7 +37,7 @@ pub fn finite_difference_jacobian(
 pub struct GradientError {
     /// Largest difference of an entry, relative to the largest entry of the reference.
     pub relative: f64,
-    /// Cosine of the angle between the two.
+    /// Cosine of the angle between the two; 0 where one of them is zero.
     pub cosine: f64,
 }
 
@@ -47,15 +47,19 @@ pub struct GradientError {
 /// If they differ in length.
 pub fn compare_gradients(gradient: &[f64], reference: &[f64]) -> GradientError {
     assert_eq!(gradient.len(), reference.len(), "lengths of the gradients");
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let scale = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);
+    let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);
+    let scales = [largest(gradient), largest(reference)];
     let worst = gradient.iter().zip(reference).fold(0.0, |m: f64, (a, b)| {
         let d = (a - b).abs();
         if d.is_nan() { f64::INFINITY } else { m.max(d) }
     });
-    let norms = (dot(gradient, gradient) * dot(reference, reference)).sqrt();
-    let cosine = dot(gradient, reference) / norms.max(f64::MIN_POSITIVE);
-    GradientError { relative: worst / scale, cosine }
+    // Both brought to the size of 1, so that no square leaves the range of f64.
+    let units = gradient.iter().zip(reference).map(|(a, b)| [a / scales[0], b / scales[1]]);
+    let [dot, squares, others] = units.fold([0.0; 3], |[dot, squares, others], [a, b]| {
+        [dot + a * b, squares + a * a, others + b * b]
+    });
+    let cosine = dot / (squares * others).sqrt().max(f64::MIN_POSITIVE);
+    GradientError { relative: worst / scales[1], cosine }
 }
 
 #[cfg(test)]

@@ -135,7 +135,8 @@ let modulus = num_traits::Signed::abs(&self);
                 atan |c, x, _y| (c(1.0) + x * x).recip();
                 sinh |_c, x, _y| x.cosh();
                 cosh |_c, x, _y| x.sinh();
-                tanh |_c, x, _y| (x.cosh() * x.cosh()).recip();
+                // Beyond, the square overflows, and the slope is less than any normal number.
+                tanh |c, x, _y| if x.value().abs() > 355.0 { c(0.0) } else { (x.cosh() * x.cosh()).recip() };
                 asinh |c, x, _y| x.hypot(c(1.0)).recip();
                 acosh |c, x, _y| ((x - c(1.0)).sqrt() * (x + c(1.0)).sqrt()).recip();
                 atanh |c, x, _y| ((c(1.0) - x) * (c(1.0) + x)).recip();
@@ -172,7 +173,13 @@ let modulus = num_traits::Signed::abs(&self);
                 let by_base = if Differentiable::is_constant(self) || (at_zero && e.value() == 0.0) {
                     Self::inner(0.0)
                 } else {
-                    e * x.powf(e - Self::inner(1.0))
+                    let below = x.powf(e - Self::inner(1.0));
+                    // The reciprocal of a subnormal base overflows; to the power of 0 it has no slope.
+                    if e.value() == 0.0 && below.value().is_infinite() {
+                        Self::inner(0.0)
+                    } else {
+                        e * below
+                    }
                 };
                 let by_exponent = if Differentiable::is_constant(n) || (at_zero && value.value() == 0.0) {
                     Self::inner(0.0)

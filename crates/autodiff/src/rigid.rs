@@ -62,7 +62,7 @@ pub fn conjugated<S: Scalar>(
 /// Angular acceleration \[rad/s²\] of a free body by Euler's equation, α = I⁻¹ (τ − ω × I ω), I = R diag(J) Rᵀ.
 ///
 /// `rotation` maps the body's principal axes into the frame of `velocity` \[rad/s\], `torque` \[N·m\] and the
-/// result; `inertia` are the principal moments \[kg·m²\].
+/// result; `inertia` are the principal moments \[kg·m²\], all positive.
 ///
 /// In reverse mode the derivative is that along turns of the body: what would change the length of the
 /// quaternion has none.

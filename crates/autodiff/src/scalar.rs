@@ -21,7 +21,9 @@ use crate::vjp::CustomVjp;
 ///
 /// At points without a derivative `abs` and `copysign` have slope 0, as has `hypot` at (0, 0); `min` and `max`
 /// follow the first operand on a tie; rounding has slope 0. At the edge of its domain a function has the slope
-/// from inside, which may be infinite.
+/// from inside, which may be infinite. Derivatives are NaN where there are none at all: those of `atan2` at (0, 0), and of
+/// `powf` by the exponent at a negative base. Elsewhere a finite value has no NaN among its first derivatives; what is beyond the range
+/// of `f64`, such as the slope 1/x of a logarithm at a subnormal number, is infinite.
 pub trait Scalar: RealField + Copy + Default {
     /// Of which order the derivatives are that it carries: 0 for plain numbers, 2 for forward mode over another mode.
     ///

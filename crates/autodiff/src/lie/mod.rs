@@ -15,6 +15,9 @@
 //!
 //! [`lift`] makes constants of a pose. [`twist_row`] is the derivative of a point's coordinate by a left twist about a center, [`perturb_about`] that twist.
 //!
+//! All are finite, with their first and second derivatives, for twists of entries up to 10⁶⁰ (products of several must be in range), inverse Jacobians
+//! except at whole turns.
+//!
 //! A right Jacobian moves the perturbation to the other side: exp(ξ + δ) ≈ exp(ξ) exp(J_r δ). It is the
 //! left one of −ξ.
 
