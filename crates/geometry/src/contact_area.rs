@@ -14,7 +14,7 @@ const LOOK: f64 = 4.0;
 ///
 /// `samples` are area-uniform points of the first surface ([`surface_samples`](crate::sample::surface_samples)), which
 /// `t_surface_samples` brings into the frame of `surface`. The standard error is at most
-/// area·√(f(1−f)/n), f the fraction of the n samples that are near. NaN without samples.
+/// area·√(f(1−f)/n), f the fraction of the n samples that are near. Zero without samples, which a surface without area has none of.
 ///
 /// A distance changes by no more than its point moves, so the distance of one sample answers for those around it: samples
 /// in the order of their faces, as they are drawn, need a query for few of them.
@@ -46,7 +46,7 @@ pub fn contact_area(
         chunk.iter().filter(is_near).count()
     };
     let count: usize = samples.par_chunks(CHUNK).map(near).sum();
-    count as f64 / samples.len() as f64 * area
+    count as f64 / samples.len().max(1) as f64 * area
 }
 
 #[cfg(test)]
