@@ -191,7 +191,7 @@ proptest! {
             }
         }
         let tree = KdTree::new(&cloud).unwrap();
-        prop_assert!(estimate_normals(&tree, 5, &Point3::new(0.0, 0.0, 1e300)).iter().all(|n| finite(n)));
+        prop_assert!(estimate_normals(&tree, 5, &Point3::new(0.0, 0.0, 1e300)).iter().all(finite));
     }
 
     #[test]
