@@ -14,7 +14,7 @@ const LOOK: f64 = 4.0;
 ///
 /// `samples` are area-uniform points of the first surface ([`surface_samples`](crate::sample::surface_samples)), which
 /// `t_surface_samples` brings into the frame of `surface`. The standard error is at most
-/// area·√(f(1−f)/n), f the fraction of the n samples that are near. NaN without samples.
+/// area·√(f(1−f)/n), f the fraction of the n samples that are near. Zero without samples, which a surface without area has none of.
 ///
 /// A distance changes by no more than its point moves, so the distance of one sample answers for those around it: samples
 /// in the order of their faces, as they are drawn, need a query for few of them.
@@ -46,7 +46,7 @@ pub fn contact_area(
         chunk.iter().filter(is_near).count()
     };
     let count: usize = samples.par_chunks(CHUNK).map(near).sum();
-    count as f64 / samples.len() as f64 * area
+    count as f64 / samples.len().max(1) as f64 * area
 }
 
 #[cfg(test)]
@@ -73,7 +73,7 @@ mod tests {
         let area = |z: f64| contact_area(&samples, 0.01, &pose(z), &plane(), 0.005);
         assert!((area(0.4999) - 0.01 * 10.0 / 200.0).abs() < 1e-13, "{}", area(0.4999));
         assert_eq!(area(3.5), 0.0);
-        assert!(contact_area(&[], 0.01, &pose(0.5), &plane(), 0.005).is_nan());
+        assert_eq!(contact_area(&[], 0.0, &pose(0.5), &plane(), 0.005), 0.0);
     }
 
     #[test]

@@ -36,6 +36,12 @@ pub enum MassError {
         /// Signed volume \[m³\].
         volume: f64,
     },
+    /// Mass or inertia beyond the range of numbers.
+    #[error("the mass or inertia of a solid of {volume:e} m³ is beyond the range of numbers")]
+    Range {
+        /// Volume \[m³\].
+        volume: f64,
+    },
     /// A density or mass that is not positive and finite.
     #[error("{what} must be positive and finite, not {value}")]
     BadScale {
@@ -51,7 +57,7 @@ pub enum MassError {
 /// By [`Moments::enclosed`]. Overlapping components count twice.
 ///
 /// # Errors
-/// [`MassError`] where the mesh is open, encloses no volume or faces inward, or the density is not positive.
+/// [`MassError`] where the mesh is open, encloses no volume or faces inward, the density is not positive, or a result is not finite.
 pub fn mass_properties(mesh: &TriMesh, density: f64) -> Result<MassProperties, MassError> {
     let open = closedness(mesh);
     if open > 0 {
@@ -72,19 +78,27 @@ pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassPropert
         return Err(MassError::NoVolume { volume });
     }
     let (mass, center, inertia) = moments.of_density(density);
-    Ok(MassProperties { volume, mass, center_of_mass: origin + center.coords, inertia })
+    MassProperties { volume, mass, center_of_mass: origin + center.coords, inertia }.in_range()
 }
 
 impl MassProperties {
     /// The same solid weighing `mass` \[kg\].
     ///
     /// # Errors
-    /// [`MassError::BadScale`] where the mass is not positive and finite.
+    /// [`MassError::BadScale`] where the mass is not positive and finite, [`MassError::Range`] where the inertia would not be.
     pub fn with_mass(self, mass: f64) -> Result<Self, MassError> {
         if !(mass > 0.0 && mass.is_finite()) {
             return Err(MassError::BadScale { what: "mass", value: mass });
         }
-        Ok(Self { mass, inertia: self.inertia * (mass / self.mass), ..self })
+        Self { mass, inertia: self.inertia * (mass / self.mass), ..self }.in_range()
+    }
+
+    fn in_range(self) -> Result<Self, MassError> {
+        let mut numbers = self.inertia.iter().chain(self.center_of_mass.iter());
+        if self.mass > 0.0 && self.mass.is_finite() && numbers.all(|x| x.is_finite()) {
+            return Ok(self);
+        }
+        Err(MassError::Range { volume: self.volume })
     }
 }
 

@@ -75,8 +75,12 @@ impl<S: Scalar> Moments<S> {
     }
 
     /// Mass \[kg\], center of mass \[m\] and inertia about it \[kg m²\] at a uniform `density` \[kg/m³\].
+    /// The center of what has no volume is the origin.
     pub fn of_density(&self, density: S) -> (S, Point3<S>, Matrix3<S>) {
-        let center = self.first / self.volume;
+        let center = match self.volume.value() {
+            0.0 => Vector3::zeros(),
+            _ => self.first / self.volume,
+        };
         let central = (self.second - center * center.transpose() * self.volume) * density;
         let inertia = Matrix3::from_diagonal_element(central.trace()) - central;
         (self.volume * density, center.into(), inertia)

@@ -3,7 +3,8 @@
 /// A loss ρ of a squared residual r² that is ½ r² near zero and grows more slowly, or no more, beyond `scale`.
 ///
 /// Forms as in Z. Zhang, "Parameter estimation techniques", 1997, table 1, and J. Barron, "A general and adaptive
-/// robust loss function", 2019. `scale` is in the residual's unit, \[m\] for distances, and positive.
+/// robust loss function", 2019. `scale` is in the residual's unit, \[m\] for distances, and positive; below 1e-75 and above 1e75 it counts
+/// as these.
 ///
 /// ```
 /// use prehend_geometry::RobustKernel;
@@ -47,12 +48,14 @@ impl RobustKernel {
             Self::Squared => 0.5 * r2,
             Self::Huber { scale } if r2 <= scale * scale => 0.5 * r2,
             Self::Huber { scale } => scale * (r2.sqrt() - 0.5 * scale),
-            Self::Cauchy { scale } => 0.5 * scale * scale * (r2 / (scale * scale)).ln_1p(),
-            Self::GemanMcClure { scale } => 0.5 * r2 / (1.0 + r2 / (scale * scale)),
+            Self::Cauchy { scale } => {
+                0.5 * square(scale) * (r2 / square(scale)).min(f64::MAX).ln_1p()
+            }
+            Self::GemanMcClure { scale } => 0.5 * r2 / (1.0 + r2 / square(scale)),
             Self::Tukey { scale } => {
-                let u = (r2 / (scale * scale)).min(1.0);
+                let u = (r2 / square(scale)).min(1.0);
                 // 1 − (1 − u)³ without cancellation.
-                scale * scale / 6.0 * u * (3.0 - u * (3.0 - u))
+                square(scale) / 6.0 * u * (3.0 - u * (3.0 - u))
             }
         }
     }
@@ -65,9 +68,9 @@ impl RobustKernel {
             Self::Squared => 1.0,
             Self::Huber { scale } if r2 <= scale * scale => 1.0,
             Self::Huber { scale } => scale / r2.sqrt(),
-            Self::Cauchy { scale } => 1.0 / (1.0 + r2 / (scale * scale)),
-            Self::GemanMcClure { scale } => (1.0 + r2 / (scale * scale)).powi(-2),
-            Self::Tukey { scale } => (1.0 - r2 / (scale * scale)).max(0.0).powi(2),
+            Self::Cauchy { scale } => 1.0 / (1.0 + r2 / square(scale)),
+            Self::GemanMcClure { scale } => (1.0 + r2 / square(scale)).powi(-2),
+            Self::Tukey { scale } => (1.0 - r2 / square(scale)).max(0.0).powi(2),
         }
     }
 
@@ -80,18 +83,16 @@ impl RobustKernel {
             Self::Huber { scale } => -0.5 * scale / (r2 * r2.sqrt()),
             Self::Cauchy { .. } => -self.weight(r2).powi(2) * self.curvature(),
             Self::GemanMcClure { scale } => {
-                -2.0 * self.curvature() * (1.0 + r2 / (scale * scale)).powi(-3)
+                -2.0 * self.curvature() * (1.0 + r2 / square(scale)).powi(-3)
             }
-            Self::Tukey { scale } => {
-                -2.0 * self.curvature() * (1.0 - r2 / (scale * scale)).max(0.0)
-            }
+            Self::Tukey { scale } => -2.0 * self.curvature() * (1.0 - r2 / square(scale)).max(0.0),
         }
     }
 
     /// 1/s².
     #[inline]
     fn curvature(self) -> f64 {
-        self.scale().map_or(0.0, |s| 1.0 / (s * s))
+        self.scale().map_or(0.0, |s| 1.0 / square(s))
     }
 
     /// The scale \[the residual's unit\]; the squared loss has none.
@@ -121,6 +122,13 @@ impl RobustKernel {
     pub fn is_valid(self) -> bool {
         self.scale().is_none_or(|s| s > 0.0 && s.is_finite())
     }
+}
+
+/// The square of a scale, within a range that ratios to it do not leave for 0 · ∞.
+#[inline]
+fn square(scale: f64) -> f64 {
+    let scale = scale.clamp(1e-75, 1e75);
+    scale * scale
 }
 
 #[cfg(test)]

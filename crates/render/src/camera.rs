@@ -41,6 +41,14 @@ pub enum CameraError {
         /// The focal length \[px\].
         value: f64,
     },
+    /// A focal length is larger than [`Camera::LONGEST`].
+    #[error("focal length {name} is {value} px, expected 1e9 at most")]
+    TooLong {
+        /// `"fx"` or `"fy"`.
+        name: &'static str,
+        /// The focal length \[px\].
+        value: f64,
+    },
     /// An entry that must be 0 or 1 is not: the matrix is skewed, transposed or not a camera matrix.
     #[error("camera matrix entry {index} is {value}, expected {expected} (row-major, no skew)")]
     Layout {
@@ -62,11 +70,14 @@ pub enum CameraError {
 }
 
 impl Camera {
+    /// The longest focal length \[px\]: derivatives in single precision hold its square.
+    pub const LONGEST: f64 = 1e9;
+
     /// A camera from its row-major matrix `[fx, 0, cx, 0, fy, cy, 0, 0, 1]` \[px\] and image size.
     ///
     /// # Errors
-    /// When an entry is not finite, a focal length is not positive, the matrix has skew or the image is
-    /// empty.
+    /// When an entry is not finite, a focal length is not positive or longer than [`Camera::LONGEST`], the matrix has
+    /// skew or the image is empty.
     pub fn from_k(k: [f64; 9], width: usize, height: usize) -> Result<Self, CameraError> {
         for (index, expected) in [(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)] {
             let value = k[index];
@@ -82,7 +93,7 @@ impl Camera {
     /// Whether a camera can be like this, whoever made it.
     ///
     /// # Errors
-    /// When a number is not finite, a focal length is not positive or the image is empty.
+    /// When a number is not finite, a focal length is not positive or longer than [`Camera::LONGEST`], or the image is empty.
     pub fn check(&self) -> Result<(), CameraError> {
         let Self { width, height, .. } = *self;
         if width == 0 || height == 0 {
@@ -96,6 +107,9 @@ impl Camera {
             if value <= 0.0 {
                 return Err(CameraError::FocalLength { name, value });
             }
+            if value > Self::LONGEST {
+                return Err(CameraError::TooLong { name, value });
+            }
         }
         Ok(())
     }
@@ -106,14 +120,16 @@ impl Camera {
     }
 
     /// Image position (column, row) \[px\] of a point in the camera frame \[m\]; `None` unless it lies in
-    /// front of the camera (Z > 0). The position may lie outside the image.
+    /// front of the camera (Z > 0). The position may lie outside the image, but not so far that it is no number.
     pub fn project(&self, point: &Point3<f64>) -> Option<Vector2<f64>> {
-        (point.z > 0.0).then(|| {
+        let position = || {
             Vector2::new(
                 self.fx * point.x / point.z + self.cx,
                 self.fy * point.y / point.z + self.cy,
             )
-        })
+        };
+        let finite = |position: &Vector2<f64>| position.iter().all(|p| p.is_finite());
+        (point.z > 0.0).then(position).filter(finite)
     }
 
     /// The point in the camera frame \[m\] at image position (`u`, `v`) \[px\] and depth `z` (its Z) \[m\].
@@ -194,6 +210,7 @@ mod tests {
         };
         assert!(matches!(with(2, f64::NAN), CameraError::NotFinite { index: 2, .. }));
         assert!(matches!(with(4, -1.0), CameraError::FocalLength { name: "fy", .. }));
+        assert!(matches!(with(0, 1e30), CameraError::TooLong { name: "fx", .. }));
         assert!(matches!(with(1, 0.3), CameraError::Layout { index: 1, .. }));
         assert!(matches!(Camera::from_k(K, 0, 480), Err(CameraError::Empty { .. })));
     }

@@ -10,10 +10,10 @@ pub fn look_at(
     up: &Vector3<f64>,
     roll: f64,
 ) -> Isometry3<f64> {
-    let forward = (target - eye).try_normalize(1e-12).unwrap_or_else(Vector3::z);
+    let forward = in_range(&(target - eye)).try_normalize(1e-12).unwrap_or_else(Vector3::z);
     // Straight up or down, any direction serves as right.
     let right = forward
-        .cross(up)
+        .cross(&in_range(up))
         .try_normalize(1e-9)
         .or_else(|| forward.cross(&Vector3::x()).try_normalize(1e-6))
         .unwrap_or_else(|| forward.cross(&Vector3::y()).normalize());
@@ -22,6 +22,11 @@ pub fn look_at(
     let upright = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll) * upright;
     Isometry3::from_parts(Translation3::from(-(rotation * eye.coords)), rotation)
+}
+
+/// The vector, or a shorter one of its direction whose square is a number.
+fn in_range(v: &Vector3<f64>) -> Vector3<f64> {
+    if v.amax() > 1e150 { v / v.amax() } else { *v }
 }
 
 #[cfg(test)]

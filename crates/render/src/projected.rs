@@ -181,7 +181,8 @@ pub(crate) fn barycentric(corners: [Vec3; 3], at: Vec2) -> [f32; 3] {
     let [a, b, c] = edge_functions(corners, at);
     let weights = [a * corners[0].z, b * corners[1].z, c * corners[2].z];
     let sum = weights[0] + weights[1] + weights[2];
-    let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
+    // The reciprocal of a subnormal number is infinite.
+    let scale = if sum.abs() < f32::MIN_POSITIVE { 0.0 } else { 1.0 / sum };
     let (second, third) = (weights[1] * scale, weights[2] * scale);
     [1.0 - second - third, second, third]
 }

@@ -17,6 +17,7 @@ pub struct ClosestDerivative {
     /// `p - c` \[m\].
     pub offset: Vector3<f64>,
     /// Gradients of the barycentric weights by the closest point, along the face \[1/m\]: by the query each is multiplied by `by_query`.
+    /// Zero on a face without area, whose weights are not unique.
     pub weight_gradients: [Vector3<f64>; 3],
     barycentric: [f64; 3],
 }
@@ -72,8 +73,10 @@ impl ClosestPoints {
         let w = closest.barycentric;
         // Surface gradients of the weights of the second and third corner.
         let area = t.ab.cross(&t.ac).norm();
-        let second = t.ac.cross(&t.normal) / area;
-        let third = t.normal.cross(&t.ab) / area;
+        // Without area the normal is zero, too.
+        let per_area = if area > 0.0 { 1.0 / area } else { 0.0 };
+        let second = t.ac.cross(&t.normal) * per_area;
+        let third = t.normal.cross(&t.ab) * per_area;
         let gradients = [-second - third, second, third];
         let mut by_query = Matrix3::zeros();
         let mut by_corners = [Matrix3::zeros(); 3];

@@ -66,7 +66,8 @@ impl Degeneracy {
 
 /// What brings the columns of a twist to meters of motion.
 fn scaling(length: f64) -> Vector6<f64> {
-    let turn = if length > 0.0 { 1.0 / length } else { 1.0 };
+    // What is smaller cannot be turned, and squares of its reciprocal leave the range of numbers.
+    let turn = if length > 1e-60 { 1.0 / length } else { 1.0 };
     Vector6::new(1.0, 1.0, 1.0, turn, turn, turn)
 }
 

@@ -34,7 +34,7 @@ impl<S: Scalar> Moments<S> {
     /// All within `border` \[m\] of the convex polyhedron of `triangles`, corners counterclockwise from outside: the polyhedron, a
     /// prism on each face, a sector of a cylinder on each edge and of a ball on each vertex.
     ///
-    /// Edges with a triangle on one side only are left out: the surface must be closed.
+    /// Edges with a triangle on one side only, and those of triangles without area, are left out: the surface must be closed.
     pub fn round_convex(vertices: &[Point3<S>], triangles: &[[usize; 3]], border: S) -> Self {
         let corners = |triangle: &[usize; 3]| triangle.map(|i| vertices[i]);
         let faces: Vec<Face<S>> = triangles.iter().map(|t| Face::new(corners(t))).collect();
@@ -77,11 +77,11 @@ impl<S: Scalar> Face<S> {
     fn new(corners: [Point3<S>; 3]) -> Self {
         let [a, b, c] = corners.map(|p| p.coords);
         let cross = (b - a).cross(&(c - a));
-        let (twice, sum) = (cross.norm(), a + b + c);
+        let (twice, sum) = (norm(&cross), a + b + c);
         let area = twice.times(0.5);
         let squares = square(&sum) + square(&a) + square(&b) + square(&c);
         Self {
-            normal: cross / twice,
+            normal: if twice.value() > 0.0 { cross / twice } else { Vector3::zeros() },
             area,
             first: sum * area.times(1.0 / 3.0),
             second: squares * area.times(1.0 / 12.0),
@@ -185,6 +185,12 @@ impl<S: Scalar> Tip<S> {
                 + second * r5,
         }
     }
+}
+
+/// The length of a vector, without a derivative where it is zero.
+fn norm<S: Scalar>(a: &Vector3<S>) -> S {
+    let square = a.norm_squared();
+    if square.value() > 0.0 { square.sqrt() } else { S::zero() }
 }
 
 /// a aᵀ.

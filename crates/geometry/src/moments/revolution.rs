@@ -70,7 +70,8 @@ impl<S: Scalar> Moments<S> {
     pub fn round_cone(half_height: S, radius: S, border: S) -> Self {
         let right = S::constant(FRAC_PI_2);
         // Where the normal of the side points.
-        let tilt = radius.atan2(half_height.times(2.0));
+        let flat = radius.value() == 0.0 && half_height.value() == 0.0;
+        let tilt = S::zero().select(flat, radius.atan2(half_height.times(2.0)));
         let shift = [border * tilt.cos(), border * tilt.sin()];
         let arc = |center: [S; 2], angles: [S; 2]| Piece::Arc { center, radius: border, angles };
         let [base, tip] = [[radius, -half_height], [S::zero(), half_height]];

@@ -2,6 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
+/// Farthest position \[m\], whose squares are well within range.
+const FARTHEST: f64 = 1e100;
+
 /// Largest number of samples a grid may have: half a gigabyte.
 pub const MAX_SAMPLES: usize = 64 << 20;
 
@@ -21,8 +24,8 @@ pub enum SdfError {
     /// The box around the shape is not finite or turned around.
     #[error("the box around the shape is not finite or has a negative size")]
     Bounds,
-    /// The first sample is not at a finite position.
-    #[error("the first sample of the distance grid is not at a finite position")]
+    /// A sample is not at a finite position, or farther than 1e100 m from the origin.
+    #[error("the distance grid is not at a finite position within 1e100 m")]
     Origin,
     /// Fewer than two samples along an axis.
     #[error("the distance grid has {count} samples along axis {axis}, fewer than 2")]
@@ -56,11 +59,13 @@ impl Lattice {
     /// `dims` samples along each axis, `spacing` \[m\] apart, the first at `origin` \[m\].
     ///
     /// # Errors
-    /// [`SdfError`] for a spacing that is not positive, an origin that is not finite, fewer than two samples along an
+    /// [`SdfError`] for a spacing that is not positive (1e-100 m at least), samples beyond 1e100 m, fewer than two samples along an
     /// axis, or more than [`MAX_SAMPLES`] in all.
     pub fn new(origin: Point3<f64>, spacing: f64, dims: [usize; 3]) -> Result<Self, SdfError> {
         check_spacing(spacing)?;
-        if !origin.iter().all(|x| x.is_finite()) {
+        let within = |x: f64| x.abs() <= FARTHEST;
+        let last = |axis: usize| origin[axis] + dims[axis] as f64 * spacing;
+        if !(0..3).all(|axis| within(origin[axis]) && within(last(axis))) {
             return Err(SdfError::Origin);
         }
         if let Some(axis) = dims.iter().position(|&n| n < 2) {
@@ -125,8 +130,9 @@ impl Lattice {
 }
 
 fn check_spacing(spacing: f64) -> Result<(), SdfError> {
-    if spacing.is_finite() && spacing > 0.0 {
+    if spacing.is_finite() && spacing >= 1.0 / FARTHEST {
         return Ok(());
     }
-    Err(SdfError::Length { name: "spacing", value: spacing, requirement: "finite and positive" })
+    let requirement = "finite and positive, 1e-100 at least";
+    Err(SdfError::Length { name: "spacing", value: spacing, requirement })
 }

@@ -8,6 +8,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+/// Cells beyond the border from where on a spline is constant: the product of three such numbers is still far from the end of the range.
+const FARTHEST: f64 = 1e60;
+
 /// Basis values and derivatives of the four coefficients around a point, with respect to the grid
 /// coordinate in units of the spacing.
 pub(super) struct Basis {
@@ -38,6 +41,7 @@ impl Basis {
         let mut curvature = [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t];
         let beyond = x - inside;
         if beyond != 0.0 {
+            let beyond = beyond.clamp(-FARTHEST, FARTHEST);
             for i in 0..4 {
                 value[i] += beyond * slope[i];
             }

@@ -97,7 +97,8 @@ pub fn rounded_box(shape: &RoundedBox) -> TriMesh {
     let half = 0.5 * shape.size;
     let radius = shape.radius.min(half.min()).max(0.0);
     let stops = [0, 1, 2].map(|a| axis_stops(half[a], radius, shape.arc_steps, shape.cell));
-    let sheet = [2.0 * (shape.size.x + shape.size.y), shape.size.z + shape.size.x];
+    let sheet = [2.0 * (shape.size.x + shape.size.y), shape.size.z + shape.size.x]
+        .map(|side| side.max(f64::MIN_POSITIVE));
     let mut mesh = TriMesh::default();
     let mut uvs = Vec::new();
     for face in BoxFace::ALL {
@@ -155,7 +156,7 @@ fn place(q: Vector3<f64>, half: Vector3<f64>, radius: f64, bulge: Vector3<f64>) 
     let core = half.add_scalar(-radius);
     let inner = q.zip_map(&core, |c, h| c.max(-h).min(h));
     let rounded = (q - inner).try_normalize(0.0).map_or(q, |n| inner + radius * n);
-    let s = q.component_div(&half);
+    let s = q.zip_map(&half, |q, half| if half > 0.0 { q / half } else { 0.0 });
     let fall = s.map(|c| 1.0 - c * c);
     let weight = Vector3::new(s.x * fall.y * fall.z, s.y * fall.z * fall.x, s.z * fall.x * fall.y);
     rounded + bulge.component_mul(&weight)

@@ -30,7 +30,10 @@ pub fn revolve_ring(profile: &[[f64; 2]], segments: usize) -> TriMesh {
         for (i, length) in lengths.iter().enumerate() {
             let [r, z] = at(i);
             mesh.vertices.push(Point3::new(r * cos, r * sin, z));
-            uvs.push([j as f32 / columns as f32, (length / lengths[rows]) as f32]);
+            uvs.push([
+                j as f32 / columns as f32,
+                (length / lengths[rows].max(f64::MIN_POSITIVE)) as f32,
+            ]);
         }
     }
     for j in 0..columns {

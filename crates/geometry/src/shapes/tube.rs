@@ -9,10 +9,12 @@ use crate::mesh::TriMesh;
 /// The points within `radius` \[m\] of `path` \[m\], in `segments` columns (at least three), with a hemisphere of `rows` rows (at
 /// least one) at each end.
 ///
-/// Neighboring points of the path must differ, and it should bend by less than the radius: a row of vertices lies across each
-/// of its points, turned from the last one without a twist. Fewer than two points give an empty mesh.
+/// Points that repeat the one before count once, and the path should bend by less than the radius: a row of vertices lies across each
+/// of its points, turned from the last one without a twist. Fewer than two different points give an empty mesh.
 pub fn tube(path: &[Point3<f64>], radius: f64, segments: usize, rows: usize) -> TriMesh {
     let (segments, rows) = (segments.max(3), rows.max(1));
+    let mut path = path.to_vec();
+    path.dedup_by(|next, last| (*next - *last).norm() == 0.0);
     let sides: Vec<Vector3<f64>> = path.windows(2).map(|p| (p[1] - p[0]).normalize()).collect();
     let (Some(first), Some(last)) = (sides.first(), sides.last()) else {
         return TriMesh::default();
@@ -39,7 +41,8 @@ pub fn tube(path: &[Point3<f64>], radius: f64, segments: usize, rows: usize) -> 
     }
     for (i, &center) in path.iter().enumerate() {
         let [before, after] = [i.saturating_sub(1), i.min(sides.len() - 1)].map(|k| sides[k]);
-        ring(center, &(before + after).normalize(), radius);
+        // Where the path turns back there is no direction between.
+        ring(center, &(before + after).try_normalize(0.0).unwrap_or(after), radius);
     }
     for row in (1..rows).rev() {
         let (sin, cos) = (FRAC_PI_2 * row as f64 / rows as f64).sin_cos();

@@ -52,7 +52,8 @@ impl BrownConrady {
         [k1, k2, p1, p2, k3, k4, k5, k6]
     }
 
-    /// Where the lens shows an ideal image position; both as X/Z, Y/Z.
+    /// Where the lens shows an ideal image position; both as X/Z, Y/Z. Not finite where the denominator vanishes or powers
+    /// leave the range of numbers, which lies beyond the fold.
     pub fn distort<S: Scalar>(&self, ideal: Vector2<S>) -> Vector2<S> {
         let (x, y) = (ideal.x, ideal.y);
         let r2 = x * x + y * y;

@@ -32,7 +32,8 @@ impl KannalaBrandt {
         Ok(Self { radial })
     }
 
-    /// Where the lens shows an ideal image position; both as X/Z, Y/Z.
+    /// Where the lens shows an ideal image position; both as X/Z, Y/Z. Not finite for positions beyond 1e150 and coefficients
+    /// beyond 1e300.
     pub fn distort<S: Scalar>(&self, ideal: Vector2<S>) -> Vector2<S> {
         let r2 = ideal.norm_squared();
         // θ/r, and θ².

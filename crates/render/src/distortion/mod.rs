@@ -80,7 +80,7 @@ impl Distortion {
                 (low[k], high[k]) = (at.min(low[k]), at.max(high[k]));
             }
         }
-        let size = |k: usize| (high[k].ceil() - low[k].floor()) as usize + 1;
+        let size = |k: usize| ((high[k].ceil() - low[k].floor()) as usize).saturating_add(1);
         let [left, top] = low.map(f64::floor);
         Camera { cx: cx - left, cy: cy - top, width: size(0), height: size(1), ..*camera }
     }

@@ -25,13 +25,17 @@ fn check(
     if holds { Ok(()) } else { Err(OptionError { name, value, expected }) }
 }
 
+/// Smaller ones than its inverse vanish when squared in single precision, and larger ones leave its range.
+const LARGEST: f64 = 1e15;
+
 fn positive(name: &'static str, value: f64) -> Result<(), OptionError> {
-    // Smaller ones vanish when squared in single precision.
-    check(name, value, "a finite number of at least 1e-15", value >= 1e-15 && value.is_finite())
+    let holds = (1.0 / LARGEST..=LARGEST).contains(&value);
+    check(name, value, "a number from 1e-15 to 1e15", holds)
 }
 
 fn weight(name: &'static str, value: f64) -> Result<(), OptionError> {
-    check(name, value, "a finite number of at least 0", value >= 0.0 && value.is_finite())
+    // Squares of derivatives are multiplied by it, in single precision.
+    check(name, value, "a number from 0 to 1e12", (0.0..=1e12).contains(&value))
 }
 
 impl PoseLoss {
@@ -62,7 +66,8 @@ impl SoftRasOptions {
         let few = (1..=Self::MOST_FACES).contains(&faces);
         check("faces_per_pixel", faces as f64, "1 to 64", few)?;
         let (near, far) = (self.z_near, self.z_far);
-        check("z_far", far, "a finite number above z_near", far > near && far.is_finite())
+        let holds = far > near && near.abs() <= LARGEST && far.abs() <= LARGEST;
+        check("z_far", far, "above z_near, neither beyond 1e15", holds)
     }
 }
 
@@ -72,7 +77,9 @@ impl LossOptions {
         weight("mask_weight", self.mask_weight)?;
         if let Some(depth) = self.depth {
             weight("depth.weight", depth.weight)?;
-            positive("depth.scale", depth.scale)?;
+            let scale = depth.scale;
+            let holds = (1e-9..=LARGEST).contains(&scale);
+            check("depth.scale", scale, "a number from 1e-9 to 1e15", holds)?;
             let limit = depth.truncation;
             check("depth.truncation", limit, "above 0, or infinite", limit > 0.0)?;
         }
@@ -100,7 +107,7 @@ mod tests {
             let mode = Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() });
             assert_eq!(named(mode, plain), "half_width");
         }
-        for scale in [0.0, -1.0, f64::NAN, 1e-25] {
+        for scale in [0.0, -1.0, f64::NAN, 1e-25, 1e20] {
             for kernel in [RobustKernel::Huber { scale }, RobustKernel::Cauchy { scale }] {
                 assert_eq!(named(soft, LossOptions { kernel, ..plain }), "kernel.scale");
             }
@@ -114,6 +121,7 @@ mod tests {
             named(soft, with(DepthOptions { truncation: -0.1, ..depth })),
             "depth.truncation"
         );
+        assert_eq!(named(soft, LossOptions { mask_weight: 1e300, ..plain }), "mask_weight");
         let nan = LossOptions { color_weight: f64::NAN, ..plain };
         assert_eq!(named(soft, nan), "color_weight");
         let of = |change: fn(&mut SoftRasOptions)| {
@@ -126,9 +134,6 @@ mod tests {
         assert_eq!((of(|o| o.sigma = 0.0), of(|o| o.gamma = -1.0)), ("sigma", "gamma"));
         assert_eq!(PoseLoss::default().with_samples(0).check().unwrap_err().name, "samples");
         let error = PoseLoss::new(soft, nan).check().unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "color_weight is NaN, expected a finite number of at least 0"
-        );
+        assert_eq!(error.to_string(), "color_weight is NaN, expected a number from 0 to 1e12");
     }
 }

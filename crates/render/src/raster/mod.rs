@@ -21,8 +21,9 @@ pub(crate) const MISS: u32 = u32::MAX;
 /// The smallest whole number not below `v` ≥ 0 (`f32::ceil` is a function call on baseline x86-64).
 #[inline(always)]
 fn ceil(v: f32) -> i32 {
+    // Wraps where `v` is beyond all pixels, which callers look at themselves.
     let whole = v as i32;
-    whole + i32::from((whole as f32) < v)
+    whole.wrapping_add(i32::from((whole as f32) < v))
 }
 
 /// The smaller and the larger of three numbers (`f32::min` would look for a NaN).

@@ -81,7 +81,7 @@ impl SoftFaces {
 
 /// The tiles (of [`RUN`] pixels from `first` on) that lie between two places, if any.
 fn tiles_between(low: f32, high: f32, first: usize, end: usize) -> std::ops::Range<usize> {
-    if high < first as f32 || low >= end as f32 {
+    if first >= end || high < first as f32 || low >= end as f32 {
         return 0..0;
     }
     // Casts to integers saturate.
