@@ -116,17 +116,17 @@ pub fn fuzz(seconds: u64, only: &[&str]) -> Result<Vec<Row>> {
 /// # Errors
 /// If cargo cannot be run.
 pub fn numbers() -> Result<Vec<Row>> {
-    let golden = ["test", "--release", "--package", "prehend-reliability", "--test", "golden"];
+    // Programs of that name, and modules of other programs.
+    let tests = |words: &[&str]| cargo(&[&["test", "--release", "--workspace"], words].concat());
+    let golden = ["--test", "golden"];
     let mut rows = vec![
-        tested(
-            cargo(&["test", "--release", "--workspace", "--tests", "finite"]),
-            "finite numbers",
-        )?,
-        tested(cargo(&golden), "golden numbers, to the bit")?,
+        tested(tests(&["--test", "finite*"]), "finite numbers of autodiff, geometry and render")?,
+        tested(tests(&["--test", "it", "finite"]), "finite numbers of sim and refine")?,
+        tested(tests(&golden), "golden numbers, to the bit")?,
     ];
     let old = Command::new("qemu-x86_64").arg("--version").stdout(Stdio::null()).status();
     if cfg!(target_arch = "x86_64") && old.is_ok() {
-        let mut command = cargo(&golden);
+        let mut command = tests(&golden);
         // Without vector instructions beyond SSE4.2, and without fused products.
         let runner = "qemu-x86_64 -cpu Nehalem";
         command.env("CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER", runner);
