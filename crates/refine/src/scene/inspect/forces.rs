@@ -44,7 +44,7 @@ pub(super) fn inspect(hand: &Hand, measured: &HandMeasurement) -> (Vec<Warning>,
         warnings.push(
             Warning::new(Subject::Touch, largest, "N")
                 .found(format!("the largest taxel force is {largest:.4} N, all are {sum:.4} N together"))
-                .hint("are they in the unit of the format (scene_tactile.json: 1000 a newton), or raw counts?"),
+                .hint("are they in the unit of the format (newtons in a frame file, thousandths of one in scene_tactile.json), or raw counts?"),
         );
     }
     let pairs = hand.taxels.iter().zip(forces).filter(|(_, f)| f.norm().is_finite());
