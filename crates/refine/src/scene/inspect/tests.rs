@@ -165,7 +165,7 @@ fn masks_that_are_not_of_the_object() {
 #[test]
 fn forces_in_another_unit_and_of_another_sign() {
     for factor in [1e3, 1e-3] {
-        named(Subject::Touch, "1000 a newton", |scene| {
+        named(Subject::Touch, "newtons in a frame file", |scene| {
             hand(scene).forces.iter_mut().for_each(|f| *f *= factor);
         });
     }
