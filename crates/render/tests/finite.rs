@@ -160,7 +160,7 @@ fn config(cases: u32) -> ProptestConfig {
 }
 
 proptest! {
-    #![proptest_config(config(1000))]
+    #![proptest_config(config(4000))]
 
     #[test]
     fn losses_of_poses(camera in cameras(), mesh in bodies(), (size, pose) in places(), mode in modes(), options in options(), seen in [0..2_u8, 0..3_u8, 0..3_u8], samples in select(vec![1, 1, 2])) {
@@ -185,7 +185,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(200))]
+    #![proptest_config(config(800))]
 
     #[test]
     fn adjoints_of_scenes(camera in cameras(), mesh in bodies(), (size, pose) in places(), mode in modes()) {
