@@ -4,6 +4,7 @@
 
 mod batch;
 mod driven;
+mod finite;
 mod functions;
 mod gradients;
 mod groups;
