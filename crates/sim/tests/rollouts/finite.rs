@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
 use parry3d_f64::shape::Capsule;
-use prehend_autodiff::Fwd;
+use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::articulated::{Articulation, Joint, Link};
 use prehend_sim::{
     Adaptive, BackwardEuler, Body, BodyId, CompliantBalance, CompliantSupport, ContactBodies,
@@ -19,8 +19,18 @@ use proptest::test_runner::TestRunner;
 
 use crate::gradients::coordinates;
 
+/// As many lanes as other tests here have: less to compile.
+type Lanes = Fwd<8>;
+
+/// States with their pose and two directions of their velocity as variables.
+fn variables(states: &[State]) -> Vec<State<Lanes>> {
+    let mut tangent = [Lanes::constant(0.0); 12];
+    tangent[..8].copy_from_slice(&Lanes::variables([0.0; 8]));
+    states.iter().map(|state| state.retract(&tangent)).collect()
+}
+
 /// The numbers of `states` with their derivatives.
-fn numbers<const N: usize>(states: &[State<Fwd<N>>]) -> Vec<f64> {
+fn numbers(states: &[State<Lanes>]) -> Vec<f64> {
     let all = states.iter().flat_map(coordinates);
     all.flat_map(|x| std::iter::once(x.value).chain(x.derivative)).collect()
 }
@@ -40,8 +50,7 @@ fn assert_told(what: &str, world: &World, result: Result<Vec<f64>, SimulationErr
 /// A few steps of `integrator` in both modes.
 fn assert_steps(what: &str, integrator: &impl Integrator, world: &World, states: &[State], t: f64) {
     let time_steps = TimeSteps { dt: t / 4.0, steps: 4 };
-    let lifted: Vec<_> = states.iter().map(State::variables).collect();
-    let forward = world.lift().simulate_with(integrator, &lifted, time_steps, |_, _| ());
+    let forward = world.lift().simulate_with(integrator, &variables(states), time_steps, |_, _| ());
     assert_told(what, world, forward.map(|run| numbers(&run.states)));
     let run = world.simulate_with(integrator, states, time_steps, |_, _| ());
     let of_run = |run: prehend_sim::Simulation<Vec<State>>| {
@@ -53,10 +62,9 @@ fn assert_steps(what: &str, integrator: &impl Integrator, world: &World, states:
 /// Everything that is asked of a world.
 fn assert_all(what: &str, world: &World, states: &[State], time: f64) {
     let adaptive = Adaptive { max_parts: 60, ..Adaptive::default() };
-    let lifted: Vec<_> = states.iter().map(State::variables).collect();
-    let wrenches = world.lift::<Fwd<12>>().wrenches(&lifted, 0);
+    let wrenches = world.lift().wrenches(&variables(states), 0);
     let of_wrench =
-        |w: &Vector6<Fwd<12>>| w.iter().flat_map(|x| [x.value, x.derivative[0]]).collect();
+        |w: &Vector6<Lanes>| w.iter().flat_map(|x| [x.value, x.derivative[0]]).collect();
     let wrenches: Vec<Vec<f64>> = wrenches.iter().map(of_wrench).collect();
     assert!(wrenches.iter().flatten().all(|x| x.is_finite()), "{what}: {wrenches:?}");
     assert!(!world.contact_frequency(states).is_nan(), "{what}");
