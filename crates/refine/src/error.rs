@@ -30,6 +30,14 @@ pub enum RefineError {
         /// The factor that needs it.
         factor: &'static str,
     },
+    /// Gravity that presses nothing into the hand.
+    #[error("the {factor} factor needs gravity: {problem}")]
+    Gravity {
+        /// The factor that needs it.
+        factor: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// Forces and taxels do not match.
     #[error("{forces} taxel forces were given for {taxels} taxels")]
     TaxelCount {

@@ -85,18 +85,23 @@ impl<'a, S: Scalar> Audit<'a, S> {
     /// What is to be said of `time_steps` that have led to `states`.
     ///
     /// # Errors
-    /// If contacts have made energy.
+    /// If contacts have made energy, or velocities are too large to be squared.
     pub(crate) fn finish(
         mut self,
         TimeSteps { dt, steps }: TimeSteps,
         states: &[State<S>],
     ) -> Result<Resolution, SimulationError> {
-        self.energy.check(self.world, dt * steps as f64, states)?;
+        let time = dt * steps as f64;
+        self.energy.check(self.world, time, states)?;
+        let roughness = self.roughness.as_ref().map(Roughness::mean);
+        if roughness.is_some_and(|roughness| !roughness.is_finite()) {
+            return Err(self.world.blown_up(states, time));
+        }
         let name = |body: BodyId| self.world.bodies[body].name.clone();
         let roughest = self.roughness.as_ref().and_then(Roughness::roughest);
         Ok(Resolution {
             steps,
-            roughness: self.roughness.as_ref().map(Roughness::mean),
+            roughness,
             roughest: roughest.map(|(body, time)| (name(body), time)),
         })
     }

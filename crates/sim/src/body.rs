@@ -45,6 +45,10 @@ impl<S: Scalar> RigidBody<S> {
         }
         let inertia = (inertia + inertia.transpose()) * S::constant(0.5);
         let inverse_inertia = inertia.cholesky().ok_or(BodyError::Inertia)?.inverse();
+        // Of what is next to nothing it overflows.
+        if !inverse_inertia.iter().all(|x| x.value().is_finite()) {
+            return Err(BodyError::Inertia);
+        }
         Ok(Self { mass, inertia, inverse_inertia, com })
     }
 

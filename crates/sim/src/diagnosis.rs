@@ -17,6 +17,16 @@ impl<S: Scalar> World<S> {
         time: f64,
     ) -> SimulationError {
         let failed = next.iter().position(|state| !state.is_finite()).unwrap_or_default();
+        self.not_finite_at(failed, states, time)
+    }
+
+    /// The error of the state number `failed`, or of derivatives by it, that is not finite at `time` \[s\], beside `states`.
+    pub(crate) fn not_finite_at(
+        &self,
+        failed: usize,
+        states: &[State<S>],
+        time: f64,
+    ) -> SimulationError {
         let links = self.articulations.iter().flat_map(|own| own.bodies()).copied();
         let joint =
             failed.checked_sub(self.bodies.len()).and_then(|joint| links.clone().nth(joint));
@@ -28,6 +38,12 @@ impl<S: Scalar> World<S> {
         };
         let body = body.unwrap_or(BodyId(0));
         let (body, contact) = self.names(states, body);
+        SimulationError::NotFinite { body, contact, time }
+    }
+
+    /// The error of `states` at `time` \[s\] that are too large to measure, or have derivatives that are.
+    pub(crate) fn blown_up(&self, states: &[State<S>], time: f64) -> SimulationError {
+        let (body, contact) = self.most_accelerated(states);
         SimulationError::NotFinite { body, contact, time }
     }
 

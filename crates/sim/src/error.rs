@@ -104,6 +104,16 @@ pub enum SimulationError {
         /// How many it has.
         expected: [usize; 2],
     },
+    /// A rotation of a joint that is none.
+    #[error(
+        "the rotation of the joint of link '{link}' is a quaternion of the length {norm}, which has no direction"
+    )]
+    JointRotation {
+        /// Its name.
+        link: String,
+        /// The length of the quaternion.
+        norm: f64,
+    },
     /// An integrator that knows no joints.
     #[error("{integrator} does not move articulations")]
     Joints {
@@ -223,9 +233,10 @@ pub enum SimulationError {
     /// The time step is not a positive number.
     #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),
-    /// A body's state is not finite: given so, or blown up.
+    /// A body's state, or a derivative of it, is not finite: given so, or blown up.
     #[error(
-        "the state of body '{body}' is not finite at {time} s{}: bad input, or a time step too long for the contacts",
+        "the state of body '{body}', or a derivative of it, is not finite at {time} s{}: bad input, or a time step too long for the \
+         contacts",
         touching(contact)
     )]
     NotFinite {
@@ -310,13 +321,19 @@ pub enum SimulationError {
     },
     /// An implicit step found no solution.
     #[error(
-        "the equations of step {step}, at {time} s, were not solved: residual {residual:.3e} after {iterations} iterations"
+        "the equations of step {step}, at {time} s, were not solved: residual {residual:.3e} after {iterations} iterations; body '{body}'{} \
+         is accelerated most",
+        touching(contact)
     )]
     Unsolved {
         /// Number of the step.
         step: usize,
         /// Time \[s\].
         time: f64,
+        /// The body that is accelerated most.
+        body: String,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
         /// Norm of what remained, as a velocity \[m/s, rad/s\].
         residual: f64,
         /// Newton iterations.

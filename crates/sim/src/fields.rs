@@ -66,7 +66,7 @@ impl DistanceField for HalfSpace {
     }
 }
 
-/// A solid sphere. At its center the gradient is NaN, which is no contact.
+/// A solid sphere. At its center the gradient is zero, which is no contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Its center \[m\].
@@ -80,8 +80,12 @@ impl DistanceField for Sphere {
         let offset = point - self.center;
         let length = offset.norm();
         let distance = length - self.radius;
-        let gradient = offset / length;
-        let hessian = (Matrix3::identity() - gradient * gradient.transpose()) / length;
+        let (gradient, hessian) = if length < f64::MIN_POSITIVE {
+            (Vector3::zeros(), Matrix3::zeros())
+        } else {
+            let outward = offset / length;
+            (outward, (Matrix3::identity() - outward * outward.transpose()) / length)
+        };
         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
     }
 
@@ -94,7 +98,7 @@ impl DistanceField for Sphere {
     }
 }
 
-/// Everything outside of a sphere. At its center the gradient is NaN, which is no contact.
+/// Everything outside of a sphere. At its center the gradient is zero, which is no contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereCavity {
     /// Center of the sphere \[m\].

@@ -61,7 +61,15 @@ impl World {
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
         near.bodies_after(&states, &forces, step.dt, &mut by_state, &mut by_force);
         near.joints_after(&next, &forces, step.dt, &mut by_state, &mut by_force);
-        Ok(LinearStep { states: next, by_state, by_force })
+        near.finite(LinearStep { states: next, by_state, by_force }, step)
+    }
+
+    /// `result`, unless its derivatives overflow.
+    fn finite(&self, result: LinearStep, step: Step) -> Result<LinearStep, SimulationError> {
+        match result.by_state.iter().chain(result.by_force.iter()).all(|x| x.is_finite()) {
+            true => Ok(result),
+            false => Err(self.blown_up(&result.states, step.end())),
+        }
     }
 
     /// The rows of free bodies.

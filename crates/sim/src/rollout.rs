@@ -133,7 +133,7 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
     ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
         let initial = self.begin(initial, time_steps)?;
-        let mut states = Vec::with_capacity(time_steps.steps + 1);
+        let mut states = room_for(time_steps.steps)?;
         states.push(initial.clone());
         let keep = |_, next: &[State<S>]| states.push(next.to_vec());
         let Simulation { resolution, .. } = self.audited(integrator, initial, time_steps, keep)?;
@@ -194,7 +194,7 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
         control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
     ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let mut run = Vec::with_capacity(time_steps.steps + 1);
+        let mut run = room_for(time_steps.steps)?;
         let keep = |states: &[State<S>]| run.push(states.to_vec());
         let end = self.controlled(integrator, initial, time_steps, control, keep)?;
         run.push(end);
@@ -332,6 +332,15 @@ impl<S: Scalar> World<S> {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),
         }
+    }
+}
+
+/// An empty list with room for what is at the start and after each of `steps`.
+fn room_for<T>(steps: usize) -> Result<Vec<T>, SimulationError> {
+    let mut list = Vec::new();
+    match steps.checked_add(1).map(|count| list.try_reserve_exact(count)) {
+        Some(Ok(())) => Ok(list),
+        _ => Err(SimulationError::Memory { steps }),
     }
 }
 

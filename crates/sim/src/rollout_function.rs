@@ -241,7 +241,8 @@ impl<I: Integrator> RolloutFunction<I> {
     /// The derivatives are those of [`StepCheckpointed`](crate::StepCheckpointed).
     ///
     /// # Errors
-    /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, or the integrator's steps have no derivatives in this world.
+    /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, the integrator's steps have no derivatives in this world, or
+    /// derivatives are not finite.
     pub fn vjp(
         &self,
         inputs: RolloutInputs<'_>,
@@ -293,6 +294,7 @@ impl<I: Integrator> RolloutFunction<I> {
         adjoints: &[f64],
         change: impl FnOnce(&World<Var>, &[State<Var>]) -> Result<Vec<State<Var>>, SimulationError>,
     ) -> Result<[Vec<f64>; 2], SimulationError> {
+        let time = Step::new(step, self.time_steps.dt).start;
         let values = self.values_at(inputs, step);
         if adjoints.iter().all(|adjoint| *adjoint == 0.0) {
             return Ok([vec![0.0; before.len()], vec![0.0; values.len()]]);
@@ -305,8 +307,16 @@ impl<I: Integrator> RolloutFunction<I> {
         let seeds = coordinates_of(&after).zip(adjoints.iter().copied());
         let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();
         let adjoints = recording.vjp(&seeds);
-        let by = |vars: &[Var]| vars.iter().map(|&var| adjoints.wrt(var)).collect();
-        Ok([by(&states), by(&values)])
+        let by = |vars: &[Var]| vars.iter().map(|&var| adjoints.wrt(var)).collect::<Vec<f64>>();
+        let (by_states, by_values) = (by(&states), by(&values));
+        if let Some(failed) = by_states.iter().position(|slope| !slope.is_finite()) {
+            let states: Vec<State> = states_of(before).collect();
+            return Err(self.world().not_finite_at(failed / STATE, &states, time));
+        }
+        match by_values.iter().all(|slope| slope.is_finite()) {
+            true => Ok([by_states, by_values]),
+            false => Err(world.blown_up(&after, time)),
+        }
     }
 
     /// The states of [`RolloutFunction::evaluate`] and their derivatives along `tangents` of all inputs, by forward mode.

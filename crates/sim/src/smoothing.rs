@@ -107,7 +107,8 @@ impl<const N: usize> Smoothing<N> {
             let (ahead, behind) = (f(&(x + delta))?, f(&(x - delta))?);
             let slope = delta.zip_map(&self.deviations, |d, deviation| {
                 if deviation > 0.0 {
-                    0.5 * (ahead - behind) * d / (deviation * deviation)
+                    // In this order nothing overflows where a deviation is tiny.
+                    0.5 * (ahead - behind) * (d / deviation) / deviation
                 } else {
                     0.0
                 }

@@ -58,7 +58,8 @@ pub struct StabilityWeights {
 
 impl StabilityWeights {
     /// Relative to free fall under `gravity` \[m/s²\] for `time` \[s\], which velocity and displacement
-    /// then score 1 each at its end; rotations count as motion at `radius` \[m\] of the center of mass.
+    /// then score 1 each at its end; rotations count as motion at `radius` \[m\] of the center of mass. Without gravity or time they are
+    /// infinite, which [`StabilityLoss`] refuses.
     pub fn relative_to_fall(gravity: f64, time: f64, radius: f64) -> Self {
         let (linear, displacement) = (1.0 / (gravity * time), 2.0 / (gravity * time * time));
         Self {
@@ -114,8 +115,9 @@ impl<I: Integrator> StabilityLoss<I> {
     /// The loss with the object at `pose` (`t_world_model`); dimensionless.
     ///
     /// # Errors
-    /// Where the simulation blows up (see [`Self::check`]) or cannot begin.
+    /// Where the simulation blows up (see [`Self::check`]) or cannot begin; without perturbations, or if a weight is not finite.
     pub fn value(&self, pose: &Isometry3<f64>) -> Result<f64, SimulationError> {
+        self.check_settings()?;
         let rollouts: Vec<f64> = self
             .perturbations
             .par_iter()
@@ -129,7 +131,8 @@ impl<I: Integrator> StabilityLoss<I> {
                 Ok(sum)
             })
             .collect::<Result<_, SimulationError>>()?;
-        Ok(rollouts.iter().sum::<f64>() / self.count())
+        let value = rollouts.iter().sum::<f64>() / self.count();
+        if value.is_finite() { Ok(value) } else { Err(self.blown_up()) }
     }
 
     /// The loss and its derivatives by a twist of `pose` about the point `center` (world frame).
@@ -141,6 +144,7 @@ impl<I: Integrator> StabilityLoss<I> {
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
     ) -> Result<StabilityJacobian, SimulationError> {
+        self.check_settings()?;
         let world = self.world.lift::<Fwd<6>>();
         let constants: Vec<State<Fwd<6>>> = self.states.iter().map(State::lift).collect();
         let rollouts: Vec<StabilityJacobian> = self
@@ -173,11 +177,13 @@ impl<I: Integrator> StabilityLoss<I> {
         let mut chain = Matrix6::identity();
         chain.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(com - center)));
         let count = self.count();
-        Ok(StabilityJacobian {
-            value: value / count,
-            gradient: chain.tr_mul(&gradient) / count,
-            normal: chain.transpose() * normal * chain / count,
-        })
+        let (gradient, normal) = (chain.tr_mul(&gradient), chain.transpose() * normal * chain);
+        let mut numbers = gradient.iter().chain(normal.iter()).chain(std::iter::once(&value));
+        if !numbers.all(|x| x.is_finite()) {
+            return Err(self.blown_up());
+        }
+        let (value, gradient, normal) = (value / count, gradient / count, normal / count);
+        Ok(StabilityJacobian { value, gradient, normal })
     }
 
     /// Checks that the time step resolves the contacts with the object at rest at `pose`: for their
@@ -195,6 +201,31 @@ impl<I: Integrator> StabilityLoss<I> {
         check.map_err(|StepError { limit, .. }| StepError { dt, limit: SAFETY * limit })
     }
 
+    fn check_settings(&self) -> Result<(), SimulationError> {
+        if self.perturbations.is_empty() {
+            return Err(SimulationError::NoPerturbations);
+        }
+        let StabilityWeights { linear, angular, displacement, rotation, .. } = self.weights;
+        let weights = [
+            ("StabilityWeights::linear", linear),
+            ("StabilityWeights::angular", angular),
+            ("StabilityWeights::displacement", displacement),
+            ("StabilityWeights::rotation", rotation),
+        ];
+        match weights.into_iter().find(|(_, value)| !value.is_finite()) {
+            Some((setting, value)) => {
+                Err(SimulationError::Setting { setting, range: "finite", value })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The error of a rollout whose residuals are too large to be squared.
+    fn blown_up(&self) -> SimulationError {
+        let TimeSteps { dt, steps } = self.time_steps;
+        self.world.not_finite_at(self.object.index(), &self.states, dt * steps as f64)
+    }
+
     fn count(&self) -> f64 {
         self.perturbations.len().max(1) as f64
     }
@@ -204,9 +235,6 @@ impl<I: Integrator> StabilityLoss<I> {
         pose: &Isometry3<f64>,
         perturbation: &Perturbation,
     ) -> Result<State, SimulationError> {
-        if self.perturbations.is_empty() {
-            return Err(SimulationError::NoPerturbations);
-        }
         let body = self.world.body(self.object)?;
         let states = self.states.len();
         if states != self.world.joint_places().end {

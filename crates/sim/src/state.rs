@@ -34,11 +34,11 @@ impl<S: Scalar> State<S> {
         }
     }
 
-    /// Whether every coordinate is a finite number.
+    /// Whether every coordinate is a finite number, and has finite derivatives; those of a recording are not known before its sweep.
     pub fn is_finite(&self) -> bool {
         let parts = [&self.pose.translation.vector, &self.linear, &self.angular];
-        parts.iter().flat_map(|v| v.iter()).all(|x| x.value().is_finite())
-            && self.pose.rotation.coords.iter().all(|x| x.value().is_finite())
+        parts.iter().flat_map(|v| v.iter()).all(is_finite)
+            && self.pose.rotation.coords.iter().all(is_finite)
     }
 
     /// The state after moving on with its velocities for `time` \[s\].
@@ -92,6 +92,12 @@ impl<S: Scalar> State<S> {
         let [wx, wy, wz] = less(&self.angular, &value.angular).into();
         [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz]
     }
+}
+
+/// Whether a number and the derivatives that it carries are finite: only then is nothing left of them times zero.
+#[inline]
+pub(crate) fn is_finite<S: Scalar>(x: &S) -> bool {
+    x.value().is_finite() && (S::RECORDED || x.times(0.0).is_constant_zero())
 }
 
 /// `a` less its own value.

@@ -142,10 +142,10 @@ impl Surface {
     /// the edges of this one never touch it.
     ///
     /// # Errors
-    /// If a length is not positive and finite.
+    /// If a length is not positive and finite, or samples would be more than ten million.
     pub fn cuboid(half_extents: [f64; 3], spacing: f64) -> Result<Self, BodyError> {
         check_lengths(&half_extents)?;
-        check_lengths(&[spacing])?;
+        check_spacing(half_extents, spacing)?;
         let parts = half_extents.map(|half| (2.0 * half / spacing).ceil() as usize);
         let step = [0, 1, 2].map(|i| 2.0 * half_extents[i] / parts[i] as f64);
         let (mut points, mut areas) = (Vec::new(), Vec::new());
@@ -173,7 +173,7 @@ impl Surface {
         spacing: f64,
     ) -> Result<Self, BodyError> {
         check_lengths(&half_extents)?;
-        check_lengths(&[spacing])?;
+        check_spacing(half_extents, spacing)?;
         let flat = half_extents.map(|half| half - inset);
         let parts = flat.map(|flat| (2.0 * flat / spacing).ceil() as usize);
         // Place along an axis, and the width it stands for.
@@ -244,6 +244,19 @@ impl Surface {
     #[inline]
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (&Block, &[SurfacePoint])> {
         self.blocks.iter().map(|block| (block, &self.points[block.start..block.end]))
+    }
+}
+
+/// Samples that a lattice has at most.
+const MOST_SAMPLES: f64 = 1e7;
+
+/// Whether lattices with distances of `spacing` \[m\] on the faces of a box fit into memory.
+pub(crate) fn check_spacing(half_extents: [f64; 3], spacing: f64) -> Result<(), BodyError> {
+    check_lengths(&[spacing])?;
+    let [x, y, z] = half_extents.map(|half| 2.0 * half / spacing + 1.0);
+    match 2.0 * (x * y + y * z + z * x) <= MOST_SAMPLES {
+        true => Ok(()),
+        false => Err(BodyError::Spacing(spacing)),
     }
 }
 

@@ -11,7 +11,7 @@ use prehend_sim::{
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
-use crate::scene::Frame;
+use crate::scene::{Frame, check_gravity};
 
 /// Settings of the stability factor.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl StabilityFactor {
     /// Prepares rollouts of the object in the hand of `frame`; displacement is from `initial`.
     ///
     /// # Errors
-    /// If gravity or the hand is unknown, or the object cannot be simulated.
+    /// If gravity or the hand is unknown, gravity is none ([`check_gravity`]), or the object cannot be simulated.
     pub fn new(
         frame: &Frame<'_>,
         initial: &State,
@@ -85,6 +85,8 @@ impl StabilityFactor {
     ) -> Result<Self, RefineError> {
         let missing = RefineError::Missing { what: "gravity", factor: "stability" };
         let gravity = frame.observation().gravity.ok_or(missing)?;
+        check_gravity(&gravity)
+            .map_err(|problem| RefineError::Gravity { factor: "stability", problem })?;
         let (robot, hand) = frame.require_hand("stability")?;
         let object = frame.object();
         let fail = |reason: String| RefineError::Object { object: object.name.clone(), reason };

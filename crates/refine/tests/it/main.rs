@@ -12,6 +12,7 @@ mod data_metrics;
 mod data_search;
 mod device;
 mod factors;
+mod finite;
 mod fused;
 mod icp;
 mod journal;

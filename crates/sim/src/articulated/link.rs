@@ -99,9 +99,34 @@ impl<S: Scalar> Link<S> {
         if !(self.mass.value() >= 0.0 && self.armature.value() >= 0.0) {
             return Err(wrong("mass and armature may not be negative"));
         }
-        match self.numbers().all(|x| x.value().is_finite()) {
+        if !self.numbers().all(|x| x.value().is_finite()) {
+            return Err(wrong("place, mass, center of mass, inertia or armature is not finite"));
+        }
+        let moments = self.inertia.map(S::value).symmetric_eigenvalues();
+        // Some room for what was rounded.
+        match moments.min() >= -1e-9 * moments.amax() {
             true => Ok(()),
-            false => Err(wrong("place, mass, center of mass, inertia or armature is not finite")),
+            false => Err(wrong("a principal moment of its inertia is negative")),
+        }
+    }
+
+    /// The least inertia \[kg or kg m²\] that its joint moves if nothing hangs on the link, without armature; of a joint type of one's own nothing is known.
+    fn least_inertia(&self) -> f64 {
+        let (mass, inertia) = (self.mass.value(), self.inertia.map(S::value));
+        let com = self.com.coords.map(S::value);
+        let about_joint =
+            inertia + (Matrix3::identity() * com.norm_squared() - com * com.transpose()) * mass;
+        // What is left of a moment that is none.
+        let least = |matrix: Matrix3<f64>| {
+            let moments = matrix.symmetric_eigenvalues();
+            if moments.min() > 1e-14 * moments.amax() { moments.min() } else { 0.0 }
+        };
+        match &self.joint {
+            Joint::Fixed | Joint::Custom(_) => f64::INFINITY,
+            Joint::Revolute(axis) => axis.dot(&(about_joint * axis.into_inner())),
+            Joint::Prismatic(axis) => mass * axis.norm_squared(),
+            Joint::Spherical => least(about_joint),
+            Joint::Floating => mass.min(least(inertia)),
         }
     }
 
@@ -191,7 +216,14 @@ fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
         .iter()
         .map(|link| link.mass.value() > 0.0 || link.inertia.iter().any(|x| x.value() != 0.0))
         .collect();
+    let carries = |index: usize| links.iter().any(|link| link.parent == Some(index));
     for (index, link) in links.iter().enumerate().rev() {
+        let moved = link.least_inertia() + link.armature.value();
+        // What moves with a link that carries others depends on where they are.
+        if weighs[index] && (moved.is_nan() || moved <= 0.0) && !carries(index) {
+            let problem = "its joint turns or slides without moving any mass, or has no axis";
+            return Err(ArticulationError::Mass { link: link.name.clone(), problem });
+        }
         if !weighs[index] && link.joint.freedoms() > 0 && link.armature.value() == 0.0 {
             let problem = "its joint moves no mass: neither the link nor what hangs on it has any";
             return Err(ArticulationError::Mass { link: link.name.clone(), problem });

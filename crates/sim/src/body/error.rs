@@ -2,14 +2,18 @@
 
 use thiserror::Error;
 
+use crate::contact::range::{LARGEST, SMALLEST};
+
 /// Why a body cannot be simulated.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum BodyError {
     /// The mass is not a positive number.
     #[error("mass must be positive and finite, is {0} kg")]
     Mass(f64),
-    /// The inertia is not symmetric and positive definite.
-    #[error("inertia must be symmetric and positive definite")]
+    /// The inertia is not symmetric and positive definite, or so small that it has no inverse.
+    #[error(
+        "inertia must be symmetric and positive definite, and not so small that it has no inverse"
+    )]
     Inertia,
     /// No body has such an inertia: a principal moment is larger than the other two together.
     #[error(
@@ -30,9 +34,12 @@ pub enum BodyError {
         /// Number of areas.
         areas: usize,
     },
-    /// A length of a box or the radius of a ball is not positive and finite.
-    #[error("lengths must be positive and finite, one is {0} m")]
+    /// A length of a box or the radius of a ball is not positive and finite, or beyond all measure.
+    #[error("lengths must be positive and finite, within 1e-60 and 1e60, one is {0} m")]
     Length(f64),
+    /// Samples so close that there is no memory for them.
+    #[error("samples {0} m apart would be more than ten million")]
+    Spacing(f64),
     /// The edges of a box are not round, or leave nothing of its faces.
     #[error("edges of a box must be round and leave something of its faces, their radius is {0} m")]
     Edges(f64),
@@ -50,9 +57,14 @@ pub enum BodyError {
     },
 }
 
+/// Whether a length \[m\] is positive, and neither the fifth power of its inverse nor its own overflows, as moments of inertia of a density have it.
+pub(crate) fn is_length(length: f64) -> bool {
+    (SMALLEST..=LARGEST).contains(&length)
+}
+
 /// Whether all `lengths` \[m\] are positive and finite.
 pub(crate) fn check_lengths(lengths: &[f64]) -> Result<(), BodyError> {
-    match lengths.iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+    match lengths.iter().find(|x| !is_length(**x)) {
         Some(&length) => Err(BodyError::Length(length)),
         None => Ok(()),
     }

@@ -2,7 +2,8 @@
 
 use super::error::LawError;
 
-/// What a parameter may be. Infinity and NaN are in none, but where a range says so.
+/// What a parameter may be. Infinity and NaN are in none, but where a range says so; nor is what is larger than 10⁶⁰, or positive
+/// and less than 10⁻⁶⁰ where it is to be positive: laws square and divide by such numbers, and raise them to the fifth power.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum ParameterRange {
     /// x > 0.
@@ -21,6 +22,10 @@ pub enum ParameterRange {
     Finite,
 }
 
+/// The largest number, and the smallest that is positive: their fifth powers and those of their inverses are still numbers.
+pub(crate) const LARGEST: f64 = 1e60;
+pub(crate) const SMALLEST: f64 = 1e-60;
+
 impl ParameterRange {
     /// Checks that `value`, called `name` in the error, is in this range.
     ///
@@ -36,7 +41,18 @@ impl ParameterRange {
             Self::PositiveFraction => value > 0.0 && value <= 1.0,
             Self::Finite => value.is_finite(),
         };
-        if inside { Ok(()) } else { Err(LawError::Range { name, range: self.as_str(), value }) }
+        let range = match self {
+            _ if !inside => self.as_str(),
+            Self::PositiveOrInfinite if value == f64::INFINITY => return Ok(()),
+            _ if value.abs() > LARGEST => "at most 1e60",
+            Self::Positive | Self::PositiveOrInfinite | Self::PositiveFraction
+                if value < SMALLEST =>
+            {
+                "at least 1e-60"
+            }
+            _ => return Ok(()),
+        };
+        Err(LawError::Range { name, range, value })
     }
 
     fn as_str(self) -> &'static str {

@@ -9,7 +9,7 @@ use super::balance::Support;
 pub struct CompliantSupport {
     /// Where it is, and its friction cone.
     pub support: Support,
-    /// What a squared newton costs, as a share of what one left unbalanced costs; positive.
+    /// What a squared newton costs, as a share of what one left unbalanced costs; positive, and less than 10⁻¹² counts as that.
     pub compliance: f64,
 }
 
@@ -33,11 +33,20 @@ pub struct CompliantBalance {
 
 const MOST_STEPS: usize = 100;
 
+/// Below this the dual problem overflows.
+const LEAST_COMPLIANCE: f64 = 1e-12;
+
+impl CompliantSupport {
+    fn cost(&self) -> f64 {
+        self.compliance.max(LEAST_COMPLIANCE)
+    }
+}
+
 /// A residual is right to this share of the load.
 const TOLERANCE: f64 = 1e-12;
 
 impl CompliantBalance {
-    /// Balances `load`, a force \[N\] and a torque about `center` over `length` \[m\], by `supports`.
+    /// Balances `load`, a force \[N\] and a torque about `center` over `length` \[m\], by `supports`. A length that is not positive counts as 1 m.
     ///
     /// The dual problem is smooth and has six unknowns, the residual: least of ½ |y|² − y · load + Σ |Π(−Wᵀy)|² / 2c, where W makes a wrench of
     /// a force, c is a support's compliance and Π projects onto its cone. Newton's method solves it in a few steps; the
@@ -48,6 +57,7 @@ impl CompliantBalance {
         length: f64,
         load: &Vector6<f64>,
     ) -> Self {
+        let length = if length > 0.0 { length } else { 1.0 };
         let dual = Dual { supports, center: *center, length, load: *load };
         let mut residual = *load;
         let mut at = dual.at(&residual);
@@ -75,13 +85,13 @@ impl CompliantBalance {
         }
         let forces: Vec<Vector3<f64>> = supports
             .iter()
-            .map(|s| Projection::new(&dual.pull(s, &residual), &s.support).point / s.compliance)
+            .map(|s| Projection::new(&dual.pull(s, &residual), &s.support).point / s.cost())
             .collect();
         let residual = supports
             .iter()
             .zip(&forces)
             .fold(*load, |sum, (support, force)| sum + dual.wrench(support, force));
-        let cost = supports.iter().zip(&forces).map(|(s, f)| s.compliance * f.norm_squared());
+        let cost = supports.iter().zip(&forces).map(|(s, f)| s.cost() * f.norm_squared());
         let value = 0.5 * (residual.norm_squared() + cost.sum::<f64>());
         let residual_jacobian =
             at.hessian.cholesky().map_or_else(Matrix6::zeros, |factor| factor.inverse());
@@ -131,9 +141,9 @@ impl Dual<'_> {
             let arm = (support.support.position - self.center) / self.length;
             wrench.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
             wrench.fixed_view_mut::<3, 3>(3, 0).copy_from(&arm.cross_matrix());
-            value += 0.5 * projection.point.norm_squared() / support.compliance;
-            gradient -= wrench * projection.point / support.compliance;
-            hessian += wrench * (projection.jacobian / support.compliance) * wrench.transpose();
+            value += 0.5 * projection.point.norm_squared() / support.cost();
+            gradient -= wrench * projection.point / support.cost();
+            hessian += wrench * (projection.jacobian / support.cost()) * wrench.transpose();
         }
         DualAt { value, gradient, hessian }
     }

@@ -111,9 +111,11 @@ impl<I: Integrator> Integrator for SubStepped<I> {
             match self.divided(world, states, step, parts) {
                 Err(SimulationError::Unsolved { .. }) if 2 * parts <= max_substeps => parts *= 2,
                 // Parts have numbers of their own.
-                Err(SimulationError::Unsolved { time, residual, iterations, .. }) => {
-                    let step = step.index;
-                    return Err(SimulationError::Unsolved { step, time, residual, iterations });
+                Err(mut error) => {
+                    if let SimulationError::Unsolved { step: part, .. } = &mut error {
+                        *part = step.index;
+                    }
+                    return Err(error);
                 }
                 done => return done,
             }

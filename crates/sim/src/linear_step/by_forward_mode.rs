@@ -47,7 +47,7 @@ impl World {
         let forces = Generalized::without_forces(self, states);
         let mut scratch = DMatrix::zeros(2 * n, 2 * n);
         self.joints_after(&next, &forces, step.dt, &mut scratch, &mut by_force);
-        Ok(LinearStep { states: next, by_state, by_force })
+        self.finite(LinearStep { states: next, by_state, by_force }, step)
     }
 
     /// N of [`LinearStep`].

@@ -15,8 +15,8 @@ pub enum ShapeError {
         /// What it is.
         kind: String,
     },
-    /// A dimension is not a positive, finite number.
-    #[error("{name} of a shape must be positive and finite, is {value} m")]
+    /// A dimension is not a positive, finite number, or beyond all measure.
+    #[error("{name} of a shape must be positive and finite, within 1e-60 and 1e60, is {value} m")]
     Dimension {
         /// Its name.
         name: String,
@@ -41,6 +41,9 @@ pub enum ShapeError {
         /// What it is \[m\].
         value: f64,
     },
+    /// A half-space whose normal has no direction.
+    #[error("the normal of a half-space must have a direction")]
+    Normal,
     /// Corners that are not those of a convex solid.
     #[error("the corners are not those of a convex polyhedron")]
     NotConvex,

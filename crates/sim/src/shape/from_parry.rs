@@ -47,7 +47,8 @@ pub(super) fn read(
             revolved(Outline::Cone, [half_height, radius], Some(round.border_radius), options)
         }
         TypedShape::HalfSpace(half_space) => {
-            let normal = Unit::new_normalize(vector(half_space.normal));
+            let normal = Unit::try_new(vector(half_space.normal), f64::MIN_POSITIVE)
+                .ok_or(ShapeError::Normal)?;
             let field = HalfSpace { normal, height: 0.0 };
             Ok((Kind::Ground(Ground::endless("half-space", field)), Vec::new()))
         }

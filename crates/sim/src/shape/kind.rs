@@ -16,7 +16,9 @@ use super::lifted::LiftedField;
 use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
 use super::solid::{Sample, Solid};
+use crate::contact::range::{LARGEST, SMALLEST};
 use crate::fields::INSET;
+use crate::surface::check_spacing;
 
 /// What a shape is, but for the values of its dimensions.
 pub(crate) enum Kind {
@@ -91,6 +93,25 @@ impl Kind {
         }, all => LiftedField::Parts(all.lifted_parts(dimensions)))
     }
 
+    /// The largest extent of what has a lattice of samples, and their distance \[m\].
+    fn extent(&self, dimensions: &[f64]) -> Option<(f64, f64)> {
+        let largest = |lengths: &[f64]| lengths.iter().copied().fold(0.0, f64::max);
+        match self {
+            Self::Ball(_) | Self::Ground(_) | Self::Compound(_) => None,
+            Self::Cuboid(cuboid) => Some((2.0 * largest(dimensions), cuboid.spacing)),
+            Self::Capsule(capsule) => Some((2.0 * largest(dimensions), capsule.spacing)),
+            Self::Revolved(revolved) => Some((2.0 * largest(dimensions), revolved.spacing)),
+            Self::Polyhedron(polyhedron) => {
+                let corners = dimensions[..3 * polyhedron.vertices].as_chunks::<3>().0;
+                let along = |axis: usize| {
+                    let places = corners.iter().map(|corner| corner[axis]);
+                    places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min)
+                };
+                Some((largest(&[along(0), along(1), along(2)]), polyhedron.spacing))
+            }
+        }
+    }
+
     /// Whether there is such a shape.
     pub(super) fn check(&self, dimensions: &[f64]) -> Result<(), ShapeError> {
         if let Self::Compound(all) = self {
@@ -100,12 +121,15 @@ impl Kind {
             // The segment of a capsule may be a point, a vertex may be anywhere.
             let least = match self {
                 Self::Capsule(_) if name == "half_height" => 0.0,
-                Self::Polyhedron(_) if name.starts_with("vertex") => f64::MIN,
-                _ => f64::MIN_POSITIVE,
+                Self::Polyhedron(_) if name.starts_with("vertex") => -LARGEST,
+                _ => SMALLEST,
             };
-            if !(value.is_finite() && value >= least) {
+            if !(least..=LARGEST).contains(&value) {
                 return Err(ShapeError::Dimension { name, value });
             }
+        }
+        if let Some((extent, spacing)) = self.extent(dimensions) {
+            check_spacing([0.5 * extent; 3], spacing)?;
         }
         let (border, deepest) = match self {
             Self::Ball(_) | Self::Capsule(_) | Self::Ground(_) | Self::Compound(_) => return Ok(()),

@@ -34,6 +34,10 @@ impl<T: Scalar> Nearest<T> {
     #[inline]
     fn across(offset: Vector3<T>, curved: Matrix3<T>) -> Self {
         let distance = offset.norm();
+        // At a core that is a point or a line no direction leads out.
+        if distance.value() < f64::MIN_POSITIVE {
+            return Self::face(T::zero(), Vector3::zeros());
+        }
         let gradient = offset / distance;
         let hessian = (curved - gradient * gradient.transpose()) / distance;
         Self { distance, gradient, hessian }

@@ -48,7 +48,7 @@ impl<T: Scalar> Round<T> {
         to_core - self.border
     }
 
-    /// The distance with its derivatives. On the axis of a capsule and at the center of a ball they are NaN, which is no contact.
+    /// The distance with its derivatives. On the axis of a capsule and at the center of a ball they are zero, which is no contact.
     #[inline]
     pub(crate) fn nearest(&self, point: &Point3<T>) -> Nearest<T> {
         let mut nearest = match &self.core {

@@ -110,7 +110,7 @@ impl<S: Scalar> World<S> {
     /// Sets coordinates and velocities of the joint of a link, as [`Joint`] has them, and moves all links to where they are then.
     ///
     /// # Errors
-    /// If it is no link, the numbers are too few or too many, or the states are not those of this world.
+    /// If it is no link, the numbers are too few or too many, a quaternion is zero, or the states are not those of this world.
     pub fn set_joint(
         &self,
         states: &mut [State<S>],
@@ -138,6 +138,14 @@ impl<S: Scalar> World<S> {
                 given: [position.len(), velocity.len()],
                 expected: [joint.coordinates(), joint.freedoms()],
             });
+        }
+        if joint.turns() {
+            let quaternion = &position[position.len() - 4..];
+            let norm = quaternion.iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt();
+            if norm < f64::MIN_POSITIVE || !norm.is_finite() {
+                let link = self.bodies[link].name.clone();
+                return Err(SimulationError::JointRotation { link, norm });
+            }
         }
         states[place] = joint.write(position, velocity);
         Ok(())

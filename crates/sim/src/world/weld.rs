@@ -38,7 +38,7 @@ pub struct WeldStiffness<S: Scalar = f64> {
 
 impl WeldStiffness {
     /// Critically damped, so that a displacement of what weighs `mass` \[kg\] and has `inertia` \[kg m²\] decays in `time` \[s\]. With an inertia of 0
-    /// the frames turn freely.
+    /// the frames turn freely. Infinite for a time of 0, which [`World::add_weld`] refuses.
     pub fn critical(mass: f64, inertia: f64, time: f64) -> Self {
         let [linear, angular] = [mass, inertia].map(|m| m / (time * time));
         let [linear_damping, angular_damping] = [mass, inertia].map(|m| 2.0 * m / time);

@@ -45,7 +45,7 @@ pub struct PoseScore {
     pub oe_deg: Option<f64>,
     /// Orientation error up to symmetry \[deg\].
     pub oe_symmetric_deg: Option<f64>,
-    /// Average distance of corresponding points \[mm\].
+    /// Average distance of corresponding points \[mm\]; this and the next three are none of a model without points.
     pub add_mm: Option<f64>,
     /// Average distance to the nearest point \[mm\].
     pub adi_mm: Option<f64>,

@@ -28,21 +28,24 @@ impl ScoredModel {
         Self { tree, transforms: symmetries.transforms(), points, symmetries }
     }
 
-    /// All metrics that need no hand.
+    /// All metrics that need no hand; those of points are none without points, or where a point is behind the camera or too far away
+    /// for a number.
     pub fn score(
         &self,
         estimate: &Isometry3<f64>,
         truth: &Isometry3<f64>,
         camera: &Camera,
     ) -> PoseScore {
+        let of_points =
+            |value: f64| Some(value).filter(|v| v.is_finite() && !self.points.is_empty());
         PoseScore {
             pe_cm: Some(pe_cm(estimate, truth)),
             oe_deg: Some(oe_deg(estimate, truth)),
             oe_symmetric_deg: Some(oe_symmetric_deg(estimate, truth, &self.symmetries)),
-            add_mm: Some(1e3 * self.add(estimate, truth)),
-            adi_mm: Some(1e3 * self.adi(estimate, truth)),
-            mssd_mm: Some(1e3 * self.mssd(estimate, truth)),
-            mspd_px: Some(self.mspd(estimate, truth, camera)).filter(|mspd| mspd.is_finite()),
+            add_mm: of_points(1e3 * self.add(estimate, truth)),
+            adi_mm: of_points(1e3 * self.adi(estimate, truth)),
+            mssd_mm: of_points(1e3 * self.mssd(estimate, truth)),
+            mspd_px: of_points(self.mspd(estimate, truth, camera)),
             ..PoseScore::default()
         }
     }

@@ -4,7 +4,7 @@ use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
 use crate::contact::error::LawError;
-use crate::contact::parameters::law_part;
+use crate::contact::parameters::{Parameters, law_part};
 use crate::contact::point::Contact;
 use crate::contact::static_target::StaticContactTarget;
 
@@ -30,7 +30,8 @@ impl Hertz {
     /// Names the parameter that is out of its range.
     pub fn from_target(target: &StaticContactTarget) -> Result<Self, LawError> {
         target.check()?;
-        Ok(Self { stiffness: target.stiffness(1.5) })
+        let law = Self { stiffness: target.stiffness(1.5) };
+        law.check(&law.values()).map(|()| law)
     }
 }
 

@@ -4,7 +4,7 @@ use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
 use crate::contact::error::LawError;
-use crate::contact::parameters::law_part;
+use crate::contact::parameters::{Parameters, law_part};
 use crate::contact::point::Contact;
 use crate::contact::range::ParameterRange;
 use crate::contact::restitution::hunt_crossley_damping;
@@ -52,7 +52,8 @@ impl HuntCrossley {
         ParameterRange::Positive.check("impact_speed", impact_speed)?;
         ParameterRange::AtLeastOne.check("exponent", exponent)?;
         let damping = hunt_crossley_damping(restitution, impact_speed);
-        Ok(Self { stiffness: target.stiffness(exponent), damping, exponent })
+        let law = Self { stiffness: target.stiffness(exponent), damping, exponent };
+        law.check(&law.values()).map(|()| law)
     }
 }
 

@@ -4,7 +4,7 @@ use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
 use crate::contact::error::LawError;
-use crate::contact::parameters::law_part;
+use crate::contact::parameters::{Parameters, law_part};
 use crate::contact::point::Contact;
 use crate::contact::restitution::damping_ratio;
 use crate::contact::static_target::StaticContactTarget;
@@ -29,7 +29,8 @@ impl KelvinVoigt {
     /// Names the parameter that is out of its range.
     pub fn from_target(target: &StaticContactTarget, restitution: f64) -> Result<Self, LawError> {
         let [stiffness, damping] = target.bouncing(restitution, damping_ratio)?;
-        Ok(Self { stiffness, damping })
+        let law = Self { stiffness, damping };
+        law.check(&law.values()).map(|()| law)
     }
 }
 

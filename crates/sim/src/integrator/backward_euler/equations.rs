@@ -126,7 +126,8 @@ impl ImplicitStep<'_> {
 
     pub(super) fn unsolved(&self, residual: f64, iterations: usize) -> SimulationError {
         let (step, time) = (self.step.index, self.step.start);
-        SimulationError::Unsolved { step, time, residual, iterations }
+        let (body, contact) = self.world.most_accelerated(self.states);
+        SimulationError::Unsolved { step, time, body, contact, residual, iterations }
     }
 }
 

@@ -361,11 +361,12 @@ fn jump() -> (World, Vec<State>, Step) {
 fn a_jump_without_a_solution_is_an_error() {
     let (world, states, step) = jump();
     let error = BackwardEuler.step(&world, &states, step).unwrap_err();
-    let SimulationError::Unsolved { step: 3, time, residual, iterations } = error else {
+    let SimulationError::Unsolved { step: 3, time, residual, iterations, .. } = error else {
         panic!("{error}");
     };
     assert!((time - 0.03).abs() < 1e-15 && residual > 1e-3 && iterations > 0);
-    assert!(error.to_string().contains("step 3"));
+    let told = error.to_string();
+    assert!(told.contains("step 3") && told.contains(&world.bodies[1].name), "{told}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod batch;
 mod driven;
+mod finite;
 mod functions;
 mod gradients;
 mod groups;

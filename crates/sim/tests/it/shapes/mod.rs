@@ -4,6 +4,7 @@ mod catalog;
 mod derivatives;
 mod dimensions;
 mod distances;
+mod finite;
 mod heights;
 mod joined;
 mod mass;
