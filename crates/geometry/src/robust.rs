@@ -46,8 +46,8 @@ impl RobustKernel {
     pub fn loss(self, r2: f64) -> f64 {
         match self {
             Self::Squared => 0.5 * r2,
-            Self::Huber { scale } if r2 <= scale * scale => 0.5 * r2,
-            Self::Huber { scale } => scale * (r2.sqrt() - 0.5 * scale),
+            Self::Huber { scale } if r2 <= square(scale) => 0.5 * r2,
+            Self::Huber { scale } => in_range(scale) * (r2.sqrt() - 0.5 * in_range(scale)),
             Self::Cauchy { scale } => {
                 0.5 * square(scale) * (r2 / square(scale)).min(f64::MAX).ln_1p()
             }
@@ -66,8 +66,8 @@ impl RobustKernel {
     pub fn weight(self, r2: f64) -> f64 {
         match self {
             Self::Squared => 1.0,
-            Self::Huber { scale } if r2 <= scale * scale => 1.0,
-            Self::Huber { scale } => scale / r2.sqrt(),
+            Self::Huber { scale } if r2 <= square(scale) => 1.0,
+            Self::Huber { scale } => in_range(scale) / r2.sqrt(),
             Self::Cauchy { scale } => 1.0 / (1.0 + r2 / square(scale)),
             Self::GemanMcClure { scale } => (1.0 + r2 / square(scale)).powi(-2),
             Self::Tukey { scale } => (1.0 - r2 / square(scale)).max(0.0).powi(2),
@@ -79,8 +79,8 @@ impl RobustKernel {
     pub fn weight_derivative(self, r2: f64) -> f64 {
         match self {
             Self::Squared => 0.0,
-            Self::Huber { scale } if r2 <= scale * scale => 0.0,
-            Self::Huber { scale } => -0.5 * scale / (r2 * r2.sqrt()),
+            Self::Huber { scale } if r2 <= square(scale) => 0.0,
+            Self::Huber { scale } => -0.5 * in_range(scale) / (r2 * r2.sqrt()),
             Self::Cauchy { .. } => -self.weight(r2).powi(2) * self.curvature(),
             Self::GemanMcClure { scale } => {
                 -2.0 * self.curvature() * (1.0 + r2 / square(scale)).powi(-3)
@@ -124,11 +124,15 @@ impl RobustKernel {
     }
 }
 
-/// The square of a scale, within a range that ratios to it do not leave for 0 · ∞.
+/// A scale within a range that its square, and ratios to that, do not leave for 0 · ∞.
+#[inline]
+fn in_range(scale: f64) -> f64 {
+    scale.clamp(1e-75, 1e75)
+}
+
 #[inline]
 fn square(scale: f64) -> f64 {
-    let scale = scale.clamp(1e-75, 1e75);
-    scale * scale
+    in_range(scale).powi(2)
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ pub enum CameraError {
         /// The focal length \[px\].
         value: f64,
     },
-    /// A focal length is larger than [`Camera::LONGEST`].
+    /// A focal length is larger than [`Camera::MAX_FOCAL_LENGTH`].
     #[error("focal length {name} is {value} px, expected 1e9 at most")]
     TooLong {
         /// `"fx"` or `"fy"`.
@@ -70,13 +70,13 @@ pub enum CameraError {
 }
 
 impl Camera {
-    /// The longest focal length \[px\]: derivatives in single precision hold its square.
-    pub const LONGEST: f64 = 1e9;
+    /// The longest focal length \[px\]: with it derivatives by poses stay within single precision.
+    pub const MAX_FOCAL_LENGTH: f64 = 1e9;
 
     /// A camera from its row-major matrix `[fx, 0, cx, 0, fy, cy, 0, 0, 1]` \[px\] and image size.
     ///
     /// # Errors
-    /// When an entry is not finite, a focal length is not positive or longer than [`Camera::LONGEST`], the matrix has
+    /// When an entry is not finite, a focal length is not positive or longer than [`Camera::MAX_FOCAL_LENGTH`], the matrix has
     /// skew or the image is empty.
     pub fn from_k(k: [f64; 9], width: usize, height: usize) -> Result<Self, CameraError> {
         for (index, expected) in [(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)] {
@@ -93,7 +93,7 @@ impl Camera {
     /// Whether a camera can be like this, whoever made it.
     ///
     /// # Errors
-    /// When a number is not finite, a focal length is not positive or longer than [`Camera::LONGEST`], or the image is empty.
+    /// When a number is not finite, a focal length is not positive or longer than [`Camera::MAX_FOCAL_LENGTH`], or the image is empty.
     pub fn check(&self) -> Result<(), CameraError> {
         let Self { width, height, .. } = *self;
         if width == 0 || height == 0 {
@@ -107,7 +107,7 @@ impl Camera {
             if value <= 0.0 {
                 return Err(CameraError::FocalLength { name, value });
             }
-            if value > Self::LONGEST {
+            if value > Self::MAX_FOCAL_LENGTH {
                 return Err(CameraError::TooLong { name, value });
             }
         }

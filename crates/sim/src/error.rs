@@ -233,9 +233,9 @@ pub enum SimulationError {
     /// The time step is not a positive number.
     #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),
-    /// A body's state, or a derivative of it, is not finite: given so, or blown up.
+    /// A body's state, its square or a derivative of it, is not finite: given so, or blown up.
     #[error(
-        "the state of body '{body}', or a derivative of it, is not finite at {time} s{}: bad input, or a time step too long for the \
+        "the state of body '{body}', its square or a derivative of it, is not finite at {time} s{}: bad input, or a time step too long for the \
          contacts",
         touching(contact)
     )]

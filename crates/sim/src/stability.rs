@@ -132,7 +132,7 @@ impl<I: Integrator> StabilityLoss<I> {
             })
             .collect::<Result<_, SimulationError>>()?;
         let value = rollouts.iter().sum::<f64>() / self.count();
-        if value.is_finite() { Ok(value) } else { Err(self.blown_up()) }
+        if value.is_finite() { Ok(value) } else { Err(self.blown_up(pose)) }
     }
 
     /// The loss and its derivatives by a twist of `pose` about the point `center` (world frame).
@@ -180,7 +180,7 @@ impl<I: Integrator> StabilityLoss<I> {
         let (gradient, normal) = (chain.tr_mul(&gradient), chain.transpose() * normal * chain);
         let mut numbers = gradient.iter().chain(normal.iter()).chain(std::iter::once(&value));
         if !numbers.all(|x| x.is_finite()) {
-            return Err(self.blown_up());
+            return Err(self.blown_up(pose));
         }
         let (value, gradient, normal) = (value / count, gradient / count, normal / count);
         Ok(StabilityJacobian { value, gradient, normal })
@@ -220,10 +220,14 @@ impl<I: Integrator> StabilityLoss<I> {
         }
     }
 
-    /// The error of a rollout whose residuals are too large to be squared.
-    fn blown_up(&self) -> SimulationError {
+    /// The error of rollouts from `pose` whose residuals are too large to be squared.
+    fn blown_up(&self, pose: &Isometry3<f64>) -> SimulationError {
         let TimeSteps { dt, steps } = self.time_steps;
-        self.world.not_finite_at(self.object.index(), &self.states, dt * steps as f64)
+        let mut states = self.states.clone();
+        if let Some(rigid) = self.world.bodies[self.object].rigid() {
+            states[self.object] = rigid.at_rest(pose);
+        }
+        self.world.not_finite_at(self.object.index(), &states, dt * steps as f64)
     }
 
     fn count(&self) -> f64 {

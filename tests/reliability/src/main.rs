@@ -146,13 +146,22 @@ fn main() -> Result<ExitCode> {
 fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
     let program = Some(program.map_or_else(tools::program, Ok)?);
     let everything = Chosen { only: Vec::new() };
-    let mut rows = Parsers { seconds: 60, seed: 0 }.run(&everything)?;
-    rows.extend(tools::fuzz(600, &[])?);
-    rows.extend(Faults { program: program.clone(), count: 6, seed: 0 }.run(&everything)?);
-    rows.extend(Loads { program, scale: 1.0, curves }.run(&everything)?);
-    rows.extend(tools::numbers()?);
-    rows.extend(mutants(100, 0, &everything)?);
-    Ok(rows)
+    let fuzzed: Vec<&str> = PARSERS.iter().map(|parser| parser.name).collect();
+    let faults = Faults { program: program.clone(), count: 6, seed: 0 };
+    let parts = [
+        ("parsers", Parsers { seconds: 60, seed: 0 }.run(&everything)),
+        ("fuzz", tools::fuzz(600, &fuzzed)),
+        ("faults", faults.run(&everything)),
+        ("loads", Loads { program, scale: 1.0, curves }.run(&everything)),
+        ("numbers", tools::numbers()),
+        ("mutants", mutants(100, 0, &everything)),
+    ];
+    // What breaks off is a line of the table: the rest was tried all the same.
+    let broken_off = |name: &str, error: anyhow::Error| {
+        vec![Row { tried: 1, wrong: 1, note: format!("{error:#}"), ..Row::new(name) }]
+    };
+    let rows = parts.map(|(name, rows)| rows.unwrap_or_else(|error| broken_off(name, error)));
+    Ok(rows.into_iter().flatten().collect())
 }
 
 impl Parsers {
@@ -186,6 +195,9 @@ impl Loads {
         let program =
             std::fs::canonicalize(&program).with_context(|| program.display().to_string())?;
         let curves = self.curves.as_deref();
+        if let Some(folder) = curves {
+            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
         chosen
             .into_iter()
             .map(|load| told(loads::carry(load, &program, self.scale, curves)?))

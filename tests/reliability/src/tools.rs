@@ -72,19 +72,23 @@ fn install(package: &str) -> Result<()> {
     Ok(())
 }
 
-/// The command `prehend` beside this program, built as users have it.
+/// The command `prehend`, built as users have it.
 ///
 /// # Errors
 /// If it does not compile.
 pub fn program() -> Result<PathBuf> {
     let words = ["build", "--release", "--package", "prehend-refine", "--features", "mcap"];
-    let status = cargo(&words).status().context("cargo")?;
-    ensure!(status.success(), "the command was not built: {status}");
-    let folder = std::env::current_exe()?;
-    Ok(folder.parent().context("no folder of programs")?.join("prehend"))
+    let mut command = cargo(&words);
+    command.arg("--message-format=json-render-diagnostics").stderr(Stdio::inherit());
+    let output = command.output().context("cargo")?;
+    ensure!(output.status.success(), "the command was not built: {}", output.status);
+    let messages = String::from_utf8_lossy(&output.stdout);
+    let messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let mut programs = messages.filter_map(|m| m["executable"].as_str().map(PathBuf::from));
+    programs.next_back().context("cargo tells no program")
 }
 
-/// Runs libFuzzer for `seconds` on each parser of `only`, or on all of them.
+/// Runs libFuzzer for `seconds` on each parser of `only`.
 ///
 /// # Errors
 /// If it cannot be built, or does not run.
@@ -98,16 +102,17 @@ pub fn fuzz(seconds: u64, only: &[&str]) -> Result<Vec<Row>> {
         let line = line?;
         eprintln!("{line}");
         let cells: Vec<&str> = line.split_whitespace().collect();
-        if let [parser, files, coverage, found] = cells[..]
-            && let (Ok(tried), Ok(crashes)) = (files.parse(), found.parse())
+        if let [parser, files, coverage, crashes, hangs] = cells[..]
+            && let (Ok(tried), Ok(crashes), Ok(hangs)) =
+                (files.parse(), crashes.parse(), hangs.parse())
         {
             let note = format!("{seconds} s, {coverage} edges");
             let row = Row::new(format!("files of `{parser}`, by coverage"));
-            rows.push(Row { tried, crashes, note, ..row });
+            rows.push(Row { tried, crashes, hangs, note, ..row });
         }
     }
-    child.wait()?;
-    ensure!(!rows.is_empty(), "fuzz/run tried nothing");
+    let status = child.wait()?;
+    ensure!(rows.len() == only.len(), "{} of {} parsers: {status}", rows.len(), only.len());
     Ok(rows)
 }
 
@@ -118,11 +123,15 @@ pub fn fuzz(seconds: u64, only: &[&str]) -> Result<Vec<Row>> {
 pub fn numbers() -> Result<Vec<Row>> {
     // Programs of that name, and modules of other programs.
     let tests = |words: &[&str]| cargo(&[&["test", "--release", "--workspace"], words].concat());
+    let it = |package| ["test", "--release", "--package", package, "--test", "it", "finite"];
     let golden = ["--test", "golden"];
+    let mut to_the_bit = tests(&golden);
+    to_the_bit.env("PREHEND_GOLDEN_BITS", "1");
     let mut rows = vec![
         tested(tests(&["--test", "finite*"]), "finite numbers of autodiff, geometry and render")?,
-        tested(tests(&["--test", "it", "finite"]), "finite numbers of sim and refine")?,
-        tested(tests(&golden), "golden numbers, to the bit")?,
+        tested(cargo(&it("prehend-sim")), "finite numbers of sim")?,
+        tested(cargo(&it("prehend-refine")), "finite numbers of refine")?,
+        tested(to_the_bit, "golden numbers, to the bit")?,
     ];
     let old = Command::new("qemu-x86_64").arg("--version").stdout(Stdio::null()).status();
     if cfg!(target_arch = "x86_64") && old.is_ok() {
@@ -165,16 +174,27 @@ pub fn mutants(part: &Mutated, count: usize, seed: usize) -> Result<Row> {
     let all: Vec<Value> = serde_json::from_slice(&all.stdout)?;
     let every = (all.len() / count.max(1)).max(1);
     let output = root().join("target/mutants").join(part.name);
+    // Nothing of another run is taken for this one's.
+    if output.exists() {
+        std::fs::remove_dir_all(&output)?;
+    }
     std::fs::create_dir_all(&output)?;
     let mut command = cargo(&chosen);
     command.args(["--shard", &format!("{}/{every}", seed % every), "--sharding", "round-robin"]);
     command.args(["--no-times", "--colors", "never", "--output"]).arg(&output);
-    command.arg("--").args(part.tests).status()?;
+    let status = command.arg("--").args(part.tests).status()?;
+    // 2 and 3: no test noticed some mutant, or some test did not end with it.
+    ensure!(matches!(status.code(), Some(0 | 2 | 3)), "cargo mutants: {status}");
     let outcomes = std::fs::read_to_string(output.join("mutants.out/outcomes.json"))?;
     let outcomes: Value = serde_json::from_str(&outcomes)?;
     let number = |name: &str| outcomes[name].as_u64().unwrap_or(0) as usize;
     let (caught, missed) = (number("caught") + number("timeout"), number("missed"));
-    let note = format!("of {} places; {} do not compile", all.len(), number("unviable"));
+    let note = format!(
+        "of {}; {} % required; {} more do not compile",
+        all.len(),
+        1e2 * NOTICED,
+        number("unviable")
+    );
     let row = Row::new(format!("mutants of {}", part.name));
     Ok(Row { tried: caught + missed, wrong: missed, required: NOTICED, note, ..row })
 }

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Cells beyond the border from where on a spline is constant: the product of three such numbers is still far from the end of the range.
+/// Cells beyond the border from where on the value of a spline is constant: the product of three such numbers is still far from the end of the range.
 const FARTHEST: f64 = 1e60;
 
 /// Basis values and derivatives of the four coefficients around a point, with respect to the grid

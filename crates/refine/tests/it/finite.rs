@@ -77,11 +77,16 @@ fn observation(fault: Fault) -> Observation {
     observation
 }
 
-/// Numbers, or an error: `of` gives nothing else.
+/// Numbers, or an error: `of` gives nothing else. An error is none of what is as it is, at the truth or near it.
 fn assert_finite(what: &str, of: impl FnOnce() -> Result<Vec<f64>, RefineError>) {
     match of() {
         Ok(numbers) => assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {numbers:?}"),
-        Err(error) => println!("{what}: {error}"),
+        Err(error) => {
+            let elsewhere = ["upside down", "turned", "kilometers away", "beside", "in the camera"];
+            let is_right =
+                what.contains(FAULTS[0].0) && !elsewhere.iter().any(|w| what.ends_with(w));
+            assert!(!is_right, "{what}: {error}");
+        }
     }
 }
 

@@ -66,8 +66,8 @@ impl SoftRasOptions {
         let few = (1..=Self::MOST_FACES).contains(&faces);
         check("faces_per_pixel", faces as f64, "1 to 64", few)?;
         let (near, far) = (self.z_near, self.z_far);
-        let holds = far > near && near.abs() <= LARGEST && far.abs() <= LARGEST;
-        check("z_far", far, "above z_near, neither beyond 1e15", holds)
+        check("z_near", near, "a number within ±1e15", near.abs() <= LARGEST)?;
+        check("z_far", far, "above z_near and at most 1e15", far > near && far <= LARGEST)
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) const MISS: u32 = u32::MAX;
 /// The smallest whole number not below `v` ≥ 0 (`f32::ceil` is a function call on baseline x86-64).
 #[inline(always)]
 fn ceil(v: f32) -> i32 {
-    // Wraps where `v` is beyond all pixels, which callers look at themselves.
+    // Wraps where `v` is beyond all pixels: callers compare both ends of a range first.
     let whole = v as i32;
     whole.wrapping_add(i32::from((whole as f32) < v))
 }

@@ -29,7 +29,8 @@ fn barycentric(c: mat3x3<f32>, p: vec2<f32>) -> vec3<f32> {
         (a.x * b.y - a.y * b.x) * c[2].z,
     );
     let sum = weights.x + weights.y + weights.z;
-    if sum == 0.0 {
+    // As on the processor: the reciprocal of a subnormal number is infinite.
+    if abs(sum) < 1.1754944e-38 {
         return vec3<f32>(1.0, 0.0, 0.0);
     }
     return weights / sum;

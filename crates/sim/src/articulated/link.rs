@@ -103,8 +103,8 @@ impl<S: Scalar> Link<S> {
             return Err(wrong("place, mass, center of mass, inertia or armature is not finite"));
         }
         let moments = self.inertia.map(S::value).symmetric_eigenvalues();
-        // Some room for what was rounded.
-        match moments.min() >= -1e-9 * moments.amax() {
+        // Descriptions of robots have few decimals, and what they round below zero is small beside what the joints move.
+        match moments.min() >= -1e-3 * moments.amax() {
             true => Ok(()),
             false => Err(wrong("a principal moment of its inertia is negative")),
         }
@@ -239,7 +239,7 @@ impl<S: Scalar> Articulation<S> {
     /// Of `links`, each after its parent, that fall with `gravity` \[m/s²\].
     ///
     /// # Errors
-    /// If a parent does not come before its link, a number is not finite or a mass negative, or a joint moves no mass.
+    /// If a parent does not come before its link, a number is not finite, a mass or a principal moment negative, or a joint moves no mass.
     pub fn new(links: Vec<Link<S>>, gravity: Vector3<S>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
         let mut carriers = Vec::new();

@@ -35,7 +35,7 @@ pub enum BodyError {
         areas: usize,
     },
     /// A length of a box or the radius of a ball is not positive and finite, or beyond all measure.
-    #[error("lengths must be positive and finite, within 1e-60 and 1e60, one is {0} m")]
+    #[error("lengths must be from 1e-60 to 1e60 m, one is {0} m")]
     Length(f64),
     /// Samples so close that there is no memory for them.
     #[error("samples {0} m apart would be more than ten million")]

@@ -44,7 +44,7 @@ impl ParameterRange {
         let range = match self {
             _ if !inside => self.as_str(),
             Self::PositiveOrInfinite if value == f64::INFINITY => return Ok(()),
-            _ if value.abs() > LARGEST => "at most 1e60",
+            _ if value.abs() > LARGEST => "within ±1e60",
             Self::Positive | Self::PositiveOrInfinite | Self::PositiveFraction
                 if value < SMALLEST =>
             {

@@ -16,7 +16,7 @@ pub enum ShapeError {
         kind: String,
     },
     /// A dimension is not a positive, finite number, or beyond all measure.
-    #[error("{name} of a shape must be positive and finite, within 1e-60 and 1e60, is {value} m")]
+    #[error("{name} of a shape must be from 1e-60 to 1e60 m, is {value} m")]
     Dimension {
         /// Its name.
         name: String,

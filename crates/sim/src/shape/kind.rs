@@ -93,21 +93,27 @@ impl Kind {
         }, all => LiftedField::Parts(all.lifted_parts(dimensions)))
     }
 
-    /// The largest extent of what has a lattice of samples, and their distance \[m\].
-    fn extent(&self, dimensions: &[f64]) -> Option<(f64, f64)> {
-        let largest = |lengths: &[f64]| lengths.iter().copied().fold(0.0, f64::max);
+    /// Half the extents of the box that holds a lattice of samples, and the distance of these \[m\].
+    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
         match self {
             Self::Ball(_) | Self::Ground(_) | Self::Compound(_) => None,
-            Self::Cuboid(cuboid) => Some((2.0 * largest(dimensions), cuboid.spacing)),
-            Self::Capsule(capsule) => Some((2.0 * largest(dimensions), capsule.spacing)),
-            Self::Revolved(revolved) => Some((2.0 * largest(dimensions), revolved.spacing)),
+            Self::Cuboid(cuboid) => {
+                Some(([dimensions[0], dimensions[1], dimensions[2]], cuboid.spacing))
+            }
+            // Its samples are a row.
+            Self::Capsule(capsule) => Some(([0.0, 0.0, dimensions[0]], capsule.spacing)),
+            Self::Revolved(revolved) => {
+                Some(([dimensions[1], dimensions[1], dimensions[0]], revolved.spacing))
+            }
             Self::Polyhedron(polyhedron) => {
                 let corners = dimensions[..3 * polyhedron.vertices].as_chunks::<3>().0;
                 let along = |axis: usize| {
                     let places = corners.iter().map(|corner| corner[axis]);
-                    places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min)
+                    let span =
+                        places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min);
+                    0.5 * span
                 };
-                Some((largest(&[along(0), along(1), along(2)]), polyhedron.spacing))
+                Some(([0, 1, 2].map(along), polyhedron.spacing))
             }
         }
     }
@@ -128,8 +134,8 @@ impl Kind {
                 return Err(ShapeError::Dimension { name, value });
             }
         }
-        if let Some((extent, spacing)) = self.extent(dimensions) {
-            check_spacing([0.5 * extent; 3], spacing)?;
+        if let Some((half_extents, spacing)) = self.lattice(dimensions) {
+            check_spacing(half_extents, spacing)?;
         }
         let (border, deepest) = match self {
             Self::Ball(_) | Self::Capsule(_) | Self::Ground(_) | Self::Compound(_) => return Ok(()),

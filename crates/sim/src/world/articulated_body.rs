@@ -87,7 +87,7 @@ impl World {
     /// ```
     ///
     /// # Errors
-    /// If the links are no tree, or a joint moves no mass.
+    /// If the links are no tree, a joint moves no mass, or a link's inertia has a negative principal moment.
     pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, SimulationError> {
         let tree = Articulation::new(links, self.gravity)?;
         let links = tree.links().iter();

@@ -42,9 +42,15 @@ pub(super) fn frames(site: &Site<'_>) -> Result<Carried> {
     fs::write(site.folder.join("poses.csv"), text)?;
     let memory = site.run("refine --dataset ds --poses poses.csv --out r.csv --seed 1")?;
     let results = fs::read_to_string(site.folder.join("r.csv"))?;
-    let rows: Vec<&str> = results.lines().skip(1).collect();
-    ensure!(rows.len() == count, "{} of {count} rows", rows.len());
-    Ok(Carried { memory, is_even: true, note: format!("{count} rows") })
+    // Rotation and translation.
+    let poses = results.lines().skip(1).map(|line| line.split(',').skip(4).take(2).collect());
+    let poses: Vec<Vec<&str>> = poses.collect();
+    ensure!(poses.len() == count, "{} of {count} rows", poses.len());
+    let other = (0..count).find(|k| poses[*k] != poses[k % ORIGINALS]);
+    ensure!(other.is_none(), "row {other:?} has another pose than the same frame before");
+    let off = error(&site.folder, "r.csv")?;
+    ensure!(off < 1.5, "{off:.2} mm off");
+    Ok(Carried { memory, is_even: true, note: format!("{count} rows, {off:.2} mm off") })
 }
 
 /// An object of many faces.

@@ -28,8 +28,8 @@ impl ScoredModel {
         Self { tree, transforms: symmetries.transforms(), points, symmetries }
     }
 
-    /// All metrics that need no hand; those of points are none without points, or where a point is behind the camera or too far away
-    /// for a number.
+    /// All metrics that need no hand. Those of points are none without points or where they are no number, MSPD also where a point is
+    /// behind the camera.
     pub fn score(
         &self,
         estimate: &Isometry3<f64>,
