@@ -7,6 +7,7 @@ pub mod fuzz;
 pub mod loads;
 pub mod mutate;
 pub mod parsers;
+pub mod scene;
 pub mod seeds;
 pub mod site;
 pub mod table;

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::lift;
 use prehend_autodiff::{Scalar, Var, gradient};
 use prehend_geometry::shapes;
@@ -16,11 +16,9 @@ use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass
 use prehend_refine::scene::{default_scene, default_sequence};
 use prehend_refine::strategy::{Fused, Heuristic};
 use prehend_refine::{Frame, Strategy, refine};
+use prehend_reliability::scene::body_over_floor;
 use prehend_render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
-use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody, State,
-    Surface, World,
-};
+use prehend_sim::State;
 
 /// Relative to the largest number of its kind.
 const TOLERANCE: f64 = 1e-9;
@@ -68,16 +66,7 @@ fn pose<S: Scalar>(pose: &Isometry3<S>) -> Vec<S> {
 
 /// A box that is thrown onto the floor, slides and tumbles.
 fn thrown<S: Scalar>(tangent: &[S]) -> State<S> {
-    let mesh = shapes::superellipsoid([0.04, 0.03, 0.05], [0.8, 0.8], 12);
-    let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin()).unwrap();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
-    let samples = world.add(Body::free("box", rigid).with_surface(surface));
-    let spring = KelvinVoigt { stiffness: 2e6, damping: 1e3 };
-    let law = Law::new(spring, Coulomb { friction: 0.4, slip_scale: 5e-2 }).unwrap();
-    let smoothing = GapSmoothing::Softplus { width: 5e-4 };
-    world.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
+    let world = body_over_floor(12).unwrap();
     let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);

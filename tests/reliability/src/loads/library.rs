@@ -4,33 +4,21 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Scalar, gradient};
-use prehend_geometry::shapes;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::scene::default_sequence;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
-use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SemiImplicitEuler, State, Surface, TimeSteps, World,
-};
+use prehend_sim::{SemiImplicitEuler, State, TimeSteps};
 
 use super::memory::Memory;
 use super::{Carried, Site};
+use crate::scene::body_over_floor;
 
 /// Where a body of `points` contact points is after `steps` steps, thrown onto a floor with a velocity of `push`.
 fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<S>> {
     // A body of n segments has n²/2 vertices, about.
-    let mesh = shapes::superellipsoid([0.04, 0.03, 0.05], [0.8, 0.8], (2 * points).isqrt() + 1);
-    let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin())?;
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    let surface = Surface::uniform(&mesh.vertices, mesh.area())?;
-    let samples = world.add(Body::free("body", rigid).with_surface(surface));
-    let spring = KelvinVoigt { stiffness: 2e6, damping: 1e3 };
-    let law = Law::new(spring, Coulomb { friction: 0.4, slip_scale: 5e-2 })?;
-    let smoothing = GapSmoothing::Softplus { width: 5e-4 };
-    world.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)?;
+    let world = body_over_floor((2 * points).isqrt() + 1)?;
     let mut start: State<S> = State::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).lift();
     start.linear = Vector3::from(push);
     let still = State::at_rest(Isometry3::identity()).lift();
