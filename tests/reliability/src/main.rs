@@ -23,12 +23,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Give every parser broken files
-    Parsers {
-        #[command(flatten)]
-        parsers: Parsers,
-        #[command(flatten)]
-        chosen: Chosen,
-    },
+    Parsers(Parsers),
     /// The same, guided by coverage, with AddressSanitizer (installs cargo-fuzz)
     Fuzz {
         /// Seconds for each parser
@@ -38,19 +33,9 @@ enum Command {
         chosen: Chosen,
     },
     /// Kill long commands, fill the disk, break inputs, at random moments
-    Faults {
-        #[command(flatten)]
-        faults: Faults,
-        #[command(flatten)]
-        chosen: Chosen,
-    },
+    Faults(Faults),
     /// Carry loads: long films, many frames, large meshes, images and worlds
-    Loads {
-        #[command(flatten)]
-        loads: Loads,
-        #[command(flatten)]
-        chosen: Chosen,
-    },
+    Loads(Loads),
     /// Run the tests of numbers: finite ones from finite inputs, and the same ones on other instruction sets (with qemu-user)
     Numbers,
     /// Change the code here and there, and see whether a test fails (installs cargo-mutants)
@@ -77,7 +62,7 @@ enum Command {
     Seeds,
 }
 
-#[derive(Args)]
+#[derive(Args, Default)]
 struct Chosen {
     /// Of these alone; may be repeated
     #[arg(long)]
@@ -92,6 +77,8 @@ struct Parsers {
     /// Seed of the changes
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    chosen: Chosen,
 }
 
 #[derive(Args)]
@@ -105,6 +92,8 @@ struct Faults {
     /// Seed of the moments
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    chosen: Chosen,
 }
 
 #[derive(Args)]
@@ -118,11 +107,13 @@ struct Loads {
     /// Folder for the curves of memory over time
     #[arg(long)]
     curves: Option<PathBuf>,
+    #[command(flatten)]
+    chosen: Chosen,
 }
 
 fn main() -> Result<ExitCode> {
     let rows = match Arguments::parse().command {
-        Command::Parsers { parsers, chosen } => parsers.run(&chosen)?,
+        Command::Parsers(parsers) => parsers.run()?,
         Command::Fuzz { seconds, chosen } => {
             let names: Vec<&str> = chosen
                 .of(PARSERS, |parser| parser.name)?
@@ -131,8 +122,8 @@ fn main() -> Result<ExitCode> {
                 .collect();
             tools::fuzz(seconds, &names)?
         }
-        Command::Faults { faults, chosen } => faults.run(&chosen)?,
-        Command::Loads { loads, chosen } => loads.run(&chosen)?,
+        Command::Faults(faults) => faults.run()?,
+        Command::Loads(loads) => loads.run()?,
         Command::Numbers => tools::numbers()?,
         Command::Mutants { count, seed, chosen } => mutants(count, seed, &chosen)?,
         Command::All { program, curves } => all(program, curves)?,
@@ -145,16 +136,16 @@ fn main() -> Result<ExitCode> {
 /// Everything at the sizes of docs/RELIABILITY.md.
 fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
     let program = Some(program.map_or_else(tools::program, Ok)?);
-    let everything = Chosen { only: Vec::new() };
     let fuzzed: Vec<&str> = PARSERS.iter().map(|parser| parser.name).collect();
-    let faults = Faults { program: program.clone(), count: 6, seed: 0 };
+    let chosen = Chosen::default;
+    let faults = Faults { program: program.clone(), count: 6, seed: 0, chosen: chosen() };
     let parts = [
-        ("parsers", Parsers { seconds: 60, seed: 0 }.run(&everything)),
+        ("parsers", Parsers { seconds: 60, seed: 0, chosen: chosen() }.run()),
         ("fuzz", tools::fuzz(600, &fuzzed)),
-        ("faults", faults.run(&everything)),
-        ("loads", Loads { program, scale: 1.0, curves }.run(&everything)),
+        ("faults", faults.run()),
+        ("loads", Loads { program, scale: 1.0, curves, chosen: chosen() }.run()),
         ("numbers", tools::numbers()),
-        ("mutants", mutants(100, 0, &everything)),
+        ("mutants", mutants(100, 0, &chosen())),
     ];
     // What breaks off is a line of the table: the rest was tried all the same.
     let broken_off = |name: &str, error: anyhow::Error| {
@@ -165,16 +156,16 @@ fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
 }
 
 impl Parsers {
-    fn run(&self, chosen: &Chosen) -> Result<Vec<Row>> {
+    fn run(&self) -> Result<Vec<Row>> {
         let duration = Duration::from_secs(self.seconds);
-        let parsers = chosen.of(PARSERS, |parser| parser.name)?;
+        let parsers = self.chosen.of(PARSERS, |parser| parser.name)?;
         parsers.into_iter().map(|parser| told(fuzz::run(parser, self.seed, duration)?)).collect()
     }
 }
 
 impl Faults {
-    fn run(self, chosen: &Chosen) -> Result<Vec<Row>> {
-        let chosen = chosen.of(COMMANDS, |command| command.name)?;
+    fn run(self) -> Result<Vec<Row>> {
+        let chosen = self.chosen.of(COMMANDS, |command| command.name)?;
         let place = Place::new(&self.program.map_or_else(tools::program, Ok)?)?;
         let mut dice = Dice::new(self.seed);
         let mut rows = Vec::new();
@@ -189,8 +180,8 @@ impl Faults {
 }
 
 impl Loads {
-    fn run(self, chosen: &Chosen) -> Result<Vec<Row>> {
-        let chosen = chosen.of(LOADS, |load| load.name)?;
+    fn run(self) -> Result<Vec<Row>> {
+        let chosen = self.chosen.of(LOADS, |load| load.name)?;
         let program = self.program.map_or_else(tools::program, Ok)?;
         let program =
             std::fs::canonicalize(&program).with_context(|| program.display().to_string())?;
@@ -227,5 +218,16 @@ impl Chosen {
         let is_chosen =
             |one: &&T| self.only.is_empty() || self.only.iter().any(|only| only == name(one));
         Ok(all.iter().filter(is_chosen).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_options_of_all_commands_fit_together() {
+        Arguments::command().debug_assert();
     }
 }
