@@ -29,6 +29,8 @@ pub enum Form {
     Glb,
     /// Records of MCAP.
     Mcap,
+    /// Bytes, and a hash of them.
+    Grid,
     /// Bytes.
     Bytes,
 }
@@ -57,7 +59,7 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "urdf", form: Form::Text, read: urdf },
     Parser { name: "mjcf", form: Form::Text, read: mjcf },
     Parser { name: "taxels", form: Form::Text, read: taxels },
-    Parser { name: "grid", form: Form::Bytes, read: grid },
+    Parser { name: "grid", form: Form::Grid, read: grid },
     Parser { name: "png", form: Form::Png, read: image },
     Parser { name: "jpeg", form: Form::Bytes, read: image },
     Parser {

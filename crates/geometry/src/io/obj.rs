@@ -16,6 +16,7 @@ const OPTIONS: LoadOptions =
     LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    check_indices(bytes, path)?;
     // The name of the material library, and why it could not be read.
     let library = RefCell::new((String::new(), String::new()));
     let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OPTIONS, |name| {
@@ -56,6 +57,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
 
 /// Positions and faces alone.
 pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    check_indices(bytes, path)?;
     // Corners share their position whatever their normals are.
     let options = LoadOptions { single_index: false, ..OPTIONS };
     let no_materials = |_: &Path| Err(LoadError::GenericFailure);
@@ -69,6 +71,37 @@ pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErro
         whole.append(&TriMesh::new(vertices, faces));
     }
     Ok(whole)
+}
+
+/// Refuses indices before the first element and beyond [`u32`], with which `tobj` computes offsets that overflow.
+fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
+    // Of positions, texture coordinates and normals: a face counts back from the last one above it.
+    let mut counts = [0_i64; 3];
+    for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => counts[0] += 1,
+            Some(b"vt") => counts[1] += 1,
+            Some(b"vn") => counts[2] += 1,
+            Some(b"f" | b"l") => {
+                let indices = words.flat_map(|word| word.split(|b| *b == b'/').zip(counts));
+                for (index, count) in indices {
+                    // What is no number, `tobj` tells.
+                    let Ok(text) = str::from_utf8(index) else { continue };
+                    if text.parse().is_ok_and(|i: i64| i < -count || i > i64::from(u32::MAX)) {
+                        let line = format!("line {}", number + 1);
+                        return Err(MeshError::malformed(
+                            path,
+                            line,
+                            format!("index {text} is out of range"),
+                        ));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// The line, from 1, without which the lines before it can be read: `tobj` does not say where it stopped. Where faces
@@ -182,11 +215,16 @@ mod tests {
             "f 1 2 4\n",
             "f 1 2 0\n",
             "f 1 2 -9\n",
+            "f 1 2 9223372036854775807\n",
+            "f 1/1 2/1 3/-3\n",
+            "f 1//1 2//1 3//-2\n",
+            // Three times as much is 5, without the carry.
+            "f 1//1 2//1 3//6148914691236517207\n",
             "f 1 2 99999999999999999999\n",
             "v 0 0\n",
             "f a b c\n",
         ] {
-            let text = format!("# a comment\n{triangle}{bad}vn 0 0 1\nf 1 2 3\n");
+            let text = format!("vn 0 0 1\n{triangle}{bad}vn 0 0 1\nf 1 2 3\n");
             let error = load(&text, path).unwrap_err().to_string();
             assert!(error.starts_with("m.obj: line 5: "), "{bad}{error}");
         }

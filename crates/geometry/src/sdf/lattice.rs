@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 /// Farthest position \[m\], whose squares are well within range.
-const FARTHEST: f64 = 1e100;
+pub(super) const FARTHEST: f64 = 1e100;
 
 /// Largest number of samples a grid may have: half a gigabyte.
 pub const MAX_SAMPLES: usize = 64 << 20;

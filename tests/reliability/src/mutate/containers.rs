@@ -55,6 +55,25 @@ fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |sum, byte| (0..8).fold(sum ^ u32::from(*byte), step))
 }
 
+/// Anything but the hash at the end of a distance grid.
+pub(super) fn grid(original: &[u8], dice: &mut Dice) -> Vec<u8> {
+    let length = original.len().saturating_sub(8);
+    let mut changed = bytes::mutated(&original[..length], dice);
+    let hash = grid_hash(changed.get(8..).unwrap_or_default());
+    changed.extend(hash.to_le_bytes());
+    changed
+}
+
+/// The hash of distance grids.
+fn grid_hash(bytes: &[u8]) -> u64 {
+    let step = |hash: u64, word: &[u8]| {
+        let word = word.iter().rev().fold(0, |word, byte| (word << 8) | u64::from(*byte));
+        let mixed = (hash ^ word).wrapping_mul(0x0100_0000_01b3);
+        mixed ^ (mixed >> 32)
+    };
+    bytes.chunks(8).fold(0xcbf2_9ce4_8422_2325, step)
+}
+
 /// The JSON or the bytes of a GLB file.
 pub(super) fn glb(original: &[u8], dice: &mut Dice) -> Vec<u8> {
     let number = |at: usize| {
@@ -124,5 +143,11 @@ mod tests {
     fn the_checksum_is_that_of_png() {
         assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
         assert_eq!(crc32(b"IEND"), 0xae42_6082);
+    }
+
+    #[test]
+    fn the_hash_is_that_of_grids() {
+        let (content, hash) = include_bytes!("../../corpus/grid/box").split_last_chunk().unwrap();
+        assert_eq!(grid_hash(&content[8..]).to_le_bytes(), *hash);
     }
 }

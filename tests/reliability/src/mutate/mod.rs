@@ -46,6 +46,7 @@ pub fn mutated(original: &[u8], form: Form, dice: &mut Dice) -> Vec<u8> {
             Form::HeaderAndBytes => containers::header_and_bytes(&changed, dice),
             Form::Png => containers::png(&changed, dice),
             Form::Glb => containers::glb(&changed, dice),
+            Form::Grid => containers::grid(&changed, dice),
             Form::Mcap => containers::mcap(&changed, dice),
             Form::Bytes => bytes::mutated(&changed, dice),
         };
