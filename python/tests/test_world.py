@@ -150,7 +150,7 @@ def test_states_that_cannot_be_are_refused():
         world.longest_step(states[:1])
     with pytest.raises(prehend.Error, match="no memory"):
         world.rollout(1e-3, 2**62)(states)
-    rod = world.add_articulation([prehend.Link("rod", mass=1.0, com=[0, 0, -1])])[0]
+    rod = world.add_articulation([prehend.Link("rod", axis=[0, 1, 0], mass=1.0, com=[0, 0, -1])])[0]
     with pytest.raises(prehend.Error, match="'rod' is a link"):
         world.set_pose(world.neutral_states(), rod, [0, 0, 1])
 
