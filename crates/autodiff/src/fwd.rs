@@ -239,6 +239,49 @@ mod tests {
     }
 
     #[test]
+    fn local_functions_are_derived_by_what_they_have() {
+        struct Cube;
+        impl LocalFunction<1, 1> for Cube {
+            fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+                [x.powi(3)]
+            }
+        }
+        /// Wrong on purpose: which of its answers is taken can be seen.
+        struct Marked;
+        impl LocalFunction<1, 1> for Marked {
+            fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+                [x]
+            }
+            fn linearize(&self, _: [f64; 1]) -> Option<([f64; 1], [[f64; 1]; 1])> {
+                Some(([3.0], [[5.0]]))
+            }
+            fn derivative_along(&self, _: [f64; 1], [d]: [f64; 1]) -> Option<([f64; 1], [f64; 1])> {
+                Some(([7.0], [11.0 * d]))
+            }
+        }
+        fn along<F: LocalFunction<1, 1>>(function: &F) -> (f64, f64) {
+            let x = Fwd::<1> { value: 2.0, derivative: [3.0] };
+            let [y] = Scalar::local(function, [x]);
+            (y.value, y.derivative[0])
+        }
+        assert_eq!((along(&Cube), along(&&Cube)), ((8.0, 36.0), (8.0, 36.0)));
+        assert_eq!((along(&Marked), along(&&Marked)), ((7.0, 33.0), (7.0, 33.0)));
+        assert_eq!(linearize(&Cube, [2.0]), ([8.0], [[12.0]]));
+        assert_eq!(linearize(&&Marked, [2.0]), ([3.0], [[5.0]]));
+    }
+
+    #[test]
+    fn infinite_slopes_of_products_stay_in_their_direction_at_second_order() {
+        let [one, zero] = [1.0, 0.0].map(Fwd::<3>::lift);
+        let [x, y, _] = Fwd::<3>::variables([2.0, 0.0, 1.0]);
+        let x = Fwd { value: x, derivative: [one, zero, zero] };
+        let y = Fwd { value: y, derivative: [zero, one, zero] };
+        let second = (x * y.sqrt()).derivative.map(|d| d.derivative);
+        assert_eq!(second[0], [0.0, f64::INFINITY, 0.0]);
+        assert_eq!(second[2], [0.0; 3]);
+    }
+
+    #[test]
     fn angles_of_tiny_and_huge_vectors_have_derivatives() {
         for scale in [1e-200, 1.0, 1e200] {
             let [y, x] = Fwd::<2>::variables([3.0 * scale, 4.0 * scale]);

@@ -147,6 +147,27 @@ mod tests {
         assert_eq!(loss(&x, true), value);
     }
 
+    /// Recomputes within what is recomputed.
+    struct Around;
+
+    impl Recompute for Around {
+        type Error = &'static str;
+
+        fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, &'static str> {
+            let y = S::recompute(Root, &[x[0] * x[1], x[1], x[0] + x[1]])?;
+            Ok(vec![y[0] * y[1] + y[2] * x[0]])
+        }
+    }
+
+    #[test]
+    fn recomputed_functions_may_be_nested() {
+        let x = [0.7, 1.3];
+        let (value, reverse) = gradient(|x| Var::recompute(Around, x).unwrap()[0], &x);
+        let forward = Around.evaluate(&Fwd::<2>::variables(x)).unwrap()[0];
+        assert_eq!(value, forward.value);
+        reverse.iter().zip(forward.derivative).for_each(|(a, b)| assert!((a - b).abs() < 1e-13));
+    }
+
     #[test]
     fn failures_constants_and_unused_infinite_slopes() {
         let recording = Recording::start();

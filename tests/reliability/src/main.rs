@@ -87,7 +87,7 @@ struct Faults {
     #[arg(long)]
     program: Option<PathBuf>,
     /// Of each fault, for each command
-    #[arg(long, default_value_t = 6)]
+    #[arg(long, default_value_t = 7)]
     count: usize,
     /// Seed of the moments
     #[arg(long, default_value_t = 0)]
@@ -138,7 +138,7 @@ fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
     let program = Some(program.map_or_else(tools::program, Ok)?);
     let fuzzed: Vec<&str> = PARSERS.iter().map(|parser| parser.name).collect();
     let chosen = Chosen::default;
-    let faults = Faults { program: program.clone(), count: 6, seed: 0, chosen: chosen() };
+    let faults = Faults { program: program.clone(), count: 7, seed: 0, chosen: chosen() };
     let parts = [
         ("parsers", Parsers { seconds: 60, seed: 0, chosen: chosen() }.run()),
         ("fuzz", tools::fuzz(600, &fuzzed)),

@@ -16,6 +16,8 @@ pub struct Mutated {
     package: &'static str,
     /// Its files, from the root of the repository.
     files: &'static str,
+    /// What it is built with.
+    features: &'static str,
     /// Which tests have to notice: arguments of `cargo test`.
     tests: &'static [&'static str],
 }
@@ -26,24 +28,28 @@ pub const MUTANTS: &[Mutated] = &[
         name: "autodiff",
         package: "prehend-autodiff",
         files: "crates/autodiff/src/**/*.rs",
+        features: "faer",
         tests: &["--lib", "--tests"],
     },
     Mutated {
         name: "sim",
         package: "prehend-sim",
         files: "crates/sim/src/**/*.rs",
+        features: "faer",
         tests: &["--lib", "--tests"],
     },
     Mutated {
         name: "metrics",
         package: "prehend-refine",
         files: "crates/refine/src/evaluate/metrics/*.rs",
+        features: "",
         tests: &["--lib", "--test", "it"],
     },
     Mutated {
         name: "factors",
         package: "prehend-refine",
         files: "crates/refine/src/factor/**/*.rs",
+        features: "",
         tests: &["--lib", "--test", "it"],
     },
 ];
@@ -181,6 +187,7 @@ pub fn mutants(part: &Mutated, count: usize, seed: usize) -> Result<Row> {
     std::fs::create_dir_all(&output)?;
     let mut command = cargo(&chosen);
     command.args(["--shard", &format!("{}/{every}", seed % every), "--sharding", "round-robin"]);
+    command.args(["--profile", "mutants", "--features", part.features]);
     command.args(["--no-times", "--colors", "never", "--output"]).arg(&output);
     let status = command.arg("--").args(part.tests).status()?;
     // 2 and 3: no test noticed some mutant, or some test did not end with it.

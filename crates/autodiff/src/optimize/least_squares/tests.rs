@@ -23,6 +23,18 @@ fn rosenbrock_is_solved_to_rounding() {
 }
 
 #[test]
+fn linear_residuals_take_one_step_without_damping() {
+    fn plane<S: Scalar>(x: &[S]) -> Vec<S> {
+        vec![x[0] + x[1] * S::constant(2.0) - S::constant(3.0), x[0] - x[1], x[0]]
+    }
+    let [damped, undamped] = both().map(|method| {
+        method.minimize(&[5.0, -7.0], |x| NormalEquations::forward::<2>(plane, x)).unwrap()
+    });
+    assert_eq!((undamped.iterations, undamped.stop), (1, Stop::Gradient));
+    assert!(damped.iterations > 1, "{damped:?}");
+}
+
+#[test]
 fn powell_singular_is_reached_though_its_jacobian_loses_rank_there() {
     for method in both() {
         let found = method
@@ -251,6 +263,25 @@ fn a_missing_answer_is_an_error() {
     let found = LevenbergMarquardt::default().minimize_on(&problem, start, linearized, go_on);
     let error = OptimizeError::Answers { expected: 1, found: 0 };
     assert_eq!(found.map(|found| found.0), Err(error));
+}
+
+#[test]
+fn steps_on_a_manifold_are_measured_by_themselves() {
+    let problem = Valley(Vec::new().into());
+    let start = vec![-1.2, 1.0];
+    let linearized = problem.linearize(&start);
+    let criteria = Criteria { gradient: 0.0, decrease: 0.0, step: 1e-3, ..Criteria::default() };
+    let method = LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() };
+    let mut steps = Vec::new();
+    let (found, _) = method
+        .minimize_on(&problem, start, linearized, |iteration| {
+            steps.push(iteration.step);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert_eq!(found.stop, Stop::Step);
+    let (last, before) = steps.split_last().unwrap();
+    assert!(*last < 1e-3 && before.iter().all(|step| *step >= 1e-3), "{steps:?}");
 }
 
 #[test]
