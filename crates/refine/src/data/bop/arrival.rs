@@ -22,9 +22,9 @@ impl Dataset {
     pub fn has_arrived(&self, scene_id: u32, im_id: u32) -> bool {
         let Ok(scene) = self.scene(scene_id) else { return false };
         let key = im_id.to_string();
-        let told = [&scene.bodies, &scene.tactile].into_iter().all(|file| {
-            !file.exists() || file.root().is_ok_and(|entries| entries.contains_key(&key))
-        });
+        let told = [&scene.bodies, &scene.tactile]
+            .into_iter()
+            .all(|file| !file.exists() || file.root().is_ok_and(|entries| entries.contains(&key)));
         let together = scene.taken_together(im_id);
         let seen = |images: Option<Vec<u32>>| {
             let images = images.unwrap_or_else(|| vec![im_id]);

@@ -224,7 +224,7 @@ impl Scene {
             let fault = |_| DatasetError::unusable(file, format!("{key:?} is not an image id"));
             key.parse().map_err(fault)
         };
-        let mut ids = self.camera.root()?.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
+        let mut ids = self.camera.root()?.names().map(id).collect::<Result<Vec<u32>, _>>()?;
         ids.sort_unstable();
         Ok(ids)
     }

@@ -9,8 +9,9 @@ use std::sync::OnceLock;
 use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
+use super::entries::Entries;
 use super::error::DatasetError;
 use super::files::read_bytes;
 use super::pose::{exactly, require_in_range, rotation_from_row_major};
@@ -20,7 +21,7 @@ use super::unique::parse_json;
 #[derive(Debug)]
 pub(super) struct JsonFile {
     path: PathBuf,
-    root: OnceLock<Result<Map<String, Value>, DatasetError>>,
+    root: OnceLock<Result<Entries, DatasetError>>,
 }
 
 impl JsonFile {
@@ -37,12 +38,21 @@ impl JsonFile {
         self.path.exists()
     }
 
-    /// The top-level object.
+    /// The fields of the top-level object.
     ///
     /// # Errors
     /// When the file is absent, cannot be read, is not JSON, or its top level is no object.
-    pub(super) fn root(&self) -> Result<&Map<String, Value>, DatasetError> {
-        self.root.get_or_init(|| read(&self.path)).as_ref().map_err(Clone::clone)
+    pub(super) fn root(&self) -> Result<&Entries, DatasetError> {
+        let read = || {
+            let text = read_bytes(&self.path)?;
+            Entries::new(&text).map_err(|problem| DatasetError::unusable(&self.path, problem))
+        };
+        self.root.get_or_init(read).as_ref().map_err(Clone::clone)
+    }
+
+    fn value(&self, name: &str) -> Result<Option<Value>, DatasetError> {
+        let fault = |problem: String| DatasetError::field(&self.path, name, problem);
+        self.root()?.get(name).transpose().map_err(fault)
     }
 
     /// A field of the top level, if it is there.
@@ -50,8 +60,8 @@ impl JsonFile {
     /// # Errors
     /// Those of [`JsonFile::root`], and [`DatasetError::Field`] if it is not of its type.
     pub(super) fn field<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, DatasetError> {
-        let value = self.root()?.get(name);
-        value.map(|value| convert(&self.path, name.to_owned(), value)).transpose()
+        let value = self.value(name)?;
+        value.map(|value| convert(&self.path, name.to_owned(), &value)).transpose()
     }
 
     /// The entry of an image or object id.
@@ -78,11 +88,11 @@ impl JsonFile {
         id: u32,
     ) -> Result<Vec<(String, T)>, DatasetError> {
         let key = id.to_string();
-        let one = |name: String, value| Ok((name.clone(), convert(&self.path, name, value)?));
-        match self.root()?.get(&key) {
+        let one = |name: String, value| Ok((name.clone(), convert(&self.path, name, &value)?));
+        match self.value(&key)? {
             None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
             Some(Value::Array(all)) => {
-                let named = all.iter().enumerate();
+                let named = all.into_iter().enumerate();
                 named.map(|(k, value)| one(format!("{key}[{k}]"), value)).collect()
             }
             Some(value) => Ok(vec![one(key, value)?]),
@@ -185,47 +195,6 @@ fn plain(problem: &str) -> (Option<&str>, String) {
     };
     let absent = found == "invalid type: null";
     (None, if absent { "is missing".into() } else { format!("is not {kind}") })
-}
-
-fn read(path: &Path) -> Result<Map<String, Value>, DatasetError> {
-    let bytes = read_bytes(path)?;
-    let parsed = parse_json(&bytes).or_else(|error| {
-        // Report the strict parser's complaint unless non-finite numbers were all that stopped it.
-        parse_json(&false_for_non_finite(&bytes)).map_err(|_| error)
-    });
-    match parsed {
-        Ok(Value::Object(root)) => Ok(root),
-        Ok(_) => Err(DatasetError::unusable(path, "the top level is not a JSON object")),
-        Err(e) => Err(DatasetError::unusable(path, format!("not valid JSON: {e}"))),
-    }
-}
-
-/// Replaces `NaN`, `Infinity` and `-Infinity` outside strings by `false`, which no field accepts: unlike `null`,
-/// it does not count as absent.
-fn false_for_non_finite(bytes: &[u8]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(bytes.len());
-    let (mut i, mut in_string) = (0, false);
-    while let Some(&byte) = bytes.get(i) {
-        let word = [&b"NaN"[..], b"-Infinity", b"Infinity"]
-            .into_iter()
-            .find(|w| bytes[i..].starts_with(w));
-        match (in_string, byte, word) {
-            (true, b'\\', _) => {
-                out.extend(bytes[i..].iter().take(2));
-                i += 2;
-            }
-            (false, _, Some(word)) => {
-                out.extend(b"false");
-                i += word.len();
-            }
-            _ => {
-                in_string ^= byte == b'"';
-                out.push(byte);
-                i += 1;
-            }
-        }
-    }
-    out
 }
 
 /// `N` numbers; a matrix may also be a list of rows.

@@ -9,6 +9,7 @@
 mod arrival;
 mod bodies;
 mod dataset;
+mod entries;
 mod error;
 mod files;
 mod frame;
