@@ -29,14 +29,14 @@ pub const MUTANTS: &[Mutated] = &[
         package: "prehend-autodiff",
         files: "crates/autodiff/src/**/*.rs",
         features: "faer",
-        tests: &["--lib", "--tests"],
+        tests: &["--lib", "--test", "*"],
     },
     Mutated {
         name: "sim",
         package: "prehend-sim",
         files: "crates/sim/src/**/*.rs",
         features: "faer",
-        tests: &["--lib", "--tests"],
+        tests: &["--lib", "--test", "*"],
     },
     Mutated {
         name: "metrics",

@@ -78,8 +78,11 @@ impl Memory {
             chart
                 .configure_mesh()
                 .disable_x_mesh()
+                .max_light_lines(0)
                 .x_desc("s")
+                .x_label_formatter(&|x| format!("{x:.0}"))
                 .y_desc("resident memory [MB]")
+                .y_label_formatter(&|y| format!("{y:.0}"))
                 .draw()?;
             // No more than a picture can show.
             let step = self.samples.len().div_ceil(700);
