@@ -71,7 +71,7 @@ impl Memory {
             area.fill(&WHITE)?;
             let mut chart = ChartBuilder::on(&area)
                 .margin(12)
-                .caption(title, ("sans-serif", 15))
+                .caption(title.replace('`', ""), ("sans-serif", 15))
                 .x_label_area_size(34)
                 .y_label_area_size(52)
                 .build_cartesian_2d(0.0..end, 0.0..1.15 * self.peak())?;
