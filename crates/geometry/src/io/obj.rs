@@ -84,24 +84,22 @@ fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
             Some(b"vt") => counts[1] += 1,
             Some(b"vn") => counts[2] += 1,
             Some(b"f" | b"l") => {
-                let indices = words.flat_map(|word| word.split(|b| *b == b'/').zip(counts));
-                for (index, count) in indices {
-                    // What is no number, `tobj` tells.
-                    let Ok(text) = str::from_utf8(index) else { continue };
-                    if text.parse().is_ok_and(|i: i64| i < -count || i > i64::from(u32::MAX)) {
-                        let line = format!("line {}", number + 1);
-                        return Err(MeshError::malformed(
-                            path,
-                            line,
-                            format!("index {text} is out of range"),
-                        ));
-                    }
+                let mut indices = words.flat_map(|word| word.split(|b| *b == b'/').zip(counts));
+                if let Some(index) = indices.find_map(|(text, count)| out_of_range(text, count)) {
+                    let (line, reason) = (number + 1, format!("index {index} is out of range"));
+                    return Err(MeshError::malformed(path, format!("line {line}"), reason));
                 }
             }
             _ => {}
         }
     }
     Ok(())
+}
+
+/// The index that `text` is, after `count` elements, if it is of none. What is no number, `tobj` tells.
+fn out_of_range(text: &[u8], count: i64) -> Option<i64> {
+    let index: i64 = str::from_utf8(text).ok()?.parse().ok()?;
+    (index < -count || index > i64::from(u32::MAX)).then_some(index)
 }
 
 /// The line, from 1, without which the lines before it can be read: `tobj` does not say where it stopped. Where faces

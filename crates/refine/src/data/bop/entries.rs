@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use super::unique::parse_json;
+use super::unique::{parse_json, unique_fields};
 
 /// A JSON object whose fields are text: as values they would take ten times as much memory.
 #[derive(Debug)]
@@ -58,15 +58,8 @@ impl<'de> Deserialize<'de> for Entries {
                 f.write_str("a JSON object")
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Entries, A::Error> {
-                let mut all = BTreeMap::new();
-                while let Some(name) = fields.next_key::<String>()? {
-                    if all.contains_key(&name) {
-                        return Err(A::Error::custom(format!("the key {name:?} is there twice")));
-                    }
-                    all.insert(name, fields.next_value()?);
-                }
-                Ok(Entries(all))
+            fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Entries, A::Error> {
+                unique_fields(fields, A::next_value).map(Entries)
             }
         }
 

@@ -70,9 +70,15 @@ impl JsonFile {
     /// Those of [`JsonFile::root`], [`DatasetError::NoEntry`], and [`DatasetError::Field`] for the first field that is
     /// absent or not of its type.
     pub(super) fn entry<T: DeserializeOwned>(&self, id: u32) -> Result<T, DatasetError> {
+        let (key, value) = self.entry_value(id)?;
+        convert(&self.path, key, &value)
+    }
+
+    /// The key and the value of an image or object id.
+    fn entry_value(&self, id: u32) -> Result<(String, Value), DatasetError> {
         let key = id.to_string();
-        match self.field(&key)? {
-            Some(entry) => Ok(entry),
+        match self.value(&key)? {
+            Some(value) => Ok((key, value)),
             None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
         }
     }
@@ -87,15 +93,13 @@ impl JsonFile {
         &self,
         id: u32,
     ) -> Result<Vec<(String, T)>, DatasetError> {
-        let key = id.to_string();
         let one = |name: String, value| Ok((name.clone(), convert(&self.path, name, &value)?));
-        match self.value(&key)? {
-            None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
-            Some(Value::Array(all)) => {
+        match self.entry_value(id)? {
+            (key, Value::Array(all)) => {
                 let named = all.into_iter().enumerate();
                 named.map(|(k, value)| one(format!("{key}[{k}]"), value)).collect()
             }
-            Some(value) => Ok(vec![one(key, value)?]),
+            (key, value) => Ok(vec![one(key, value)?]),
         }
     }
 

@@ -1,9 +1,10 @@
 //! JSON in which no key is there twice: which of two values is meant, nobody knows.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
-use serde_json::{Map, Number, Value};
+use serde_json::{Number, Value};
 
 /// The value in `bytes`.
 ///
@@ -64,16 +65,28 @@ impl<'de> Visitor<'de> for Unique {
         Ok(values.into())
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
-        let mut map = Map::new();
-        while let Some(key) = entries.next_key::<String>()? {
-            if map.contains_key(&key) {
-                return Err(A::Error::custom(format!("the key {key:?} is there twice")));
-            }
-            map.insert(key, entries.next_value_seed(Unique)?);
-        }
-        Ok(map.into())
+    fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Value, A::Error> {
+        let map = unique_fields(fields, |fields| fields.next_value_seed(Unique))?;
+        Ok(map.into_iter().collect())
     }
+}
+
+/// The fields of an object, whose values `value` reads.
+///
+/// # Errors
+/// Those of `value`, and a key that is there twice.
+pub(super) fn unique_fields<'de, A: MapAccess<'de>, V>(
+    mut fields: A,
+    value: impl Fn(&mut A) -> Result<V, A::Error>,
+) -> Result<BTreeMap<String, V>, A::Error> {
+    let mut all = BTreeMap::new();
+    while let Some(key) = fields.next_key::<String>()? {
+        if all.contains_key(&key) {
+            return Err(A::Error::custom(format!("the key {key:?} is there twice")));
+        }
+        all.insert(key, value(&mut fields)?);
+    }
+    Ok(all)
 }
 
 #[cfg(test)]
