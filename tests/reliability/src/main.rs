@@ -1,17 +1,18 @@
 //! `cargo reliability`: attacks on Prehend, and a table of what came of them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
-use prehend_reliability::faults::{self, COMMANDS, FAULTS, Place};
-use prehend_reliability::loads::{self, LOADS};
+use prehend_reliability::attack::{Attack, carry_on, carry_out};
+use prehend_reliability::faults::{self, COMMANDS, FAULTS, Fault, LongCommand, Place};
+use prehend_reliability::loads::{self, LOADS, Load};
 use prehend_reliability::mutate::Dice;
-use prehend_reliability::parsers::PARSERS;
+use prehend_reliability::parsers::{PARSERS, Parser as FileParser};
 use prehend_reliability::table::{Row, Table};
-use prehend_reliability::tools::{self, MUTANTS};
+use prehend_reliability::tools::{self, MUTANTS, Mutated};
 use prehend_reliability::{fuzz, seeds};
 
 #[derive(Parser)]
@@ -25,13 +26,7 @@ enum Command {
     /// Give every parser broken files
     Parsers(Parsers),
     /// The same, guided by coverage, with AddressSanitizer (installs cargo-fuzz)
-    Fuzz {
-        /// Seconds for each parser
-        #[arg(long, default_value_t = 600)]
-        seconds: u64,
-        #[command(flatten)]
-        chosen: Chosen,
-    },
+    Fuzz(Fuzz),
     /// Kill long commands, fill the disk, break inputs, at random moments
     Faults(Faults),
     /// Carry loads: long films, many frames, large meshes, images and worlds
@@ -39,30 +34,14 @@ enum Command {
     /// Run the tests of numbers: finite ones from finite inputs, and the same ones on other instruction sets (with qemu-user)
     Numbers,
     /// Change the code here and there, and see whether a test fails (installs cargo-mutants)
-    Mutants {
-        /// Changes of each part of the code at least, drawn evenly
-        #[arg(long, default_value_t = 100)]
-        count: usize,
-        /// Which of them
-        #[arg(long, default_value_t = 0)]
-        seed: usize,
-        #[command(flatten)]
-        chosen: Chosen,
-    },
-    /// All of it at full size, and one table in the end: takes a night
-    All {
-        /// The command `prehend` [default: built]
-        #[arg(long)]
-        program: Option<PathBuf>,
-        /// Folder for the curves of memory over time
-        #[arg(long)]
-        curves: Option<PathBuf>,
-    },
+    Mutants(Mutants),
+    /// All of it at full size, and one table in the end: takes a night; if it is cut short, the next one goes on
+    All(All),
     /// Write the right files of every kind, with which corpora begin
     Seeds,
 }
 
-#[derive(Args, Default)]
+#[derive(Args)]
 struct Chosen {
     /// Of these alone; may be repeated
     #[arg(long)]
@@ -77,6 +56,15 @@ struct Parsers {
     /// Seed of the changes
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    chosen: Chosen,
+}
+
+#[derive(Args)]
+struct Fuzz {
+    /// Seconds for each parser
+    #[arg(long, default_value_t = 600)]
+    seconds: u64,
     #[command(flatten)]
     chosen: Chosen,
 }
@@ -111,105 +99,150 @@ struct Loads {
     chosen: Chosen,
 }
 
+#[derive(Args)]
+struct Mutants {
+    /// Changes of each part of the code at least, drawn evenly
+    #[arg(long, default_value_t = 100)]
+    count: usize,
+    /// Which of them
+    #[arg(long, default_value_t = 0)]
+    seed: usize,
+    #[command(flatten)]
+    chosen: Chosen,
+}
+
+#[derive(Args)]
+struct All {
+    /// The command `prehend` [default: built]
+    #[arg(long)]
+    program: Option<PathBuf>,
+    /// Folder for the curves of memory over time
+    #[arg(long)]
+    curves: Option<PathBuf>,
+    /// Where the rows of the table are kept until it is complete
+    #[arg(long, default_value = "target/reliability.journal")]
+    journal: PathBuf,
+    /// Try again what that has rows of
+    #[arg(long)]
+    restart: bool,
+}
+
 fn main() -> Result<ExitCode> {
     let rows = match Arguments::parse().command {
-        Command::Parsers(parsers) => parsers.run()?,
-        Command::Fuzz { seconds, chosen } => {
-            let names: Vec<&str> = chosen
-                .of(PARSERS, |parser| parser.name)?
-                .iter()
-                .map(|parser| parser.name)
-                .collect();
-            tools::fuzz(seconds, &names)?
-        }
-        Command::Faults(faults) => faults.run()?,
-        Command::Loads(loads) => loads.run()?,
-        Command::Numbers => tools::numbers()?,
-        Command::Mutants { count, seed, chosen } => mutants(count, seed, &chosen)?,
-        Command::All { program, curves } => all(program, curves)?,
+        Command::Parsers(parsers) => carry_out(parsers.attacks()?),
+        Command::Fuzz(fuzz) => carry_out(fuzz.attacks()?),
+        Command::Faults(faults) => carry_out(faults.attacks(&faults.place()?)?),
+        Command::Loads(loads) => carry_out(loads.attacks()?),
+        Command::Numbers => carry_out(tools::numbers()),
+        Command::Mutants(mutants) => carry_out(mutants.attacks()?),
+        Command::All(all) => all.carry_out()?,
         Command::Seeds => return seeds::write().map(|()| ExitCode::SUCCESS),
     };
     println!("{}", Table(&rows));
     Ok(if rows.iter().all(Row::is_good) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Everything at the sizes of docs/RELIABILITY.md.
-fn all(program: Option<PathBuf>, curves: Option<PathBuf>) -> Result<Vec<Row>> {
-    let program = Some(program.map_or_else(tools::program, Ok)?);
-    let fuzzed: Vec<&str> = PARSERS.iter().map(|parser| parser.name).collect();
-    let chosen = Chosen::default;
-    let faults = Faults { program: program.clone(), count: 7, seed: 0, chosen: chosen() };
-    let parts = [
-        ("parsers", Parsers { seconds: 60, seed: 0, chosen: chosen() }.run()),
-        ("fuzz", tools::fuzz(600, &fuzzed)),
-        ("faults", faults.run()),
-        ("loads", Loads { program, scale: 1.0, curves, chosen: chosen() }.run()),
-        ("numbers", tools::numbers()),
-        ("mutants", mutants(100, 0, &chosen())),
-    ];
-    // What breaks off is a line of the table: the rest was tried all the same.
-    let broken_off = |name: &str, error: anyhow::Error| {
-        vec![Row { tried: 1, wrong: 1, note: format!("{error:#}"), ..Row::new(name) }]
-    };
-    let rows = parts.map(|(name, rows)| rows.unwrap_or_else(|error| broken_off(name, error)));
-    Ok(rows.into_iter().flatten().collect())
+impl Parsers {
+    fn attacks(&self) -> Result<Vec<Attack<'_>>> {
+        let duration = Duration::from_secs(self.seconds);
+        let attack = |parser: &'static FileParser| {
+            let name = format!("files of `{}`", parser.name);
+            Attack::new(name, move || fuzz::run(parser, self.seed, duration))
+        };
+        Ok(self.chosen.of(PARSERS, |parser| parser.name)?.into_iter().map(attack).collect())
+    }
 }
 
-impl Parsers {
-    fn run(&self) -> Result<Vec<Row>> {
-        let duration = Duration::from_secs(self.seconds);
-        let parsers = self.chosen.of(PARSERS, |parser| parser.name)?;
-        parsers.into_iter().map(|parser| told(fuzz::run(parser, self.seed, duration)?)).collect()
+impl Fuzz {
+    fn attacks(&self) -> Result<Vec<Attack<'_>>> {
+        let attack = |parser: &'static FileParser| {
+            let name = format!("files of `{}`, by coverage", parser.name);
+            Attack::new(name, || tools::fuzz(parser.name, self.seconds))
+        };
+        Ok(self.chosen.of(PARSERS, |parser| parser.name)?.into_iter().map(attack).collect())
     }
 }
 
 impl Faults {
-    fn run(self) -> Result<Vec<Row>> {
-        let chosen = self.chosen.of(COMMANDS, |command| command.name)?;
-        let place = Place::new(&self.program.map_or_else(tools::program, Ok)?)?;
-        let mut dice = Dice::new(self.seed);
-        let mut rows = Vec::new();
-        for command in chosen {
-            for fault in FAULTS {
-                let row = faults::befall(&place, command, fault, (self.count, &mut dice))?;
-                rows.extend(row.map(told).transpose()?);
-            }
-        }
-        Ok(rows)
+    fn place(&self) -> Result<Place> {
+        Place::new(program(self.program.as_deref())?)
+    }
+
+    fn attacks<'a>(&'a self, place: &'a Place) -> Result<Vec<Attack<'a>>> {
+        let commands = self.chosen.of(COMMANDS, |command| command.name)?;
+        let all = commands.into_iter().flat_map(|command| FAULTS.map(|fault| (command, fault)));
+        let attack = |(command, fault): (&'static LongCommand, Fault)| {
+            Attack::new(format!("`{}`, {fault}", command.name), move || {
+                let mut dice = Dice::new(self.seed);
+                faults::befall(place, command, fault, (self.count, &mut dice))
+            })
+        };
+        Ok(all.filter(|(command, fault)| fault.concerns(command)).map(attack).collect())
     }
 }
 
 impl Loads {
-    fn run(self) -> Result<Vec<Row>> {
-        let chosen = self.chosen.of(LOADS, |load| load.name)?;
-        let program = self.program.map_or_else(tools::program, Ok)?;
-        let program =
-            std::fs::canonicalize(&program).with_context(|| program.display().to_string())?;
-        let curves = self.curves.as_deref();
-        if let Some(folder) = curves {
+    fn attacks(&self) -> Result<Vec<Attack<'_>>> {
+        let program = program(self.program.as_deref())?;
+        if let Some(folder) = &self.curves {
             std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
-        chosen
-            .into_iter()
-            .map(|load| told(loads::carry(load, &program, self.scale, curves)?))
-            .collect()
+        let attack = |load: &'static Load| {
+            let program = program.clone();
+            let curves = self.curves.as_deref();
+            Attack::new(load.what, move || loads::carry(load, &program, self.scale, curves))
+        };
+        Ok(self.chosen.of(LOADS, |load| load.name)?.into_iter().map(attack).collect())
     }
 }
 
-fn mutants(count: usize, seed: usize, chosen: &Chosen) -> Result<Vec<Row>> {
-    let parts = chosen.of(MUTANTS, |part| part.name)?;
-    parts.into_iter().map(|part| told(tools::mutants(part, count, seed)?)).collect()
+impl Mutants {
+    fn attacks(&self) -> Result<Vec<Attack<'_>>> {
+        let attack = |part: &'static Mutated| {
+            let name = format!("mutants of {}", part.name);
+            Attack::new(name, move || tools::mutants(part, self.count, self.seed))
+        };
+        Ok(self.chosen.of(MUTANTS, |part| part.name)?.into_iter().map(attack).collect())
+    }
 }
 
-/// Says at once what came of one attack: all of them take long.
-fn told(row: Row) -> Result<Row> {
-    eprintln!("{}: {} of {} held {}", row.what, row.held(), row.tried, row.note);
-    Ok(row)
+impl All {
+    /// Everything at the sizes of docs/RELIABILITY.md.
+    fn carry_out(self) -> Result<Vec<Row>> {
+        let program = Some(program(self.program.as_deref())?);
+        let parsers = Parsers { seconds: 60, ..defaults()? };
+        let fuzz: Fuzz = defaults()?;
+        let faults = Faults { program: program.clone(), ..defaults()? };
+        let place = faults.place()?;
+        let loads = Loads { program, curves: self.curves, ..defaults()? };
+        let mutants: Mutants = defaults()?;
+        let attacks = [
+            parsers.attacks()?,
+            fuzz.attacks()?,
+            faults.attacks(&place)?,
+            loads.attacks()?,
+            tools::numbers(),
+            mutants.attacks()?,
+        ];
+        carry_on(attacks.into_iter().flatten().collect(), &self.journal, self.restart)
+    }
+}
+
+/// What a command's options are if none is given.
+fn defaults<T: Args>() -> Result<T> {
+    let command = T::augment_args(clap::Command::new("defaults"));
+    Ok(T::from_arg_matches(&command.try_get_matches_from(["defaults"])?)?)
+}
+
+/// The command `prehend` that is meant, whatever folder it is run in.
+fn program(given: Option<&Path>) -> Result<PathBuf> {
+    let program = given.map_or_else(tools::program, |path| Ok(path.to_owned()))?;
+    std::fs::canonicalize(&program).with_context(|| program.display().to_string())
 }
 
 impl Chosen {
     /// Those of `all` that are named, or all without names.
-    fn of<'a, T>(&self, all: &'a [T], name: fn(&T) -> &str) -> Result<Vec<&'a T>> {
+    fn of<T>(&self, all: &'static [T], name: fn(&T) -> &str) -> Result<Vec<&'static T>> {
         if let Some(unknown) =
             self.only.iter().find(|only| !all.iter().any(|one| name(one) == **only))
         {
@@ -229,5 +262,16 @@ mod tests {
     #[test]
     fn the_options_of_all_commands_fit_together() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_command_line() {
+        let Ok(Arguments { command: Command::Faults(given) }) =
+            Arguments::try_parse_from(["reliability", "faults"])
+        else {
+            panic!("no command");
+        };
+        let faults: Faults = defaults().unwrap();
+        assert_eq!((faults.count, faults.seed), (given.count, given.seed));
     }
 }

@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// One kind of attack.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Row {
     /// What was attacked, and how.
     pub what: String,
@@ -19,13 +21,15 @@ pub struct Row {
     pub required: f64,
     /// What else is to be said: sizes, times.
     pub note: String,
+    /// The commit of the code, if it is told.
+    pub commit: String,
 }
 
 impl Row {
     /// Of attacks that must all be withstood; none yet.
     pub fn new(what: impl Into<String>) -> Self {
-        let (what, note) = (what.into(), String::new());
-        Self { what, tried: 0, crashes: 0, hangs: 0, wrong: 0, required: 1.0, note }
+        let (what, note, commit) = (what.into(), String::new(), String::new());
+        Self { what, tried: 0, crashes: 0, hangs: 0, wrong: 0, required: 1.0, note, commit }
     }
 
     /// How often it held.
@@ -44,21 +48,23 @@ pub struct Table<'a>(pub &'a [Row]);
 
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let head = ["", "tried", "held", "crashes", "hangs", "wrong", ""].map(String::from);
+        let head =
+            ["", "tried", "held", "crashes", "hangs", "wrong", "", "commit"].map(String::from);
         let cells = |row: &Row| {
             let [held, rest @ ..] = [row.held(), row.crashes, row.hangs, row.wrong];
             let [crashes, hangs, wrong] = rest;
             let numbers = [row.tried, held, crashes, hangs, wrong].map(|n| n.to_string());
             let [tried, held, crashes, hangs, wrong] = numbers;
-            [row.what.clone(), tried, held, crashes, hangs, wrong, row.note.clone()]
+            let (note, commit) = (row.note.clone(), row.commit.clone());
+            [row.what.clone(), tried, held, crashes, hangs, wrong, note, commit]
         };
         let lines: Vec<_> = std::iter::once(head).chain(self.0.iter().map(cells)).collect();
-        let widths: [usize; 7] = std::array::from_fn(|column| {
+        let widths: [usize; 8] = std::array::from_fn(|column| {
             lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)
         });
         for (index, line) in lines.iter().enumerate() {
             for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
-                let is_text = column == 0 || column == 6;
+                let is_text = column == 0 || column >= 6;
                 if is_text {
                     write!(f, "| {cell:<width$} ")?
                 } else {
@@ -67,7 +73,7 @@ impl fmt::Display for Table<'_> {
             }
             writeln!(f, "|")?;
             if index == 0 {
-                writeln!(f, "|---|--:|--:|--:|--:|--:|---|")?;
+                writeln!(f, "|---|--:|--:|--:|--:|--:|---|---|")?;
             }
         }
         Ok(())

@@ -1,12 +1,12 @@
 //! Attacks that other programs carry out: cargo's tests, libFuzzer and cargo-mutants.
 
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
+use crate::attack::Attack;
 use crate::table::Row;
 
 /// A part of the code that is changed here and there.
@@ -18,8 +18,8 @@ pub struct Mutated {
     files: &'static str,
     /// What it is built with.
     features: &'static str,
-    /// Which tests have to notice: arguments of `cargo test`.
-    tests: &'static [&'static str],
+    /// Which tests have to notice, the fastest first: arguments of `cargo test`.
+    tests: &'static [&'static [&'static str]],
 }
 
 /// All parts.
@@ -29,28 +29,28 @@ pub const MUTANTS: &[Mutated] = &[
         package: "prehend-autodiff",
         files: "crates/autodiff/src/**/*.rs",
         features: "faer",
-        tests: &["--lib", "--test", "*"],
+        tests: &[&["--lib"], &["--test", "*"]],
     },
     Mutated {
         name: "sim",
         package: "prehend-sim",
         files: "crates/sim/src/**/*.rs",
         features: "faer",
-        tests: &["--lib", "--test", "*"],
+        tests: &[&["--lib"], &["--test", "*"]],
     },
     Mutated {
         name: "metrics",
         package: "prehend-refine",
         files: "crates/refine/src/evaluate/metrics/*.rs",
         features: "",
-        tests: &["--lib", "--test", "it"],
+        tests: &[&["--lib"], &["--test", "it"]],
     },
     Mutated {
         name: "factors",
         package: "prehend-refine",
         files: "crates/refine/src/factor/**/*.rs",
         features: "",
-        tests: &["--lib", "--test", "it"],
+        tests: &[&["--lib"], &["--test", "it"]],
     },
 ];
 
@@ -94,50 +94,39 @@ pub fn program() -> Result<PathBuf> {
     programs.next_back().context("cargo tells no program")
 }
 
-/// Runs libFuzzer for `seconds` on each parser of `only`.
+/// Runs libFuzzer for `seconds` on `parser`.
 ///
 /// # Errors
 /// If it cannot be built, or does not run.
-pub fn fuzz(seconds: u64, only: &[&str]) -> Result<Vec<Row>> {
+pub fn fuzz(parser: &str, seconds: u64) -> Result<Row> {
     let mut command = Command::new(root().join("fuzz/run"));
-    command.arg(seconds.to_string()).args(only).stdin(Stdio::null()).stdout(Stdio::piped());
-    let mut child = command.spawn().context("fuzz/run")?;
-    let output = child.stdout.take().context("no output")?;
-    let mut rows = Vec::new();
-    for line in BufReader::new(output).lines() {
-        let line = line?;
-        eprintln!("{line}");
-        let cells: Vec<&str> = line.split_whitespace().collect();
-        if let [parser, files, coverage, crashes, hangs] = cells[..]
-            && let (Ok(tried), Ok(crashes), Ok(hangs)) =
-                (files.parse(), crashes.parse(), hangs.parse())
-        {
-            let note = format!("{seconds} s, {coverage} edges");
-            let row = Row::new(format!("files of `{parser}`, by coverage"));
-            rows.push(Row { tried, crashes, hangs, note, ..row });
-        }
-    }
-    let status = child.wait()?;
-    ensure!(rows.len() == only.len(), "{} of {} parsers: {status}", rows.len(), only.len());
-    Ok(rows)
+    command.args([&seconds.to_string(), parser]).stdin(Stdio::null()).stderr(Stdio::inherit());
+    let output = command.output().context("fuzz/run")?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    let cells: Vec<&str> = said.lines().last().unwrap_or_default().split_whitespace().collect();
+    let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
+    let [tried, edges, crashes, hangs] = numbers[..] else {
+        bail!("fuzz/run: {}", output.status);
+    };
+    let note = format!("{seconds} s, {edges} edges");
+    let row = Row::new(format!("files of `{parser}`, by coverage"));
+    Ok(Row { tried, crashes, hangs, note, ..row })
 }
 
-/// Runs the tests of numbers here, and those of golden numbers on an old processor that qemu-user plays, if it is installed.
-///
-/// # Errors
-/// If cargo cannot be run.
-pub fn numbers() -> Result<Vec<Row>> {
+/// The tests of numbers here, and those of golden numbers on an old processor that qemu-user plays, if it is installed.
+pub fn numbers() -> Vec<Attack<'static>> {
     // Programs of that name, and modules of other programs.
     let tests = |words: &[&str]| cargo(&[&["test", "--release", "--workspace"], words].concat());
-    let it = |package| ["test", "--release", "--package", package, "--test", "it", "finite"];
+    let it =
+        |package| cargo(&["test", "--release", "--package", package, "--test", "it", "finite"]);
     let golden = ["--test", "golden"];
     let mut to_the_bit = tests(&golden);
     to_the_bit.env("PREHEND_GOLDEN_BITS", "1");
-    let mut rows = vec![
-        tested(tests(&["--test", "finite*"]), "finite numbers of autodiff, geometry and render")?,
-        tested(cargo(&it("prehend-sim")), "finite numbers of sim")?,
-        tested(cargo(&it("prehend-refine")), "finite numbers of refine")?,
-        tested(to_the_bit, "golden numbers, to the bit")?,
+    let mut commands = vec![
+        ("finite numbers of autodiff, geometry and render", tests(&["--test", "finite*"])),
+        ("finite numbers of sim", it("prehend-sim")),
+        ("finite numbers of refine", it("prehend-refine")),
+        ("golden numbers, to the bit", to_the_bit),
     ];
     let old = Command::new("qemu-x86_64").arg("--version").stdout(Stdio::null()).status();
     if cfg!(target_arch = "x86_64") && old.is_ok() {
@@ -145,9 +134,10 @@ pub fn numbers() -> Result<Vec<Row>> {
         // Without vector instructions beyond SSE4.2, and without fused products.
         let runner = "qemu-x86_64 -cpu Nehalem";
         command.env("CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER", runner);
-        rows.push(tested(command, "golden numbers on a processor without AVX, to 10⁻⁹")?);
+        commands.push(("golden numbers on a processor without AVX, to 10⁻⁹", command));
     }
-    Ok(rows)
+    let attack = |(what, command)| Attack::new(what, move || tested(command, what));
+    commands.into_iter().map(attack).collect()
 }
 
 /// What `cargo test` says.
@@ -174,34 +164,55 @@ fn tested(mut command: Command, what: &str) -> Result<Row> {
 /// If cargo-mutants cannot be run, or its tests fail without a change.
 pub fn mutants(part: &Mutated, count: usize, seed: usize) -> Result<Row> {
     install("cargo-mutants")?;
-    let chosen = ["mutants", "--package", part.package, "--file", part.files];
-    let all = cargo(&chosen).args(["--list", "--json"]).output()?;
+    let all = cargo(&part.words()).args(["--list", "--json"]).output()?;
     ensure!(all.status.success(), "{}", String::from_utf8_lossy(&all.stderr));
     let all: Vec<Value> = serde_json::from_slice(&all.stdout)?;
     let every = (all.len() / count.max(1)).max(1);
-    let output = root().join("target/mutants").join(part.name);
-    // Nothing of another run is taken for this one's.
-    if output.exists() {
-        std::fs::remove_dir_all(&output)?;
+    let shard = format!("{}/{every}", seed % every);
+    let mut chosen = ["--shard", &shard, "--sharding", "round-robin"].map(String::from).to_vec();
+    let (mut caught, mut missed, mut unviable) = (0, 0, 0);
+    for (round, tests) in part.tests.iter().enumerate() {
+        let round = root().join(format!("target/mutants/{}-{round}", part.name));
+        let outcomes = part.round(&chosen, tests, &round)?;
+        let number = |name: &str| outcomes[name].as_u64().unwrap_or(0) as usize;
+        caught += number("caught") + number("timeout");
+        unviable += number("unviable");
+        missed = number("missed");
+        // The tests that take longer see only what the others missed.
+        let names = std::fs::read_to_string(round.join("mutants.out/missed.txt"))?;
+        let is_special = |c: char| !c.is_ascii_alphanumeric();
+        let exactly = |name: &str| ["--re".into(), format!("^{}$", name.replace(is_special, "."))];
+        chosen = names.lines().flat_map(exactly).collect();
+        if missed == 0 {
+            break;
+        }
     }
-    std::fs::create_dir_all(&output)?;
-    let mut command = cargo(&chosen);
-    command.args(["--shard", &format!("{}/{every}", seed % every), "--sharding", "round-robin"]);
-    command.args(["--profile", "mutants", "--features", part.features]);
-    command.args(["--no-times", "--colors", "never", "--output"]).arg(&output);
-    let status = command.arg("--").args(part.tests).status()?;
-    // 2 and 3: no test noticed some mutant, or some test did not end with it.
-    ensure!(matches!(status.code(), Some(0 | 2 | 3)), "cargo mutants: {status}");
-    let outcomes = std::fs::read_to_string(output.join("mutants.out/outcomes.json"))?;
-    let outcomes: Value = serde_json::from_str(&outcomes)?;
-    let number = |name: &str| outcomes[name].as_u64().unwrap_or(0) as usize;
-    let (caught, missed) = (number("caught") + number("timeout"), number("missed"));
-    let note = format!(
-        "of {}; {} % required; {} more do not compile",
-        all.len(),
-        1e2 * NOTICED,
-        number("unviable")
-    );
+    let note =
+        format!("of {}; {} % required; {unviable} more do not compile", all.len(), 1e2 * NOTICED);
     let row = Row::new(format!("mutants of {}", part.name));
     Ok(Row { tried: caught + missed, wrong: missed, required: NOTICED, note, ..row })
+}
+
+impl Mutated {
+    fn words(&self) -> [&'static str; 5] {
+        ["mutants", "--package", self.package, "--file", self.files]
+    }
+
+    /// What cargo-mutants says came of `tests`, with all mutants that the options `chosen` choose. Nothing of another run in `output` is left.
+    fn round(&self, chosen: &[String], tests: &[&str], output: &Path) -> Result<Value> {
+        if output.exists() {
+            std::fs::remove_dir_all(output)?;
+        }
+        std::fs::create_dir_all(output)?;
+        let mut command = cargo(&self.words());
+        command.args(chosen).args(["--profile", "mutants", "--features", self.features]);
+        command.args(["--no-times", "--colors", "never", "--output"]).arg(output);
+        // Nothing else is built either, examples above all.
+        let status =
+            command.args(tests.iter().map(|word| format!("--cargo-arg={word}"))).status()?;
+        // 2 and 3: no test noticed some mutant, or some test did not end with it.
+        ensure!(matches!(status.code(), Some(0 | 2 | 3)), "cargo mutants: {status}");
+        let outcomes = std::fs::read_to_string(output.join("mutants.out/outcomes.json"))?;
+        Ok(serde_json::from_str(&outcomes)?)
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
 use super::run::{Ended, Run};
 
@@ -77,14 +77,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// With a dataset that `program`, the command `prehend`, makes.
+    /// With a dataset that `program`, the command `prehend`, makes; its path is absolute, for it is run elsewhere.
     ///
     /// # Errors
     /// If it cannot.
-    pub fn new(program: &Path) -> Result<Self> {
-        let folder = tempfile::tempdir()?;
-        let program = fs::canonicalize(program).with_context(|| program.display().to_string())?;
-        let place = Self { folder, program };
+    pub fn new(program: PathBuf) -> Result<Self> {
+        let place = Self { folder: tempfile::tempdir()?, program };
         let made = place
             .run("synth --objects 061_foam_brick,006_mustard_bottle --frames 3 --out ds")
             .end()?;

@@ -35,6 +35,17 @@ pub enum Fault {
 pub const FAULTS: [Fault; 5] =
     [Fault::Killed, Fault::FullDisk, Fault::BrokenInput, Fault::BlockedOutput, Fault::Threads];
 
+impl Fault {
+    /// Whether it can befall `command`: not every one has inputs or threads.
+    pub fn concerns(self, command: &LongCommand) -> bool {
+        match self {
+            Self::Threads => command.name != "export",
+            Self::BrokenInput => command.name != "synth",
+            _ => true,
+        }
+    }
+}
+
 /// How a run that is not as it should be ended, other than with wrong files.
 #[derive(Debug, thiserror::Error)]
 enum Disorder {
@@ -44,7 +55,7 @@ enum Disorder {
     Crash(String),
 }
 
-/// Lets `fault` befall `command` `count` times, drawn by `dice`; what goes wrong is printed. None where it does not apply.
+/// Lets `fault` befall `command` `count` times, drawn by `dice`; what goes wrong is printed.
 ///
 /// # Errors
 /// If the program cannot be run at all, or does not do undisturbed what it is asked.
@@ -53,15 +64,7 @@ pub fn befall(
     command: &LongCommand,
     fault: Fault,
     (count, dice): (usize, &mut Dice),
-) -> Result<Option<Row>> {
-    let nothing = match fault {
-        Fault::Threads => command.name == "export",
-        Fault::BrokenInput => command.name == "synth",
-        _ => false,
-    };
-    if nothing {
-        return Ok(None);
-    }
+) -> Result<Row> {
     let (expected, undisturbed) = place.reference(command)?;
     let mut row = Row::new(format!("`{}`, {fault}", command.name));
     for _ in 0..count {
@@ -78,7 +81,7 @@ pub fn befall(
         }
     }
     place.clear(command)?;
-    Ok(Some(row))
+    Ok(row)
 }
 
 struct Trial<'a> {
