@@ -178,6 +178,17 @@ mod tests {
     }
 
     #[test]
+    fn without_points_or_in_front_of_the_camera_metrics_are_unknown() {
+        let [front, behind] = [4.0, -4.0].map(|z| Isometry3::translation(0.0, 0.0, z));
+        let score = cube(Symmetries::default()).score(&behind, &front, &CAMERA);
+        assert_eq!((score.mspd_px, score.add_mm), (None, Some(8e3)));
+        let empty = ScoredModel::new(Vec::new(), Symmetries::default());
+        let score = empty.score(&behind, &front, &CAMERA);
+        assert_eq!((score.add_mm, score.adi_mm, score.mssd_mm), (None, None, None));
+        assert_eq!((score.mspd_px, score.pe_cm), (None, Some(800.0)));
+    }
+
+    #[test]
     fn a_point_behind_the_camera_is_infinitely_wrong() {
         let [front, behind] = [4.0, -4.0].map(|z| Isometry3::translation(0.0, 0.0, z));
         for (estimate, truth) in [(behind, front), (front, behind)] {

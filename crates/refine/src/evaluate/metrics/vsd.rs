@@ -95,6 +95,38 @@ mod tests {
     }
 
     #[test]
+    fn distances_are_along_the_ray_of_each_pixel() {
+        // Two rows of two pixels: rays of length √3, √2 in the first row, √2 and 1 in the second.
+        let camera = Camera { fx: 1.0, fy: 1.0, cx: 1.0, cy: 1.0, width: 2, height: 2 };
+        let image = |depth: [f32; 4]| DepthImage::new(2, 2, depth.to_vec()).unwrap();
+        // 10 cm in depth are 17.3, 14.1, 14.1 and 10 cm along the ray.
+        let (truth, estimate) = (image([1.0; 4]), image([1.1; 4]));
+        let errors = vsd(&camera, &truth, &estimate, &truth, 1.0);
+        assert_eq!(errors, [1.0, 1.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        // 0.96 cm in depth before the model are 1.66, 1.36, 1.36 and 0.96 cm: only the first pixel is hidden.
+        let sensed = image([0.9904; 4]);
+        let estimate = image([0.0, 1.0, 1.0, 1.0]);
+        assert_eq!(vsd(&camera, &sensed, &estimate, &truth, 1.0), [0.0; 10]);
+    }
+
+    #[test]
+    fn what_only_one_pose_shows_is_wrong_whatever_the_size() {
+        let (one, none) = (row([1.0, 0.0, 0.0, 0.0]), row([0.0; 4]));
+        for (estimate, truth) in [(&one, &none), (&none, &one)] {
+            assert_eq!(vsd(&CAMERA, &none, estimate, truth, 100.0), [1.0; 10]);
+        }
+    }
+
+    #[test]
+    fn a_distance_that_equals_the_tolerance_is_too_large() {
+        let straight = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 1, height: 1 };
+        let image = |z| DepthImage::new(1, 1, vec![z]).unwrap();
+        let (truth, estimate) = (image(1.0), image(1.25));
+        let errors = vsd(&straight, &truth, &estimate, &truth, 1.0);
+        assert_eq!(errors, [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
     fn nothing_seen_is_wrong() {
         let none = row([0.0; 4]);
         assert_eq!(vsd(&CAMERA, &none, &none, &none, 0.1), [1.0; 10]);
