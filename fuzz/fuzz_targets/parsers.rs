@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use prehend_reliability::mutate::{Dice, mutated};
 use prehend_reliability::parsers::{PARSERS, Parser, find};
-use prehend_reliability::site::Site;
+use prehend_reliability::small_dataset::SmallDataset;
 
 static PARSER: LazyLock<&Parser> = LazyLock::new(|| {
     let name = std::env::var("PREHEND_PARSER").unwrap_or_default();
@@ -17,14 +17,14 @@ static PARSER: LazyLock<&Parser> = LazyLock::new(|| {
 });
 
 thread_local! {
-    static SITE: OnceCell<Site> = const { OnceCell::new() };
+    static DATASET: OnceCell<SmallDataset> = const { OnceCell::new() };
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    SITE.with(|site| {
-        let site = site.get_or_init(|| Site::new().expect("no folder for files"));
+    DATASET.with(|dataset| {
+        let dataset = dataset.get_or_init(|| SmallDataset::new().expect("no folder for files"));
         // What is wrong with them is theirs.
-        let _ = (PARSER.read)(site, bytes);
+        let _ = (PARSER.read)(dataset, bytes);
     });
 });
 

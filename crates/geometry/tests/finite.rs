@@ -191,6 +191,9 @@ proptest! {
             }
         }
         let tree = KdTree::new(&cloud).unwrap();
+        for query in cloud.iter().copied().chain([Point3::new(1e300, 0.0, -1e300)]) {
+            prop_assert!(tree.k_nearest(&query, 3).iter().all(|near| near.distance_squared.is_finite()), "{query}");
+        }
         prop_assert!(estimate_normals(&tree, 5, &Point3::new(0.0, 0.0, 1e300)).iter().all(finite));
     }
 
@@ -215,6 +218,7 @@ proptest! {
                 prop_assert!(is_finite_sample(&sample.field) && finite(sample.joints.iter().chain(&sample.base)));
                 prop_assert!(finite(&posed.hessian(&at, &sample)));
             }
+            prop_assert!(posed.point_jacobian(2, &at).all(|(_, by)| finite(&by)));
             prop_assert!(posed.posed().signed_distance(&at, f64::INFINITY).is_none_or(|d| d.is_finite()));
         }
     }

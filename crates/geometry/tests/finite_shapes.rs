@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::shapes::{
-    RoundedBox, capsule, cone, cuboid, cylinder, rounded_box, sphere, superellipsoid, torus, tube,
+    RoundedBox, Section, capsule, cone, cuboid, cylinder, extrude, loft, revolve, revolve_ring,
+    rounded_box, sphere, subdivided, superellipsoid, torus, tube,
 };
 use prehend_geometry::{Moments, RobustKernel};
 
@@ -60,6 +61,28 @@ fn shapes_of_no_size() {
             cuboid(Vector3::new(s, 1.0, s)),
             rounded_box(&box_of(Vector3::new(1.0, s, s))),
         ] {
+            assert!(mesh.vertices.iter().all(|v| finite(&v.coords)), "{s}");
+            assert!(mesh.uvs.iter().flatten().flatten().all(|x| x.is_finite()), "{s}");
+        }
+    }
+}
+
+#[test]
+fn lofts_and_extrusions_of_no_size() {
+    for s in [0.0, 1e-300, 1e-9, 1.0, 1e9] {
+        let square = [[0.0, 0.0], [s, 0.0], [s, s], [0.0, s]];
+        let sections = [
+            Section::circle(0.0, s),
+            Section { z: s, half: [s, 1.0], exponent: 1.0 },
+            Section { z: 1.0, half: [1.0, 0.0], exponent: 1e3 },
+        ];
+        let meshes = [
+            revolve(&square, 8),
+            revolve_ring(&square.map(|[r, z]| [1.0 + r, z]), 8),
+            loft(&sections, 8),
+            loft(&subdivided(&sections, 0.1), 8),
+        ];
+        for mesh in meshes.into_iter().chain(extrude(&square, [0.0, s])) {
             assert!(mesh.vertices.iter().all(|v| finite(&v.coords)), "{s}");
             assert!(mesh.uvs.iter().flatten().flatten().all(|x| x.is_finite()), "{s}");
         }

@@ -82,7 +82,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::problem::{Factor, Rows, State};
     use crate::scene::{Scene, default_scene};
+    use crate::strategy::Fused;
 
     #[test]
     fn what_becomes_of_a_frame_depends_on_no_other() {
@@ -107,5 +109,35 @@ mod tests {
             }
         }
         assert!(refine_all(&[], &Method::default(), None).unwrap().is_empty());
+    }
+
+    /// A factor that cannot do without a hand.
+    struct Faulty;
+
+    impl Factor for Faulty {
+        fn name(&self) -> &'static str {
+            "faulty"
+        }
+
+        fn rows(&self, state: &State, _: &mut Rows<'_>) {
+            assert!(!state.joints.is_empty(), "no hand");
+        }
+    }
+
+    #[test]
+    fn a_panic_costs_one_frame() {
+        let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
+        let input = |has_hand: bool| {
+            let mut observation = observation.clone();
+            observation.hand = observation.hand.filter(|_| has_hand);
+            let hand = has_hand.then(|| Arc::clone(&hand));
+            FrameInput { observation, object: Arc::clone(&object), hand, rig: None }
+        };
+        let inputs = [input(true), input(false), input(true)];
+        let job = |input| RefineJob { input, initial, rivals: None };
+        let jobs: Vec<_> = inputs.iter().map(job).collect();
+        let done = refine_all(&jobs, &Fused::default().with(Faulty).into(), None).unwrap();
+        assert!(matches!(done[1], Err(RefineError::Panicked(_))));
+        assert!(done[0].is_ok() && done[2].is_ok());
     }
 }

@@ -1,15 +1,16 @@
 //! What is tried one after the other, and what came of it.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::Result;
-use prehend_refine::data::{Identity, Journal};
-use serde_json::json;
+use anyhow::{Context, Result, anyhow};
+use prehend_geometry::write_atomic;
 
 use crate::table::Row;
+use crate::tools::root;
 
 /// Something to try.
 pub struct Attack<'a> {
@@ -23,53 +24,67 @@ impl<'a> Attack<'a> {
         Self { name: name.into(), run: Box::new(run) }
     }
 
-    /// Carries it out and says at once what came of it: all of them take long. One that breaks off is a row of its own kind.
-    fn carry_out(self) -> Row {
-        let commit = commit();
-        let mut row = (self.run)().unwrap_or_else(|error| {
+    /// Runs it and says at once what came of it: all of them take long. One that breaks off has a row of its own, too.
+    fn run(self, commit: &str) -> Row {
+        let outcome = catch_unwind(AssertUnwindSafe(self.run));
+        let outcome = outcome.unwrap_or_else(|_| Err(anyhow!("the suite itself panicked")));
+        let mut row = outcome.unwrap_or_else(|error| {
             let note = format!("{error:#}");
             Row { tried: 1, wrong: 1, note, ..Row::new(self.name) }
         });
-        row.commit = commit;
+        row.commit = commit.to_owned();
         eprintln!("{}: {} of {} held; {}", row.what, row.held(), row.tried, row.note);
         row
     }
 }
 
-/// Carries out all attacks.
-pub fn carry_out(attacks: Vec<Attack<'_>>) -> Vec<Row> {
-    attacks.into_iter().map(Attack::carry_out).collect()
+/// Runs all attacks.
+pub fn run_all(attacks: Vec<Attack<'_>>) -> Vec<Row> {
+    let commit = commit();
+    attacks.into_iter().map(|attack| attack.run(&commit)).collect()
 }
 
-/// Carries out the attacks that the journal at `path` has no row of yet, so that a night may be cut short; also of other code than it was
-/// begun with, for every row has its commit. With `restart` none counts. In the end the journal is removed.
+/// Runs the attacks that `file` has no good row of yet, and keeps their rows there as they come: a night that was cut short goes on, also with
+/// other code than it was begun with, for every row has its commit. With `restart` no row counts.
 ///
 /// # Errors
-/// If the journal is of other attacks, or cannot be written.
-pub fn carry_on(attacks: Vec<Attack<'_>>, path: &Path, restart: bool) -> Result<Vec<Row>> {
-    let names: Vec<&str> = attacks.iter().map(|attack| attack.name.as_str()).collect();
-    let identity = Identity::of(&json!({ "attacks": names }));
-    let (mut journal, mut rows): (_, BTreeMap<usize, Row>) =
-        Journal::open(path, &identity, restart)?;
-    for (index, attack) in attacks.into_iter().enumerate() {
-        if let Entry::Vacant(open) = rows.entry(index) {
-            open.insert(journal.append(index, &attack.carry_out())?);
+/// If the file is of another kind, or cannot be written.
+pub fn resume(attacks: Vec<Attack<'_>>, file: &Path, restart: bool) -> Result<Vec<Row>> {
+    let mut rows: BTreeMap<String, Row> = match fs::read(file) {
+        Ok(text) if !restart => {
+            serde_json::from_slice(&text).with_context(|| file.display().to_string())?
         }
+        _ => BTreeMap::new(),
+    };
+    if let Some(folder) = file.parent() {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    journal.discard()?;
-    Ok(rows.into_values().collect())
+    let commit = commit();
+    let mut all = Vec::new();
+    for attack in attacks {
+        let name = attack.name.clone();
+        let row = match rows.remove(&name).filter(Row::is_good) {
+            Some(row) => row,
+            None => attack.run(&commit),
+        };
+        all.push(row.clone());
+        rows.insert(name, row);
+        write_atomic(file, &serde_json::to_vec_pretty(&rows)?)
+            .with_context(|| file.display().to_string())?;
+    }
+    Ok(all)
 }
 
 /// The commit of the code at hand, with a `+` where it was changed since; empty if git does not tell.
 fn commit() -> String {
     let words = ["describe", "--always", "--exclude=*", "--dirty=+"];
-    let output = Command::new("git").args(words).output();
+    let output = Command::new("git").args(words).current_dir(root()).output();
     output.map_or_else(|_| String::new(), |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
 }
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
+    use std::cell::RefCell;
 
     use anyhow::bail;
 
@@ -83,32 +98,36 @@ mod tests {
     fn what_breaks_off_is_a_row_that_is_not_good() {
         let attacks = vec![
             Attack::new("a", || bail!("no program")),
-            Attack::new("b", || Ok(good("all of b"))),
+            Attack::new("b", || panic!("a fault")),
+            Attack::new("c", || Ok(good("all of c"))),
         ];
-        let rows = carry_out(attacks);
-        assert_eq!((rows[0].what.as_str(), rows[0].note.as_str()), ("a", "no program"));
-        assert!(!rows[0].is_good() && rows[1].is_good());
+        let rows = run_all(attacks);
+        let said: Vec<_> = rows.iter().map(|row| (row.what.as_str(), row.is_good())).collect();
+        assert_eq!(said, [("a", false), ("b", false), ("all of c", true)]);
+        assert_eq!(rows[0].note, "no program");
     }
 
     #[test]
-    fn what_the_journal_has_is_not_tried_again() {
+    fn what_has_a_good_row_is_not_tried_again() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("rows.journal");
-        let tried = Cell::new(0);
-        let attack = |name: &'static str| {
-            let tried = &tried;
-            Attack::new(name, move || {
-                tried.set(tried.get() + 1);
-                Ok(good(name))
-            })
+        let file = folder.path().join("target/rows.json");
+        let tried = RefCell::new(String::new());
+        let run = |restart: bool, is_well: bool| {
+            let attack = |name: &'static str, wrong: usize| {
+                let tried = &tried;
+                Attack::new(name, move || {
+                    tried.borrow_mut().push_str(name);
+                    Ok(Row { wrong, ..good(name) })
+                })
+            };
+            let attacks = vec![attack("a", 0), attack("b", usize::from(!is_well))];
+            let rows = resume(attacks, &file, restart).unwrap();
+            assert_eq!(rows.iter().map(|row| row.what.as_str()).collect::<String>(), "ab");
+            tried.take()
         };
-        // A run that is cut short after its first attack.
-        let identity = Identity::of(&json!({ "attacks": ["a", "b"] }));
-        let (mut journal, _) = Journal::open::<Row>(&path, &identity, false).unwrap();
-        journal.append(0, &Row { note: "kept".into(), ..good("a") }).unwrap();
-        drop(journal);
-        let rows = carry_on(vec![attack("a"), attack("b")], &path, false).unwrap();
-        assert_eq!((tried.get(), rows.len(), rows[0].note.as_str()), (1, 2, "kept"));
-        assert!(!path.exists());
+        assert_eq!(run(false, false), "ab");
+        assert_eq!(run(false, true), "b");
+        assert_eq!(run(false, true), "");
+        assert_eq!(run(true, true), "ab");
     }
 }

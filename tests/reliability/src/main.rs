@@ -6,14 +6,13 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
-use prehend_reliability::attack::{Attack, carry_on, carry_out};
+use prehend_reliability::attack::{Attack, resume, run_all};
 use prehend_reliability::faults::{self, COMMANDS, FAULTS, Fault, LongCommand, Place};
 use prehend_reliability::loads::{self, LOADS, Load};
-use prehend_reliability::mutate::Dice;
+use prehend_reliability::mutants::{self, MUTANTS, Mutated};
 use prehend_reliability::parsers::{PARSERS, Parser as FileParser};
 use prehend_reliability::table::{Row, Table};
-use prehend_reliability::tools::{self, MUTANTS, Mutated};
-use prehend_reliability::{fuzz, seeds};
+use prehend_reliability::{fuzz, seeds, tools};
 
 #[derive(Parser)]
 struct Arguments {
@@ -35,7 +34,7 @@ enum Command {
     Numbers,
     /// Change the code here and there, and see whether a test fails (installs cargo-mutants)
     Mutants(Mutants),
-    /// All of it at full size, and one table in the end: takes a night; if it is cut short, the next one goes on
+    /// All of it at full size, and one table in the end: takes a night; one that is cut short goes on where it was
     All(All),
     /// Write the right files of every kind, with which corpora begin
     Seeds,
@@ -74,7 +73,7 @@ struct Faults {
     /// The command `prehend` [default: built]
     #[arg(long)]
     program: Option<PathBuf>,
-    /// Of each fault, for each command
+    /// How often each fault has to strike each command
     #[arg(long, default_value_t = 7)]
     count: usize,
     /// Seed of the moments
@@ -119,23 +118,23 @@ struct All {
     /// Folder for the curves of memory over time
     #[arg(long)]
     curves: Option<PathBuf>,
-    /// Where the rows of the table are kept until it is complete
-    #[arg(long, default_value = "target/reliability.journal")]
-    journal: PathBuf,
-    /// Try again what that has rows of
+    /// Where the rows of the table are kept [default: target/reliability.json]
+    #[arg(long)]
+    rows: Option<PathBuf>,
+    /// Try again what that has good rows of
     #[arg(long)]
     restart: bool,
 }
 
 fn main() -> Result<ExitCode> {
     let rows = match Arguments::parse().command {
-        Command::Parsers(parsers) => carry_out(parsers.attacks()?),
-        Command::Fuzz(fuzz) => carry_out(fuzz.attacks()?),
-        Command::Faults(faults) => carry_out(faults.attacks(&faults.place()?)?),
-        Command::Loads(loads) => carry_out(loads.attacks()?),
-        Command::Numbers => carry_out(tools::numbers()),
-        Command::Mutants(mutants) => carry_out(mutants.attacks()?),
-        Command::All(all) => all.carry_out()?,
+        Command::Parsers(parsers) => run_all(parsers.attacks()?),
+        Command::Fuzz(fuzz) => run_all(fuzz.attacks()?),
+        Command::Faults(faults) => run_all(faults.attacks(&faults.place()?)?),
+        Command::Loads(loads) => run_all(loads.attacks()?),
+        Command::Numbers => run_all(tools::numbers()),
+        Command::Mutants(mutants) => run_all(mutants.attacks()?),
+        Command::All(all) => all.run()?,
         Command::Seeds => return seeds::write().map(|()| ExitCode::SUCCESS),
     };
     println!("{}", Table(&rows));
@@ -173,8 +172,7 @@ impl Faults {
         let all = commands.into_iter().flat_map(|command| FAULTS.map(|fault| (command, fault)));
         let attack = |(command, fault): (&'static LongCommand, Fault)| {
             Attack::new(format!("`{}`, {fault}", command.name), move || {
-                let mut dice = Dice::new(self.seed);
-                faults::befall(place, command, fault, (self.count, &mut dice))
+                faults::befall(place, command, fault, self.count, self.seed)
             })
         };
         Ok(all.filter(|(command, fault)| fault.concerns(command)).map(attack).collect())
@@ -190,7 +188,7 @@ impl Loads {
         let attack = |load: &'static Load| {
             let program = program.clone();
             let curves = self.curves.as_deref();
-            Attack::new(load.what, move || loads::carry(load, &program, self.scale, curves))
+            Attack::new(load.what, move || loads::run(load, &program, self.scale, curves))
         };
         Ok(self.chosen.of(LOADS, |load| load.name)?.into_iter().map(attack).collect())
     }
@@ -200,15 +198,15 @@ impl Mutants {
     fn attacks(&self) -> Result<Vec<Attack<'_>>> {
         let attack = |part: &'static Mutated| {
             let name = format!("mutants of {}", part.name);
-            Attack::new(name, move || tools::mutants(part, self.count, self.seed))
+            Attack::new(name, move || mutants::run(part, self.count, self.seed))
         };
         Ok(self.chosen.of(MUTANTS, |part| part.name)?.into_iter().map(attack).collect())
     }
 }
 
 impl All {
-    /// Everything at the sizes of docs/RELIABILITY.md.
-    fn carry_out(self) -> Result<Vec<Row>> {
+    /// Everything at full size.
+    fn run(self) -> Result<Vec<Row>> {
         let program = Some(program(self.program.as_deref())?);
         let parsers = Parsers { seconds: 60, ..defaults()? };
         let fuzz: Fuzz = defaults()?;
@@ -224,7 +222,8 @@ impl All {
             tools::numbers(),
             mutants.attacks()?,
         ];
-        carry_on(attacks.into_iter().flatten().collect(), &self.journal, self.restart)
+        let file = self.rows.unwrap_or_else(|| tools::root().join("target/reliability.json"));
+        resume(attacks.into_iter().flatten().collect(), &file, self.restart)
     }
 }
 

@@ -8,11 +8,12 @@ use nalgebra::{Isometry3, Point3};
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::data::{Assets, Target, find_targets, load_frame_file};
+use prehend_refine::data::{Assets, Journal, Target, Times, find_targets, load_frame_file};
 use prehend_refine::rig::Rig;
 use prehend_render::{DepthImage, RgbImage};
+use serde_json::Value;
 
-use crate::site::Site;
+use crate::small_dataset::SmallDataset;
 
 /// How the content of a file is built, for changes that keep most of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +46,7 @@ pub struct Parser {
     ///
     /// # Errors
     /// What is wrong with them.
-    pub read: fn(&Site, &[u8]) -> Result<()>,
+    pub read: fn(&SmallDataset, &[u8]) -> Result<()>,
 }
 
 /// All parsers.
@@ -87,6 +88,8 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "results", form: Form::Text, read: results },
     Parser { name: "frame", form: Form::Json, read: frame },
     Parser { name: "rig", form: Form::Json, read: rig },
+    Parser { name: "journal", form: Form::Text, read: journal },
+    Parser { name: "times", form: Form::Text, read: times },
     #[cfg(feature = "mcap")]
     Parser { name: "mcap", form: Form::Mcap, read: log },
 ];
@@ -96,8 +99,8 @@ pub fn find(name: &str) -> Option<&'static Parser> {
     PARSERS.iter().find(|parser| parser.name == name)
 }
 
-fn mesh(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
-    whole(&TriMesh::from_bytes(bytes, &site.path(name))?);
+fn mesh(small: &SmallDataset, bytes: &[u8], name: &str) -> Result<()> {
+    whole(&TriMesh::from_bytes(bytes, &small.path(name))?);
     Ok(())
 }
 
@@ -119,14 +122,15 @@ fn whole(mesh: &TriMesh) {
     }
 }
 
-fn mtl(site: &Site, bytes: &[u8]) -> Result<()> {
-    fs::write(site.path("n.mtl"), bytes)?;
+fn mtl(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    fs::write(small.path("n.mtl"), bytes)?;
     let text = "mtllib n.mtl\nusemtl textured\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
-    mesh(site, text.as_bytes(), "m.obj")
+    mesh(small, text.as_bytes(), "m.obj")
 }
 
-fn urdf(site: &Site, bytes: &[u8]) -> Result<()> {
-    let tree = KinematicTree::from_urdf_str(std::str::from_utf8(bytes)?, Some(&site.path("hand")))?;
+fn urdf(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let tree =
+        KinematicTree::from_urdf_str(std::str::from_utf8(bytes)?, Some(&small.path("hand")))?;
     let rest: Vec<f64> = tree.joint_names().iter().map(|_| 0.0).collect();
     let poses = tree.forward_kinematics(&rest);
     assert_eq!(poses.len(), tree.links().len());
@@ -139,15 +143,15 @@ fn finite(pose: &Isometry3<f64>) {
     assert!({ numbers }.all(|v| v.is_finite()), "{pose}");
 }
 
-fn mjcf(site: &Site, bytes: &[u8]) -> Result<()> {
-    let model = mjcf::Model::from_str(std::str::from_utf8(bytes)?, Some(&site.path("hand")))?;
+fn mjcf(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let model = mjcf::Model::from_str(std::str::from_utf8(bytes)?, Some(&small.path("hand")))?;
     model.reference_poses().iter().for_each(finite);
     assert!(model.reference_positions().iter().all(|q| q.is_finite()));
     Ok(())
 }
 
-fn taxels(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("broken.csv");
+fn taxels(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.csv");
     fs::write(&file, bytes)?;
     for taxel in load_taxels(&file)? {
         assert!(
@@ -158,8 +162,8 @@ fn taxels(site: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-fn grid(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("grid");
+fn grid(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("grid");
     fs::write(&file, bytes)?;
     let grid = SdfGrid::load(&file)?;
     for point in [Point3::origin(), Point3::new(0.01, -0.02, 0.03)] {
@@ -170,7 +174,7 @@ fn grid(site: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-fn image(_: &Site, bytes: &[u8]) -> Result<()> {
+fn image(_: &SmallDataset, bytes: &[u8]) -> Result<()> {
     let name = Path::new("image");
     let color = RgbImage::decode(bytes, name).map(|image| {
         assert!(image.pixels().iter().flatten().all(|c| (0.0..=1.0).contains(c)));
@@ -186,24 +190,24 @@ fn image(_: &Site, bytes: &[u8]) -> Result<()> {
 
 /// Puts `bytes` into the dataset in place of the file `name`, takes what it says, and puts the right file back.
 fn instead(
-    site: &Site,
+    small: &SmallDataset,
     bytes: &[u8],
     name: &str,
-    take: fn(&Dataset, &Site) -> Result<()>,
+    take: fn(&Dataset, &SmallDataset) -> Result<()>,
 ) -> Result<()> {
-    let file = site.path(name);
+    let file = small.path(name);
     let right = fs::read(&file)?;
     fs::write(&file, bytes)?;
-    let outcome = Dataset::open(&site.path("")).map_err(Into::into).and_then(|d| take(&d, site));
+    let outcome = Dataset::open(&small.path("")).map_err(Into::into).and_then(|d| take(&d, small));
     fs::write(&file, right)?;
     outcome
 }
 
-fn scene(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
-    instead(site, bytes, name, |dataset, site| {
+fn scene(small: &SmallDataset, bytes: &[u8], name: &str) -> Result<()> {
+    instead(small, bytes, name, |dataset, small| {
         let target = Target { scene_id: 1, im_id: 0, obj_id: 1, instance: 0 };
         // Distance grids are made once.
-        let cache = Some(GridCache::new(site.path("cache")));
+        let cache = Some(GridCache::new(small.path("cache")));
         let input = Assets::new(dataset, 0).with_cache(cache).load(&target, &[])?;
         // Warnings look at everything.
         let _ = input.warnings(&Isometry3::translation(0.0, 0.0, 0.3));
@@ -212,23 +216,23 @@ fn scene(site: &Site, bytes: &[u8], name: &str) -> Result<()> {
     })
 }
 
-fn truth(site: &Site, bytes: &[u8]) -> Result<()> {
-    instead(site, bytes, "test/000001/scene_gt.json", |dataset, _| {
+fn truth(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    instead(small, bytes, "test/000001/scene_gt.json", |dataset, _| {
         let objects = GroundTruth::new(dataset).objects(1, 0)?;
         objects.iter().for_each(|object| finite(&object.t_cam_model));
         Ok(())
     })
 }
 
-fn targets(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("targets.json");
+fn targets(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("targets.json");
     fs::write(&file, bytes)?;
-    find_targets(&Dataset::open(&site.path(""))?, Some(&file))?;
+    find_targets(&Dataset::open(&small.path(""))?, Some(&file))?;
     Ok(())
 }
 
-fn results(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("broken.csv");
+fn results(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.csv");
     fs::write(&file, bytes)?;
     for row in read_results(&file)?.rows {
         finite(&row.t_cam_model);
@@ -236,10 +240,10 @@ fn results(site: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-fn frame(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("broken.json");
+fn frame(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.json");
     fs::write(&file, bytes)?;
-    let cache = GridCache::new(site.path("cache"));
+    let cache = GridCache::new(small.path("cache"));
     let (input, pose) = load_frame_file(&file, 0, Some(&cache), None)?;
     finite(&pose);
     let _ = input.warnings(&pose);
@@ -247,8 +251,8 @@ fn frame(site: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-fn rig(site: &Site, bytes: &[u8]) -> Result<()> {
-    let file = site.path("rig.json");
+fn rig(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("rig.json");
     fs::write(&file, bytes)?;
     let rig = Rig::load(&file)?;
     assert!(rig.parameters().iter().all(|(_, value)| value.is_finite()));
@@ -257,10 +261,29 @@ fn rig(site: &Site, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
+fn journal(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.journal");
+    fs::write(&file, bytes)?;
+    let (identity, entries) = Journal::read::<Value>(&file)?;
+    // What a resumed run takes over is the same.
+    let (journal, again) = Journal::open::<Value>(&file, &identity, false)?;
+    assert_eq!(entries, again);
+    journal.discard()?;
+    Ok(())
+}
+
+fn times(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.times.csv");
+    fs::write(&file, bytes)?;
+    let times = Times::open(&file, true)?;
+    assert!(times.means().values().all(|(mean, _)| mean.is_finite()));
+    Ok(())
+}
+
 #[cfg(feature = "mcap")]
-fn log(site: &Site, bytes: &[u8]) -> Result<()> {
+fn log(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     use prehend_refine::data::mcap::{ImageTopics, Recording};
-    let file = site.path("log.mcap");
+    let file = small.path("log.mcap");
     fs::write(&file, bytes)?;
     let recording = Recording::open(&file, &ImageTopics::default(), "world")?;
     for frame in recording.frames(None)?.take(8) {

@@ -2,16 +2,16 @@
 
 use prehend_reliability::corpus;
 use prehend_reliability::parsers::PARSERS;
-use prehend_reliability::site::Site;
+use prehend_reliability::small_dataset::SmallDataset;
 
 #[test]
 fn every_file_of_the_corpora_is_read_or_refused() {
-    let site = Site::new().unwrap();
+    let dataset = SmallDataset::new().unwrap();
     for parser in PARSERS {
         let files = corpus::files(parser.name).unwrap();
         let mut read = 0;
         for (path, bytes) in &files {
-            let outcome = (parser.read)(&site, bytes);
+            let outcome = (parser.read)(&dataset, bytes);
             let is_broken = path.extension().is_some_and(|extension| extension == "broken");
             if let Err(error) = &outcome {
                 assert!(is_broken, "{}: {error:#}", path.display());

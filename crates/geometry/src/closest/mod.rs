@@ -289,6 +289,11 @@ fn nearest_edge(barycentric: &[f64; 3]) -> usize {
 }
 
 fn build(mesh: &TriMesh) -> Result<Bvh, ClosestError> {
+    check(mesh).map(|()| Bvh::new(mesh))
+}
+
+/// What [`ClosestPoints::new`] refuses.
+pub(crate) fn check(mesh: &TriMesh) -> Result<(), ClosestError> {
     if mesh.faces.is_empty() {
         return Err(ClosestError::Empty);
     }
@@ -304,7 +309,7 @@ fn build(mesh: &TriMesh) -> Result<Bvh, ClosestError> {
     // Beyond 1e9 m the squares of box sizes would leave single precision.
     match mesh.vertices.iter().position(|v| !v.iter().all(|x| x.abs() <= 1e9)) {
         Some(vertex) => Err(ClosestError::Coordinate { vertex }),
-        None => Ok(Bvh::new(mesh)),
+        None => Ok(()),
     }
 }
 

@@ -135,6 +135,7 @@ mod tests {
                 "line 2: column `nx`: expected a normal",
             ),
             (format!("{HEADER}palm,0,51,1,0,0,0,1e308,0,1\n"), "line 2: column `nx`"),
+            (format!("{HEADER}palm,0,51,1,1e308,0,0,0,0,1\n"), "line 2: column `x_m`"),
             (format!("{HEADER},0,51,1,0,0,0,0,0,1\n"), "line 2: column `link`"),
             (format!("{HEADER}palm,0,51\n"), "line: 2"),
             ("idx,patch\n".to_owned(), "line 1: no column `link`"),

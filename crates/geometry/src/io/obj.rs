@@ -78,13 +78,14 @@ fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
     // Of positions, texture coordinates and normals: a face counts back from the last one above it.
     let mut counts = [0_i64; 3];
     for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        // The white space of `tobj`; what is no UTF-8 it refuses.
+        let mut words = str::from_utf8(line).unwrap_or_default().split_whitespace();
         match words.next() {
-            Some(b"v") => counts[0] += 1,
-            Some(b"vt") => counts[1] += 1,
-            Some(b"vn") => counts[2] += 1,
-            Some(b"f" | b"l") => {
-                let mut indices = words.flat_map(|word| word.split(|b| *b == b'/').zip(counts));
+            Some("v") => counts[0] += 1,
+            Some("vt") => counts[1] += 1,
+            Some("vn") => counts[2] += 1,
+            Some("f" | "l") => {
+                let mut indices = words.flat_map(|word| word.split('/').zip(counts));
                 if let Some(index) = indices.find_map(|(text, count)| out_of_range(text, count)) {
                     let (line, reason) = (number + 1, format!("index {index} is out of range"));
                     return Err(MeshError::malformed(path, format!("line {line}"), reason));
@@ -97,8 +98,8 @@ fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
 }
 
 /// The index that `text` is, after `count` elements, if it is of none. What is no number, `tobj` tells.
-fn out_of_range(text: &[u8], count: i64) -> Option<i64> {
-    let index: i64 = str::from_utf8(text).ok()?.parse().ok()?;
+fn out_of_range(text: &str, count: i64) -> Option<i64> {
+    let index: i64 = text.parse().ok()?;
     (index < -count || index > i64::from(u32::MAX)).then_some(index)
 }
 
@@ -231,5 +232,19 @@ mod tests {
         let error = load("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", path).unwrap_err().to_string();
         assert!(error.contains("m.obj: vertex 1: coordinate is not finite"), "{error}");
         assert!(TriMesh::from_bytes(&[0xff, 0xfe, b'\n', 0x80], path).is_err());
+    }
+
+    #[test]
+    fn indices_out_of_range_are_refused_whatever_the_white_space() {
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
+        for space in [" ", "\t", "\u{b}", "\u{85}", "\u{a0}"] {
+            for index in ["-2", "6148914691236517207", "4294967296"] {
+                let text = format!("{corners}f{space}1//1 2//1 3//{index}\n");
+                let error = load(&text, Path::new("m.obj")).unwrap_err().to_string();
+                assert_eq!(error, format!("m.obj: line 5: index {index} is out of range"));
+            }
+            let text = format!("{corners}f{space}1//1 2//1 3//-1\n");
+            assert!(load(&text, Path::new("m.obj")).is_ok());
+        }
     }
 }

@@ -10,6 +10,7 @@ use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry;
 
 use super::{RobotError, origin};
+use crate::closest;
 use crate::io::folder;
 use crate::mesh::TriMesh;
 use crate::shapes;
@@ -77,6 +78,8 @@ fn geometry(
             for v in &mut mesh.vertices {
                 *v = Point3::from(v.coords.component_mul(&Vector3::from(scale)));
             }
+            // Here, where the file is known.
+            closest::check(&mesh).map_err(|e| error(e.to_string()))?;
             // An odd number of reflections turns the surface inside out.
             if scale.iter().product::<f64>() < 0.0 {
                 mesh.faces.iter_mut().for_each(|f| f.swap(1, 2));
@@ -166,6 +169,9 @@ mod tests {
         stl[80] = 5;
         std::fs::write(folder.join("cut.stl"), stl).unwrap();
         assert!(read("cut.stl").unwrap_err().contains("collision mesh 'cut.stl'"));
+        std::fs::write(folder.join("far.obj"), obj.replace("v 1 0 0", "v 1e30 0 0")).unwrap();
+        let far = read("far.obj").unwrap_err();
+        assert!(far.contains("link 'l': collision mesh 'far.obj': vertex 1 of the mesh"), "{far}");
     }
 
     #[test]

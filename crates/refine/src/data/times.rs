@@ -5,6 +5,8 @@ use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use prehend_geometry::limits::MAX_NUMBER;
+
 use crate::data::bop::{DatasetError, read_text, write_atomically};
 
 const HEADER: &str = "index,frame,method,seconds\n";
@@ -37,7 +39,8 @@ impl Times {
         file.set_len(whole.len() as u64).map_err(fault)?;
         let rows = csv::Reader::from_reader(whole.as_bytes()).into_deserialize();
         let entry = |(index, _, method, seconds): (_, String, _, _)| ((index, method), seconds);
-        times.seconds = rows.flatten().map(entry).collect();
+        let is_time = |(_, seconds): &(_, f64)| (0.0..=MAX_NUMBER).contains(seconds);
+        times.seconds = rows.flatten().map(entry).filter(is_time).collect();
         Ok(times)
     }
 
@@ -127,5 +130,14 @@ mod tests {
         join_times(&[path.clone(), dir.path().join("absent")], &joined).unwrap();
         assert_eq!(fs::read_to_string(joined).unwrap().lines().count(), 3);
         assert!(Times::open(&path, false).unwrap().means().is_empty());
+    }
+
+    #[test]
+    fn what_is_no_time_is_left_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("times.csv");
+        let rows = "0,f,a,NaN\n1,f,a,1e308\n2,f,a,-1\n3,f,a,2\n4,f,a,inf\n5,f,a\n";
+        fs::write(&path, format!("{HEADER}{rows}")).unwrap();
+        assert_eq!(Times::open(&path, true).unwrap().means()["a"], (2.0, 1));
     }
 }

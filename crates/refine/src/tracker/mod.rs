@@ -27,6 +27,7 @@ use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
+use crate::data::guard;
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
@@ -171,9 +172,17 @@ impl Tracker {
     /// agrees with these. In the first frame the pose or a search tells where it is.
     ///
     /// # Errors
-    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with.
-    /// The tracker is then as it was before.
+    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with;
+    /// [`RefineError::Panicked`] for a fault of the program or of a factor. The tracker is then as it was before.
     pub fn push(
+        &mut self,
+        observation: Observation,
+        time: Duration,
+    ) -> Result<Tracked, RefineError> {
+        guard(|| self.advance(observation, time))
+    }
+
+    fn advance(
         &mut self,
         observation: Observation,
         time: Duration,

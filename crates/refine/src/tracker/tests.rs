@@ -1,7 +1,9 @@
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
+use crate::problem::Rows;
 use crate::scene::{Sequence, default_sequence};
 
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
@@ -107,4 +109,32 @@ fn calibrations_carry_over() {
     let blind = tracker.track(&observation(8), SEQUENCE.frames[8].time).unwrap();
     let moved = error(&blind, 8);
     assert!(moved > errors[7] && moved < errors[7] + 0.05 * wrong, "{moved} {errors:?}");
+}
+
+/// A factor with a fault that shows when it is told to.
+struct Faulty(Arc<AtomicBool>);
+
+impl Factor for Faulty {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn rows(&self, _: &State, _: &mut Rows<'_>) {
+        assert!(!self.0.load(Ordering::Relaxed), "a fault");
+    }
+}
+
+#[test]
+fn a_panic_costs_one_frame() {
+    let fault = Arc::new(AtomicBool::new(false));
+    let mut tracker = tracker(TrackerSettings::default()).with(Faulty(Arc::clone(&fault)));
+    (0..2).for_each(|index| drop(track(&mut tracker, index)));
+    fault.store(true, Ordering::Relaxed);
+    let frame = &SEQUENCE.frames[2];
+    let failed = tracker.track(&frame.observation, frame.time);
+    assert!(matches!(failed, Err(RefineError::Panicked(_))));
+    fault.store(false, Ordering::Relaxed);
+    let next = track(&mut tracker, 3);
+    let (pe, oe) = errors(&next, 3);
+    assert!(next.status == TrackStatus::Tracked && pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
 }

@@ -16,7 +16,9 @@ pub struct LongCommand {
     pub words: &'static str,
     /// What it writes: files and folders.
     pub outputs: &'static [&'static str],
-    /// What of that, and beside it, grows while it is at work: journals and times.
+    /// Of its files those that a folder may be in the way of.
+    pub blockable: &'static [&'static str],
+    /// What of all that, and beside it, grows while it is at work: journals and times.
     pub growing: &'static [&'static str],
 }
 
@@ -26,12 +28,14 @@ pub const COMMANDS: &[LongCommand] = &[
         name: "refine",
         words: "refine --dataset ds --poses ds/init_low.csv --out r.csv --details r.npz --report page",
         outputs: &["r.csv", "r.npz", "page"],
+        blockable: &["r.csv", "r.npz", "page/index.html"],
         growing: &["r.csv.journal", "r.csv.times.csv"],
     },
     LongCommand {
         name: "initial",
         words: "initial --dataset ds --search --out i.csv",
         outputs: &["i.csv", "i.csv.rivals.csv"],
+        blockable: &["i.csv", "i.csv.rivals.csv"],
         growing: &["i.csv.journal"],
     },
     LongCommand {
@@ -39,30 +43,35 @@ pub const COMMANDS: &[LongCommand] = &[
         // Its report has times, which are never the same.
         words: "track --dataset ds --scene 21 --poses first.csv --out t.csv",
         outputs: &["t.csv"],
+        blockable: &["t.csv"],
         growing: &[],
     },
     LongCommand {
         name: "study",
         words: "study noise --dataset ds --iterations 2 --out st",
         outputs: &["st"],
+        blockable: &["st/tables.csv", "st/tables.txt"],
         growing: &["st/records.jsonl", "st/times.csv"],
     },
     LongCommand {
         name: "calibrate",
         words: "calibrate --dataset ds --poses ds/init_low.csv --out rig.json",
         outputs: &["rig.json", "rig.models"],
+        blockable: &["rig.json"],
         growing: &[],
     },
     LongCommand {
         name: "synth",
         words: "synth --objects 061_foam_brick --frames 4 --out made",
         outputs: &["made"],
+        blockable: &["made/test/000021/scene_gt.json", "made/test_targets_bop19.json"],
         growing: &["made/test/000021/journal.jsonl"],
     },
     LongCommand {
         name: "export",
         words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb --contacts c.ply",
         outputs: &["f.glb", "c.ply"],
+        blockable: &["f.glb", "c.ply"],
         growing: &[],
     },
 ];
@@ -119,13 +128,13 @@ impl Place {
         Ok(())
     }
 
-    /// What `command` has written, what grows left out; hidden files are not seen.
+    /// What `command` has written; hidden files are not seen, and times are never the same.
     pub(super) fn written(&self, command: &LongCommand) -> Result<Files> {
         let mut files = Files::new();
         for name in command.outputs {
             gather(&self.path(name), Path::new(name), &mut files)?;
         }
-        files.retain(|path, _| !command.growing.iter().any(|name| path == Path::new(name)));
+        files.retain(|path, _| !path.ends_with("times.csv"));
         Ok(files)
     }
 

@@ -29,16 +29,20 @@ impl Run {
     pub(super) fn new(program: &Path, words: &str, folder: &Path) -> Self {
         // Writing beyond a limit is then an error like that of a full disk, and no signal.
         let mut command = Command::new("sh");
-        command.args(["-c", "trap '' XFSZ; ulimit -f ${BLOCKS:-unlimited}; exec \"$@\"", "sh"]);
+        command.args([
+            "-c",
+            "trap '' XFSZ; ulimit -f ${PREHEND_BLOCKS:-unlimited}; exec \"$@\"",
+            "sh",
+        ]);
         command.arg(program).args(words.split_whitespace()).current_dir(folder);
-        command.env("PREHEND_CACHE", "").env_remove("PREHEND_LOG");
+        command.env("PREHEND_CACHE", "").env_remove("PREHEND_LOG").env_remove("PREHEND_BLOCKS");
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         Self { command }
     }
 
     /// With files no longer than so many blocks of 512 bytes, as if the disk were full behind them.
     pub(super) fn with_blocks(mut self, blocks: usize) -> Self {
-        self.command.env("BLOCKS", blocks.to_string());
+        self.command.env("PREHEND_BLOCKS", blocks.to_string());
         self
     }
 
@@ -67,13 +71,17 @@ impl Run {
             pipe.read_to_end(&mut text).map(|_| String::from_utf8_lossy(&text).into_owned())
         });
         let mut interrupt = Some(interrupt);
-        let (mut hung, mut status) = (false, None);
+        let (mut hung, mut status, mut interrupted) = (false, None, Ok(()));
         while status.is_none() {
             status = child.try_wait()?;
-            if start.elapsed() >= after
+            if status.is_none()
+                && start.elapsed() >= after
                 && let Some(interrupt) = interrupt.take()
             {
-                interrupt(&mut child)?;
+                interrupted = interrupt(&mut child);
+                if interrupted.is_err() {
+                    child.kill()?;
+                }
             }
             if start.elapsed() > HANG && !hung {
                 hung = true;
@@ -82,6 +90,7 @@ impl Run {
             thread::sleep(Duration::from_micros(500));
         }
         let error = reader.join().ok().context("no standard error")??;
+        interrupted?;
         let code = status.and_then(|status| status.code());
         Ok(Ended { code, error, took: start.elapsed(), hung })
     }

@@ -1,10 +1,11 @@
 //! Faults at random moments.
 
 use std::fs;
-use std::path::PathBuf;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::place::{Files, LongCommand, Place};
 use super::run::Ended;
@@ -35,6 +36,9 @@ pub enum Fault {
 pub const FAULTS: [Fault; 5] =
     [Fault::Killed, Fault::FullDisk, Fault::BrokenInput, Fault::BlockedOutput, Fault::Threads];
 
+/// Draws for each fault that is to strike: a run may have ended before, or not read what is broken.
+const DRAWS: usize = 8;
+
 impl Fault {
     /// Whether it can befall `command`: not every one has inputs or threads.
     pub fn concerns(self, command: &LongCommand) -> bool {
@@ -55,7 +59,7 @@ enum Disorder {
     Crash(String),
 }
 
-/// Lets `fault` befall `command` `count` times, drawn by `dice`; what goes wrong is printed.
+/// Lets `fault` befall `command` until it has struck `count` times, at moments that `seed` draws; what goes wrong is printed.
 ///
 /// # Errors
 /// If the program cannot be run at all, or does not do undisturbed what it is asked.
@@ -63,25 +67,40 @@ pub fn befall(
     place: &Place,
     command: &LongCommand,
     fault: Fault,
-    (count, dice): (usize, &mut Dice),
+    count: usize,
+    seed: u64,
 ) -> Result<Row> {
     let (expected, undisturbed) = place.reference(command)?;
+    let trial = Trial { place, command, expected: &expected, took: undisturbed.took };
+    let mut dice = Dice::new(seed_of(seed, command, fault));
     let mut row = Row::new(format!("`{}`, {fault}", command.name));
-    for _ in 0..count {
+    for _ in 0..DRAWS * count {
+        if row.tried == count {
+            break;
+        }
         place.clear(command)?;
-        row.tried += 1;
-        let trial = Trial { place, command, expected: &expected, took: undisturbed.took };
-        if let Err(problem) = trial.run(fault, dice) {
-            eprintln!("{} {fault}: {problem:#}", command.name);
-            match problem.downcast_ref() {
-                Some(Disorder::Hang) => row.hangs += 1,
-                Some(Disorder::Crash(_)) => row.crashes += 1,
-                None => row.wrong += 1,
+        match trial.run(fault, row.tried, &mut dice) {
+            Ok(has_struck) => row.tried += usize::from(has_struck),
+            Err(problem) => {
+                eprintln!("{} {fault}: {problem:#}", command.name);
+                row.tried += 1;
+                match problem.downcast_ref() {
+                    Some(Disorder::Hang) => row.hangs += 1,
+                    Some(Disorder::Crash(_)) => row.crashes += 1,
+                    None => row.wrong += 1,
+                }
             }
         }
     }
     place.clear(command)?;
     Ok(row)
+}
+
+/// Other moments for every command and fault.
+fn seed_of(seed: u64, command: &LongCommand, fault: Fault) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (seed, command.name, fault.to_string()).hash(&mut hasher);
+    hasher.finish()
 }
 
 struct Trial<'a> {
@@ -93,52 +112,75 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn run(&self, fault: Fault, dice: &mut Dice) -> Result<()> {
+    /// The trial after `before` others: whether the fault has struck. Of kinds and numbers of threads each has its turn.
+    fn run(&self, fault: Fault, before: usize, dice: &mut Dice) -> Result<bool> {
         let run = || self.place.run(self.command.words);
         let moment = self.took.mul_f64(dice.below(1000) as f64 / 1000.0);
-        match fault {
-            Fault::Killed => drop(run().interrupted(moment, |child| Ok(child.kill()?))?),
+        let has_struck = match fault {
+            Fault::Killed => {
+                let ended = run().interrupted(moment, |child| Ok(child.kill()?))?;
+                ensure!(ended.code.is_none_or(|code| code == 0), "ended with {}", ended.error);
+                ended.code.is_none()
+            }
             Fault::FullDisk => {
                 let longest = self.expected.values().map(Vec::len).max().unwrap_or(0);
                 let ended = run().with_blocks(dice.below(longest / 512 + 2)).end()?;
-                orderly(&ended)?;
+                self.failed(&ended)?
             }
-            Fault::BrokenInput => {
-                let file = self.an_input(dice)?;
-                let whole = fs::read(&file)?;
-                let ended = run().interrupted(moment, |_| {
-                    match dice.below(3) {
-                        0 => fs::remove_file(&file)?,
-                        1 => fs::write(&file, &whole[..dice.below(whole.len())])?,
-                        _ => fs::write(&file, b"{\"0\": [\xff")?,
-                    }
-                    Ok(())
-                });
-                fs::write(&file, &whole)?;
-                orderly(&ended?)?;
-                // Results may be of fewer frames, or of what the file said; and journals of a run with another input.
-                return self.place.clear(self.command).and_then(|()| self.finished());
-            }
+            Fault::BrokenInput => return self.broken_input(before, moment, dice),
             Fault::BlockedOutput => {
-                let output =
-                    self.place.path(self.command.outputs[dice.below(self.command.outputs.len())]);
-                let made = |_: &mut std::process::Child| {
-                    // Where the output is there already, or is a folder, nothing is in its way.
+                let blocked = self.command.blockable;
+                let output = self.place.path(blocked[dice.below(blocked.len())]);
+                // Where the output is there already, or its folder is not yet, nothing is in its way.
+                let ended = run().interrupted(moment, |_| {
                     let _ = fs::create_dir(&output);
                     Ok(())
-                };
-                orderly(&run().interrupted(moment, made)?)?;
-                if fs::read_dir(&output).is_ok_and(|mut inside| inside.next().is_none()) {
+                })?;
+                let has_failed = self.failed(&ended)?;
+                if output.is_dir() {
                     fs::remove_dir(&output)?;
                 }
+                has_failed
             }
             Fault::Threads => {
-                let ended = run().with_threads([1, 2, 4, 8][dice.below(4)]).end()?;
-                orderly(&ended)?;
+                let ended = run().with_threads([1, 2, 4, 8][before % 4]).end()?;
+                ensure!(!self.failed(&ended)?, "{}", ended.error);
+                true
             }
-        }
+        };
         self.nothing_half_written()?;
-        self.finished()
+        self.finished()?;
+        Ok(has_struck)
+    }
+
+    /// Breaks a file while it is read.
+    fn broken_input(&self, before: usize, moment: Duration, dice: &mut Dice) -> Result<bool> {
+        let file = self.an_input(dice)?;
+        let whole = fs::read(&file)?;
+        let is_removed = before.is_multiple_of(3);
+        let ended = self.place.run(self.command.words).interrupted(moment, |_| {
+            match before % 3 {
+                0 => fs::remove_file(&file)?,
+                1 => fs::write(&file, &whole[..dice.below(whole.len())])?,
+                _ => fs::write(&file, b"{\"0\": [\xff")?,
+            }
+            Ok(())
+        });
+        fs::write(&file, &whole)?;
+        let ended = ended?;
+        orderly(&ended)?;
+        let written = self.place.written(self.command)?;
+        let is_same = written == *self.expected;
+        // Files that need not be there may be taken for absent; what is broken may not pass for right.
+        let name = file.display();
+        ensure!(is_same || is_removed || ended.code != Some(0), "{name}: no error, other results");
+        if !is_removed {
+            self.rows_are_right(&written)?;
+        }
+        // A journal is of a run with another input: begun anew, all is as it should be.
+        self.place.clear(self.command)?;
+        self.finished()?;
+        Ok(ended.code != Some(0) || !is_same)
     }
 
     /// One of the files that the dataset is made of.
@@ -155,11 +197,38 @@ impl Trial<'_> {
         Ok(files.swap_remove(dice.below(files.len())))
     }
 
+    /// Whether a run failed, which it must tell; else what it wrote must be right and complete.
+    fn failed(&self, ended: &Ended) -> Result<bool> {
+        orderly(ended)?;
+        if ended.code != Some(0) {
+            ensure!(!ended.error.trim().is_empty(), "ended with {:?} and said nothing", ended.code);
+            return Ok(true);
+        }
+        let written = self.place.written(self.command)?;
+        ensure!(written == *self.expected, "ended well, with other files");
+        Ok(false)
+    }
+
     /// What can be seen is as it will be in the end.
     fn nothing_half_written(&self) -> Result<()> {
-        for (path, content) in self.place.written(self.command)? {
+        let is_growing =
+            |path: &Path| self.command.growing.iter().any(|name| path == Path::new(name));
+        let written = self.place.written(self.command)?;
+        for (path, content) in written.into_iter().filter(|(path, _)| !is_growing(path)) {
             let is_right = self.expected.get(&path) == Some(&content);
-            anyhow::ensure!(is_right, "{} is half-written", path.display());
+            ensure!(is_right, "{} is half-written", path.display());
+        }
+        Ok(())
+    }
+
+    /// Tables have whole rows of the right ones, if fewer.
+    fn rows_are_right(&self, written: &Files) -> Result<()> {
+        let is_table = |path: &Path| path.extension().is_some_and(|extension| extension == "csv");
+        for (path, content) in written.iter().filter(|(path, _)| is_table(path)) {
+            let Some(expected) = self.expected.get(path) else { continue };
+            let rows: Vec<&[u8]> = expected.split(|byte| *byte == b'\n').collect();
+            let is_known = content.split(|byte| *byte == b'\n').all(|row| rows.contains(&row));
+            ensure!(is_known, "{} has a row of another kind", path.display());
         }
         Ok(())
     }
@@ -168,11 +237,11 @@ impl Trial<'_> {
     fn finished(&self) -> Result<()> {
         let ended = self.place.run(self.command.words).end()?;
         orderly(&ended)?;
-        anyhow::ensure!(ended.code == Some(0), "run again: {}", ended.error);
+        ensure!(ended.code == Some(0), "run again: {}", ended.error);
         let written = self.place.written(self.command)?;
         for path in self.expected.keys().chain(written.keys()) {
             let is_same = self.expected.get(path) == written.get(path);
-            anyhow::ensure!(is_same, "{} is another in the end", path.display());
+            ensure!(is_same, "{} is another in the end", path.display());
         }
         Ok(())
     }

@@ -9,17 +9,17 @@ use prehend_geometry::shapes;
 use serde_json::{Map, Value};
 
 use super::memory::Memory;
-use super::{Carried, Site};
+use super::{LoadContext, NOISE, Outcome};
 
 /// Frames of the dataset of which [`frames`] makes many.
 const ORIGINALS: usize = 4;
 
 /// The same few frames, each as often under another number.
-pub(super) fn frames(site: &Site<'_>) -> Result<Carried> {
-    let count = site.scaled(10_000);
+pub(super) fn frames(context: &LoadContext<'_>) -> Result<Outcome> {
+    let count = context.scaled(10_000);
     let objects = format!("synth --objects 061_foam_brick --frames {ORIGINALS} --out ds");
-    site.run(&objects)?;
-    let scene = scene(&site.folder)?;
+    context.run(&objects)?;
+    let scene = scene(&context.folder)?;
     for folder in fs::read_dir(&scene)? {
         let path = folder?.path();
         if path.is_dir() {
@@ -31,7 +31,7 @@ pub(super) fn frames(site: &Site<'_>) -> Result<Carried> {
             fs::write(&path, serde_json::to_vec(&many)?)?;
         }
     }
-    let poses = fs::read_to_string(site.folder.join("ds/init_low.csv"))?;
+    let poses = fs::read_to_string(context.folder.join("ds/init_low.csv"))?;
     let mut lines = poses.lines();
     let mut text = lines.next().context("no poses")?.to_owned() + "\n";
     let lines: Vec<Vec<&str>> = lines.map(|line| line.splitn(3, ',').collect()).collect();
@@ -39,46 +39,53 @@ pub(super) fn frames(site: &Site<'_>) -> Result<Carried> {
         let line = &lines[k % ORIGINALS];
         text += &format!("{},{k},{}\n", line[0], line[2]);
     }
-    fs::write(site.folder.join("poses.csv"), text)?;
-    let memory = site.run("refine --dataset ds --poses poses.csv --out r.csv --seed 1")?;
-    let results = fs::read_to_string(site.folder.join("r.csv"))?;
+    fs::write(context.folder.join("poses.csv"), text)?;
+    let memory = context.run("refine --dataset ds --poses poses.csv --out r.csv --seed 1")?;
+    let results = fs::read_to_string(context.folder.join("r.csv"))?;
     // Rotation and translation.
     let poses = results.lines().skip(1).map(|line| line.split(',').skip(4).take(2).collect());
     let poses: Vec<Vec<&str>> = poses.collect();
     ensure!(poses.len() == count, "{} of {count} rows", poses.len());
     let other = (0..count).find(|k| poses[*k] != poses[k % ORIGINALS]);
     ensure!(other.is_none(), "row {other:?} has another pose than the same frame before");
-    let off = error(&site.folder, "r.csv")?;
+    let off = error(&context.folder, "r.csv")?;
     ensure!(off < 1.5, "{off:.2} mm off");
-    Ok(Carried { memory, is_even: true, note: format!("{count} rows, {off:.2} mm off") })
+    // Poses with their covariances are kept until the files are written.
+    let kept = 1.7e-3 * count as f64;
+    Ok(Outcome {
+        memory,
+        growth: Some(NOISE + 0.7 * kept),
+        note: format!("{count} rows, {off:.2} mm off"),
+    })
 }
 
 /// An object of many faces.
-pub(super) fn mesh(site: &Site<'_>) -> Result<Carried> {
-    let segments = site.scaled(1_000_000).isqrt();
+pub(super) fn mesh(context: &LoadContext<'_>) -> Result<Outcome> {
+    let segments = context.scaled(1_000_000).isqrt();
     let mesh = shapes::superellipsoid([0.03, 0.03, 0.07], [0.6, 0.8], segments);
-    mesh.save(&site.folder.join("fine.ply"))?;
+    mesh.save(&context.folder.join("fine.ply"))?;
     let synth = "synth --mesh fine.ply --frames 1 --out ds";
-    refined(site, synth, &format!("{} faces", mesh.faces.len()))
+    refined(context, synth, &format!("{} faces", mesh.faces.len()))
 }
 
 /// Images as large as those of a film camera.
-pub(super) fn images(site: &Site<'_>) -> Result<Carried> {
-    let [width, height] = [3840, 2160].map(|full| (f64::from(full) * site.scale.sqrt()) as usize);
+pub(super) fn images(context: &LoadContext<'_>) -> Result<Outcome> {
+    let [width, height] =
+        [3840, 2160].map(|full| (f64::from(full) * context.scale.sqrt()) as usize);
     let synth = format!(
         "synth --objects 061_foam_brick --frames 1 --width {width} --height {height} --out ds"
     );
-    refined(site, &synth, &format!("{width} × {height}"))
+    refined(context, &synth, &format!("{width} × {height}"))
 }
 
 /// Makes a dataset of one frame and refines its pose, which must come near the truth.
-fn refined(site: &Site<'_>, synth: &str, note: &str) -> Result<Carried> {
-    site.run(synth)?;
-    let memory = site.run("refine --dataset ds --poses ds/init_low.csv --out r.csv")?;
-    let [begun, refined] = ["ds/init_low.csv", "r.csv"].map(|file| error(&site.folder, file));
+fn refined(context: &LoadContext<'_>, synth: &str, note: &str) -> Result<Outcome> {
+    context.run(synth)?;
+    let memory = context.run("refine --dataset ds --poses ds/init_low.csv --out r.csv")?;
+    let [begun, refined] = ["ds/init_low.csv", "r.csv"].map(|file| error(&context.folder, file));
     let (begun, refined) = (begun?, refined?);
     ensure!(refined < 1.5 && refined < begun, "{refined:.2} mm off, {begun:.2} mm at first");
-    Ok(Carried { memory, is_even: false, note: format!("{note}, {refined:.2} mm off") })
+    Ok(Outcome { memory, growth: None, note: format!("{note}, {refined:.2} mm off") })
 }
 
 /// How far the first pose of `file` is from the truth \[mm\].
@@ -113,7 +120,7 @@ fn multiply_images(folder: &Path, count: usize) -> Result<()> {
     Ok(())
 }
 
-impl Site<'_> {
+impl LoadContext<'_> {
     /// Runs the command with these words to its end.
     fn run(&self, words: &str) -> Result<Memory> {
         let mut command = Command::new(self.program);

@@ -12,7 +12,7 @@ use prehend_refine::tracker::{Tracker, TrackerSettings};
 use prehend_sim::{SemiImplicitEuler, State, TimeSteps};
 
 use super::memory::Memory;
-use super::{Carried, Site};
+use super::{LoadContext, NOISE, Outcome};
 use crate::scene::body_over_floor;
 
 /// Where a body of `points` contact points is after `steps` steps, thrown onto a floor with a velocity of `push`.
@@ -29,8 +29,8 @@ fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<
 }
 
 /// Many points of a body touch a floor for many steps.
-pub(super) fn contacts(site: &Site<'_>) -> Result<Carried> {
-    let (points, steps) = (10_000, site.scaled(10_000));
+pub(super) fn contacts(context: &LoadContext<'_>) -> Result<Outcome> {
+    let (points, steps) = (10_000, context.scaled(10_000));
     let push = [0.3, 0.1, 0.0];
     let work = || {
         let end = slid(points, steps, push)?;
@@ -60,15 +60,15 @@ pub(super) fn contacts(site: &Site<'_>) -> Result<Carried> {
         Ok(format!("slid {:.1} mm, gradient {off:.0e} off differences", 1e3 * end.x))
     };
     let (note, memory) = Memory::of(std::process::id(), work)?;
-    Ok(Carried { memory, is_even: false, note })
+    Ok(Outcome { memory, growth: None, note })
 }
 
 /// Frames of the film that is played forth and back.
 const FILM: usize = 90;
 
 /// A film of an hour, whose object is never at rest.
-pub(super) fn tracker(site: &Site<'_>) -> Result<Carried> {
-    let count = site.scaled(30 * 3600);
+pub(super) fn tracker(context: &LoadContext<'_>) -> Result<Outcome> {
+    let count = context.scaled(30 * 3600);
     let film = default_sequence(1, FILM)?;
     let hand = Some(Arc::clone(&film.hand));
     let mut tracker = Tracker::new(Arc::clone(&film.object), hand, TrackerSettings::default())?;
@@ -93,5 +93,9 @@ pub(super) fn tracker(site: &Site<'_>) -> Result<Carried> {
     let share = near as f64 / count as f64;
     let last = errors.last().context("no frame")?;
     ensure!(share >= 0.99 && last.0 < 0.5, "{near} of {count} within 5 mm and 5°");
-    Ok(Carried { memory, is_even: true, note: format!("{near} of {count} within 5 mm and 5°") })
+    Ok(Outcome {
+        memory,
+        growth: Some(NOISE),
+        note: format!("{near} of {count} within 5 mm and 5°"),
+    })
 }

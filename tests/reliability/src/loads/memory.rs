@@ -1,5 +1,6 @@
 //! Resident memory over time.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -20,8 +21,9 @@ impl Memory {
     /// Of `process` while `work` goes on.
     ///
     /// # Errors
-    /// Those of `work`, and if the system does not tell as Linux does.
+    /// Those of `work`, and if the system does not tell memory as Linux does.
     pub(super) fn of<T>(process: u32, work: impl FnOnce() -> Result<T>) -> Result<(T, Self)> {
+        resident(std::process::id()).context("this system does not tell memory as Linux does")?;
         let done = AtomicBool::new(false);
         thread::scope(|scope| {
             let watch = scope.spawn(|| {
@@ -33,11 +35,12 @@ impl Memory {
                 }
                 samples
             });
-            let result = work();
+            // The watch must end even if the work panics.
+            let result = catch_unwind(AssertUnwindSafe(work));
             done.store(true, Ordering::Relaxed);
             let samples = watch.join().map_err(|_| anyhow!("the watch broke off"))?;
-            let result = result?;
-            samples.first().context("this system does not tell the memory of a process")?;
+            let result = result.unwrap_or_else(|panic| resume_unwind(panic))?;
+            samples.first().context("the process ended before it was looked at")?;
             Ok((result, Self { samples }))
         })
     }

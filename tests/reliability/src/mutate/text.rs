@@ -24,7 +24,8 @@ const NUMBERS: [&str; 17] = [
 ];
 
 /// In place of a word.
-const WORDS: [&str; 6] = ["", "\0", "a", "../../etc/passwd", "é\u{202e}", "%s%n"];
+const WORDS: [&str; 8] =
+    ["", "\0", "a", "../../etc/passwd", "é\u{202e}", "%s%n", "\u{b}", "\u{a0}"];
 
 /// A changed copy.
 pub(super) fn mutated(original: &[u8], dice: &mut Dice) -> Vec<u8> {

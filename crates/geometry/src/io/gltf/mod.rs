@@ -433,6 +433,8 @@ mod tests {
             r#""count": 18446744073709551615, "type": "VEC3""#,
             "accessor 0: outside",
         );
+        broken(r#""POSITION": 0"#, r#""POSITION": 3"#, "an accessor of positions is not there");
+        broken(r#""TEXCOORD_0": 1"#, r#""TEXCOORD_0": 3"#, "document");
         broken(r#""children": [1]"#, r#""children": [1, 0]"#, "reached twice");
         broken(r#""scenes": [{"nodes": [0]}]"#, r#""scenes": [{"nodes": [7]}]"#, "document");
         broken(

@@ -1,10 +1,12 @@
 //! Images of a scene that somebody else is still writing.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::time::SystemTime;
+
+use prehend_geometry::open_plain;
 
 use super::dataset::{Dataset, Scene};
 use super::frame::Frame;
@@ -71,11 +73,12 @@ fn masks_are_whole(scene: &Scene, im_id: u32) -> bool {
 /// Whether a PNG or JPEG file has its end: decoders fill up what lacks of some pictures without complaint.
 fn is_whole(file: &Path) -> bool {
     let tail = || -> std::io::Result<Vec<u8>> {
-        let mut file = File::open(file)?;
+        let mut file = open_plain(file)?;
         let mut tail = Vec::with_capacity(TAIL);
         let size = file.metadata()?.len();
         file.seek(SeekFrom::Start(size.saturating_sub(TAIL as u64)))?;
-        file.read_to_end(&mut tail)?;
+        // The file may grow in the meantime.
+        file.take(TAIL as u64).read_to_end(&mut tail)?;
         Ok(tail)
     };
     let Ok(tail) = tail() else { return false };
@@ -115,5 +118,18 @@ mod tests {
         fs::remove_file(scene.join("scene_bodies.json")).unwrap();
         fs::remove_file(scene.join("mask_visib/000000_000000.png")).unwrap();
         assert!(now.reread().has_arrived(1, 0));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_plain_file_never_arrives() {
+        assert!(!is_whole(Path::new("/dev/zero")));
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("0.png");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        // Nobody writes to it: opened, it would be waited for.
+        let (sender, told) = std::sync::mpsc::channel();
+        std::thread::spawn(move || sender.send(is_whole(&pipe)));
+        assert_eq!(told.recv_timeout(std::time::Duration::from_secs(20)), Ok(false));
     }
 }

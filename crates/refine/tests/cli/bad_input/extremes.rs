@@ -153,7 +153,31 @@ fn peak(place: &Workplace, arguments: &str) -> (String, u64) {
         most = most.max(1024 * kilobytes.unwrap_or(0));
         std::thread::sleep(Duration::from_millis(2));
     }
+    assert!(most > 0 || !cfg!(target_os = "linux"), "the program ended before it was looked at");
     (String::from_utf8(child.wait_with_output().unwrap().stderr).unwrap(), most)
+}
+
+/// Texts with a hole in them that is as long as may be.
+#[test]
+fn texts_beyond_the_limit_are_not_read() {
+    let place = workplace();
+    place.write("options.toml", "");
+    for (name, command) in [
+        ("init.csv", REFINE),
+        ("ds/models/models_info.json", REFINE),
+        ("ds/test/000001/scene_camera.json", REFINE),
+        ("ds/hand/taxels.csv", REFINE),
+        ("ds/hand/hand.urdf", REFINE),
+        ("options.toml", "info ds --config options.toml"),
+    ] {
+        let whole = place.read(name);
+        let file = fs::File::options().write(true).open(place.path(name)).unwrap();
+        file.set_len((1 << 30) + 1).unwrap();
+        let (said, bytes) = peak(&place, command);
+        assert!(said.contains("more than the limit of"), "{name}: {said}");
+        assert!(bytes < 300 << 20, "{name}: {bytes} bytes");
+        place.write(name, &whole);
+    }
 }
 
 /// Pipes that nobody writes to, and files without end.

@@ -94,20 +94,34 @@ fn models_and_hands() {
             ),
             (
                 "hand with a missing mesh",
-                |p| {
-                    other_hand(p, |urdf| {
-                        let (a, rest) = urdf.split_once("<collision>").unwrap();
-                        let (_, b) = rest.split_once("</collision>").unwrap();
-                        let mesh = "<geometry><mesh filename=\"palm.stl\"/></geometry>";
-                        format!("{a}<collision>{mesh}</collision>{b}")
-                    })
-                },
+                |p| with_collision_mesh(p, "palm.stl"),
                 &[
                     "ds/hand/other.urdf: link '",
                     "collision mesh 'palm.stl': no such file in ds/hand",
                 ],
             ),
+            (
+                "hand with a vertex far away",
+                |p| {
+                    p.write("ds/hand/far.obj", "v 0 0 0\nv 1e30 0 0\nv 0 1 0\nf 1 2 3\n");
+                    with_collision_mesh(p, "far.obj");
+                },
+                &[
+                    "ds/hand/other.urdf: link '",
+                    "collision mesh 'far.obj': vertex 1 of the mesh is not finite or farther than 1e9 m",
+                ],
+            ),
         ],
         &OTHERS,
     );
+}
+
+/// Gives the hand's first link a mesh for its collision shape.
+fn with_collision_mesh(place: &Workplace, file: &str) {
+    other_hand(place, |urdf| {
+        let (a, rest) = urdf.split_once("<collision>").unwrap();
+        let (_, b) = rest.split_once("</collision>").unwrap();
+        let mesh = format!("<geometry><mesh filename=\"{file}\"/></geometry>");
+        format!("{a}<collision>{mesh}</collision>{b}")
+    });
 }

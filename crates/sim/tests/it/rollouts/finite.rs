@@ -1,5 +1,6 @@
 //! Nothing finite leads to NaN, infinity or a panic: results are numbers, values and derivatives, or an error says which body it is about.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
@@ -284,6 +285,36 @@ fn chains_at_their_singular_places() {
     let inverse = Link { inertia: -Matrix3::identity(), ..pin.clone() };
     for link in [pin, inverse] {
         assert!(Articulation::new(vec![link], Vector3::z()).is_err());
+    }
+}
+
+#[test]
+fn dynamics_of_chains_of_all_sizes() {
+    let rod = RigidBody::cuboid(1.0, [0.01, 0.01, 0.5]).unwrap();
+    let speck = RigidBody::ball(1e-12, 1e-6).unwrap();
+    let sizes = [0.0, 1e-300, 1e-9, 1.0, PI, 1e6];
+    for (body, joint) in [
+        (rod, Joint::Revolute(Vector3::y_axis())),
+        (speck, Joint::Revolute(Vector3::y_axis())),
+        (speck, Joint::Prismatic(Vector3::x_axis())),
+    ] {
+        let link = |name| Link::new(name, joint.clone(), &body);
+        let below = Isometry3::translation(0.0, 0.0, -1.0);
+        let links = vec![link("first"), link("second").on(0, below), link("third").on(1, below)];
+        let tree = Articulation::new(links, Vector3::new(0.0, 0.0, -9.81)).unwrap();
+        for (q, v) in sizes.into_iter().flat_map(|q| sizes.map(|v| (q, v))) {
+            let at = tree.kinematics(&[q, -q, q], &[v, v, -v]);
+            let accelerations = at.forward_dynamics(&[v, 0.0, -1.0]);
+            let efforts = at.inverse_dynamics(accelerations.as_slice());
+            let by = at.inverse_dynamics_derivatives(accelerations.as_slice());
+            let slopes = by.by_position.iter().chain(&by.by_velocity).chain(&by.by_acceleration);
+            let matrix = at.mass_matrix();
+            let all = accelerations.iter().chain(&efforts).chain(&matrix).chain(slopes);
+            assert!({ all }.all(|x| x.is_finite()), "{joint:?} at {q}, {v}");
+            let forward = at.forward_dynamics_derivatives(&accelerations).unwrap();
+            let slopes = forward.by_position.iter().chain(&forward.by_velocity);
+            assert!({ slopes }.all(|x| x.is_finite()), "{joint:?} at {q}, {v}");
+        }
     }
 }
 
