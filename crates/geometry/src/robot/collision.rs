@@ -171,7 +171,7 @@ mod tests {
         assert!(read("cut.stl").unwrap_err().contains("collision mesh 'cut.stl'"));
         std::fs::write(folder.join("far.obj"), obj.replace("v 1 0 0", "v 1e30 0 0")).unwrap();
         let far = read("far.obj").unwrap_err();
-        assert!(far.contains("link 'l': collision mesh 'far.obj': vertex 1 of the mesh"), "{far}");
+        assert!(far.contains("link 'l': collision mesh 'far.obj': vertex 2 of the mesh"), "{far}");
     }
 
     #[test]
