@@ -18,6 +18,8 @@ pub struct LongCommand {
     pub outputs: &'static [&'static str],
     /// Of its files those that a folder may be in the way of.
     pub blockable: &'static [&'static str],
+    /// Tables each row of which is of one frame alone, whatever becomes of the others.
+    pub tables: &'static [&'static str],
     /// What of all that, and beside it, grows while it is at work: journals and times.
     pub growing: &'static [&'static str],
 }
@@ -29,6 +31,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "refine --dataset ds --poses ds/init_low.csv --out r.csv --details r.npz --report page",
         outputs: &["r.csv", "r.npz", "page"],
         blockable: &["r.csv", "r.npz", "page/index.html"],
+        tables: &["r.csv"],
         growing: &["r.csv.journal", "r.csv.times.csv"],
     },
     LongCommand {
@@ -36,6 +39,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "initial --dataset ds --search --out i.csv",
         outputs: &["i.csv", "i.csv.rivals.csv"],
         blockable: &["i.csv", "i.csv.rivals.csv"],
+        tables: &["i.csv", "i.csv.rivals.csv"],
         growing: &["i.csv.journal"],
     },
     LongCommand {
@@ -44,6 +48,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "track --dataset ds --scene 21 --poses first.csv --out t.csv",
         outputs: &["t.csv"],
         blockable: &["t.csv"],
+        tables: &[],
         growing: &[],
     },
     LongCommand {
@@ -51,6 +56,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "study noise --dataset ds --iterations 2 --out st",
         outputs: &["st"],
         blockable: &["st/tables.csv", "st/tables.txt"],
+        tables: &[],
         growing: &["st/records.jsonl", "st/times.csv"],
     },
     LongCommand {
@@ -58,6 +64,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "calibrate --dataset ds --poses ds/init_low.csv --out rig.json",
         outputs: &["rig.json", "rig.models"],
         blockable: &["rig.json"],
+        tables: &[],
         growing: &[],
     },
     LongCommand {
@@ -65,6 +72,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "synth --objects 061_foam_brick --frames 4 --out made",
         outputs: &["made"],
         blockable: &["made/test/000021/scene_gt.json", "made/test_targets_bop19.json"],
+        tables: &[],
         growing: &["made/test/000021/journal.jsonl"],
     },
     LongCommand {
@@ -72,6 +80,7 @@ pub const COMMANDS: &[LongCommand] = &[
         words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb --contacts c.ply",
         outputs: &["f.glb", "c.ply"],
         blockable: &["f.glb", "c.ply"],
+        tables: &[],
         growing: &[],
     },
 ];

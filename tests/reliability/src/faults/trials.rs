@@ -221,14 +221,16 @@ impl Trial<'_> {
         Ok(())
     }
 
-    /// Tables have whole rows of the right ones, if fewer.
+    /// Tables of frames have whole rows of the right ones, if fewer.
     fn rows_are_right(&self, written: &Files) -> Result<()> {
-        let is_table = |path: &Path| path.extension().is_some_and(|extension| extension == "csv");
-        for (path, content) in written.iter().filter(|(path, _)| is_table(path)) {
-            let Some(expected) = self.expected.get(path) else { continue };
+        for table in self.command.tables.iter().map(Path::new) {
+            let (Some(content), Some(expected)) = (written.get(table), self.expected.get(table))
+            else {
+                continue;
+            };
             let rows: Vec<&[u8]> = expected.split(|byte| *byte == b'\n').collect();
             let is_known = content.split(|byte| *byte == b'\n').all(|row| rows.contains(&row));
-            ensure!(is_known, "{} has a row of another kind", path.display());
+            ensure!(is_known, "{} has a row that is not right", table.display());
         }
         Ok(())
     }
