@@ -12,7 +12,9 @@ use prehend_autodiff::optimize::{
     Adam, GradientDescent, LevenbergMarquardt, NormalEquations, OptimizeError,
 };
 use prehend_autodiff::rigid::{angular_acceleration, conjugated, rotate, turned};
-use prehend_autodiff::solve::lu;
+#[cfg(feature = "faer")]
+use prehend_autodiff::solve::SparseSolver;
+use prehend_autodiff::solve::{lu, sparse_lu};
 use prehend_autodiff::{Fwd, Quadratic, Recording, Scalar};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -206,6 +208,26 @@ proptest! {
         prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
         if let Ok(x) = factored.solve(&Vector2::from(b)) {
             prop_assert!(x.iter().all(|x| x.is_finite()));
+        }
+    }
+
+    #[test]
+    fn sparse_systems_are_solved_or_refused(m in [extremes(), extremes(), extremes(), extremes()], b in [extremes(), extremes()]) {
+        let places = [(0, 0), (1, 0), (0, 1), (1, 1), (1, 1)];
+        let values = [m[0], m[1], m[2], m[3], m[0]];
+        let entries = std::array::from_fn::<_, 5, _>(|k| (places[k].0, places[k].1, values[k]));
+        let found = [
+            sparse_lu(2, &entries),
+            #[cfg(feature = "faer")]
+            SparseSolver::lu(2, &places).and_then(|solver| solver.factor(&values)),
+            #[cfg(feature = "faer")]
+            SparseSolver::cholesky(2, &places).and_then(|solver| solver.factor(&values)),
+        ];
+        for factored in found.into_iter().flatten() {
+            prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
+            if let Ok(x) = factored.solve(&Vector2::from(b)) {
+                prop_assert!(x.iter().all(|x| x.is_finite()));
+            }
         }
     }
 
