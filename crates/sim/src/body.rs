@@ -246,6 +246,13 @@ mod tests {
     }
 
     #[test]
+    fn the_radius_of_gyration_is_of_all_axes_together() {
+        let ball = RigidBody::ball(2.0, 0.1).unwrap();
+        // Of ∫ r² dm = 3/5 m R².
+        assert!((ball.gyration_radius() - 0.6_f64.sqrt() * 0.1).abs() < 1e-15);
+    }
+
+    #[test]
     fn model_and_com_poses_are_inverse() {
         let com = Point3::new(0.1, -0.2, 0.3);
         let body = RigidBody::new(2.0, Matrix3::identity(), com).unwrap();

@@ -197,6 +197,20 @@ mod tests {
     }
 
     #[test]
+    fn variances_are_those_of_a_mean() {
+        // Of two values a and b, (a − b)²/4.
+        let smoothing = Smoothing::new(Vector1::new(0.5), 2, 3).unwrap();
+        let square =
+            |x: &Vector1<f64>| Ok::<_, Infallible>((x.x.powi(2), Vector1::new(3.0 * x.x.powi(2))));
+        let [a, b] = [0, 1].map(|k| smoothing.perturbations[k].x.powi(2));
+        let found = smoothing.first_order(&Vector1::zeros(), square).unwrap();
+        let expected = 0.25 * (a - b).powi(2);
+        assert!((found.value - 0.5 * (a + b)).abs() < 1e-15);
+        assert!((found.value_variance / expected - 1.0).abs() < 1e-12);
+        assert!((found.variance.x / (9.0 * expected) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_kink_has_the_slope_of_the_normal_distribution() {
         // E max(x + δ, 0) has slope Φ(x/σ) and value x Φ(x/σ) + σ φ(x/σ).
         let smoothing = Smoothing::new(Vector1::new(0.5), 20_000, 11).unwrap();

@@ -178,6 +178,15 @@ mod tests {
     }
 
     #[test]
+    fn the_fastest_point_is_where_rotation_adds_to_motion() {
+        let (linear, angular) = (Vector3::x() * 2.0, Vector3::z() * 3.0);
+        let state = State { linear, angular, ..state(0.7) };
+        // At -0.5 m along y.
+        let fastest = linear + angular.cross(&Vector3::new(0.0, -0.5, 0.0));
+        assert_eq!((state.speed_within(0.5), fastest.norm()), (3.5, 3.5));
+    }
+
+    #[test]
     fn the_view_from_a_moving_frame_is_the_derivative_of_the_relative_pose() {
         let (body, frame) = (state(0.7), state(-0.4));
         let seen = body.seen_from(&frame);
