@@ -14,6 +14,8 @@ pub struct LongCommand {
     pub name: &'static str,
     /// Its words.
     pub words: &'static str,
+    /// Folders of what it reads.
+    pub inputs: &'static [&'static str],
     /// What it writes: files and folders.
     pub outputs: &'static [&'static str],
     /// Of its files those that a folder may be in the way of.
@@ -29,6 +31,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "refine",
         words: "refine --dataset ds --poses ds/init_low.csv --out r.csv --details r.npz --report page",
+        inputs: &["ds"],
         outputs: &["r.csv", "r.npz", "page"],
         blockable: &["r.csv", "r.npz", "page/index.html"],
         tables: &["r.csv"],
@@ -37,6 +40,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "initial",
         words: "initial --dataset ds --search --out i.csv",
+        inputs: &["ds"],
         outputs: &["i.csv", "i.csv.rivals.csv"],
         blockable: &["i.csv", "i.csv.rivals.csv"],
         tables: &["i.csv", "i.csv.rivals.csv"],
@@ -46,6 +50,7 @@ pub const COMMANDS: &[LongCommand] = &[
         name: "track",
         // Its report has times, which are never the same.
         words: "track --dataset ds --scene 21 --poses first.csv --out t.csv",
+        inputs: &["ds/test/000021", "ds/models", "ds/hand"],
         outputs: &["t.csv"],
         blockable: &["t.csv"],
         tables: &[],
@@ -54,6 +59,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "study",
         words: "study noise --dataset ds --iterations 2 --out st",
+        inputs: &["ds"],
         outputs: &["st"],
         blockable: &["st/tables.csv", "st/tables.txt"],
         tables: &[],
@@ -62,6 +68,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "calibrate",
         words: "calibrate --dataset ds --poses ds/init_low.csv --out rig.json",
+        inputs: &["ds"],
         outputs: &["rig.json", "rig.models"],
         blockable: &["rig.json"],
         tables: &[],
@@ -70,6 +77,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "synth",
         words: "synth --objects 061_foam_brick --frames 4 --out made",
+        inputs: &[],
         outputs: &["made"],
         blockable: &["made/test/000021/scene_gt.json", "made/test_targets_bop19.json"],
         tables: &[],
@@ -78,6 +86,7 @@ pub const COMMANDS: &[LongCommand] = &[
     LongCommand {
         name: "export",
         words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb --contacts c.ply",
+        inputs: &["ds/test/000021", "ds/models", "ds/hand"],
         outputs: &["f.glb", "c.ply"],
         blockable: &["f.glb", "c.ply"],
         tables: &[],

@@ -44,7 +44,7 @@ impl Fault {
     pub fn concerns(self, command: &LongCommand) -> bool {
         match self {
             Self::Threads => command.name != "export",
-            Self::BrokenInput => command.name != "synth",
+            Self::BrokenInput => !command.inputs.is_empty(),
             _ => true,
         }
     }
@@ -93,6 +93,9 @@ pub fn befall(
         }
     }
     place.clear(command)?;
+    if row.tried < count {
+        row.note = format!("{count} were wanted");
+    }
     Ok(row)
 }
 
@@ -183,10 +186,11 @@ impl Trial<'_> {
         Ok(ended.code != Some(0) || !is_same)
     }
 
-    /// One of the files that the dataset is made of.
+    /// One of the files of the command's inputs.
     fn an_input(&self, dice: &mut Dice) -> Result<PathBuf> {
         let mut files = Vec::new();
-        let mut folders = vec![self.place.path("ds")];
+        let mut folders: Vec<_> =
+            self.command.inputs.iter().map(|name| self.place.path(name)).collect();
         while let Some(folder) = folders.pop() {
             for entry in fs::read_dir(folder)? {
                 let path = entry?.path();
