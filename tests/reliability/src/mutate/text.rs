@@ -27,6 +27,9 @@ const NUMBERS: [&str; 17] = [
 const WORDS: [&str; 8] =
     ["", "\0", "a", "../../etc/passwd", "é\u{202e}", "%s%n", "\u{b}", "\u{a0}"];
 
+/// A copy of a part is no longer \[bytes\].
+const LONGEST: usize = 1 << 20;
+
 /// A changed copy.
 pub(super) fn mutated(original: &[u8], dice: &mut Dice) -> Vec<u8> {
     let mut tokens = tokens(original);
@@ -40,7 +43,9 @@ pub(super) fn mutated(original: &[u8], dice: &mut Dice) -> Vec<u8> {
         0 => drop(tokens.drain(at..end)),
         1 => {
             let times = if dice.one_in(8) { 200 } else { 1 };
-            let copy = tokens[at..end].repeat(times);
+            // Repeated time and again, a text would fill all memory.
+            let size: usize = tokens[at..end].iter().map(|token| token.len()).sum();
+            let copy = tokens[at..end].repeat(times.min(LONGEST / size.max(1)));
             tokens.splice(other..other, copy);
         }
         2 => tokens.swap(at, other),
