@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::BufReader;
 
-use mcap::io::MessageReader;
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
 use super::error::RecordingError;
 use super::images::{self, describe};
+use super::reader::MessageReader;
 use super::recording::{Recording, messages, moment, type_of};
 use super::topics::ImageTopic;
 use crate::data::depth_camera::DepthCamera;

@@ -5,6 +5,7 @@ mod error;
 mod frames;
 mod images;
 mod messages;
+mod reader;
 mod recording;
 mod schemas;
 mod series;

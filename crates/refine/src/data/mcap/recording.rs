@@ -5,8 +5,6 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::open_plain;
@@ -20,6 +18,7 @@ use super::messages::{
     CameraInfo, CompressedImage, Header, Image, JointState, Named, TransformMessage,
     Vector3Stamped, WrenchStamped, decode,
 };
+use super::reader::MessageReader;
 use super::series::Series;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
 use super::transforms::{Transforms, plain};
@@ -222,9 +221,6 @@ pub(super) fn taxel_frame(index: usize) -> String {
     format!("taxel_{index}")
 }
 
-/// The longest record, compressed or not \[bytes\]: a broken length must not take all memory.
-const LONGEST: usize = 1 << 29;
-
 /// When a message was made \[ns\]; when it was recorded, if it does not say so.
 pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
     match header.stamp.nanoseconds() {
@@ -237,10 +233,7 @@ pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
 pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
     let opened = open_plain(file);
     let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
-    let options = LinearReaderOptions::default()
-        .with_record_length_limit(LONGEST)
-        .with_validate_chunk_crcs(true);
-    Ok(MessageReader::new_with_options(BufReader::with_capacity(1 << 20, opened), options))
+    Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
 }
 
 /// So many bytes of messages of what is kept are read \[bytes\]: chunks of a small file may expand to any number.
