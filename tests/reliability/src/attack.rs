@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use prehend_geometry::write_atomic;
+use prehend_refine::data::guard;
 
 use crate::table::Row;
 use crate::tools::root;
@@ -26,9 +26,7 @@ impl<'a> Attack<'a> {
 
     /// Runs it and says at once what came of it: all of them take long. One that breaks off has a row of its own, too.
     fn run(self, commit: &str) -> Row {
-        let outcome = catch_unwind(AssertUnwindSafe(self.run));
-        let outcome = outcome.unwrap_or_else(|_| Err(anyhow!("the suite itself panicked")));
-        let mut row = outcome.unwrap_or_else(|error| {
+        let mut row = guard(self.run).unwrap_or_else(|error| {
             let note = format!("{error:#}");
             Row { tried: 1, wrong: 1, note, ..Row::new(self.name) }
         });

@@ -160,9 +160,10 @@ impl Trial<'_> {
     fn broken_input(&self, before: usize, moment: Duration, dice: &mut Dice) -> Result<bool> {
         let file = self.an_input(dice)?;
         let whole = fs::read(&file)?;
-        let is_removed = before.is_multiple_of(3);
+        let kind = before % 3;
+        let is_removed = kind == 0;
         let ended = self.place.run(self.command.words).interrupted(moment, |_| {
-            match before % 3 {
+            match kind {
                 0 => fs::remove_file(&file)?,
                 1 => fs::write(&file, &whole[..dice.below(whole.len())])?,
                 _ => fs::write(&file, b"{\"0\": [\xff")?,
