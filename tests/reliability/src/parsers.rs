@@ -20,20 +20,24 @@ use crate::small_dataset::SmallDataset;
 pub enum Form {
     /// Lines of words and numbers.
     Text,
+    /// Elements and attributes.
+    Xml,
     /// JSON.
     Json,
     /// A header of lines, and bytes after one that begins with `end_header`.
     HeaderAndBytes,
     /// Chunks of PNG, with checksums.
     Png,
+    /// Segments of JPEG.
+    Jpeg,
+    /// Triangles of STL, binary or as text.
+    Stl,
     /// JSON and bytes in chunks of GLB.
     Glb,
     /// Records of MCAP.
     Mcap,
     /// Bytes, and a hash of them.
     Grid,
-    /// Bytes.
-    Bytes,
 }
 
 /// What reads a kind of file.
@@ -54,15 +58,15 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "ply", form: Form::HeaderAndBytes, read: |s, b| mesh(s, b, "m.ply") },
     Parser { name: "obj", form: Form::Text, read: |s, b| mesh(s, b, "m.obj") },
     Parser { name: "mtl", form: Form::Text, read: mtl },
-    Parser { name: "stl", form: Form::Bytes, read: |s, b| mesh(s, b, "m.stl") },
+    Parser { name: "stl", form: Form::Stl, read: |s, b| mesh(s, b, "m.stl") },
     Parser { name: "gltf", form: Form::Json, read: |s, b| mesh(s, b, "m.gltf") },
     Parser { name: "glb", form: Form::Glb, read: |s, b| mesh(s, b, "m.glb") },
-    Parser { name: "urdf", form: Form::Text, read: urdf },
-    Parser { name: "mjcf", form: Form::Text, read: mjcf },
+    Parser { name: "urdf", form: Form::Xml, read: urdf },
+    Parser { name: "mjcf", form: Form::Xml, read: mjcf },
     Parser { name: "taxels", form: Form::Text, read: taxels },
     Parser { name: "grid", form: Form::Grid, read: grid },
     Parser { name: "png", form: Form::Png, read: image },
-    Parser { name: "jpeg", form: Form::Bytes, read: image },
+    Parser { name: "jpeg", form: Form::Jpeg, read: image },
     Parser {
         name: "bop_camera",
         form: Form::Json,

@@ -3,7 +3,9 @@
 mod bytes;
 mod containers;
 mod json;
+mod parts;
 mod text;
+mod xml;
 
 use prehend_geometry::SplitMix64;
 
@@ -42,13 +44,15 @@ pub fn mutated(original: &[u8], form: Form, dice: &mut Dice) -> Vec<u8> {
             // Any structure may be broken, too.
             _ if dice.one_in(8) => bytes::mutated(&changed, dice),
             Form::Text => text::mutated(&changed, dice),
+            Form::Xml => xml::mutated(&changed, dice),
             Form::Json => json::mutated(&changed, dice),
             Form::HeaderAndBytes => containers::header_and_bytes(&changed, dice),
-            Form::Png => containers::png(&changed, dice),
+            Form::Png => parts::png(&changed, dice),
+            Form::Jpeg => parts::jpeg(&changed, dice),
+            Form::Stl => parts::stl(&changed, dice),
             Form::Glb => containers::glb(&changed, dice),
             Form::Grid => containers::grid(&changed, dice),
-            Form::Mcap => containers::mcap(&changed, dice),
-            Form::Bytes => bytes::mutated(&changed, dice),
+            Form::Mcap => parts::mcap(&changed, dice),
         };
     }
     changed
