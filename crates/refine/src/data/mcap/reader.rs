@@ -1,50 +1,53 @@
 //! The messages of a log, one after the other.
 
 use std::borrow::Cow;
-use std::io::{ErrorKind, Read};
+use std::io::{Cursor, Read};
 
 use mcap::read::ChannelAccumulator;
 use mcap::records::{Record, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Message, parse_record};
 
-/// The longest record, compressed or not \[bytes\]: a broken length must not take all memory.
-const LONGEST: usize = 1 << 29;
+use super::lengths;
+use super::records::Records;
 
 /// Messages in the order of the file; nothing after the first error. What else there is, attachments and indices, is not looked at.
 pub(super) struct MessageReader<R> {
-    source: R,
-    reader: LinearReader,
+    file: Records<R>,
+    /// The chunk that is being read.
+    chunk: Option<Records<Cursor<Vec<u8>>>>,
     channels: ChannelAccumulator<'static>,
     done: bool,
 }
 
+/// What is in a file.
+enum Part {
+    Message(Message<'static>),
+    Chunk(Vec<u8>),
+}
+
 impl<R: Read> MessageReader<R> {
     pub(super) fn new(source: R) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(LONGEST)
-            .with_validate_chunk_crcs(true);
-        let reader = LinearReader::new_with_options(options);
-        Self { source, reader, channels: ChannelAccumulator::default(), done: false }
+        let file = Records::of_file(source);
+        Self { file, chunk: None, channels: ChannelAccumulator::default(), done: false }
     }
 
     fn read(&mut self) -> Option<McapResult<Message<'static>>> {
+        let channels = &mut self.channels;
         loop {
-            match self.reader.next_event()? {
-                Ok(LinearReadEvent::ReadRequest(count)) => {
-                    match self.source.read(self.reader.insert(count)) {
-                        Ok(read) => self.reader.notify_read(read),
-                        Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                        Err(error) => return Some(Err(error.into())),
-                    }
+            if let Some(chunk) = &mut self.chunk {
+                let found = chunk.find_map(|opcode, record| message(channels, opcode, record));
+                if found.is_some() {
+                    return found;
                 }
-                Ok(LinearReadEvent::Record { opcode, data }) => {
-                    match message(&mut self.channels, opcode, data) {
-                        Ok(None) => {}
-                        Ok(Some(message)) => return Some(Ok(message)),
-                        Err(error) => return Some(Err(error)),
-                    }
-                }
+                self.chunk = None;
+            }
+            let part = |opcode, record: &[u8]| match opcode {
+                op::CHUNK => chunk(record).map(|chunk| Some(Part::Chunk(chunk))),
+                _ => Ok(message(channels, opcode, record)?.map(Part::Message)),
+            };
+            match self.file.find_map(part)? {
+                Ok(Part::Message(message)) => return Some(Ok(message)),
+                Ok(Part::Chunk(chunk)) => self.chunk = Some(Records::of_chunk(Cursor::new(chunk))),
                 Err(error) => return Some(Err(error)),
             }
         }
@@ -61,6 +64,14 @@ impl<R: Read> Iterator for MessageReader<R> {
     }
 }
 
+/// A chunk's record with its kind and length before it.
+fn chunk(record: &[u8]) -> McapResult<Vec<u8>> {
+    match lengths::fit(op::CHUNK, record) {
+        true => Ok([&[op::CHUNK], &(record.len() as u64).to_le_bytes()[..], record].concat()),
+        false => Err(McapError::UnexpectedEoc),
+    }
+}
+
 /// The message that a record is, if it is one; `channels` learn of schemas and channels.
 fn message(
     channels: &mut ChannelAccumulator<'static>,
@@ -70,8 +81,7 @@ fn message(
     if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
         return Ok(None);
     }
-    // The package would make room for a text before it sees that the record ends first.
-    if !texts_fit(opcode, record) {
+    if !lengths::fit(opcode, record) {
         return Err(McapError::UnexpectedEof);
     }
     match parse_record(opcode, record)? {
@@ -92,59 +102,59 @@ fn message(
     Ok(None)
 }
 
-/// Whether the texts of a schema or a channel end within its record.
-fn texts_fit(opcode: u8, record: &[u8]) -> bool {
-    let fit = || -> Option<()> {
-        // Of a schema its number, a name and an encoding; of a channel two numbers, a topic, an encoding and pairs of texts.
-        let mut rest = match opcode {
-            op::SCHEMA => record.get(2..)?,
-            op::CHANNEL => record.get(4..)?,
-            _ => return Some(()),
-        };
-        rest = counted(counted(rest)?.1)?.1;
-        if opcode == op::CHANNEL {
-            let mut pairs = counted(rest)?.0;
-            while !pairs.is_empty() {
-                pairs = counted(pairs)?.1;
-            }
-        }
-        Some(())
-    };
-    fit().is_some()
-}
-
-/// Bytes after a number of four bytes that says how many they are, and what follows.
-fn counted(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
-    let (count, rest) = bytes.split_first_chunk::<4>()?;
-    rest.split_at_checked(u32::from_le_bytes(*count) as usize)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use mcap::{Compression, WriteOptions};
+
     use super::*;
 
-    fn text(text: &str) -> Vec<u8> {
-        [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
+    /// Two messages in a chunk.
+    fn log(compression: Option<Compression>) -> Vec<u8> {
+        let mut file = Cursor::new(Vec::new());
+        let options = WriteOptions::new().compression(compression);
+        let mut writer = options.create(&mut file).unwrap();
+        let channel = writer.add_channel(0, "/topic", "cdr", &BTreeMap::new()).unwrap();
+        for sequence in 0..2 {
+            let header = mcap::records::MessageHeader {
+                channel_id: channel,
+                sequence,
+                log_time: 7,
+                publish_time: 7,
+            };
+            writer.write_to_known_channel(&header, &[11; 60]).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        file.into_inner()
     }
 
     #[test]
-    fn texts_longer_than_their_record_are_refused() {
-        let pairs = [text("key"), text("value")].concat();
-        let count = (pairs.len() as u32).to_le_bytes().to_vec();
-        let schema = [vec![1, 0], text("pkg/msg/Type"), text("ros2msg"), text("")].concat();
-        let channel = [vec![1, 0, 1, 0], text("/topic"), text("cdr"), count, pairs].concat();
-        // Where the numbers of bytes are.
-        for (opcode, record, places) in
-            [(op::SCHEMA, schema, vec![2, 18]), (op::CHANNEL, channel, vec![4, 14, 21, 25, 32])]
-        {
-            assert!(texts_fit(opcode, &record) && parse_record(opcode, &record).is_ok());
-            for place in places {
-                let mut broken = record.clone();
-                broken[place..place + 4].copy_from_slice(&0xeb00_0000_u32.to_le_bytes());
-                let found = message(&mut ChannelAccumulator::default(), opcode, &broken);
-                assert!(matches!(found, Err(McapError::UnexpectedEof)), "{opcode} at {place}");
-            }
-            assert!(!texts_fit(opcode, &record[..3]));
+    fn messages_of_chunks_are_read() {
+        for compression in [None, Some(Compression::Lz4), Some(Compression::Zstd)] {
+            let log = log(compression);
+            let messages: McapResult<Vec<_>> = MessageReader::new(&log[..]).collect();
+            let messages = messages.unwrap();
+            assert_eq!(messages.iter().map(|m| m.sequence).collect::<Vec<_>>(), [0, 1]);
+            assert!(messages.iter().all(|m| *m.data == [11; 60] && m.channel.topic == "/topic"));
+            // One bit of the messages is wrong, or the file ends within them.
+            let at = { log.windows(8) }.position(|bytes| bytes == [11; 8]).unwrap_or(90);
+            let mut broken = log.clone();
+            broken[at] ^= 1;
+            assert!(MessageReader::new(&broken[..]).any(|message| message.is_err()));
+            assert!(MessageReader::new(&log[..at]).any(|message| message.is_err()));
         }
+    }
+
+    #[test]
+    fn a_record_longer_than_its_chunk_is_refused() {
+        let mut log = log(None);
+        let length = (22_u64 + 60).to_le_bytes();
+        let message = [&[op::MESSAGE], &length[..]].concat();
+        let at = log.windows(9).rposition(|bytes| bytes == message).unwrap();
+        log[at + 2] = 1;
+        let read: Vec<_> = MessageReader::new(&log[..]).collect();
+        assert!(matches!(read[..], [Err(McapError::UnexpectedEoc)]), "{read:?}");
     }
 }
