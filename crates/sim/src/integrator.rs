@@ -84,3 +84,28 @@ pub trait Integrator: Sync {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Still;
+
+    impl Integrator for Still {
+        fn step<S: Scalar>(
+            &self,
+            _: &World<S>,
+            states: &[State<S>],
+            _: Step,
+        ) -> Result<Vec<State<S>>, SimulationError> {
+            Ok(states.to_vec())
+        }
+    }
+
+    #[test]
+    fn a_scheme_that_says_nothing_is_explicit_and_promises_nothing() {
+        assert_eq!(Still.stability_limit(), 1.0);
+        assert!(!Still.evaluates_forces_once() && !Still.finds_contacts());
+        assert!(!Still.controls_error());
+    }
+}

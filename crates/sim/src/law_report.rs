@@ -141,6 +141,42 @@ mod tests {
         assert!(!report.is_sound() && report.to_string().contains("WRONG"));
     }
 
+    /// A spring that takes the derivatives of its gap or its stiffness for zero.
+    struct Constant {
+        stiffness: [f64; 1],
+        gap: bool,
+    }
+
+    impl ContactLaw for Constant {
+        fn params(&self) -> &[f64] {
+            &self.stiffness
+        }
+        fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+            let [mut stiffness, mut gap] = [p[0], contact.gap];
+            let lost = if self.gap { &mut gap } else { &mut stiffness };
+            *lost = S::constant(lost.value());
+            let normal = (-stiffness * gap).times(contact.area);
+            Response { normal, tangential: contact.slip.map(|_| S::zero()) }
+        }
+        fn reach(&self) -> f64 {
+            0.0
+        }
+    }
+
+    #[test]
+    fn lost_derivatives_are_found_out() {
+        for gap in [true, false] {
+            let law: Arc<dyn DynContactLaw> = Arc::new(Constant { stiffness: [1e7], gap });
+            let report = law_report(&law).unwrap();
+            let is_wrong = |what: &str| {
+                let finding = report.findings.iter().find(|f| f.what.starts_with(what)).unwrap();
+                finding.verdict == Verdict::Wrong
+            };
+            assert_eq!(is_wrong("contacts whose derivatives differ"), gap, "{report}");
+            assert_eq!(is_wrong("the same, derivatives by parameters"), !gap, "{report}");
+        }
+    }
+
     #[test]
     fn a_spring_and_damper_bounce_as_their_damping_ratio_says() {
         let law: Arc<dyn DynContactLaw> = Arc::new(penalty(1e7, 1e4, 0.3, 1e-3));

@@ -172,6 +172,19 @@ mod tests {
     }
 
     #[test]
+    fn each_depth_point_is_matched_with_its_nearest_surface_point() {
+        let (frame, state) = fixture(0);
+        let factor = factor(&frame);
+        let pairs = factor.to_mesh(&state);
+        assert!(pairs.len() == factor.tree.points().len() && pairs.len() > 100);
+        for Pair { surface, cloud } in pairs {
+            let local = state.t_cam_object.inverse() * cloud;
+            let (distance, _) = factor.object.surface.signed_distance(&local);
+            assert!(((cloud - surface).norm() - distance.abs()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn leaving_the_view_never_pays() {
         let (frame, state) = fixture(0);
         let factor = factor(&frame);

@@ -176,4 +176,21 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn points_out_of_reach_are_as_bad_as_those_at_its_end() {
+        let (frame, state) = fixture(0);
+        let settings = HandDepthSettings::default();
+        let factor = HandDepthFactor::new(&frame, &settings).unwrap();
+        let count = factor.points.len();
+        let most = settings.noise.weighting(count).cost(2.0 * settings.reach) * count as f64;
+        let aside = |z| {
+            let away = [0.0, 0.0, z, 0.0, 0.0, 0.0];
+            factor.cost(&state.retract(&[Block::HandPose], &away))
+        };
+        assert!(aside(0.0) < 0.5 * most);
+        for z in [0.5, 2.0] {
+            assert!((aside(z) / most - 1.0).abs() < 1e-12, "{} {most}", aside(z));
+        }
+    }
 }

@@ -204,6 +204,23 @@ mod tests {
     }
 
     #[test]
+    fn derivatives_are_proportional_to_the_weight() {
+        let (frame, state) = fixture(0);
+        let [one, three] = [1.0, 3.0].map(|weight| {
+            let settings =
+                StabilitySettings { weight, displacement_sigma: 1e6, ..Default::default() };
+            let mut equations = NormalEquations::new(&[Block::ObjectPose]);
+            let term = StabilityFactor::new(&frame, &state, settings).unwrap();
+            term.linearize(&state, &mut equations);
+            equations
+        });
+        let gradient = three.gradient() - one.gradient() * 3.0;
+        assert!(gradient.norm() < 1e-9 * three.gradient().norm());
+        let hessian = three.hessian() - one.hessian() * 3.0;
+        assert!(hessian.norm() < 1e-9 * three.hessian().norm());
+    }
+
+    #[test]
     fn steps_are_fine_enough_where_the_object_penetrates() {
         let (frame, state) = fixture(0);
         let toward_palm = frame.hand().unwrap().1.t_cam_hand * -Vector3::x();

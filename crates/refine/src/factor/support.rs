@@ -336,6 +336,22 @@ mod tests {
     }
 
     #[test]
+    fn samples_stand_for_the_whole_surface() {
+        let (frame, state) = fixture(0);
+        let held = State { t_cam_object: scene().truth, ..state };
+        // What the object touches is a share of its area, however many samples are looked at.
+        let touched = |samples| {
+            let settings = SupportSettings { samples, ..SupportSettings::default() };
+            let factor = SupportFactor::new(&frame, &settings).unwrap();
+            let near = factor.held(&held).unwrap().near;
+            let pads = near.iter().map(|near| settings.area / near.support.compliance);
+            pads.sum::<f64>() / factor.object.area
+        };
+        let [all, half] = [usize::MAX, scene().object.samples.len() / 2].map(touched);
+        assert!(all > 1e-3 && all < 0.5 && (half / all - 1.0).abs() < 0.2, "{all} {half}");
+    }
+
+    #[test]
     fn what_a_finger_feels_pushes_the_object_away_from_it() {
         let scene = scene();
         let mut observation = scene.observation.clone();

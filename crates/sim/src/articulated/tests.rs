@@ -207,3 +207,17 @@ fn jacobians_are_velocities_of_points() {
         assert_near(velocity.as_slice(), difference.as_slice(), 1e-7, "difference");
     }
 }
+
+#[test]
+#[should_panic(expected = "one number a coordinate")]
+fn too_few_coordinates_are_refused() {
+    let tree = random_tree(1, 3);
+    tree.check(&vec![0.0; tree.coordinates() - 1], &vec![0.0; tree.freedoms()]);
+}
+
+#[test]
+#[should_panic(expected = "one number a degree of freedom")]
+fn too_many_velocities_are_refused() {
+    let tree = random_tree(1, 3);
+    tree.check(&vec![0.0; tree.coordinates()], &vec![0.0; tree.freedoms() + 1]);
+}

@@ -49,3 +49,24 @@ impl Bristles {
         slip * follow - deflected * yields
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_rate_is_faster_than_that_of_full_deflection_and_fast_slip() {
+        let bristles = Bristles { deflection: 2e-4, slip_speed: 3e-3 };
+        let rate = |slip: f64, deflected: f64| {
+            let by = |u: f64| bristles.rate(&(Vector3::x() * slip), &(Vector3::x() * u)).x;
+            (by(deflected + 1e-9) - by(deflected - 1e-9)) / 2e-9
+        };
+        let full = -rate(1e3, bristles.deflection);
+        assert!((full / bristles.fastest() - 1.0).abs() < 1e-4, "{full}");
+        for slip in [0.0, 1e-3, 1.0] {
+            for share in [0.0, 0.5, 0.99] {
+                assert!(-rate(slip, share * bristles.deflection) < bristles.fastest());
+            }
+        }
+    }
+}

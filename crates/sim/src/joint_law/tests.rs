@@ -68,6 +68,21 @@ fn efforts_have_their_derivatives_and_passive_laws_take_energy() {
 }
 
 #[test]
+fn a_slack_spring_pulls_back_to_its_range() {
+    let spring = SlackSpring { stiffness: 2.0, lower: -0.2, upper: 0.1 };
+    for (position, effort) in [(-0.5, 0.6), (-0.1, 0.0), (0.1, 0.0), (0.4, -0.6)] {
+        let found = DynJointLaw::effort(&spring, &spring.param_values(), position, 3.0);
+        assert!((found - effort).abs() < 1e-15, "{position}: {found}");
+    }
+}
+
+#[test]
+fn what_brings_no_energy_says_so() {
+    let passive: Vec<bool> = laws().iter().map(|law| law.is_passive()).collect();
+    assert_eq!(passive, [true, true, true, true, true, false, false, false, false]);
+}
+
+#[test]
 fn what_cannot_be_is_refused_where_it_is_added() {
     let mut world = World::new(Vector3::zeros());
     let rod = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();

@@ -49,3 +49,23 @@ fn work(contact_point: &PointContact<'_>, rate: f64, slip: f64, swing: f64) -> f
     };
     (0..STEPS).map(power).sum::<f64>() * dt
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::point_contact::AREA;
+    use super::*;
+    use crate::scenes::penalty;
+
+    #[test]
+    fn a_spring_gives_back_what_it_took_and_a_damper_nothing() {
+        // A damping c over an area A takes π c A ω a² from an oscillation of amplitude a.
+        for (damping, rate) in [(0.0, 1.0), (1e4, 1.0), (1e4, 30.0)] {
+            let law = penalty(1e7, damping, 0.0, 1e-3);
+            let work = work(&PointContact { law: &law }, rate, 0.0, 0.1);
+            let amplitude = 0.1 * (1.0 + 1e-3) * DEPTH;
+            let (pi, turn) = (std::f64::consts::PI, std::f64::consts::TAU * rate);
+            let taken = pi * damping * AREA * turn * amplitude * amplitude;
+            assert!((work + taken).abs() < 1e-9 * (taken + 1e-6), "{work} {taken}");
+        }
+    }
+}

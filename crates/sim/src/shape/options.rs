@@ -49,3 +49,19 @@ impl ShapeOptions {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_that_are_not_given_follow_from_the_size() {
+        let lengths = |extents: &[f64]| {
+            let Lengths { rounding, spacing, cell } =
+                ShapeOptions::default().lengths(extents).unwrap();
+            [rounding, spacing, cell].map(|x| (x * 1e9).round() / 1e9)
+        };
+        assert_eq!(lengths(&[0.3, 0.4, 0.32]), [0.006, 0.1, 0.00625]);
+        assert_eq!(lengths(&[0.96, 0.01, 0.64]), [0.0002, 0.04, 0.015]);
+    }
+}

@@ -135,3 +135,16 @@ impl Profile<f64> {
         2.0 * depth.fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_farthest_corner_says_how_far_an_outline_extends() {
+        let profile = Profile::new(&[[0.0, -0.3], [0.2, -0.1], [0.4, 0.3], [0.0, 0.3]]);
+        assert!((profile.radius_about_origin() - 0.5).abs() < 1e-15);
+        let below = Profile::new(&[[0.0, -0.7], [0.1, 0.0], [0.0, 0.2]]);
+        assert!((below.radius_about_origin() - 0.7).abs() < 1e-15);
+    }
+}

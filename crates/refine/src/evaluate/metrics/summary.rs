@@ -151,7 +151,8 @@ mod tests {
         assert_eq!(lines[4], ["all", "4", "4.250", "0.500"]);
         assert_eq!(lines[6], ["medians", "n", "PE", "cm", "IV", "cm³"]);
         assert_eq!(lines[10], ["all", "4", "3.500", "0.500"]);
-        assert!(text.ends_with("IV cm³: known of 1 of 4 poses\n"));
+        assert_eq!(lines[11], ["IV", "cm³:", "known", "of", "1", "of", "4", "poses"]);
+        assert_eq!(lines.len(), 12, "{text}");
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json["per_object"]["7"][0]["mean"], 1.5);
         assert_eq!(json["columns"][0], "PE cm");

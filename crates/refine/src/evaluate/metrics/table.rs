@@ -74,5 +74,7 @@ mod tests {
         let mut table = Table::new(["object", "|ΔIV|"]);
         table.push(vec!["mug".into(), "1".into()]);
         assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug | 1 |\n");
+        let parts = (vec!["object".into(), "|ΔIV|".into()], vec![vec!["mug".into(), "1".into()]]);
+        assert_eq!(table.into_parts(), parts);
     }
 }

@@ -310,6 +310,18 @@ mod tests {
     }
 
     #[test]
+    fn residuals_lead_from_the_surface_to_the_points() {
+        let (frame, state) = fixture(0);
+        let factor = factor(&frame, 0.0);
+        for (point, residual) in factor.points.iter().zip(factor.residuals(&state)) {
+            let Residual { distance, surface, away, .. } = residual.unwrap();
+            let place = state.camera.point(&point.ray, point.depth).coords;
+            assert!((surface + away * distance - place).norm() < 1e-12);
+            assert!((away.norm() - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
     fn patches_share_what_the_object_has() {
         let (frame, state) = fixture(1);
         let patches = patches(2);

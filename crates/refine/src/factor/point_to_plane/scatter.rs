@@ -74,3 +74,40 @@ impl PointToPlaneFactor {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use prehend_geometry::SplitMix64;
+
+    use super::super::super::gradient_check::{fixture, scene};
+    use super::super::{PointToPlaneFactor, PointToPlaneSettings};
+    use super::*;
+    use crate::scene::Frame;
+
+    /// Of the built-in scene's depth, to which normal errors are added: of each point, and one of all points in tiles of some pixels.
+    fn estimate(independent: f64, [shared, tile]: [f64; 2]) -> NoiseEstimate {
+        let scene = scene();
+        let (_, state) = fixture(0);
+        let mut observation = scene.observation.clone();
+        let mut random = SplitMix64::new(3);
+        let width = observation.depth.width();
+        let place = |pixel: usize| [pixel % width, pixel / width].map(|x| x / tile as usize);
+        let tiles: Vec<f64> = (0..10_000).map(|_| shared * random.normal()).collect();
+        for (pixel, depth) in observation.depth.pixels_mut().iter_mut().enumerate() {
+            let [x, y] = place(pixel);
+            *depth += (independent * random.normal() + tiles[100 * y + x]) as f32;
+        }
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let settings = PointToPlaneSettings { gp_sigma: 0.0, ..Default::default() };
+        let factor = PointToPlaneFactor::new(&frame, &settings).unwrap();
+        let truth = State { t_cam_object: scene.truth, ..state };
+        factor.noise_estimate(&truth).unwrap()
+    }
+
+    #[test]
+    fn what_neighbors_have_in_common_is_told_from_the_rest() {
+        let alone = estimate(1e-3, [0.0, 8.0]);
+        let both = estimate(1e-3, [1e-3, 8.0]);
+        println!("{alone:?} {both:?}");
+    }
+}

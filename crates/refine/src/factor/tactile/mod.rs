@@ -232,6 +232,30 @@ mod tests {
     }
 
     #[test]
+    fn distances_that_are_right_cost_nothing() {
+        let scene = scene();
+        let (_, state) = fixture(0);
+        let measured = scene.observation.hand.as_ref().unwrap();
+        let hand = scene.hand.articulated(&measured.t_cam_hand, &measured.joints).unwrap();
+        let truth = State { t_cam_object: scene.truth, ..state };
+        let cost = |off: f64| {
+            let reading = |taxel: &Taxel| {
+                let link = scene.hand.link_of(taxel).unwrap();
+                let point = hand.posed().t_world_links()[link] * taxel.position;
+                let local = scene.truth.inverse() * point;
+                let distance = scene.object.surface.signed_distance(&local).0 + off;
+                ProximityReading { link, position: taxel.position, distance }
+            };
+            let mut observation = scene.observation.clone();
+            let readings = scene.hand.taxels.iter().map(reading).collect();
+            observation.hand.as_mut().unwrap().touch = vec![TouchReading::Proximity(readings)];
+            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap().cost(&truth)
+        };
+        assert!(cost(0.0) < 1e-9 && cost(2e-3) > 0.1, "{} {}", cost(0.0), cost(2e-3));
+    }
+
+    #[test]
     fn a_patch_on_the_wrong_side_costs() {
         let scene = scene();
         let (_, state) = fixture(0);
