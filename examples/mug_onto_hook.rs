@@ -180,8 +180,8 @@ fn animate(mug: &Mug, ways: &[Vec<Isometry3<f64>>; 2], path: &Path) -> anyhow::R
     let (width, height) = (camera.width, camera.height);
     let mut encoder = png::Encoder::new(file, 2 * width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);
-    encoder.set_compression(png::Compression::Best);
-    encoder.set_adaptive_filter(png::AdaptiveFilterType::Adaptive);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::Adaptive);
     encoder.set_animated(ways[0].len() as u32, 0)?;
     encoder.set_frame_delay(1, 14)?;
     let mut writer = encoder.write_header()?;

@@ -52,3 +52,23 @@ impl Solid for Capsule {
         row.iter().enumerate().map(sample).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_press_as_the_shadow_does() {
+        let axis = Unit::new_normalize(Vector3::new(1.0, 2.0, -1.0));
+        for spacing in [0.004, 0.03, 1.0] {
+            let capsule = Capsule { center: Point3::new(0.1, 0.2, 0.3), axis, spacing };
+            let (half, radius) = (0.05, 0.02);
+            let samples = capsule.samples(&[half, radius]);
+            let area: f64 = samples.iter().map(|sample| sample.area).sum();
+            let shadow = PI * radius * radius + 4.0 * radius * half;
+            assert!((area / shadow - 1.0).abs() < 1e-12, "{area} {shadow}");
+            let moment = samples.iter().map(|s| (s.center - capsule.center) * s.area);
+            assert!(moment.sum::<Vector3<f64>>().norm() < 1e-12 * area);
+        }
+    }
+}

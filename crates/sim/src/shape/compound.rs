@@ -129,3 +129,19 @@ impl DistanceField for Nearest {
         Some((center, radii.fold(0.0, f64::max)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fields::Sphere;
+
+    #[test]
+    fn a_compound_is_as_thick_as_its_thinnest_part() {
+        let ball = |radius: f64| -> (Isometry3<f64>, Arc<dyn DistanceField>) {
+            (Isometry3::translation(radius, 0.0, 0.0), Arc::new(Sphere { radius }))
+        };
+        let alone = ball(0.02).1.thickness();
+        assert!(alone > 0.0 && alone.is_finite());
+        assert_eq!(Nearest(vec![ball(0.1), ball(0.02), ball(0.05)]).thickness(), alone);
+    }
+}

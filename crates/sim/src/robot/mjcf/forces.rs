@@ -156,3 +156,27 @@ pub(super) fn stiffness(solver: &SolverParameters, inertia: f64, softness: f64) 
     let stiffness = inertia / (most * time * ratio).powi(2);
     [stiffness, 2.0 * inertia / (most * time)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stiffness_and_damping_are_those_of_the_time_constant() {
+        // As MuJoCo's documentation has it: 1/(d² t² ζ²) and 2/(d t).
+        let impedance = [0.9, 0.8, 0.001, 0.5, 2.0];
+        let relative = |found: [f64; 2], expected: [f64; 2]| {
+            let off = |k: usize| (found[k] / expected[k] - 1.0).abs();
+            assert!(off(0) < 1e-12 && off(1) < 1e-12, "{found:?} {expected:?}");
+        };
+        for softness in [1.0, 0.25] {
+            let given = SolverParameters { reference: [0.02, 0.5], impedance };
+            let time = 0.8 * 0.02 * softness;
+            let expected = [3.0 / (time * 0.5_f64).powi(2), 2.0 * 3.0 / time];
+            relative(stiffness(&given, 3.0, softness), expected);
+            let direct = SolverParameters { reference: [-100.0, -5.0], impedance };
+            let expected = [3.0 * 100.0 / 0.64 / softness.powi(2), 3.0 * 5.0 / 0.8 / softness];
+            relative(stiffness(&direct, 3.0, softness), expected);
+        }
+    }
+}

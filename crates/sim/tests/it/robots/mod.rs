@@ -1,8 +1,9 @@
-//! Robots of descriptions: values of MuJoCo and Pinocchio. Those of the data folder run with `--ignored`.
+//! Robots of descriptions: values of MuJoCo and Pinocchio, and closed forms. Those of the data folder run with `--ignored`.
 
 mod authored;
 mod golden;
 mod gripper;
+mod urdf;
 
 use std::path::PathBuf;
 
