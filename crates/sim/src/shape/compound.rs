@@ -138,7 +138,10 @@ mod tests {
     #[test]
     fn a_compound_is_as_thick_as_its_thinnest_part() {
         let ball = |radius: f64| -> (Isometry3<f64>, Arc<dyn DistanceField>) {
-            (Isometry3::translation(radius, 0.0, 0.0), Arc::new(Sphere { radius }))
+            (
+                Isometry3::translation(radius, 0.0, 0.0),
+                Arc::new(Sphere { center: Point3::origin(), radius }),
+            )
         };
         let alone = ball(0.02).1.thickness();
         assert!(alone > 0.0 && alone.is_finite());

@@ -82,6 +82,7 @@ mod tests {
     use super::super::super::gradient_check::{fixture, scene};
     use super::super::{PointToPlaneFactor, PointToPlaneSettings};
     use super::*;
+    use crate::problem::NoiseModel;
     use crate::scene::Frame;
 
     /// Of the built-in scene's depth, to which normal errors are added: of each point, and one of all points in tiles of some pixels.
@@ -98,7 +99,9 @@ mod tests {
             *depth += (independent * random.normal() + tiles[100 * y + x]) as f32;
         }
         let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
-        let settings = PointToPlaneSettings { gp_sigma: 0.0, ..Default::default() };
+        // A kernel would limit the errors.
+        let noise = NoiseModel::gaussian(2e-3);
+        let settings = PointToPlaneSettings { noise, gp_sigma: 0.0, ..Default::default() };
         let factor = PointToPlaneFactor::new(&frame, &settings).unwrap();
         let truth = State { t_cam_object: scene.truth, ..state };
         factor.noise_estimate(&truth).unwrap()
@@ -106,8 +109,14 @@ mod tests {
 
     #[test]
     fn what_neighbors_have_in_common_is_told_from_the_rest() {
-        let alone = estimate(1e-3, [0.0, 8.0]);
-        let both = estimate(1e-3, [1e-3, 8.0]);
-        println!("{alone:?} {both:?}");
+        let alone = estimate(2e-3, [0.0, 16.0]);
+        let both = estimate(2e-3, [2e-3, 16.0]);
+        for NoiseEstimate { sigma, correlated, independent, .. } in [alone, both] {
+            assert!((sigma / correlated.hypot(independent) - 1.0).abs() < 1e-9);
+            assert!((independent / 2e-3 - 1.0).abs() < 0.4, "{independent}");
+        }
+        assert!(alone.correlated < 0.3 * alone.independent, "{alone:?}");
+        assert!((both.correlated / 2e-3 - 0.8).abs() < 0.5, "{both:?}");
+        assert!(both.effective_samples < 0.3 * alone.effective_samples, "{alone:?} {both:?}");
     }
 }
