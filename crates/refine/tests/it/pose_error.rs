@@ -64,3 +64,17 @@ fn discrete_and_continuous_symmetries_combine() {
     assert!(oe_deg(&estimate, &truth) > 90.0);
     assert!(oe_symmetric_deg(&estimate, &truth, &symmetries) < 1e-9);
 }
+
+#[test]
+fn transforms_act_as_they_are_given_not_their_inverses() {
+    let third = Isometry3::rotation(Vector3::z() * (std::f64::consts::TAU / 3.0));
+    let truth = pose(0.0, [0.5, 1.0, -0.3]);
+    let mut symmetries = Symmetries { discrete: vec![third], continuous: vec![] };
+    assert!(oe_symmetric_deg(&(truth * third), &truth, &symmetries) < 1e-9);
+    assert!(oe_symmetric_deg(&(truth * third.inverse()), &truth, &symmetries) > 100.0);
+    let axis = ContinuousSymmetry { axis: Vector3::x_axis(), point: Point3::origin() };
+    symmetries.continuous.push(axis);
+    let spin = Isometry3::rotation(Vector3::x() * 1.3);
+    assert!(oe_symmetric_deg(&(truth * spin * third), &truth, &symmetries) < 1e-9);
+    assert!(oe_symmetric_deg(&(truth * third * spin), &truth, &symmetries) > 10.0);
+}
