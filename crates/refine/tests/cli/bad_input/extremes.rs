@@ -139,6 +139,17 @@ fn sizes_of_images_are_compared_before_they_are_decoded() {
 
 /// What the program says, and the most memory that it takes; where the system does not tell, nothing.
 fn peak(place: &Workplace, arguments: &str) -> (String, u64) {
+    // A program that ends at once on a busy machine may do so before it is looked at: then again.
+    for _ in 0..10 {
+        let (said, bytes) = watched(place, arguments);
+        if bytes > 0 || !cfg!(target_os = "linux") {
+            return (said, bytes);
+        }
+    }
+    panic!("the program ended ten times before it was looked at");
+}
+
+fn watched(place: &Workplace, arguments: &str) -> (String, u64) {
     let mut child = place
         .command(arguments)
         .stdout(std::process::Stdio::null())
@@ -153,7 +164,6 @@ fn peak(place: &Workplace, arguments: &str) -> (String, u64) {
         most = most.max(1024 * kilobytes.unwrap_or(0));
         std::thread::sleep(Duration::from_millis(2));
     }
-    assert!(most > 0 || !cfg!(target_os = "linux"), "the program ended before it was looked at");
     (String::from_utf8(child.wait_with_output().unwrap().stderr).unwrap(), most)
 }
 
