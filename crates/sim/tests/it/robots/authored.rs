@@ -75,12 +75,7 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
         assert!(off < 1e-12, "{name}: {off}");
     }
     let own = &world.articulations[0];
-    let [mut q, mut v] = [Vec::new(), Vec::new()];
-    for link in own.bodies() {
-        let joint = world.joint(&states, *link).unwrap();
-        q.extend(joint.position);
-        v.extend(joint.velocity);
-    }
+    let [q, v] = super::coordinates(&world, &states);
     let at = own.tree.kinematics(&q, &v).under(world.gravity);
     let effort = at.inverse_dynamics(&vec![0.0; v.len()]);
     for (found, expected) in effort.iter().zip(EFFORTS) {

@@ -66,13 +66,8 @@ fn links_are_where_kinematics_has_them() {
     // What holds the shoulder against gravity.
     let own = &world.articulations[0];
     assert_eq!(own.tree.freedoms(), 2);
-    let mut q = vec![0.0; 2];
-    for (link, body) in own.bodies().iter().enumerate() {
-        let position = &world.joint(&states, *body).unwrap().position;
-        let range = own.tree.range(link)[0].clone();
-        q[range].copy_from_slice(position);
-    }
-    let at = own.tree.kinematics(&q, &[0.0; 2]).under(world.gravity);
+    let [q, v] = super::coordinates(&world, &states);
+    let at = own.tree.kinematics(&q, &v).under(world.gravity);
     let efforts = at.inverse_dynamics(&[0.0; 2]);
     let [upper, finger] = ["upper", "finger"].map(|name| {
         let link = own.bodies().iter().position(|b| *b == body(&tree, &bodies, name)).unwrap();
