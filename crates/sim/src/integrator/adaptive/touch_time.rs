@@ -138,9 +138,39 @@ fn crossing(from: [f64; 2], to: [f64; 2], dt: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
     use prehend_geometry::SplitMix64;
 
     use super::*;
+    use crate::{Body, ContactBodies, Coulomb, HalfSpace, KelvinVoigt, Law, RigidBody, Surface};
+
+    /// A foot that comes down and goes up again by the cubic whose least value is a quarter of the way of its speed below both ends.
+    #[test]
+    fn only_what_gets_deep_enough_dips() {
+        let (dt, speed, depth) = (0.01, 0.4, 1e-4);
+        let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
+        let mut world = World::new(Vector3::zeros());
+        let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
+        let samples = world.add(Body::free("foot", rigid).with_surface(surface));
+        let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+        let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
+        let bodies = ContactBodies { samples, field };
+        world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard).unwrap();
+        for (least, expected) in [(5e-5, false), (-5e-5, false), (-2e-4, true)] {
+            let height = 0.25 * speed * dt + least;
+            let ends = [-speed, speed].map(|speed| {
+                let mut foot = State::at_rest(Isometry3::translation(0.0, 0.0, height));
+                foot.linear.z = speed;
+                [State::at_rest(Isometry3::identity()), foot]
+            });
+            let [start, end] = &ends;
+            let found = dips(&world, &world.contacts[0], [start, end], dt, depth);
+            assert_eq!(found, expected, "{least}");
+        }
+    }
 
     #[test]
     fn a_cubic_crosses_where_it_does() {
