@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 
 use super::clock::{Clock, Timing};
-use super::memory::TrackState;
+use super::memory::{Prediction, TrackState};
 use super::settings::Recovery;
 use super::sight::Sight;
 use super::tracked::{TrackStatus, Tracked};
@@ -24,8 +24,10 @@ use crate::strategy::{Fused, FusedSettings, Posterior, Strategy};
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
-/// What share of the pixels that should show an object that was found again must do so.
+/// What share of the pixels that should show an object that was found again must do so, …
 const LEAST_SHOWN: f64 = 0.5;
+/// … and of one that is found where it was expected: fingers that hide most of it are known to some millimeters only.
+const LEAST_SHOWN_OF_EXPECTED: f64 = 0.25;
 
 impl Tracker {
     /// The first frame.
@@ -117,11 +119,13 @@ impl Tracker {
     pub(super) fn recover(
         &mut self,
         sight: &mut Sight,
-        predicted: &State,
+        prediction: &Prediction,
         track: &TrackState,
         seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
+        let Prediction { state: predicted, covariance, layout, .. } = prediction;
+        let expected = GaussianPrior::correlated(predicted.clone(), *layout, covariance);
         let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
         if long_lost {
             ways.reverse();
@@ -153,10 +157,14 @@ impl Tracker {
                 frame = frame.with_rivals(rivals);
             }
             let (solved, posterior) = self.estimate(&frame, &start)?;
-            let pose = &solved.solution.at.state.t_cam_object;
-            let shown = self.segmenter.shown(sight, &object, pose);
+            let state = &solved.solution.at.state;
+            let shown = self.segmenter.shown(sight, &object, &state.t_cam_object);
+            let is_expected = expected.as_ref().is_some_and(|expected| {
+                expected.innovation(state) <= self.settings.gating.innovation_gate
+            });
+            let least = if is_expected { LEAST_SHOWN_OF_EXPECTED } else { LEAST_SHOWN };
             let doubt = self.gate(&solved, &posterior, None, level);
-            if shown >= LEAST_SHOWN && doubt.is_none() {
+            if shown >= least && doubt.is_none() {
                 return Ok(Some((solved, posterior)));
             }
             let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));

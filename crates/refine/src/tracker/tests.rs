@@ -138,3 +138,44 @@ fn a_panic_costs_one_frame() {
     let (pe, oe) = errors(&next, 3);
     assert!(next.status == TrackStatus::Tracked && pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
 }
+
+/// Something that nobody knows hides all of it for so long that it counts as lost, and then most of it.
+#[test]
+fn what_is_found_where_it_was_expected_may_be_hidden_by_half() {
+    let mut tracker = tracker(TrackerSettings::default());
+    let hidden = |index: usize, share: f64| {
+        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let [left, top, columns, rows] = observation.mask.bounds().unwrap();
+        let width = observation.camera.width;
+        let covered = (share * columns as f64) as usize;
+        for y in top - 10..top + rows + 10 {
+            for x in left - 10..left + covered + 10 {
+                let pixel = y * width + x;
+                observation.mask.pixels_mut()[pixel] = false;
+                observation.depth.pixels_mut()[pixel] = 0.2;
+                observation.color.pixels_mut()[pixel] = [0.2, 0.8, 0.2];
+            }
+        }
+        observation
+    };
+    let statuses: Vec<TrackStatus> = (0..24)
+        .map(|index| {
+            let observation = match index {
+                0..6 => SEQUENCE.frames[index].observation.clone(),
+                6..14 => hidden(index, 1.0),
+                _ => hidden(index, 0.62),
+            };
+            let tracked = tracker.track(&observation, SEQUENCE.frames[index].time).unwrap();
+            if index == 23 {
+                let (pe, oe) = errors(&tracked, index);
+                assert!(pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
+            }
+            tracked.status
+        })
+        .collect();
+    println!("{statuses:?}");
+    assert_eq!(statuses[5], TrackStatus::Tracked);
+    assert_eq!(statuses[13], TrackStatus::Lost);
+    assert!(statuses[14..].contains(&TrackStatus::Relocalized), "{statuses:?}");
+    assert_eq!(statuses[23], TrackStatus::Tracked);
+}

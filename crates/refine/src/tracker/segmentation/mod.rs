@@ -24,6 +24,8 @@ const COLOR_GAIN: f32 = 0.3;
 /// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
 const COLOR_WEIGHT: f32 = 0.6;
 const COLOR_LIMIT: f32 = 3.0;
+/// A color that tells less is another thing's, whatever depth says: what is found may lie flush with a wall.
+const OTHERS_COLOR: f32 = -0.5 * COLOR_WEIGHT * COLOR_LIMIT;
 /// Pixels that are needed to judge a mask, and what share of those that should show the object must be sure to.
 const ENOUGH: f32 = 30.0;
 const SURE_SHARE: f32 = 0.2;
@@ -131,7 +133,7 @@ impl Segmenter {
         enough.then_some(mask)
     }
 
-    /// The share of the pixels which should show an object at `t_cam_object` that do so, of those with depth or a color that tells.
+    /// The share of the pixels which should show an object at `t_cam_object` that do so by depth and colors, of those with depth or a color that tells.
     pub(super) fn shown(
         &self,
         sight: &Sight,
@@ -144,10 +146,12 @@ impl Segmenter {
         }
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
-            let told = pixel.depth_evidence() + self.color_evidence(pixel.color);
+            let color = self.color_evidence(pixel.color);
+            let told = pixel.depth_evidence() + color;
             if told != 0.0 {
                 expected += pixel.share;
-                seen += pixel.share * f32::from(u8::from(told > 0.0));
+                let is_seen = told > 0.0 && color > OTHERS_COLOR;
+                seen += pixel.share * f32::from(u8::from(is_seen));
             }
         }
         if expected > 0.0 { f64::from(seen / expected) } else { 0.0 }
@@ -275,5 +279,13 @@ mod tests {
         let shown = |pose: &Isometry3<f64>| segmenter.shown(&sight(None), &scene.object, pose);
         let [there, elsewhere] = [&scene.truth, &away].map(shown);
         assert!(there > LEAST_OF_TRUTH && there > elsewhere, "{there} {elsewhere}");
+        // Something with the colors of what is around it, as far away as the object would be.
+        let mut disguised = scene.observation.clone();
+        let [left, top, ..] = disguised.mask.bounds().unwrap();
+        let around = disguised.color.pixels()[(top - 3) * disguised.camera.width + left - 3];
+        disguised.color.pixels_mut().fill(around);
+        let disguised = Sight::new(disguised, Some(&scene.hand), Images::default());
+        let share = segmenter.shown(&disguised, &scene.object, &scene.truth);
+        assert!(share < 0.1, "{share}");
     }
 }
