@@ -175,4 +175,16 @@ mod tests {
         let front = truth.retract(&[Block::ObjectPose], &[0.0, 0.0, -0.02, 0.0, 0.0, 0.0]);
         assert!(factor.cost(&front) > 3.0 * factor.cost(&truth));
     }
+
+    #[test]
+    fn pixels_without_depth_say_nothing() {
+        let (frame, state) = fixture(0);
+        let mut observation = frame.observation().clone();
+        for nothing in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            observation.depth.pixels_mut().fill(nothing);
+            let frame = Frame::new(&observation, frame.object(), None).unwrap();
+            let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
+            assert_eq!(factor.cost(&state), 0.0, "{nothing}");
+        }
+    }
 }
