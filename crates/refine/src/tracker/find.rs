@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 
 use super::clock::{Clock, Timing};
-use super::memory::{Prediction, TrackState};
+use super::memory::TrackState;
 use super::settings::Recovery;
 use super::sight::Sight;
 use super::tracked::{TrackStatus, Tracked};
@@ -24,10 +24,12 @@ use crate::strategy::{Fused, FusedSettings, Posterior, Strategy};
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
-/// What share of the pixels that should show an object that was found again must do so, …
+/// What share of the pixels that should show an object that was found again must do so.
 const LEAST_SHOWN: f64 = 0.5;
-/// … and of one that is found where it was expected: fingers that hide most of it are known to some millimeters only.
+/// The same of an object that is found where it was expected: fingers that hide most of it are known to some millimeters only.
 const LEAST_SHOWN_OF_EXPECTED: f64 = 0.25;
+/// By how much the surface of an object that is where it was expected has moved at most, as a share of the object's radius.
+const EXPECTED_WITHIN: f64 = 0.5;
 
 impl Tracker {
     /// The first frame.
@@ -115,17 +117,16 @@ impl Tracker {
     }
 
     /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
-    /// fit as if nothing had changed. It was looked at where it should be, and `seen` there or not.
+    /// fit as if nothing had changed. Half of the pixels that should show it must do so, or a quarter if it is where it was expected. It was looked at where it
+    /// should be, and `seen` there or not.
     pub(super) fn recover(
         &mut self,
         sight: &mut Sight,
-        prediction: &Prediction,
+        predicted: &State,
         track: &TrackState,
         seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let Prediction { state: predicted, covariance, layout, .. } = prediction;
-        let expected = GaussianPrior::correlated(predicted.clone(), *layout, covariance);
         let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
         if long_lost {
             ways.reverse();
@@ -159,9 +160,8 @@ impl Tracker {
             let (solved, posterior) = self.estimate(&frame, &start)?;
             let state = &solved.solution.at.state;
             let shown = self.segmenter.shown(sight, &object, &state.t_cam_object);
-            let is_expected = expected.as_ref().is_some_and(|expected| {
-                expected.innovation(state) <= self.settings.gating.innovation_gate
-            });
+            let is_expected = reach == Recovery::Near
+                && moved(predicted, state, object.radius) <= EXPECTED_WITHIN * object.radius;
             let least = if is_expected { LEAST_SHOWN_OF_EXPECTED } else { LEAST_SHOWN };
             let doubt = self.gate(&solved, &posterior, None, level);
             if shown >= least && doubt.is_none() {
@@ -188,4 +188,10 @@ impl Tracker {
             Err(error) => Err(error),
         }
     }
+}
+
+/// How far the surface of the object is from one state to another, at most, if it has this `radius` \[m\].
+pub(super) fn moved(from: &State, to: &State, radius: f64) -> f64 {
+    let turn = to.t_cam_object.rotation.angle_to(&from.t_cam_object.rotation);
+    (to.center() - from.center()).norm() + turn * radius
 }

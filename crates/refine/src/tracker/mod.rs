@@ -246,8 +246,9 @@ impl Tracker {
                 Err(own) => rejection = own,
             }
         }
+        let predicted = &prediction.state;
         let again = match track.is_due(seen) {
-            true => self.recover(sight, prediction, track, seen, long_lost)?,
+            true => self.recover(sight, predicted, track, seen, long_lost)?,
             false => None,
         };
         timing.recovery = clock.lap();

@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
-use crate::problem::Rows;
+use crate::problem::{Block, Rows};
 use crate::scene::{Sequence, default_sequence};
 
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
@@ -141,7 +141,7 @@ fn a_panic_costs_one_frame() {
 
 /// Something that nobody knows hides all of it for so long that it counts as lost, and then most of it.
 #[test]
-fn what_is_found_where_it_was_expected_may_be_hidden_by_half() {
+fn what_is_found_where_it_was_expected_may_be_hidden_by_more_than_half() {
     let mut tracker = tracker(TrackerSettings::default());
     let hidden = |index: usize, share: f64| {
         let mut observation = SEQUENCE.frames[index].observation.clone();
@@ -173,9 +173,22 @@ fn what_is_found_where_it_was_expected_may_be_hidden_by_half() {
             tracked.status
         })
         .collect();
-    println!("{statuses:?}");
     assert_eq!(statuses[5], TrackStatus::Tracked);
     assert_eq!(statuses[13], TrackStatus::Lost);
     assert!(statuses[14..].contains(&TrackStatus::Relocalized), "{statuses:?}");
     assert_eq!(statuses[23], TrackStatus::Tracked);
+}
+
+#[test]
+fn what_has_slipped_is_expected_and_what_is_held_in_another_way_is_not() {
+    let frame = &SEQUENCE.frames[0];
+    let state = State::measured(&frame.observation, &SEQUENCE.object, &frame.truth).unwrap();
+    let radius = SEQUENCE.object.radius;
+    let share = |twist: &[f64]| {
+        let after = state.retract(&[Block::ObjectPose], twist);
+        find::moved(&state, &after, radius) / radius
+    };
+    assert!((share(&[3e-3, 0.0, 4e-3, 0.0, 0.0, 0.0]) * radius - 5e-3).abs() < 1e-9);
+    assert!((share(&[0.0, 0.0, 0.0, 0.0, 0.1, 0.0]) - 0.1).abs() < 1e-6);
+    assert!(share(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0]) > 2.9);
 }

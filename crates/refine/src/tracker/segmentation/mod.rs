@@ -24,7 +24,7 @@ const COLOR_GAIN: f32 = 0.3;
 /// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
 const COLOR_WEIGHT: f32 = 0.6;
 const COLOR_LIMIT: f32 = 3.0;
-/// A color that tells less is another thing's, whatever depth says: what is found may lie flush with a wall.
+/// Evidence of a color \[nat\] below which it is another thing's, whatever depth says: what is found may lie flush with a wall.
 const OTHERS_COLOR: f32 = -0.5 * COLOR_WEIGHT * COLOR_LIMIT;
 /// Pixels that are needed to judge a mask, and what share of those that should show the object must be sure to.
 const ENOUGH: f32 = 30.0;

@@ -244,6 +244,17 @@ fn entries_of_an_image() {
                 &["scene_tactile.json: 0.force[5]: expected 3 numbers, found 2"],
             ),
             (
+                "a taxel on no link of the hand",
+                |p| {
+                    let taxels = p.read("ds/hand/taxels.csv").replacen("link_14.0", "nolink", 1);
+                    p.write("ds/hand/other.csv", &taxels);
+                    entry(p, "scene_tactile.json", |e| e["taxels"] = json!("hand/other.csv"));
+                },
+                &[
+                    "scene_tactile.json: 0.taxels: ds/hand/other.csv: \"hand\" has no link \"nolink\"",
+                ],
+            ),
+            (
                 "taxels absent",
                 |p| entry(p, "scene_tactile.json", |e| e["taxels"] = json!("hand/none.csv")),
                 &["ds/hand/none.csv: "],
