@@ -161,7 +161,8 @@ impl Tracker {
             let state = &solved.solution.at.state;
             let shown = self.segmenter.shown(sight, &object, &state.t_cam_object);
             let is_expected = reach == Recovery::Near
-                && moved(predicted, state, object.radius) <= EXPECTED_WITHIN * object.radius;
+                && predicted.surface_motion(state, object.radius)
+                    <= EXPECTED_WITHIN * object.radius;
             let least = if is_expected { LEAST_SHOWN_OF_EXPECTED } else { LEAST_SHOWN };
             let doubt = self.gate(&solved, &posterior, None, level);
             if shown >= least && doubt.is_none() {
@@ -188,10 +189,4 @@ impl Tracker {
             Err(error) => Err(error),
         }
     }
-}
-
-/// How far the surface of the object is from one state to another, at most, if it has this `radius` \[m\].
-pub(super) fn moved(from: &State, to: &State, radius: f64) -> f64 {
-    let turn = to.t_cam_object.rotation.angle_to(&from.t_cam_object.rotation);
-    (to.center() - from.center()).norm() + turn * radius
 }

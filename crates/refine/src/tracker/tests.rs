@@ -186,7 +186,7 @@ fn what_has_slipped_is_expected_and_what_is_held_in_another_way_is_not() {
     let radius = SEQUENCE.object.radius;
     let share = |twist: &[f64]| {
         let after = state.retract(&[Block::ObjectPose], twist);
-        find::moved(&state, &after, radius) / radius
+        state.surface_motion(&after, radius) / radius
     };
     assert!((share(&[3e-3, 0.0, 4e-3, 0.0, 0.0, 0.0]) * radius - 5e-3).abs() < 1e-9);
     assert!((share(&[0.0, 0.0, 0.0, 0.0, 0.1, 0.0]) - 0.1).abs() < 1e-6);

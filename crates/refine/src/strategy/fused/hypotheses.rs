@@ -69,11 +69,7 @@ pub(super) fn distinct(mut found: Vec<Solution>, radius: f64) -> Vec<Solution> {
     let mut kept: Vec<Solution> = Vec::new();
     for solution in found {
         let state = &solution.at.state;
-        let same = |other: &Solution| {
-            let other = &other.at;
-            let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
-            (state.center() - other.state.center()).norm() + radius * turn < SAME
-        };
+        let same = |other: &Solution| state.surface_motion(&other.at.state, radius) < SAME;
         if !kept.iter().any(same) {
             kept.push(solution);
         }
