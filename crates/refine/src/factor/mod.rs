@@ -129,19 +129,20 @@ mod gradient_check {
     ) {
         let rigid = [Block::ObjectPose, Block::Camera];
         let mut alone = NormalEquations::new(&rigid);
-        let mut all = NormalEquations::with_auxiliary(&rigid, 3 * patches.count());
+        let mut all = NormalEquations::with_patches(&rigid, patches.count());
         let (value, same) =
             (factor.linearize(state, &mut alone), factor.linearize(state, &mut all));
         assert!((value / same - 1.0).abs() < 1e-5, "{value} {same}");
-        let gradient = all.gradient().rows(0, 12) - alone.gradient();
+        let gradient = all.gradient() - alone.gradient();
         assert!(gradient.norm() < 1e-4 * alone.gradient().norm());
-        let hessian = all.hessian().view((0, 0), (12, 12)) - alone.hessian();
+        let hessian = all.hessian() - alone.hessian();
         assert!(hessian.norm() < 1e-4 * alone.hessian().norm());
         let place = alone.gradient().fixed_rows::<3>(0).into_owned();
-        let by_patch = (0..patches.count()).map(|k| all.gradient().fixed_rows::<3>(12 + 3 * k));
+        let (gradient, hessian) = all.all();
+        let by_patch = (0..patches.count()).map(|k| gradient.fixed_rows::<3>(12 + 3 * k));
         let sum = by_patch.fold(-place, |sum, by_patch| sum + by_patch);
         assert!(sum.norm() <= elsewhere * place.norm(), "{sum:?} of {place:?}");
-        let eigenvalues = all.hessian().clone().symmetric_eigenvalues();
+        let eigenvalues = hessian.symmetric_eigenvalues();
         assert!(eigenvalues.min() > -1e-9 * eigenvalues.max(), "the matrix is indefinite");
     }
 

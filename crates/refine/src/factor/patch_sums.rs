@@ -2,30 +2,58 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector2};
 
-use crate::problem::{Block, NormalEquations, radial_as_camera};
+use crate::problem::{Block, NormalEquations, PatchPart, radial_as_camera};
 
-/// Gradient and Gauss–Newton Hessian by `N` parameters of what each patch shows, the first three of which are the object's place.
+/// Gradient and Gauss–Newton Hessian by `N` parameters, the first three of which are the object's place, and by the displacements of patches.
 ///
 /// A patch that is displaced does to what it shows what the object does when all of it is, so that its own derivatives are among
 /// those by the object's place.
 pub(super) struct PatchSums<const N: usize> {
-    /// Of each patch, and last of what is in none.
-    parts: Vec<(SVector<f64, N>, SMatrix<f64, N, N>)>,
+    gradient: SVector<f64, N>,
+    hessian: SMatrix<f64, N, N>,
+    patches: Vec<PatchPart<N>>,
 }
 
 impl<const N: usize> PatchSums<N> {
     /// Of `count` patches, none of which shows anything.
     pub(super) fn new(count: usize) -> Self {
-        Self { parts: vec![(SVector::zeros(), SMatrix::zeros()); count + 1] }
+        Self {
+            gradient: SVector::zeros(),
+            hessian: SMatrix::zeros(),
+            patches: vec![PatchPart::default(); count],
+        }
     }
 
-    /// The sums of what is seen in `patch`, or in none.
-    pub(super) fn of(
+    /// Adds the gradient and Hessian by the parameters of what is seen in `patch`, or in none.
+    pub(super) fn add(
         &mut self,
         patch: Option<usize>,
-    ) -> &mut (SVector<f64, N>, SMatrix<f64, N, N>) {
-        let none = self.parts.len() - 1;
-        &mut self.parts[patch.unwrap_or(none)]
+        gradient: &SVector<f64, N>,
+        hessian: &SMatrix<f64, N, N>,
+    ) {
+        self.gradient += gradient;
+        self.hessian += hessian;
+        if let Some(part) = patch.map(|patch| &mut self.patches[patch]) {
+            part.gradient += gradient.fixed_rows::<3>(0);
+            part.hessian += hessian.fixed_rows::<3>(0);
+        }
+    }
+
+    /// The same of ½ `weight` r² of a `residual` r whose derivatives by the parameters are `row`.
+    pub(super) fn add_row(
+        &mut self,
+        patch: Option<usize>,
+        row: &SVector<f64, N>,
+        residual: f64,
+        weight: f64,
+    ) {
+        self.gradient.axpy(weight * residual, row, 1.0);
+        self.hessian.ger(weight, row, row, 1.0);
+        if let Some(part) = patch.map(|patch| &mut self.patches[patch]) {
+            let place = row.fixed_rows::<3>(0);
+            part.gradient.axpy(weight * residual, &place, 1.0);
+            part.hessian.ger(weight, &place, row, 1.0);
+        }
     }
 
     /// Where the displacement of `patch` is among all parameters.
@@ -40,7 +68,7 @@ impl<const N: usize> PatchSums<N> {
             let (mut gradient, mut hessian) = self.equations();
             // Around the object's center, distortion is as a change of the camera; of depth images say nothing.
             let (known, camera) = (gradient.len(), N - Block::Camera.dimension());
-            let (first, radial) = (N + equations.auxiliary(), radial_as_camera(center));
+            let (first, radial) = (N + equations.displacements(), radial_as_camera(center));
             let mut by_all = DMatrix::zeros(known, first + warp.len());
             by_all.fill_with_identity();
             by_all.view_mut((camera, first), radial.shape()).copy_from(&radial);
@@ -54,33 +82,24 @@ impl<const N: usize> PatchSums<N> {
 
     /// Adds all to `equations` but what the image is off by.
     pub(super) fn add_plainly_to(&self, equations: &mut NormalEquations) {
-        let mut all = (SVector::zeros(), SMatrix::zeros());
-        for (gradient, hessian) in &self.parts {
-            all.0 += gradient;
-            all.1 += hessian;
-        }
-        let patches = &self.parts[..self.parts.len() - 1];
-        equations.add_by_patch(&[Block::ObjectPose, Block::Camera], &all, patches);
+        let blocks = [Block::ObjectPose, Block::Camera];
+        equations.add(&blocks, &self.gradient, &self.hessian);
+        equations.add_patches(&blocks, &self.patches);
     }
 
     /// Gradient and Hessian by the parameters and by the displacements of all patches.
     pub(super) fn equations(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let size = Self::place(self.parts.len() - 1);
+        let size = Self::place(self.patches.len());
         let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
-        for (patch, (g, h)) in self.parts.iter().enumerate() {
-            let mut all = gradient.fixed_rows_mut::<N>(0);
-            all += g;
-            let mut all = hessian.fixed_view_mut::<N, N>(0, 0);
-            all += h;
+        gradient.fixed_rows_mut::<N>(0).copy_from(&self.gradient);
+        hessian.fixed_view_mut::<N, N>(0, 0).copy_from(&self.hessian);
+        for (patch, part) in self.patches.iter().enumerate() {
             let at = Self::place(patch);
-            if at == size {
-                break;
-            }
-            let shift = h.fixed_columns::<3>(0);
-            gradient.fixed_rows_mut::<3>(at).copy_from(&g.fixed_rows::<3>(0));
-            hessian.fixed_view_mut::<3, 3>(at, at).copy_from(&shift.fixed_rows::<3>(0));
-            hessian.fixed_view_mut::<N, 3>(0, at).copy_from(&shift);
-            hessian.fixed_view_mut::<3, N>(at, 0).copy_from(&shift.transpose());
+            let own = part.hessian.fixed_columns::<3>(0);
+            gradient.fixed_rows_mut::<3>(at).copy_from(&part.gradient);
+            hessian.fixed_view_mut::<3, 3>(at, at).copy_from(&own);
+            hessian.fixed_view_mut::<3, N>(at, 0).copy_from(&part.hessian);
+            hessian.fixed_view_mut::<N, 3>(0, at).copy_from(&part.hessian.transpose());
         }
         (gradient, hessian)
     }
@@ -122,10 +141,8 @@ mod tests {
         let mut pull = DVector::zeros(10);
         for (residual, (patch, row)) in rows.iter().enumerate() {
             let residual = residual as f64 - 1.5;
-            let (gradient, hessian) = sums.of(*patch);
             let derivatives = SVector::from(*row);
-            *gradient += derivatives * residual;
-            *hessian += derivatives * derivatives.transpose();
+            sums.add_row(*patch, &derivatives, residual, 1.0);
             let mut whole = DVector::zeros(10);
             whole.rows_mut(0, 4).copy_from(&derivatives);
             if let Some(patch) = patch {
@@ -147,12 +164,10 @@ mod tests {
         let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
         for patches in [0, 2] {
             let mut sums = PatchSums::<12>::new(patches);
-            let (gradient, hessian) = sums.of((patches > 0).then_some(1));
-            *gradient += row;
-            *hessian += row * row.transpose();
+            sums.add((patches > 0).then_some(1), &row, &(row * row.transpose()));
             let blocks = [Block::ObjectPose, Block::Camera];
             let mut equations =
-                NormalEquations::with_auxiliary(&blocks, 6).with_image_warp(Arc::clone(&warp));
+                NormalEquations::with_patches(&blocks, 2).with_image_warp(Arc::clone(&warp));
             sums.add_to(&center, &mut equations);
             let mut expected = DVector::zeros(12 + 6 + warp.len());
             expected.rows_mut(0, 12).copy_from(&row);
@@ -161,9 +176,10 @@ mod tests {
             }
             let radial = radial_as_camera(&center).tr_mul(&row.fixed_rows::<6>(6));
             expected.rows_mut(18, RADIAL).copy_from(&radial);
-            assert!((equations.gradient() - &expected).amax() < 1e-12, "{patches}");
+            let (gradient, hessian) = equations.all();
+            assert!((gradient - &expected).amax() < 1e-12, "{patches}");
             let of_all = &expected * expected.transpose();
-            assert!((equations.hessian() - of_all).amax() < 1e-12, "{patches}");
+            assert!((hessian - of_all).amax() < 1e-12, "{patches}");
         }
     }
 }

@@ -176,7 +176,7 @@ impl RenderingFactor {
 
     /// Patches, if anybody asks for derivatives by them.
     fn patches_for(&self, equations: &NormalEquations) -> Option<&(Arc<SurfacePatches>, usize)> {
-        self.patches.as_ref().filter(|_| equations.auxiliary() > 0)
+        self.patches.as_ref().filter(|_| equations.displacements() > 0)
     }
 
     /// The width of tiles that `equations` need \[px\].
@@ -201,9 +201,9 @@ impl RenderingFactor {
         let mut cost = 0.0;
         for &Tile { column, row, at } in tiles {
             let patch = patches.and_then(|patches| patches.in_tile(column, row));
-            let (gradient, hessian) = sums.of(patch);
-            *gradient += seen_by_state.tr_mul(&at.gradient) * self.scale;
-            *hessian += seen_by_state.tr_mul(&at.hessian) * seen_by_state * self.scale;
+            let gradient = seen_by_state.tr_mul(&at.gradient) * self.scale;
+            let hessian = seen_by_state.tr_mul(&at.hessian) * seen_by_state * self.scale;
+            sums.add(patch, &gradient, &hessian);
             cost += self.scale * at.loss.total;
         }
         let center = state.center();

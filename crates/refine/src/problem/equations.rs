@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2, Vector3};
 
+use super::auxiliary::Auxiliary;
 use super::triangular::{cholesky, solve_lower};
 use super::{Block, ImageWarp, Row};
 
@@ -11,17 +12,32 @@ use super::{Block, ImageWarp, Row};
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
     blocks: Vec<Block>,
-    /// Number of the blocks' parameters.
-    dimension: usize,
-    /// Number of parameters that no state holds and that are eliminated: displacements of surface patches. They come last, and
-    /// have room once something depends on them.
-    auxiliary: usize,
-    /// By which the image may be off: its coefficients come after the patches' displacements, and no state holds them either.
-    image_warp: Option<Arc<ImageWarp>>,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
-    /// Place and derivative of each parameter of the row begun last.
+    /// Number of surface patches, whose displacements no state holds: three auxiliary parameters each.
+    patches: usize,
+    /// By which the image may be off: its coefficients are auxiliary parameters, too, after the displacements.
+    image_warp: Option<Arc<ImageWarp>>,
+    /// Derivatives by auxiliary parameters, once something depends on them.
+    by_auxiliary: Option<Auxiliary>,
+    /// Place and derivative of each parameter of the row begun last, and of each auxiliary one.
     entries: Vec<(usize, f64)>,
+    auxiliary_entries: Vec<(usize, f64)>,
+}
+
+/// Gradient by the displacement of a patch, and Hessian by that and `N` parameters, the first three of which are the object's place: a patch that is
+/// displaced does to what it shows what the object does when all of it is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatchPart<const N: usize> {
+    pub(crate) gradient: Vector3<f64>,
+    pub(crate) hessian: SMatrix<f64, 3, N>,
+}
+
+impl<const N: usize> Default for PatchPart<N> {
+    /// Zero.
+    fn default() -> Self {
+        Self { gradient: Vector3::zeros(), hessian: SMatrix::zeros() }
+    }
 }
 
 /// What [`NormalEquations::marginalize`] finds.
@@ -37,60 +53,67 @@ pub(crate) struct SchurComplement {
 impl NormalEquations {
     /// Empty equations over `blocks`, in that order.
     pub fn new(blocks: &[Block]) -> Self {
-        Self::with_auxiliary(blocks, 0)
+        Self::with_patches(blocks, 0)
     }
 
-    /// Empty equations over `blocks`, and over `auxiliary` parameters if a factor depends on them.
-    pub(crate) fn with_auxiliary(blocks: &[Block], auxiliary: usize) -> Self {
+    /// Empty equations over `blocks`, and over the displacements of so many `patches` if a factor depends on them.
+    pub(crate) fn with_patches(blocks: &[Block], patches: usize) -> Self {
         let n = blocks.iter().map(|b| b.dimension()).sum();
         Self {
             blocks: blocks.to_vec(),
-            dimension: n,
-            auxiliary,
-            image_warp: None,
             gradient: DVector::zeros(n),
             hessian: DMatrix::zeros(n, n),
+            patches,
+            image_warp: None,
+            by_auxiliary: None,
             entries: Vec::new(),
+            auxiliary_entries: Vec::new(),
         }
     }
 
     /// The same over the coefficients by which the image may be off, too.
-    pub(crate) fn with_image_warp(mut self, warp: Arc<ImageWarp>) -> Self {
-        self.image_warp = Some(warp);
-        self.grow();
-        self
+    pub(crate) fn with_image_warp(self, warp: Arc<ImageWarp>) -> Self {
+        let auxiliary = Auxiliary::new(self.patches, warp.len(), self.dimension());
+        Self { image_warp: Some(warp), by_auxiliary: Some(auxiliary), ..self }
     }
 
-    /// By which the image may be off, and where its coefficients begin.
+    /// By which the image may be off, and where its coefficients begin among the parameters of [`all`](Self::all).
     pub(crate) fn image_warp(&self) -> Option<(&Arc<ImageWarp>, usize)> {
-        self.image_warp.as_ref().map(|warp| (warp, self.dimension + self.auxiliary))
+        let first = self.dimension() + self.displacements();
+        self.image_warp.as_ref().map(|warp| (warp, first))
     }
 
     /// Number of the blocks' parameters.
     pub(crate) fn dimension(&self) -> usize {
-        self.dimension
+        self.gradient.len()
     }
 
-    /// Number of auxiliary parameters that may be added to.
-    pub(crate) fn auxiliary(&self) -> usize {
-        self.auxiliary
+    /// Number of parameters of all patches.
+    pub(crate) fn displacements(&self) -> usize {
+        3 * self.patches
     }
 
     /// Whether a factor has added derivatives by auxiliary parameters.
     pub(crate) fn has_auxiliary(&self) -> bool {
-        self.gradient.len() > self.dimension
+        self.by_auxiliary.is_some()
     }
 
-    /// Makes room for the auxiliary parameters.
-    fn grow(&mut self) {
-        let warp = self.image_warp.as_ref().map_or(0, |warp| warp.len());
-        let n = self.dimension + self.auxiliary + warp;
-        if self.gradient.len() < n {
-            let old = std::mem::replace(&mut self.gradient, DVector::zeros(n));
-            self.gradient.rows_mut(0, old.len()).copy_from(&old);
-            let old = std::mem::replace(&mut self.hessian, DMatrix::zeros(n, n));
-            self.hessian.view_mut((0, 0), old.shape()).copy_from(&old);
+    /// Gradient and Hessian by the parameters of the blocks, and then by the auxiliary ones if something depends on them: displacements, and by
+    /// what the image is off by.
+    pub(crate) fn all(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let (n, m) = (self.dimension(), self.by_auxiliary.as_ref().map_or(0, Auxiliary::len));
+        let (mut gradient, mut hessian) = (DVector::zeros(n + m), DMatrix::zeros(n + m, n + m));
+        gradient.rows_mut(0, n).copy_from(&self.gradient);
+        hessian.view_mut((0, 0), (n, n)).copy_from(&self.hessian);
+        if let Some(auxiliary) = &self.by_auxiliary {
+            gradient.rows_mut(n, m).copy_from(&auxiliary.gradient);
+            hessian.view_mut((n, 0), (m, n)).copy_from(&auxiliary.coupling);
+            hessian.view_mut((0, n), (n, m)).copy_from(&auxiliary.coupling.transpose());
+            let mut own = DMatrix::zeros(m, m);
+            auxiliary.add_own_to(&mut own);
+            hessian.view_mut((n, n), (m, m)).copy_from(&own);
         }
+        (gradient, hessian)
     }
 
     /// Where the parameters of `block` begin, or `None` if it was not requested.
@@ -98,64 +121,54 @@ impl NormalEquations {
     /// # Panics
     /// For joints of another number than was requested.
     pub fn offset(&self, block: Block) -> Option<usize> {
-        let Some(position) = self.blocks.iter().position(|&b| b == block) else {
-            let joints = |b: &Block| matches!(b, Block::Joints(_));
-            assert!(!joints(&block) || !self.blocks.iter().any(joints), "a hand has not {block:?}");
-            return None;
-        };
-        Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
+        offset(&self.blocks, block)
     }
 
-    /// Eliminates the auxiliary parameters, displacements in three directions each, by the Schur complement. Their prior is a
-    /// Gaussian of mean zero, independent by direction; `precision`, the inverse of its covariance in one direction, is added.
-    /// `None` if the sum is singular.
+    /// Eliminates the displacements of patches by the Schur complement. Their prior is a Gaussian of mean zero, independent by direction;
+    /// `precision`, the inverse of its covariance in one direction, is added. `None` if the sum is singular.
     pub(crate) fn marginalize(&self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
-        let (n, m) = (self.dimension, self.auxiliary);
-        // As long as nothing depends on them there are none.
-        let known = self.has_auxiliary();
-        let part = |r: usize, c: usize, rows: usize, columns: usize| match known {
-            true => self.hessian.view((r, c), (rows, columns)).clone_owned(),
-            false => DMatrix::zeros(rows, columns),
-        };
-        let mut own = part(n, n, m, m);
+        let mut own = DMatrix::zeros(self.displacements(), self.displacements());
         for c in 0..precision.ncols() {
             for r in 0..precision.nrows() {
                 for k in 0..3 {
-                    own[(3 * r + k, 3 * c + k)] += precision[(r, c)];
+                    own[(3 * r + k, 3 * c + k)] = precision[(r, c)];
                 }
             }
         }
+        if let Some(auxiliary) = &self.by_auxiliary {
+            auxiliary.add_own_to(&mut own);
+        }
         let lower = cholesky(own)?;
-        let mut coupling = part(n, 0, m, n);
-        let mut pull = match known {
-            true => self.gradient.rows(n, m).clone_owned(),
-            false => DVector::zeros(m),
-        };
-        solve_lower(&lower, coupling.as_mut_slice());
-        solve_lower(&lower, pull.as_mut_slice());
-        let rest = Self {
+        let mut rest = Self {
             blocks: self.blocks.clone(),
-            dimension: n,
-            auxiliary: 0,
-            image_warp: None,
-            gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull),
-            hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
-            entries: Vec::new(),
+            gradient: self.gradient.clone(),
+            hessian: self.hessian.clone(),
+            ..Self::new(&[])
         };
+        let mut gain = 0.0;
+        if let Some(Auxiliary { gradient, coupling, .. }) = &self.by_auxiliary {
+            // Most of the blocks have nothing to do with any patch.
+            let is_coupled = |c: &usize| coupling.column(*c).iter().any(|value| *value != 0.0);
+            let coupled: Vec<usize> = (0..coupling.ncols()).filter(is_coupled).collect();
+            let mut columns = coupling.select_columns(&coupled);
+            let mut pull = gradient.clone();
+            solve_lower(&lower, columns.as_mut_slice());
+            solve_lower(&lower, pull.as_mut_slice());
+            for (i, &c) in coupled.iter().enumerate() {
+                rest.gradient[c] -= columns.column(i).dot(&pull);
+                for (j, &r) in coupled.iter().enumerate() {
+                    rest.hessian[(r, c)] -= columns.column(j).dot(&columns.column(i));
+                }
+            }
+            gain = 0.5 * pull.norm_squared();
+        }
         let log_determinant = 2.0 * lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        Some(SchurComplement { rest, gain: 0.5 * pull.norm_squared(), log_determinant })
+        Some(SchurComplement { rest, gain, log_determinant })
     }
 
     /// Drops the auxiliary parameters, as if they were zero.
     pub(crate) fn without_auxiliary(self) -> Self {
-        let n = self.dimension;
-        Self {
-            auxiliary: 0,
-            image_warp: None,
-            gradient: self.gradient.rows(0, n).clone_owned(),
-            hessian: self.hessian.view((0, 0), (n, n)).clone_owned(),
-            ..self
-        }
+        Self { patches: 0, image_warp: None, by_auxiliary: None, ..self }
     }
 
     /// Derivative of the sum with respect to the requested parameters.
@@ -177,6 +190,7 @@ impl NormalEquations {
     #[inline]
     pub(super) fn begin_row(&mut self) -> Row<'_> {
         self.entries.clear();
+        self.auxiliary_entries.clear();
         Row { equations: self }
     }
 
@@ -206,9 +220,9 @@ impl NormalEquations {
         by_camera: &[f64],
     ) {
         let Some(warp) = &self.image_warp else { return };
-        let first = self.dimension + self.auxiliary;
+        let first = self.displacements();
         let derivatives = warp.derivatives(pixel, ray, by_camera);
-        self.entries.extend(derivatives.map(|(k, derivative)| (first + k, derivative)));
+        self.auxiliary_entries.extend(derivatives.map(|(k, derivative)| (first + k, derivative)));
     }
 
     /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
@@ -221,6 +235,11 @@ impl NormalEquations {
                 column[j] += weight * d * e;
             }
         }
+        if let Some(auxiliary) =
+            self.by_auxiliary.as_mut().filter(|_| !self.auxiliary_entries.is_empty())
+        {
+            auxiliary.add_row(&self.auxiliary_entries, &self.entries, residual, weight);
+        }
     }
 
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
@@ -232,7 +251,7 @@ impl NormalEquations {
         gradient: &SVector<f64, N>,
         hessian: &SMatrix<f64, N, N>,
     ) {
-        self.add_views(blocks, 0, &gradient.as_view(), &hessian.as_view());
+        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
     }
 
     /// The same of blocks whose size is not known beforehand.
@@ -245,91 +264,72 @@ impl NormalEquations {
         gradient: &DVector<f64>,
         hessian: &DMatrix<f64>,
     ) {
-        self.add_views(blocks, 0, &gradient.as_view(), &hessian.as_view());
+        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
     }
 
-    /// The same with derivatives by all auxiliary parameters, after those by the blocks.
+    /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements, and by what the image is off by if that
+    /// is asked for.
     pub(crate) fn add_with_auxiliary(
         &mut self,
         blocks: &[Block],
         gradient: &DVector<f64>,
         hessian: &DMatrix<f64>,
     ) {
-        self.grow();
-        // Those of an image's warp too, where they are given.
-        let auxiliary = gradient.len() - blocks.iter().map(|b| b.dimension()).sum::<usize>();
-        self.add_views(blocks, auxiliary, &gradient.as_view(), &hessian.as_view());
+        self.add_dynamic(blocks, gradient, hessian);
+        let own = blocks.iter().map(|b| b.dimension()).sum();
+        let count = gradient.len() - own;
+        let (known, auxiliary) = self.blocks_and_auxiliary();
+        let mut part = auxiliary.gradient.rows_mut(0, count);
+        part += gradient.rows(own, count);
+        for Place { from, to, size } in places(known, blocks) {
+            let mut part = auxiliary.coupling.view_mut((0, to), (count, size));
+            part += hessian.view((own, from), (count, size));
+        }
+        let mut part = auxiliary.others_mut().view_mut((0, 0), (count, count));
+        part += hessian.view((own, own), (count, count));
     }
 
-    /// Adds what the patches of a surface show, of each the gradient and Hessian by the parameters of `blocks`, the first three of which are the
-    /// object's place: a patch that is displaced does to what it shows what the object does when all of it is. `all` is their sum.
-    pub(crate) fn add_by_patch<const N: usize>(
+    /// Adds derivatives by the displacements of patches, by themselves and together with those by the parameters of `blocks`, of which the first
+    /// three are the object's place.
+    pub(crate) fn add_patches<const N: usize>(
         &mut self,
         blocks: &[Block],
-        all: &(SVector<f64, N>, SMatrix<f64, N, N>),
-        patches: &[(SVector<f64, N>, SMatrix<f64, N, N>)],
+        patches: &[PatchPart<N>],
     ) {
-        self.add(blocks, &all.0, &all.1);
         if patches.is_empty() {
             return;
         }
-        self.grow();
-        let mut local = 0;
-        for block in blocks {
-            let size = block.dimension();
-            if let Some(to) = self.offset(*block) {
-                for (patch, (_, hessian)) in patches.iter().enumerate() {
-                    let at = self.dimension + 3 * patch;
-                    for column in 0..3 {
-                        for row in 0..size {
-                            let value = hessian[(local + row, column)];
-                            self.hessian[(to + row, at + column)] += value;
-                            self.hessian[(at + column, to + row)] += value;
-                        }
-                    }
-                }
+        let (known, auxiliary) = self.blocks_and_auxiliary();
+        for (patch, PatchPart { gradient, hessian }) in patches.iter().enumerate() {
+            let own = hessian.fixed_columns::<3>(0).into_owned();
+            auxiliary.add_patch(patch, gradient, &own);
+            for Place { from, to, size } in places(known, blocks) {
+                let mut part = auxiliary.coupling.view_mut((3 * patch, to), (3, size));
+                part += hessian.columns(from, size);
             }
-            local += size;
         }
-        for (patch, (gradient, hessian)) in patches.iter().enumerate() {
-            let at = self.dimension + 3 * patch;
-            let mut own = self.gradient.fixed_rows_mut::<3>(at);
-            own += gradient.fixed_rows::<3>(0);
-            let mut own = self.hessian.fixed_view_mut::<3, 3>(at, at);
-            own += hessian.fixed_view::<3, 3>(0, 0);
-        }
+    }
+
+    /// The blocks, and derivatives by the auxiliary parameters to be added to.
+    fn blocks_and_auxiliary(&mut self) -> (&[Block], &mut Auxiliary) {
+        let (patches, n) = (self.patches, self.dimension());
+        let auxiliary = self.by_auxiliary.get_or_insert_with(|| Auxiliary::new(patches, 0, n));
+        (&self.blocks, auxiliary)
     }
 
     fn add_views(
         &mut self,
         blocks: &[Block],
-        auxiliary: usize,
         gradient: &DVectorView<f64>,
         hessian: &DMatrixView<f64>,
     ) {
-        let mut local = 0;
-        let mut places: Vec<(usize, usize, usize)> = blocks
-            .iter()
-            .filter_map(|&b| {
-                let from = local;
-                local += b.dimension();
-                self.offset(b).map(|to| (from, to, b.dimension()))
-            })
-            .collect();
-        if auxiliary > 0 {
-            places.push((local, self.dimension, auxiliary));
-        }
-        for &(row_from, row_to, rows) in &places {
-            for r in 0..rows {
-                self.gradient[row_to + r] += gradient[row_from + r];
-            }
-            for &(column_from, column_to, columns) in &places {
-                for r in 0..rows {
-                    for c in 0..columns {
-                        self.hessian[(row_to + r, column_to + c)] +=
-                            hessian[(row_from + r, column_from + c)];
-                    }
-                }
+        for row in places(&self.blocks, blocks) {
+            let mut part = self.gradient.rows_mut(row.to, row.size);
+            part += gradient.rows(row.from, row.size);
+            for column in places(&self.blocks, blocks) {
+                let size = (row.size, column.size);
+                let mut part = self.hessian.view_mut((row.to, column.to), size);
+                part += hessian.view((row.from, column.from), size);
             }
         }
     }
@@ -338,15 +338,39 @@ impl NormalEquations {
 impl std::ops::AddAssign<&Self> for NormalEquations {
     /// Adds equations over the same blocks.
     fn add_assign(&mut self, other: &Self) {
-        if other.has_auxiliary() {
-            self.grow();
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
+        if let Some(auxiliary) = &other.by_auxiliary {
+            *self.blocks_and_auxiliary().1 += auxiliary;
         }
-        let n = other.gradient.len();
-        let mut gradient = self.gradient.rows_mut(0, n);
-        gradient += &other.gradient;
-        let mut hessian = self.hessian.view_mut((0, 0), (n, n));
-        hessian += &other.hessian;
     }
+}
+
+/// Where the parameters of `block` begin among those of `blocks`.
+fn offset(blocks: &[Block], block: Block) -> Option<usize> {
+    let Some(position) = blocks.iter().position(|&b| b == block) else {
+        let joints = |b: &Block| matches!(b, Block::Joints(_));
+        assert!(!joints(&block) || !blocks.iter().any(joints), "a hand has not {block:?}");
+        return None;
+    };
+    Some(blocks[..position].iter().map(|b| b.dimension()).sum())
+}
+
+/// Where the parameters of a block are: among those of a factor, and among those that are requested.
+struct Place {
+    from: usize,
+    to: usize,
+    size: usize,
+}
+
+/// Those of a factor's `blocks` that are among the `known` ones.
+fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = Place> {
+    let mut next = 0;
+    blocks.iter().filter_map(move |&block| {
+        let (from, size) = (next, block.dimension());
+        next += size;
+        offset(known, block).map(|to| Place { from, to, size })
+    })
 }
 
 #[cfg(test)]

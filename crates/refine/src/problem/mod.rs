@@ -1,6 +1,7 @@
 //! The least-squares problem: [`Factor`]s over a [`State`] in [`Block`]s of parameters, the [`NormalEquations`] that they
 //! add to, and the solver.
 
+mod auxiliary;
 mod depth_field;
 mod equations;
 mod factor;
@@ -16,7 +17,7 @@ mod triangular;
 
 pub(crate) use depth_field::DepthField;
 pub use equations::NormalEquations;
-pub(crate) use equations::SchurComplement;
+pub(crate) use equations::{PatchPart, SchurComplement};
 pub use factor::Factor;
 pub(crate) use image_warp::{ImageWarp, RADIAL, radial_as_camera};
 pub(crate) use inducing_points::far_apart;

@@ -39,12 +39,8 @@ const OWN: f64 = 1e-3;
 /// Patches are of the image rather than of the model, so that only what is seen has any.
 #[derive(Clone, Debug)]
 pub(crate) struct SurfacePatches {
-    /// Width of a tile \[px\].
-    side: usize,
-    /// The first tile's column and row, and how many columns there are.
-    first: [usize; 2],
-    columns: usize,
-    /// Number of the patch in each tile, row-major.
+    tiles: Tiles,
+    /// Number of the patch in each tile.
     numbers: Vec<Option<usize>>,
     /// Where each patch is, in the middle of what is seen of it (camera frame) \[m\].
     places: Vec<Point3<f64>>,
@@ -52,6 +48,42 @@ pub(crate) struct SurfacePatches {
     precision: DMatrix<f64>,
     /// Logarithm of the determinant of that of all displacements.
     log_determinant: f64,
+}
+
+/// Square tiles over a part of an image, row-major.
+#[derive(Clone, Debug)]
+struct Tiles {
+    /// Width of a tile \[px\].
+    side: usize,
+    /// Column and row of the first, and how many columns and rows there are.
+    first: [usize; 2],
+    size: [usize; 2],
+}
+
+impl Tiles {
+    /// Those that have a part in the rectangle of this left, top, width and height, not zero.
+    fn around([left, top, width, height]: [usize; 4], side: usize) -> Self {
+        let first = [left / side, top / side];
+        let last = [(left + width - 1) / side, (top + height - 1) / side];
+        Self { side, first, size: [0, 1].map(|k| last[k] - first[k] + 1) }
+    }
+
+    /// How many there are.
+    fn len(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// The one in this column and row of the image's tiles.
+    fn index(&self, column: usize, row: usize) -> Option<usize> {
+        let column = column.checked_sub(self.first[0]).filter(|column| *column < self.size[0])?;
+        let row = row.checked_sub(self.first[1]).filter(|row| *row < self.size[1])?;
+        Some(row * self.size[0] + column)
+    }
+
+    /// The one with this pixel.
+    fn at(&self, [x, y]: [usize; 2]) -> Option<usize> {
+        self.index(x / self.side, y / self.side)
+    }
 }
 
 impl SurfacePatches {
@@ -70,33 +102,36 @@ impl SurfacePatches {
         }
         let (mask, camera) = (&observation.mask, &observation.camera);
         let width = camera.width;
-        let [left, top, columns, rows] = mask.bounds()?;
+        let bounds = mask.bounds()?;
+        let [left, top, columns, rows] = bounds;
         let within = (top..top + rows).flat_map(|y| (left..left + columns).map(move |x| [x, y]));
-        let seen: Vec<[usize; 2]> = within.filter(|[x, y]| mask.pixels()[y * width + x]).collect();
+        let seen = within.filter(|[x, y]| mask.pixels()[y * width + x]);
         let largest = width.max(camera.height);
         let least = LEAST_SIDE * length_scale * camera.fx / distance;
-        let wanted = (seen.len() as f64 / FULL_PATCHES).sqrt().max(least);
+        let wanted = (mask.count() as f64 / FULL_PATCHES).sqrt().max(least);
         let mut side = (wanted.min(largest as f64).ceil() as usize).max(1).next_multiple_of(unit);
-        // Specks of a mask would each have a tile of their own.
-        while side < largest && tiles_of(&seen, side) > MOST_PATCHES {
-            side += side.div_ceil(4).next_multiple_of(unit);
-        }
-        let first = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).min());
-        let last = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).max());
-        let ([Some(left), Some(top)], [Some(right), Some(bottom)]) = (first, last) else {
-            return None;
+        let count = |tiles: &Tiles| {
+            let mut shown = vec![false; tiles.len()];
+            seen.clone().filter_map(|pixel| tiles.at(pixel)).for_each(|tile| shown[tile] = true);
+            shown.into_iter().filter(|shown| *shown).count()
         };
-        let columns = right - left + 1;
+        // Specks of a mask would each have a tile of their own.
+        let mut tiles = Tiles::around(bounds, side);
+        while side < largest && count(&tiles) > MOST_PATCHES {
+            side += side.div_ceil(4).next_multiple_of(unit);
+            tiles = Tiles::around(bounds, side);
+        }
         // Sums of places and numbers of pixels.
-        let mut tiles = vec![(Vector3::zeros(), 0.0); columns * (bottom - top + 1)];
+        let mut sums = vec![(Vector3::zeros(), 0.0); tiles.len()];
         for [x, y] in seen {
             let measured = f64::from(observation.depth.pixels()[y * width + x]);
             let near = (measured - distance).abs() < NEAR * distance;
             let depth = if near { measured } else { distance };
             let place = camera.unproject(x as f64, y as f64, depth);
-            let (sum, count) = &mut tiles[(y / side - top) * columns + x / side - left];
-            *sum += place.coords;
-            *count += 1.0;
+            if let Some((sum, count)) = tiles.at([x, y]).map(|tile| &mut sums[tile]) {
+                *sum += place.coords;
+                *count += 1.0;
+            }
         }
         let mut places = Vec::new();
         let number = |(sum, count): &(Vector3<f64>, f64)| {
@@ -105,21 +140,14 @@ impl SurfacePatches {
                 places.len() - 1
             })
         };
-        let numbers = tiles.iter().map(number).collect();
+        let numbers = sums.iter().map(number).collect();
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             let squared = (places[i] - places[j]).norm_squared();
             let own = if i == j { OWN } else { 0.0 };
             gp_sigma.powi(2) * ((-0.5 * squared / length_scale.powi(2)).exp() + own)
         });
-        let patches = Self {
-            side,
-            first: [left, top],
-            columns,
-            numbers,
-            places,
-            precision: DMatrix::zeros(0, 0),
-            log_determinant: 0.0,
-        };
+        let patches =
+            Self { tiles, numbers, places, precision: DMatrix::zeros(0, 0), log_determinant: 0.0 };
         patches.with_covariance(covariance)
     }
 
@@ -142,22 +170,17 @@ impl SurfacePatches {
 
     /// Width of a tile \[px\].
     pub(crate) fn side(&self) -> usize {
-        self.side
+        self.tiles.side
     }
 
     /// The patch in a tile of the image.
     pub(crate) fn in_tile(&self, column: usize, row: usize) -> Option<usize> {
-        let [left, top] = self.first;
-        let (column, row) = (column.checked_sub(left)?, row.checked_sub(top)?);
-        if column >= self.columns {
-            return None;
-        }
-        *self.numbers.get(row * self.columns + column)?
+        *self.numbers.get(self.tiles.index(column, row)?)?
     }
 
     /// The patch at pixel (x, y).
     pub(crate) fn at(&self, x: usize, y: usize) -> Option<usize> {
-        self.in_tile(x / self.side, y / self.side)
+        *self.numbers.get(self.tiles.at([x, y])?)?
     }
 
     /// Logarithm of the determinant of the information that all displacements have beforehand.
@@ -169,15 +192,6 @@ impl SurfacePatches {
     pub(crate) fn precision(&self) -> &DMatrix<f64> {
         &self.precision
     }
-}
-
-/// How many tiles of `side` pixels some pixels are in.
-fn tiles_of(pixels: &[[usize; 2]], side: usize) -> usize {
-    let columns = pixels.iter().map(|[x, _]| x / side + 1).max().unwrap_or(0);
-    let rows = pixels.iter().map(|[_, y]| y / side + 1).max().unwrap_or(0);
-    let mut tiles = vec![false; columns * rows];
-    pixels.iter().for_each(|[x, y]| tiles[y / side * columns + x / side] = true);
-    tiles.into_iter().filter(|seen| *seen).count()
 }
 
 #[cfg(test)]

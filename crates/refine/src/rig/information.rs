@@ -42,7 +42,8 @@ impl FrameInformation {
         }
         let pose = equations.offset(Block::ObjectPose)?;
         let (_, first_warp) = equations.image_warp()?;
-        let (n, first_patch) = (equations.gradient().len(), equations.dimension());
+        let (gradient, hessian) = equations.all();
+        let (n, first_patch) = (gradient.len(), equations.dimension());
         // What the evidence is about, by the rig's parameters and the object's coefficients.
         let coefficients = field.map_or(0, |field| 3 * field.count());
         let mut by_shared = DMatrix::zeros(n, rig.len() + coefficients);
@@ -76,9 +77,8 @@ impl FrameInformation {
         let mut offset = DVector::zeros(n);
         let deviation = state.calibration_deviation(said);
         calibrations.iter().zip(&deviation).for_each(|(at, off)| offset[*at] = *off);
-        let hessian = equations.hessian();
-        let gradient = equations.gradient() - hessian * offset;
-        let by_all = hessian * &by_shared;
+        let gradient = gradient - &hessian * offset;
+        let by_all = &hessian * &by_shared;
         let mut of_own = hessian.select_rows(&own).select_columns(&own);
         variances.iter().enumerate().for_each(|(k, variance)| of_own[(k, k)] += variance.recip());
         let inverse = ScaledCholesky::new(&of_own, RIDGE)?.inverse();
@@ -237,6 +237,7 @@ mod tests {
             let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));
             factor.linearize(&state, &mut equations);
             let first = equations.image_warp().unwrap().1 + RADIAL;
+            let (gradient, _) = equations.all();
             let step = 2e-6;
             for k in [16, 17, 23, 24, 25] {
                 let cost = |sign: f64| {
@@ -247,13 +248,13 @@ mod tests {
                     factors[f].cost(&state)
                 };
                 let difference = (cost(1.0) - cost(-1.0)) / (2.0 * step);
-                let found = equations.gradient()[first + k];
+                let found = gradient[first + k];
                 let error = (found - difference).abs() / difference.abs().max(500.0);
                 assert!(error < 0.03, "{} {k}: {found} {difference}", factor.name());
             }
             // A field that is the same everywhere is the bias of the camera.
-            let sum: f64 = equations.gradient().rows(first, warp.depth.len()).sum();
-            let bias = equations.gradient()[equations.offset(Block::Camera).unwrap() + 1];
+            let sum: f64 = gradient.rows(first, warp.depth.len()).sum();
+            let bias = gradient[equations.offset(Block::Camera).unwrap() + 1];
             assert!((sum - bias).abs() < 1e-9 * bias.abs(), "{sum} {bias}");
         }
     }
@@ -305,7 +306,7 @@ mod tests {
             let (camera, first) =
                 (equations.offset(Block::Camera).unwrap(), equations.image_warp().unwrap().1);
             let ray = window.camera.ray((center % 640) as f64, (center / 640) as f64).xy();
-            let hessian = equations.hessian();
+            let (_, hessian) = equations.all();
             let by_shift = |row: usize| {
                 ray.x * hessian[(row, camera + 2)] + ray.y * hessian[(row, camera + 3)]
             };

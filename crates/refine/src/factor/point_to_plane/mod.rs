@@ -220,7 +220,7 @@ impl Factor for PointToPlaneFactor {
             row
         };
         let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
-        let patches = self.patches.as_ref().filter(|_| equations.auxiliary() > 0);
+        let patches = self.patches.as_ref().filter(|_| equations.displacements() > 0);
         let count = patches.map_or(0, |patches| patches.count());
         let patch = |i: usize| {
             let (column, row) = self.points[i].pixel;
@@ -228,7 +228,7 @@ impl Factor for PointToPlaneFactor {
         };
         let image_warp = equations.image_warp().map(|(warp, _)| Arc::clone(warp));
         // After all patches of the equations, whether or not this factor knows of them.
-        let first = N + equations.auxiliary();
+        let first = N + equations.displacements();
         let derivatives = |i: usize| {
             let at = patch(i).map(PatchSums::<N>::place);
             let displaced = at.into_iter().flat_map(|at| at..at + 3).zip(rows[i]);
@@ -243,10 +243,7 @@ impl Factor for PointToPlaneFactor {
         let by_patch = || {
             let mut sums = PatchSums::<N>::new(count);
             for (i, (weight, left)) in weighted() {
-                let row = SVector::from(rows[i]);
-                let (gradient, hessian) = sums.of(patch(i));
-                gradient.axpy(weight * left, &row, 1.0);
-                hessian.ger(*weight, &row, &row, 1.0);
+                sums.add_row(patch(i), &SVector::from(rows[i]), *left, *weight);
             }
             sums
         };
