@@ -5,6 +5,7 @@ use std::time::Duration;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
+use super::rival::Rivals;
 use super::settings::{ProcessNoise, TrackerSettings};
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
@@ -53,6 +54,8 @@ pub(super) struct TrackState {
     unseen: bool,
     /// Frames in which it was followed.
     followed: u32,
+    /// Other poses that may fit better.
+    pub(super) rivals: Rivals,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -92,6 +95,7 @@ impl TrackState {
             misses: 0,
             unseen: false,
             followed: 0,
+            rivals: Rivals::default(),
         }
     }
 
@@ -105,6 +109,11 @@ impl TrackState {
     /// Whether colors are to be learnt from this frame: they change slowly.
     pub(super) fn is_time_to_learn(&self) -> bool {
         self.followed.is_multiple_of(LEARN_EVERY)
+    }
+
+    /// Whether poses that are turned are to be tried in this frame: not in one that colors are learnt from, too.
+    pub(super) fn is_time_to_compare(&self) -> bool {
+        self.followed % LEARN_EVERY == LEARN_EVERY / 2
     }
 
     /// Whether it was lost for so long that much may have happened to it.

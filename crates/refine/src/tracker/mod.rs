@@ -3,6 +3,7 @@
 mod clock;
 mod find;
 mod memory;
+mod rival;
 mod segmentation;
 mod settings;
 mod sight;
@@ -23,6 +24,7 @@ use prehend_render::Backend;
 use self::clock::Clock;
 pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
+use self::rival::Comparison;
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
@@ -44,7 +46,8 @@ use crate::strategy::{Inconsistency, Posterior, chi_square_z, problem_of, surfac
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
 /// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
 ///
-/// A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
+/// Where a rotation is told by colors alone, poses turned about that axis are tried every few frames, and taken when they have fitted better for long
+/// ([`turn_sigma`](TrackerSettings::turn_sigma)). A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
 ///
 /// Full-size images and what tells the object from the rest live in the memory of the frame before, so that following touches no new pages
 /// for them. The terms of the problem, their normal equations and the renderer's small buffers are made anew in every frame:
@@ -288,21 +291,31 @@ impl Tracker {
         if !clock.has(Duration::ZERO) {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
-        let solved = self.solve(&problem, predicted, clock);
+        let mut solved = self.solve(&problem, predicted, clock);
         timing.steps = clock.lap();
         if solved.solution.termination == Termination::Aborted && !solved.tried {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
-        let posterior = self.posterior(&solved, nominal)?;
+        let mut posterior = self.posterior(&solved, nominal)?;
         if let Some(rejection) = self.gate(&solved, &posterior, Some(&prior), track.allowance()) {
             timing.validation = clock.lap();
             return Ok(Err(rejection));
         }
-        let motion = self.settings.motion(in_hand);
+        let (mut rivals, mut motion) = (track.rivals.clone(), *self.settings.motion(in_hand));
+        if track.is_time_to_compare() && clock.has(timing.steps) {
+            let level = track.allowance();
+            let comparison = Comparison { problem: &problem, prediction, nominal, level };
+            if let Some(rival) = self.rival(&comparison, &solved, &posterior, &mut rivals)? {
+                (solved, posterior) = rival;
+                // The way there is not a motion.
+                motion.gain = 0.0;
+            }
+        }
         let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
-        let mut next = track.followed(next, prediction, motion);
+        let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
+        next.rivals = rivals;
         if next.is_time_to_learn() {
             self.learn(sight, &solved);
         }

@@ -74,6 +74,8 @@ pub struct TrackerSettings {
     /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
     /// led astray.
     pub calibration_time_constant: f64,
+    /// Standard deviation of the rotation about its least certain axis from which poses turned about that axis are tried, too \[rad\]; infinity for never.
+    pub turn_sigma: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.
     pub budget: Option<Duration>,
@@ -103,6 +105,7 @@ impl Default for TrackerSettings {
             in_hand: ProcessNoise { translation: 0.02, rotation: 0.2, gain: 0.1 },
             free: ProcessNoise { translation: 0.3, rotation: 2.0, gain: 0.5 },
             calibration_time_constant: 0.2,
+            turn_sigma: 0.8f64.to_radians(),
             budget: None,
             gating: GatingSettings {
                 cost_ratio: 2.5,
@@ -129,6 +132,7 @@ impl TrackerSettings {
             ("free.translation", self.free.translation),
             ("free.rotation", self.free.rotation),
             ("calibration_time_constant", self.calibration_time_constant),
+            ("turn_sigma", self.turn_sigma),
             ("gating.cost_ratio", self.gating.cost_ratio),
             ("gating.cost_margin", self.gating.cost_margin),
             ("gating.innovation_gate", self.gating.innovation_gate),

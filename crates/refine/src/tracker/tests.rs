@@ -1,10 +1,11 @@
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::rival::{Rivals, widest};
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
 use crate::problem::{Block, Rows};
-use crate::scene::{Sequence, default_sequence};
+use crate::scene::{Sequence, SequenceFrame, default_sequence};
 
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
 
@@ -191,4 +192,48 @@ fn what_has_slipped_is_expected_and_what_is_held_in_another_way_is_not() {
     assert!((share(&[3e-3, 0.0, 4e-3, 0.0, 0.0, 0.0]) * radius - 5e-3).abs() < 1e-9);
     assert!((share(&[0.0, 0.0, 0.0, 0.0, 0.1, 0.0]) - 0.1).abs() < 1e-6);
     assert!(share(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0]) > 2.9);
+}
+
+/// A pose that was followed into a wrong minimum: it costs more than the right one in every frame.
+#[test]
+fn a_turned_pose_that_fits_better_in_some_frames_is_taken() {
+    let turn_sigma = 1e-4;
+    let mut tracker = tracker(TrackerSettings { turn_sigma, ..Default::default() });
+    (0..2).for_each(|index| drop(track(&mut tracker, index)));
+    let (index, object, hand) = (2, Arc::clone(&SEQUENCE.object), Arc::clone(&SEQUENCE.hand));
+    let SequenceFrame { observation, time, truth } = &SEQUENCE.frames[index];
+    let remembered = tracker.track.clone().unwrap();
+    let nominal = State::measured(observation, &object, truth).unwrap();
+    let prediction = remembered.predict(*time, &nominal, true, &tracker.settings);
+    let mut sight = Sight::new(observation.clone(), Some(&hand), Images::default());
+    assert!(tracker.segmenter.segment(&mut sight, &object, truth));
+    let frame = tracker.frame(&sight, &object, Some(&hand), None).unwrap();
+    let (problem, _) = tracker.prepare(&frame, &prediction).unwrap();
+    let level = f64::INFINITY;
+    let comparison =
+        Comparison { problem: &problem, prediction: &prediction, nominal: &nominal, level };
+    let followed = |state: &State| {
+        let at = problem.linearize(state);
+        let solution = Solution { at, termination: Termination::Stalled, iterations: 0 };
+        Solved { solution, tried: true }
+    };
+    let clock = Clock::start(None);
+    let right = tracker.solve(&problem, &prediction.state, &clock);
+    let posterior = tracker.posterior(&right, &nominal).unwrap();
+    let mut rivals = Rivals::default();
+    for _ in 0..10 {
+        let none = tracker.rival(&comparison, &right, &posterior, &mut rivals).unwrap();
+        assert!(none.is_none(), "the right pose was left");
+    }
+    // About the axis that is asked: the one that is least certain.
+    let (_, axis) = widest(posterior.covariance().fixed_view::<3, 3>(3, 3).into_owned());
+    let turn = axis * 0.15;
+    let twist = [0.0, 0.0, 0.0, turn.x, turn.y, turn.z];
+    let wrong = followed(&right.solution.at.state.retract(&[Block::ObjectPose], &twist));
+    let oe = |solved: &Solved| oe_deg(&solved.solution.at.state.t_cam_object, truth);
+    assert!(oe(&wrong) > 6.0 && wrong.cost() > right.cost() + 2.0);
+    let found =
+        (0..20).find_map(|_| tracker.rival(&comparison, &wrong, &posterior, &mut rivals).unwrap());
+    let (found, _) = found.expect("no other pose was taken");
+    assert!(oe(&found) < 3.0, "{}°", oe(&found));
 }

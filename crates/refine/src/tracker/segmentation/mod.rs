@@ -53,6 +53,8 @@ pub(super) struct Segmenter {
     false_alarms: f32,
     /// What each color tells \[nat\]; empty before any is known.
     color_evidence: Vec<f32>,
+    /// See [`visible_share`](Self::visible_share).
+    visible: f32,
     /// How much of the object is seen, in squares of depth by pixels.
     seen_area: f32,
     /// Where the last frame was looked at; its memory serves the next one.
@@ -99,7 +101,13 @@ impl Segmenter {
             fill(mask, pixel.at);
         }
         sight.focus = Some(window.range());
+        self.visible = seen / window.silhouette();
         seen >= LEAST_SHARE * expected && seen > 0.0
+    }
+
+    /// What share of the object's silhouette showed it in the frame looked at last; the rest is hidden.
+    pub(super) fn visible_share(&self) -> f32 {
+        self.visible
     }
 
     /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of

@@ -161,6 +161,11 @@ impl Window {
         (count > 0.0).then(|| sum / count)
     }
 
+    /// How many pixels the object covers where it should be, hidden or not; one at least.
+    pub(super) fn silhouette(&self) -> f32 {
+        self.drawn.pixels().iter().filter(|z| **z > 0.0).count().max(1) as f32
+    }
+
     /// Its columns and rows in the picture.
     pub(super) fn range(&self) -> [Range<usize>; 2] {
         self.range.clone()
