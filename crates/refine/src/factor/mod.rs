@@ -138,7 +138,7 @@ mod gradient_check {
         let hessian = all.hessian() - alone.hessian();
         assert!(hessian.norm() < 1e-4 * alone.hessian().norm());
         let place = alone.gradient().fixed_rows::<3>(0).into_owned();
-        let (gradient, hessian) = all.all();
+        let (gradient, hessian) = all.dense();
         let by_patch = (0..patches.count()).map(|k| gradient.fixed_rows::<3>(12 + 3 * k));
         let sum = by_patch.fold(-place, |sum, by_patch| sum + by_patch);
         assert!(sum.norm() <= elsewhere * place.norm(), "{sum:?} of {place:?}");

@@ -4,10 +4,8 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector2};
 
 use crate::problem::{Block, NormalEquations, PatchPart, radial_as_camera};
 
-/// Gradient and Gauss–Newton Hessian by `N` parameters, the first three of which are the object's place, and by the displacements of patches.
-///
-/// A patch that is displaced does to what it shows what the object does when all of it is, so that its own derivatives are among
-/// those by the object's place.
+/// Gradient and Gauss–Newton Hessian by `N` parameters, the first three of which are the object's place, and by the displacements of patches,
+/// whose derivatives are among those by the object's place ([`PatchPart`]).
 pub(super) struct PatchSums<const N: usize> {
     gradient: SVector<f64, N>,
     hessian: SMatrix<f64, N, N>,
@@ -176,7 +174,7 @@ mod tests {
             }
             let radial = radial_as_camera(&center).tr_mul(&row.fixed_rows::<6>(6));
             expected.rows_mut(18, RADIAL).copy_from(&radial);
-            let (gradient, hessian) = equations.all();
+            let (gradient, hessian) = equations.dense();
             assert!((gradient - &expected).amax() < 1e-12, "{patches}");
             let of_all = &expected * expected.transpose();
             assert!((hessian - of_all).amax() < 1e-12, "{patches}");

@@ -16,7 +16,7 @@ pub(super) struct Auxiliary {
 }
 
 impl Auxiliary {
-    /// Zero, of so many `patches`, of as many coefficients of a `warp` and beside `dimension` parameters of blocks.
+    /// Zeros for the displacements of `patches` patches and `warp` coefficients, beside `dimension` parameters of blocks.
     pub(super) fn new(patches: usize, warp: usize, dimension: usize) -> Self {
         let count = 3 * patches + warp;
         Self {

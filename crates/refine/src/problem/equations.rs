@@ -77,7 +77,7 @@ impl NormalEquations {
         Self { image_warp: Some(warp), by_auxiliary: Some(auxiliary), ..self }
     }
 
-    /// By which the image may be off, and where its coefficients begin among the parameters of [`all`](Self::all).
+    /// By which the image may be off, and where its coefficients begin among the parameters of [`dense`](Self::dense).
     pub(crate) fn image_warp(&self) -> Option<(&Arc<ImageWarp>, usize)> {
         let first = self.dimension() + self.displacements();
         self.image_warp.as_ref().map(|warp| (warp, first))
@@ -93,14 +93,14 @@ impl NormalEquations {
         3 * self.patches
     }
 
-    /// Whether a factor has added derivatives by auxiliary parameters.
+    /// Whether there are derivatives by auxiliary parameters.
     pub(crate) fn has_auxiliary(&self) -> bool {
         self.by_auxiliary.is_some()
     }
 
-    /// Gradient and Hessian by the parameters of the blocks, and then by the auxiliary ones if something depends on them: displacements, and by
-    /// what the image is off by.
-    pub(crate) fn all(&self) -> (DVector<f64>, DMatrix<f64>) {
+    /// Gradient and Hessian by the parameters of the blocks and then, if something depends on them, by the auxiliary ones: displacements and
+    /// coefficients of the warp.
+    pub(crate) fn dense(&self) -> (DVector<f64>, DMatrix<f64>) {
         let (n, m) = (self.dimension(), self.by_auxiliary.as_ref().map_or(0, Auxiliary::len));
         let (mut gradient, mut hessian) = (DVector::zeros(n + m), DMatrix::zeros(n + m, n + m));
         gradient.rows_mut(0, n).copy_from(&self.gradient);
@@ -126,7 +126,12 @@ impl NormalEquations {
 
     /// Eliminates the displacements of patches by the Schur complement. Their prior is a Gaussian of mean zero, independent by direction;
     /// `precision`, the inverse of its covariance in one direction, is added. `None` if the sum is singular.
+    ///
+    /// # Panics
+    /// Of equations over the coefficients of a warp, or of another number of patches than `precision` has.
     pub(crate) fn marginalize(&self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
+        assert!(self.image_warp.is_none(), "coefficients of a warp are not eliminated");
+        assert_eq!(precision.nrows(), self.patches, "precision of the patches");
         let mut own = DMatrix::zeros(self.displacements(), self.displacements());
         for c in 0..precision.ncols() {
             for r in 0..precision.nrows() {
@@ -267,8 +272,8 @@ impl NormalEquations {
         self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
     }
 
-    /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements, and by what the image is off by if that
-    /// is asked for.
+    /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements and, if asked for, by the coefficients of
+    /// the warp.
     pub(crate) fn add_with_auxiliary(
         &mut self,
         blocks: &[Block],
@@ -375,6 +380,8 @@ fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = Place> {
 
 #[cfg(test)]
 mod tests {
+    use prehend_geometry::SplitMix64;
+
     use super::*;
 
     #[test]
@@ -389,5 +396,40 @@ mod tests {
         let mut pose_only = NormalEquations::new(&[Block::ObjectPose]);
         pose_only.add(&[Block::HandPose, Block::ObjectPose], &gradient, &hessian);
         assert_eq!((pose_only.gradient()[0], pose_only.hessian()[(0, 1)]), (6.0, 607.0));
+    }
+
+    /// Of three blocks, one of which has nothing to do with patches.
+    #[test]
+    fn what_is_eliminated_is_the_schur_complement() {
+        let mut random = SplitMix64::new(7);
+        let blocks = [Block::HandPose, Block::ObjectPose, Block::Camera];
+        let mut equations = NormalEquations::with_patches(&blocks, 2);
+        let mut patches = [PatchPart::<12>::default(); 2];
+        for row in 0..40 {
+            let row_of_all = SVector::<f64, 12>::from_fn(|_, _| random.normal());
+            let (residual, place) = (random.normal(), row_of_all.fixed_rows::<3>(0).into_owned());
+            let own = [Block::ObjectPose, Block::Camera];
+            equations.add(&own, &(row_of_all * residual), &(row_of_all * row_of_all.transpose()));
+            patches[row % 2].gradient += place * residual;
+            patches[row % 2].hessian += place * row_of_all.transpose();
+        }
+        equations.add_patches(&[Block::ObjectPose, Block::Camera], &patches);
+        let of_hand = SMatrix::<f64, 6, 6>::identity();
+        equations.add(&[Block::HandPose], &SVector::<f64, 6>::repeat(1.0), &of_hand);
+        let precision = DMatrix::from_row_slice(2, 2, &[2.0, -0.5, -0.5, 1.0]);
+        let found = equations.marginalize(&precision).unwrap();
+        let (gradient, mut hessian) = equations.dense();
+        let mut own = hessian.view_mut((18, 18), (6, 6));
+        own += precision.kronecker(&DMatrix::identity(3, 3));
+        let own = hessian.view((18, 18), (6, 6)).into_owned();
+        let (coupling, pull) = (hessian.view((18, 0), (6, 18)), gradient.rows(18, 6));
+        let inverse = own.clone().try_inverse().unwrap();
+        let of_rest = hessian.view((0, 0), (18, 18)) - coupling.tr_mul(&(&inverse * coupling));
+        let by_rest = gradient.rows(0, 18) - coupling.tr_mul(&(&inverse * pull));
+        assert!((found.rest.hessian() - of_rest).amax() < 1e-9);
+        assert!((found.rest.gradient() - by_rest).amax() < 1e-9);
+        assert!((found.gain - 0.5 * pull.dot(&(&inverse * pull))).abs() < 1e-9);
+        assert!((found.log_determinant - own.determinant().ln()).abs() < 1e-9);
+        assert!(!found.rest.has_auxiliary());
     }
 }

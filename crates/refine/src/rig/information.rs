@@ -42,7 +42,7 @@ impl FrameInformation {
         }
         let pose = equations.offset(Block::ObjectPose)?;
         let (_, first_warp) = equations.image_warp()?;
-        let (gradient, hessian) = equations.all();
+        let (gradient, hessian) = equations.dense();
         let (n, first_patch) = (gradient.len(), equations.dimension());
         // What the evidence is about, by the rig's parameters and the object's coefficients.
         let coefficients = field.map_or(0, |field| 3 * field.count());
@@ -237,7 +237,7 @@ mod tests {
             let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));
             factor.linearize(&state, &mut equations);
             let first = equations.image_warp().unwrap().1 + RADIAL;
-            let (gradient, _) = equations.all();
+            let (gradient, _) = equations.dense();
             let step = 2e-6;
             for k in [16, 17, 23, 24, 25] {
                 let cost = |sign: f64| {
@@ -306,7 +306,7 @@ mod tests {
             let (camera, first) =
                 (equations.offset(Block::Camera).unwrap(), equations.image_warp().unwrap().1);
             let ray = window.camera.ray((center % 640) as f64, (center / 640) as f64).xy();
-            let (_, hessian) = equations.all();
+            let (_, hessian) = equations.dense();
             let by_shift = |row: usize| {
                 ray.x * hessian[(row, camera + 2)] + ray.y * hessian[(row, camera + 3)]
             };

@@ -5,8 +5,8 @@ use std::time::Duration;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
-use super::rival::Rivals;
 use super::settings::{ProcessNoise, TrackerSettings};
+use super::turned::TurnedPoses;
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
@@ -54,8 +54,8 @@ pub(super) struct TrackState {
     unseen: bool,
     /// Frames in which it was followed.
     followed: u32,
-    /// Other poses that may fit better.
-    pub(super) rivals: Rivals,
+    /// Whether it may be turned otherwise.
+    pub(super) turned: TurnedPoses,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -95,13 +95,14 @@ impl TrackState {
             misses: 0,
             unseen: false,
             followed: 0,
-            rivals: Rivals::default(),
+            turned: TurnedPoses::default(),
         }
     }
 
     /// A frame in which the object was not followed, though something was `seen` where it should be.
     pub(super) fn missed(&mut self, seen: bool) {
         self.unseen = !seen;
+        self.turned = TurnedPoses::default();
         self.misses = self.misses.saturating_add(1);
         self.lost = self.lost.saturating_add(u32::from(seen));
     }
@@ -112,7 +113,7 @@ impl TrackState {
     }
 
     /// Whether poses that are turned are to be tried in this frame: not in one that colors are learnt from, too.
-    pub(super) fn is_time_to_compare(&self) -> bool {
+    pub(super) fn is_time_to_turn(&self) -> bool {
         self.followed % LEARN_EVERY == LEARN_EVERY / 2
     }
 

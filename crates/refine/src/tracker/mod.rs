@@ -3,13 +3,13 @@
 mod clock;
 mod find;
 mod memory;
-mod rival;
 mod segmentation;
 mod settings;
 mod sight;
 #[cfg(test)]
 mod tests;
 mod tracked;
+mod turned;
 
 use std::mem;
 use std::ops::ControlFlow;
@@ -24,11 +24,11 @@ use prehend_render::Backend;
 use self::clock::Clock;
 pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
-use self::rival::Comparison;
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
+use self::turned::Followed;
 use crate::data::guard;
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
@@ -46,8 +46,8 @@ use crate::strategy::{Inconsistency, Posterior, chi_square_z, problem_of, surfac
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
 /// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
 ///
-/// Where a rotation is told by colors alone, poses turned about that axis are tried every few frames, and taken when they have fitted better for long
-/// ([`turn_sigma`](TrackerSettings::turn_sigma)). A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
+/// Where a rotation is uncertain, poses turned about that axis are tried every few frames, and one is taken that has fitted better in several of them
+/// ([`turn_sigma`](TrackerSettings::turn_sigma), [`Tracked::turned`]). A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
 ///
 /// Full-size images and what tells the object from the rest live in the memory of the frame before, so that following touches no new pages
 /// for them. The terms of the problem, their normal equations and the renderer's small buffers are made anew in every frame:
@@ -301,27 +301,31 @@ impl Tracker {
             timing.validation = clock.lap();
             return Ok(Err(rejection));
         }
-        let (mut rivals, mut motion) = (track.rivals.clone(), *self.settings.motion(in_hand));
-        if track.is_time_to_compare() && clock.has(timing.steps) {
+        timing.validation = clock.lap();
+        let (mut turned, mut motion) = (track.turned.clone(), *self.settings.motion(in_hand));
+        let mut is_turned = false;
+        if track.is_time_to_turn() && clock.has(self.time_of_turned(&solved, timing.steps)) {
             let level = track.allowance();
-            let comparison = Comparison { problem: &problem, prediction, nominal, level };
-            if let Some(rival) = self.rival(&comparison, &solved, &posterior, &mut rivals)? {
-                (solved, posterior) = rival;
+            let followed = Followed { problem: &problem, prediction, nominal, level };
+            if let Some(other) = self.try_turned(&followed, &solved, &posterior, &mut turned)? {
+                (solved, posterior) = other;
                 // The way there is not a motion.
-                motion.gain = 0.0;
+                (motion.gain, is_turned) = (0.0, true);
             }
+            timing.steps += clock.lap();
         }
         let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
-        next.rivals = rivals;
+        next.turned = turned;
         if next.is_time_to_learn() {
             self.learn(sight, &solved);
         }
-        timing.validation = clock.lap();
+        timing.validation += clock.lap();
         self.track = Some(next);
-        Ok(Ok(Tracked::solved(solved, posterior, TrackStatus::Tracked, None, *timing)))
+        let tracked = Tracked::solved(solved, posterior, TrackStatus::Tracked, None, *timing);
+        Ok(Ok(Tracked { turned: is_turned, ..tracked }))
     }
 
     /// The frame of a sight.

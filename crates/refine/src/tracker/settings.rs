@@ -74,7 +74,8 @@ pub struct TrackerSettings {
     /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
     /// led astray.
     pub calibration_time_constant: f64,
-    /// Standard deviation of the rotation about its least certain axis from which poses turned about that axis are tried, too \[rad\]; infinity for never.
+    /// Poses turned about the least certain axis of rotation are tried, too, where its standard deviation in
+    /// [`Posterior::covariance`](crate::strategy::Posterior::covariance) exceeds this \[rad\]; infinity for never.
     pub turn_sigma: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.

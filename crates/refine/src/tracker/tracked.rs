@@ -74,6 +74,8 @@ pub struct Tracked {
     pub status: TrackStatus,
     /// How uncertain it is, unless it was only predicted.
     pub posterior: Option<Posterior>,
+    /// Whether the pose has left a wrong minimum: it is turned by some 10° from where it was followed.
+    pub turned: bool,
     /// Why the object was not tracked, if it was tried.
     pub rejection: Option<Rejection>,
     /// Steps that lowered the cost; of a pose found anew, the stage that it comes from.
@@ -92,6 +94,7 @@ impl Tracked {
             state,
             status: TrackStatus::Predicted,
             posterior: None,
+            turned: false,
             rejection: None,
             iterations: 0,
             cost: f64::NAN,

@@ -86,8 +86,10 @@ impl Segmenter {
         let mask = &mut sight.observation.mask;
         mask.refill(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
-        for pixel in window.pixels() {
+        let (mut visible, mut silhouette) = (0.0, 0.0);
+        for (pixel, covered) in window.pixels().zip(window.silhouette()) {
             expected += pixel.share;
+            silhouette += f32::from(u8::from(covered));
             // Most pixels.
             if pixel.is_elsewhere() {
                 continue;
@@ -98,14 +100,15 @@ impl Segmenter {
                 continue;
             }
             seen += 1.0;
+            visible += f32::from(u8::from(covered));
             fill(mask, pixel.at);
         }
         sight.focus = Some(window.range());
-        self.visible = seen / window.silhouette();
+        self.visible = visible / f32::max(silhouette, 1.0);
         seen >= LEAST_SHARE * expected && seen > 0.0
     }
 
-    /// What share of the object's silhouette showed it in the frame looked at last; the rest is hidden.
+    /// What share of the object's silhouette within the picture showed it in the frame looked at last; the rest is hidden.
     pub(super) fn visible_share(&self) -> f32 {
         self.visible
     }

@@ -161,9 +161,9 @@ impl Window {
         (count > 0.0).then(|| sum / count)
     }
 
-    /// How many pixels the object covers where it should be, hidden or not; one at least.
-    pub(super) fn silhouette(&self) -> f32 {
-        self.drawn.pixels().iter().filter(|z| **z > 0.0).count().max(1) as f32
+    /// Whether the object covers each pixel where it should be, hidden or not.
+    pub(super) fn silhouette(&self) -> impl Iterator<Item = bool> {
+        self.drawn.pixels().iter().map(|z| *z > 0.0)
     }
 
     /// Its columns and rows in the picture.
