@@ -230,8 +230,8 @@ fn a_turned_pose_that_fits_better_in_some_frames_is_taken() {
     let oe = |solved: &Solved| oe_deg(&solved.solution.at.state.t_cam_object, truth);
     assert!(oe(&wrong) > 6.0 && wrong.cost() > right.cost() + 2.0);
     let mut again = || tracker.try_turned(&comparison, &wrong, &posterior, &mut turned).unwrap();
-    assert!(again().is_none() && again().is_none(), "taken in a hurry");
-    let (found, _) = (2..20).find_map(|_| again()).expect("no other pose was taken");
+    assert!(again().is_none(), "one frame is enough");
+    let (found, _) = (1..20).find_map(|_| again()).expect("no other pose was taken");
     assert!(oe(&found) < 3.0, "{}°", oe(&found));
 }
 

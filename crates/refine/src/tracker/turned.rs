@@ -17,9 +17,8 @@ use crate::strategy::Posterior;
 const TURN: f64 = 10.0 / 180.0 * std::f64::consts::PI;
 /// A solution that is nearer to the pose that is followed than this share of the angle is in the same minimum.
 const SAME_MINIMUM: f64 = 0.5;
-/// Gain of a frame at which a sum stays as it is, the most that a frame counts, and the sum at which a turned pose is taken \[nat\].
+/// Gain of a frame at which a sum stays as it is, and the sum above which a turned pose is taken, which is also the most that a frame counts \[nat\].
 const SLACK: f64 = 1.0;
-const MOST_GAIN: f64 = 4.0;
 const THRESHOLD: f64 = 6.0;
 /// Cosine of the angle between the axes of two frames above which they are the same.
 const SAME_AXIS: f64 = 0.9;
@@ -48,7 +47,9 @@ impl TurnedPoses {
         }
         self.axis = *axis;
         for (sum, gain) in self.sums.iter_mut().zip(gains) {
-            *sum = (*sum + gain.min(MOST_GAIN) - SLACK).max(0.0);
+            // Written so that what is not a number counts as none.
+            let gain = if gain > THRESHOLD { THRESHOLD } else { gain };
+            *sum = (*sum + gain - SLACK).max(0.0);
         }
         let best = usize::from(self.sums[1] > self.sums[0]);
         (self.sums[best] > THRESHOLD).then_some(best)
@@ -136,11 +137,11 @@ mod tests {
         let axis = Vector3::z();
         // However much better it fits in one.
         assert_eq!(turned.add(&axis, [-3.0, 50.0]), None);
-        assert_eq!(turned.add(&axis, [2.0, -1.0]), None);
-        assert_eq!(turned.sums, [1.0, 1.0]);
-        assert_eq!(turned.add(&axis, [-9.0, 9.0]), None);
-        assert_eq!(turned.add(&axis, [f64::NAN, 9.0]), Some(1));
-        assert_eq!(turned.sums, [0.0, 7.0]);
+        assert_eq!(turned.add(&axis, [3.0, -3.0]), None);
+        assert_eq!(turned.sums, [2.0, 1.0]);
+        assert_eq!(turned.add(&axis, [f64::NAN, 9.0]), None);
+        assert_eq!(turned.sums, [0.0, 6.0]);
+        assert_eq!(turned.add(&axis, [-9.0, 1.5]), Some(1));
         // What is said of another axis has no part in it.
         assert_eq!(turned.add(&Vector3::x(), [-9.0, 3.0]), None);
         assert_eq!(turned.sums, [0.0, 2.0]);
