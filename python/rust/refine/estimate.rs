@@ -45,10 +45,9 @@ pub(super) fn estimate<'py>(py: Python<'py>, refined: &Refined) -> PyResult<Boun
         fields.set_item("fit", summary.fit)?;
         fields.set_item("misfits", summary.misfits)?;
         fields.set_item("disagreements", summary.disagreements)?;
-        fields.set_item("let_off", summary.let_off)?;
+        fields.set_item("scales", summary.scales)?;
         let unobserved: Vec<f64> = summary.unobserved_mm.iter().map(|mm| 1e-3 * mm).collect();
         fields.set_item("unobserved", unobserved)?;
-        fields.set_item("exact", summary.exact)?;
         fields.set_item("ending", summary.ending)?;
     }
     dataclass("Estimate", &fields)

@@ -34,15 +34,13 @@ class Estimate:
     fit: float | None = None
     """Probability that model and data are right, where that was asked."""
     misfits: list[tuple[str, float]] = field(default_factory=list)
-    """What fits worse than it does for right poses, and by how many standard deviations."""
+    """Evidence that is more probably of something else (another object, another frame, a hand that is elsewhere) than not, and how probably."""
     disagreements: list[tuple[str, float]] = field(default_factory=list)
     """Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance."""
-    let_off: str | None = None
-    """Evidence that did not fit, "color", "depth", "touch", "views" (other cameras) or the name of a factor from outside: the pose is found without it."""
+    scales: list[tuple[str, float]] = field(default_factory=list)
+    """Errors over their nominal sizes, by group: "hand", "joints", "camera", "surface"."""
     unobserved: list[float] = field(default_factory=list)
     """Standard deviations of surface motion along directions that the evidence says hardly anything of [m]."""
-    exact: bool = False
-    """Whether all calibrations were found to be exact, and believed to be so."""
     ending: str = ""
     """Why the search ended."""
     iterations: int = 0

@@ -1,8 +1,8 @@
 //! Whether the fused estimator knows when it is wrong: every frame as it is, and with a fault of a random kind and size.
 //!
-//! `cargo run --release -p prehend-refine --example faults -- DATASET POSES [KIND ...]`
+//! `cargo run --release -p prehend-refine --example faults -- DATASET POSES OUT.csv [KIND ...]`
 //!
-//! Without kinds all of them take turns. A pose is wrong if it is more than 5 mm or 5° from the truth, and always with another model; it is
+//! Without kinds all of them take turns. OUT.csv gets a row a trial, for `docs/scripts/reliability.py`. A pose is wrong if it is more than 5 mm or 5° from the truth, and always with another model; it is
 //! called right if its probability is above 0.9. The last lines weigh frames with faults and without alike.
 
 mod fault;
@@ -17,7 +17,7 @@ use prehend_geometry::SplitMix64;
 use prehend_refine::data::bop::{Dataset, GroundTruth, ResultRow, read_results};
 use prehend_refine::data::{Assets, Target};
 use prehend_refine::scene::Object;
-use prehend_refine::strategy::Fused;
+use prehend_refine::strategy::{Consistency, Fit, Fused};
 use prehend_refine::{Frame, refine};
 use rayon::prelude::*;
 
@@ -29,12 +29,17 @@ struct Outcome {
     probability: f64,
     /// What the estimator thinks is wrong in the first place.
     named: Option<&'static str>,
+    /// Scene, image and object; errors \[cm; °\]; probability that the pose is right if model and data are; logarithms of scales.
+    frame: String,
+    errors: [f64; 2],
+    within: f64,
+    scales: String,
 }
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [dataset, poses, kinds @ ..] = arguments.as_slice() else {
-        bail!("usage: faults DATASET POSES [KIND ...]")
+    let [dataset, poses, out, kinds @ ..] = arguments.as_slice() else {
+        bail!("usage: faults DATASET POSES OUT.csv [KIND ...]")
     };
     let all: Vec<String> = fault::KINDS.map(str::to_owned).to_vec();
     let kinds = if kinds.is_empty() { &all } else { kinds };
@@ -77,7 +82,11 @@ fn main() -> anyhow::Result<()> {
             kind: kind.cloned(),
             wrong: off > 5e-3 || angle > 5.0 || kind.is_some_and(|kind| kind == "another model"),
             probability: posterior.map_or(0.0, |posterior| posterior.probability()),
-            named: fit.and_then(|fit| fit.misfits.first()).map(|(name, _)| *name),
+            named: fit.and_then(|fit| fit.misfits().first().map(|(name, _)| *name)),
+            frame: format!("{}/{}/{}", rows[index].scene_id, rows[index].im_id, rows[index].obj_id),
+            errors: [off * 100.0, angle],
+            within: posterior.map_or(0.0, |p| p.probability_within(5e-3, 5f64.to_radians())),
+            scales: fit.map_or_else(String::new, scales),
         })
     };
     let trials: Vec<_> = (0..rows.len())
@@ -86,8 +95,46 @@ fn main() -> anyhow::Result<()> {
     // What cannot be refined at all is refused, not wrong.
     let outcomes: Vec<Outcome> =
         trials.par_iter().filter_map(|&(index, kind)| trial(index, kind).ok()).collect();
+    write(Path::new(out), &outcomes)?;
     report(&outcomes, trials.len() - outcomes.len());
     Ok(())
+}
+
+/// Logarithms of all scales, as `name=u` with semicolons between.
+fn scales(fit: &Fit) -> String {
+    let of = |c: &Consistency| format!("{}={:.3}", c.name, c.log_scale);
+    fit.consistency.iter().map(of).collect::<Vec<_>>().join(";")
+}
+
+fn write(out: &Path, outcomes: &[Outcome]) -> anyhow::Result<()> {
+    let mut writer = csv::Writer::from_path(out)?;
+    writer.write_record([
+        "frame",
+        "kind",
+        "wrong",
+        "pe_cm",
+        "oe_deg",
+        "probability",
+        "within",
+        "scales",
+    ])?;
+    for o in outcomes {
+        let numbers = [o.errors[0], o.errors[1], o.probability, o.within].map(|v| v.to_string());
+        let [pe, oe, probability, within] = numbers;
+        let wrong = u8::from(o.wrong).to_string();
+        let kind = o.kind.as_deref().unwrap_or("none").to_owned();
+        writer.write_record([
+            &o.frame,
+            &kind,
+            &wrong,
+            &pe,
+            &oe,
+            &probability,
+            &within,
+            &o.scales,
+        ])?;
+    }
+    Ok(writer.flush()?)
 }
 
 fn report(outcomes: &[Outcome], refused: usize) {

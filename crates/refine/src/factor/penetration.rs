@@ -44,8 +44,7 @@ impl PenetrationFactor {
         let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
         let area = object.area / object.samples.len().max(1) as f64;
         let patch = NoiseModel::gaussian(settings.sigma).weighting(1);
-        let weighting =
-            Weighting { information: area / settings.area * patch.information, ..patch };
+        let weighting = patch.shared(area / settings.area);
         Ok(Self { object, hand, weighting })
     }
 

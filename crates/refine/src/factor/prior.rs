@@ -2,10 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
+use prehend_geometry::RobustKernel;
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
 use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError};
+use crate::strategy::{ErrorGroup, Scales};
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
@@ -15,6 +17,8 @@ pub struct PriorSettings {
     pub object_translation: [f64; 3],
     /// The object's rotation about each axis of the camera frame \[rad\].
     pub object_rotation: [f64; 3],
+    /// From how many of these deviations on errors of the initial pose are outliers (Cauchy's kernel).
+    pub object_tails: f64,
     /// The hand at the object's place, in each direction \[m\].
     pub hand_translation: f64,
     /// The hand's rotation about each axis \[rad\].
@@ -63,6 +67,15 @@ impl PriorSettings {
         }
     }
 
+    /// The scale of each parameter of a state with `layout`.
+    pub(crate) fn scales(layout: Layout, scales: &Scales) -> Vec<f64> {
+        let of = |block: Block| {
+            let scale = ErrorGroup::of(block).map_or(1.0, |group| scales.get(group));
+            std::iter::repeat_n(scale, block.dimension())
+        };
+        layout.blocks().into_iter().flat_map(of).collect()
+    }
+
     /// The same with what is known of the pose and the joints of `hand`.
     pub(crate) fn of_hand(&self, hand: Option<&HandMeasurement>) -> Self {
         let mut prior = self.clone();
@@ -88,6 +101,7 @@ impl Default for PriorSettings {
         Self {
             object_translation: [0.03; 3],
             object_rotation: [0.4; 3],
+            object_tails: 3.0,
             hand_translation: 2.1e-3,
             hand_rotation: 7e-3,
             joints: 0.014,
@@ -157,6 +171,8 @@ pub struct GaussianPrior {
     whitener: Whitener,
     /// Inverse of the covariance of the object's deviation.
     object_information: Matrix6<f64>,
+    /// Width of Cauchy's kernel of the object's displacement and rotation \[standard deviations\]; infinite for none.
+    tails: f64,
 }
 
 /// The square root of the information.
@@ -173,8 +189,21 @@ impl GaussianPrior {
     /// # Errors
     /// If a standard deviation is not a positive number.
     pub fn independent(mean: State, settings: &PriorSettings) -> Result<Self, RefineError> {
+        Self::scaled(mean, settings, &Scales::default())
+    }
+
+    /// Independent deviations from `mean`, larger than `settings` state by `scales`.
+    ///
+    /// # Errors
+    /// If a standard deviation is not a positive number.
+    pub(crate) fn scaled(
+        mean: State,
+        settings: &PriorSettings,
+        scales: &Scales,
+    ) -> Result<Self, RefineError> {
         let layout = Layout::of(&mean);
-        let sigmas = settings.all_sigmas(layout);
+        let scale = DVector::from_vec(PriorSettings::scales(layout, scales));
+        let sigmas = settings.all_sigmas(layout).component_mul(&scale);
         if let Some(wrong) = sigmas.iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
@@ -186,6 +215,7 @@ impl GaussianPrior {
             layout,
             whitener: Whitener::Diagonal(sigmas.map(f64::recip)),
             object_information: Matrix6::from_diagonal(&information),
+            tails: settings.object_tails,
         })
     }
 
@@ -198,7 +228,30 @@ impl GaussianPrior {
     ) -> Option<Self> {
         let whitener = Whitener::Full(ScaledCholesky::new(covariance, RIDGE)?.whitener()?);
         let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
-        Some(Self { center: mean.center(), mean, layout, whitener, object_information: object })
+        let object_information = object;
+        let tails = f64::INFINITY;
+        Some(Self { center: mean.center(), mean, layout, whitener, object_information, tails })
+    }
+
+    /// With outliers of the object's pose from so many standard deviations on: of an object whose deviations are independent of the rest.
+    pub(crate) fn with_tails(self, tails: f64) -> Self {
+        Self { tails, ..self }
+    }
+
+    /// Weights of the object's whitened displacement and rotation, and what their costs are beyond those with these weights \[nat\].
+    fn object_weights(&self, residuals: [f64; 6]) -> ([f64; 6], f64) {
+        if self.tails.is_infinite() {
+            return ([1.0; 6], 0.0);
+        }
+        let kernel = RobustKernel::Cauchy { scale: self.tails };
+        let (mut weights, mut beyond) = ([1.0; 6], 0.0);
+        for part in [0..3, 3..6] {
+            let squared: f64 = residuals[part.clone()].iter().map(|r| r * r).sum();
+            let weight = kernel.weight(squared);
+            weights[part].fill(weight);
+            beyond += kernel.loss(squared) - 0.5 * weight * squared;
+        }
+        (weights, beyond)
     }
 
     /// Mahalanobis distance of the object of `state` from the mean.
@@ -248,13 +301,21 @@ impl Factor for GaussianPrior {
         let all = object.iter().chain(&hand).copied().chain(numbers);
         let deviations = DVector::from_iterator(self.layout.len(), all);
         let unit = NoiseModel::gaussian(1.0).weighting(1);
+        let whitened = match &self.whitener {
+            Whitener::Diagonal(roots) => roots.component_mul(&deviations),
+            Whitener::Full(whitener) => whitener * &deviations,
+        };
+        let (weights, beyond) = self.object_weights(std::array::from_fn(|k| whitened[k]));
+        rows.add_constant(beyond);
+        let weighting = |at: usize| weights.get(at).map_or(unit, |weight| unit.shared(*weight));
         match &self.whitener {
             Whitener::Diagonal(roots) => {
                 for block in self.layout.blocks() {
                     let from = self.layout.offset(block);
                     for at in 0..block.dimension() {
                         let root = roots[from + at];
-                        rows.add(root * deviations[from + at], &unit, |row| match block {
+                        let weighting = weighting(from + at);
+                        rows.add(whitened[from + at], &weighting, |row| match block {
                             Block::ObjectPose => {
                                 row.block(block, (by_object.row(at).transpose() * root).as_slice());
                             }
@@ -269,10 +330,9 @@ impl Factor for GaussianPrior {
                 }
             }
             Whitener::Full(whitener) => {
-                let residuals = whitener * deviations;
                 let blocks = self.layout.blocks();
-                for (k, residual) in residuals.iter().enumerate() {
-                    rows.add(*residual, &unit, |row| {
+                for (k, residual) in whitened.iter().enumerate() {
+                    rows.add(*residual, &weighting(k), |row| {
                         let all: Vec<f64> = whitener.row(k).iter().copied().collect();
                         let object = by_object.tr_mul(&Vector6::from_column_slice(&all[..6]));
                         let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..POSES]));
@@ -345,6 +405,7 @@ mod tests {
         let variances = settings().all_sigmas(layout).map(|sigma| sigma.powi(2));
         let covariance = DMatrix::from_diagonal(&variances);
         let full = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
+        let full = full.with_tails(settings().object_tails);
         let diagonal = GaussianPrior::independent(start.clone(), &settings()).unwrap();
         let off: Vec<f64> = (0..layout.len()).map(|k| 0.01 * (k as f64 * 1.3).cos()).collect();
         let state = start.retract(&layout.blocks(), &off);

@@ -70,8 +70,9 @@ pub struct RenderingFactor {
     problem: PoseProblem,
     /// The same on a device, if there is one beside the processor; gone after its first failure.
     device: Mutex<Option<Box<dyn Session>>>,
-    /// Nats per unit of the renderer's loss.
+    /// Nats per unit of the renderer's loss, and how many independent measurements the pixels amount to.
     scale: f64,
+    degrees: f64,
     light_ridge: f64,
     /// Whether colors are compared.
     color: bool,
@@ -108,6 +109,7 @@ impl RenderingFactor {
             object,
             problem,
             scale: settings.effective_pixels / (sigma * sigma),
+            degrees: settings.effective_pixels,
             light_ridge: settings.light_ridge,
             color: settings.color,
             patches: None,
@@ -206,6 +208,7 @@ impl RenderingFactor {
             sums.add(patch, &gradient, &hessian);
             cost += self.scale * at.loss.total;
         }
+        equations.add_degrees(self.degrees);
         let center = state.center();
         sums.add_to(&(center.xy() / center.z), equations);
         cost

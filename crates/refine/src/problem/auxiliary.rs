@@ -1,6 +1,6 @@
 //! Derivatives by parameters that no state holds.
 
-use std::ops::AddAssign;
+use std::ops::{AddAssign, MulAssign};
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -81,6 +81,16 @@ impl Auxiliary {
         if let Some(others) = &self.others {
             *sum += others;
         }
+    }
+}
+
+impl MulAssign<f64> for Auxiliary {
+    /// Scales all derivatives.
+    fn mul_assign(&mut self, factor: f64) {
+        self.gradient *= factor;
+        self.coupling *= factor;
+        self.by_patch.iter_mut().for_each(|part| *part *= factor);
+        self.others.iter_mut().for_each(|others| *others *= factor);
     }
 }
 

@@ -23,6 +23,8 @@ pub struct NormalEquations {
     /// Place and derivative of each parameter of the row begun last, and of each auxiliary one.
     entries: Vec<(usize, f64)>,
     auxiliary_entries: Vec<(usize, f64)>,
+    /// How many independent measurements the residuals amount to.
+    degrees: f64,
 }
 
 /// Gradient by the displacement of a patch, and Hessian by that and `N` parameters, the first three of which are the object's place: a patch that is
@@ -68,6 +70,7 @@ impl NormalEquations {
             by_auxiliary: None,
             entries: Vec::new(),
             auxiliary_entries: Vec::new(),
+            degrees: 0.0,
         }
     }
 
@@ -184,6 +187,16 @@ impl NormalEquations {
     /// Gauss–Newton approximation of the second derivative: symmetric, positive semi-definite.
     pub fn hessian(&self) -> &DMatrix<f64> {
         &self.hessian
+    }
+
+    /// How many independent measurements the residuals amount to, those that are zero by a bound left out.
+    pub fn degrees(&self) -> f64 {
+        self.degrees
+    }
+
+    /// Counts so many independent measurements more.
+    pub fn add_degrees(&mut self, degrees: f64) {
+        self.degrees += degrees;
     }
 
     /// The requested blocks, in order.
@@ -340,11 +353,21 @@ impl NormalEquations {
     }
 }
 
+impl std::ops::MulAssign<f64> for NormalEquations {
+    /// Scales all derivatives, as those of a cost that is larger by `factor`.
+    fn mul_assign(&mut self, factor: f64) {
+        self.gradient *= factor;
+        self.hessian *= factor;
+        self.by_auxiliary.iter_mut().for_each(|auxiliary| *auxiliary *= factor);
+    }
+}
+
 impl std::ops::AddAssign<&Self> for NormalEquations {
     /// Adds equations over the same blocks.
     fn add_assign(&mut self, other: &Self) {
         self.gradient += &other.gradient;
         self.hessian += &other.hessian;
+        self.degrees += other.degrees;
         if let Some(auxiliary) = &other.by_auxiliary {
             *self.blocks_and_auxiliary().1 += auxiliary;
         }

@@ -1,5 +1,6 @@
 //! A sum of factors, and the way to its least value.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -24,6 +25,8 @@ pub struct Problem {
     blocks: Vec<Block>,
     /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
     patches: Option<Arc<SurfacePatches>>,
+    /// Scales of the factors' noise, by name: standard deviations are larger by these.
+    noise: BTreeMap<&'static str, f64>,
 }
 
 /// A state, the cost there, and its derivatives.
@@ -53,6 +56,8 @@ pub struct Contribution {
     pub name: &'static str,
     /// Its cost \[nat\].
     pub cost: f64,
+    /// What costs were multiplied by: the inverse square of the scale of its noise.
+    pub weight: f64,
     /// Its derivatives.
     pub(crate) equations: NormalEquations,
 }
@@ -61,8 +66,6 @@ pub struct Contribution {
 #[derive(Clone)]
 pub(crate) struct Marginal {
     pub(crate) patches: Arc<SurfacePatches>,
-    /// How much lower the cost is than with the model as it is \[nat\].
-    pub(crate) gain: f64,
     /// Logarithm of the determinant of the Hessian by the displacements.
     pub(crate) log_determinant: f64,
 }
@@ -72,6 +75,16 @@ impl Linearization {
     pub fn gauss_newton_step(&self) -> Option<DVector<f64>> {
         let factor = ScaledCholesky::new(self.equations.hessian(), RIDGE)?;
         Some(-factor.inverse() * self.equations.gradient())
+    }
+
+    /// Takes the cost as it is with these scales of the factors' noise; derivatives stay.
+    pub(crate) fn reweigh(&mut self, noise: &BTreeMap<&'static str, f64>) {
+        for part in &mut self.factors {
+            let weight = noise.get(part.name).map_or(1.0, |scale| scale.powi(-2));
+            let cost = part.cost / part.weight * weight;
+            self.cost += cost - part.cost;
+            (part.cost, part.weight) = (cost, weight);
+        }
     }
 
     /// Cost of all factors but the prior, of the model as it is \[nat\].
@@ -139,7 +152,7 @@ pub struct Solution {
 impl Problem {
     /// The sum of `factors` over `blocks`.
     pub fn new(factors: Vec<Arc<dyn Factor>>, blocks: Vec<Block>) -> Self {
-        Self { prior: None, factors, blocks, patches: None }
+        Self { prior: None, factors, blocks, patches: None, noise: BTreeMap::new() }
     }
 
     /// With what is known beforehand.
@@ -152,17 +165,31 @@ impl Problem {
         Self { patches, ..self }
     }
 
+    /// With standard deviations of the factors' noise larger by these scales.
+    pub(crate) fn with_noise(self, noise: BTreeMap<&'static str, f64>) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// What the costs of the factor `name` are multiplied by.
+    fn weight(&self, name: &str) -> f64 {
+        self.noise.get(name).map_or(1.0, |scale| scale.powi(-2))
+    }
+
     /// The cost at `state` of the model as it is \[nat\]. No derivative is computed.
     pub fn cost(&self, state: &State) -> f64 {
-        self.prior.iter().chain(&self.factors).map(|factor| factor.cost(state)).sum()
+        let cost = |factor: &Arc<dyn Factor>| self.weight(factor.name()) * factor.cost(state);
+        self.prior.iter().chain(&self.factors).map(cost).sum()
     }
 
     /// The [`cost`](Self::cost) at each of several states.
     pub(crate) fn cost_all(&self, states: &[State]) -> Vec<f64> {
         let factors: Vec<_> = self.prior.iter().chain(&self.factors).collect();
-        let costs: Vec<Vec<f64>> =
-            factors.into_par_iter().map(|factor| factor.cost_all(states)).collect();
-        (0..states.len()).map(|i| costs.iter().map(|of_factor| of_factor[i]).sum()).collect()
+        let costs: Vec<(f64, Vec<f64>)> = factors
+            .into_par_iter()
+            .map(|factor| (self.weight(factor.name()), factor.cost_all(states)))
+            .collect();
+        let sum = |i: usize| costs.iter().map(|(weight, of_factor)| weight * of_factor[i]).sum();
+        (0..states.len()).map(sum).collect()
     }
 
     /// Lowers the cost from `start` until `solver` is content, or `observe`, which hears after each step whether it lowered the
@@ -230,6 +257,20 @@ impl Problem {
         sum
     }
 
+    /// What `factor` contributes, under the scale of its noise.
+    fn contribution(
+        &self,
+        factor: &dyn Factor,
+        cost: f64,
+        mut equations: NormalEquations,
+    ) -> Contribution {
+        let (name, weight) = (factor.name(), self.weight(factor.name()));
+        if weight != 1.0 {
+            equations *= weight;
+        }
+        Contribution { name, cost: weight * cost, weight, equations }
+    }
+
     /// Nothing yet of the derivatives of a sum.
     fn no_equations(&self) -> NormalEquations {
         let patches = self.patches.as_ref().map_or(0, |patches| patches.count());
@@ -256,7 +297,7 @@ impl Problem {
                 cost -= gain;
                 equations = rest;
                 let patches = Arc::clone(patches);
-                marginal = Some(Marginal { patches, gain, log_determinant });
+                marginal = Some(Marginal { patches, log_determinant });
             } else {
                 equations = equations.without_auxiliary();
             }
@@ -287,7 +328,7 @@ impl LeastSquares for Problem {
         let contribution = |factor: &dyn Factor| {
             let mut equations = self.no_equations();
             let cost = factor.linearize(state, &mut equations);
-            Contribution { name: factor.name(), cost, equations }
+            self.contribution(factor, cost, equations)
         };
         let of_factors = self.factors.par_iter().map(|factor| contribution(factor.as_ref()));
         let factors = of_factors.collect();
@@ -300,9 +341,9 @@ impl LeastSquares for Problem {
         let contributions = |factor: &dyn Factor| {
             let mut equations = vec![self.no_equations(); states.len()];
             let costs = factor.linearize_all(states, &mut equations);
-            let name = factor.name();
             let each = costs.into_iter().zip(equations);
-            each.map(|(cost, equations)| Contribution { name, cost, equations }).collect::<Vec<_>>()
+            let of = |(cost, equations)| self.contribution(factor, cost, equations);
+            each.map(of).collect::<Vec<_>>()
         };
         let of_factors = self.factors.par_iter().map(|factor| contributions(factor.as_ref()));
         let of_factors: Vec<Vec<Contribution>> = of_factors.collect();

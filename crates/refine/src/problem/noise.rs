@@ -36,7 +36,8 @@ impl NoiseModel {
     /// The weight of one of `count` residuals; the number matters only where they amount to fewer independent ones.
     pub fn weighting(&self, count: usize) -> Weighting {
         let independent = (self.effective_samples / count.max(1) as f64).min(1.0);
-        Weighting { information: independent / self.sigma.powi(2), kernel: self.kernel }
+        let information = independent / self.sigma.powi(2);
+        Weighting { information, kernel: self.kernel, degrees: independent }
     }
 }
 
@@ -47,6 +48,8 @@ pub struct Weighting {
     pub information: f64,
     /// What forgives outliers.
     pub kernel: RobustKernel,
+    /// How many independent measurements the residual amounts to.
+    pub degrees: f64,
 }
 
 impl Weighting {
@@ -64,7 +67,8 @@ impl Weighting {
 
     /// What a residual counts that is worth `share` of one.
     pub(crate) fn shared(&self, share: f64) -> Self {
-        Self { information: share * self.information, ..*self }
+        let (information, degrees) = (share * self.information, share * self.degrees);
+        Self { information, degrees, ..*self }
     }
 }
 

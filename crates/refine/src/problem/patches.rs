@@ -46,8 +46,6 @@ pub(crate) struct SurfacePatches {
     places: Vec<Point3<f64>>,
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
     precision: DMatrix<f64>,
-    /// Logarithm of the determinant of that of all displacements.
-    log_determinant: f64,
 }
 
 /// Square tiles over a part of an image, row-major.
@@ -146,16 +144,14 @@ impl SurfacePatches {
             let own = if i == j { OWN } else { 0.0 };
             gp_sigma.powi(2) * ((-0.5 * squared / length_scale.powi(2)).exp() + own)
         });
-        let patches =
-            Self { tiles, numbers, places, precision: DMatrix::zeros(0, 0), log_determinant: 0.0 };
+        let patches = Self { tiles, numbers, places, precision: DMatrix::zeros(0, 0) };
         patches.with_covariance(covariance)
     }
 
     /// The same, displaced with this covariance in each direction \[m²\]; `None` if it is singular.
     pub(crate) fn with_covariance(self, covariance: DMatrix<f64>) -> Option<Self> {
         let factor = covariance.cholesky()?;
-        let log_determinant = -3.0 * factor.ln_determinant();
-        Some(Self { precision: factor.inverse(), log_determinant, ..self })
+        Some(Self { precision: factor.inverse(), ..self })
     }
 
     /// Where each patch is (camera frame) \[m\].
@@ -181,11 +177,6 @@ impl SurfacePatches {
     /// The patch at pixel (x, y).
     pub(crate) fn at(&self, x: usize, y: usize) -> Option<usize> {
         *self.numbers.get(self.tiles.at([x, y])?)?
-    }
-
-    /// Logarithm of the determinant of the information that all displacements have beforehand.
-    pub(crate) fn log_determinant(&self) -> f64 {
-        self.log_determinant
     }
 
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].

@@ -37,6 +37,10 @@ impl<'a> Rows<'a> {
     ) {
         self.cost += weighting.cost(residual);
         if let Some(equations) = self.equations.as_deref_mut() {
+            // A bound that holds is no measurement.
+            if residual != 0.0 {
+                equations.add_degrees(weighting.degrees);
+            }
             let mut row = equations.begin_row();
             jacobian(&mut row);
             row.add(residual, weighting.weight(residual));

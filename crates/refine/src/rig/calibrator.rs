@@ -142,7 +142,6 @@ impl Calibrator {
             let stages = &mut fused.settings.stages;
             stages.drain(..stages.len().saturating_sub(1));
             fused.settings.restart_angle = 0.0;
-            fused.settings.search_unfit = false;
         }
         let frame =
             Frame::new(&observation, self.object(*obj_id)?, Some(hand))?.with_rig(&self.rig);

@@ -11,8 +11,9 @@ mod trace;
 pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
-    CovarianceInflation, Fit, FitReference, FitStatistics, Fused, FusedSettings, Hypothesis,
-    Inconsistency, Modality, Nuisance, Posterior, PosteriorSummary, Stage, UnobservableDirection,
+    Consistency, Diagnosis, ErrorGroup, Fit, FitSettings, Fused, FusedSettings, Hypothesis,
+    Inconsistency, Modality, Nuisance, Posterior, PosteriorSummary, ScaleSettings, Scales, Stage,
+    UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, chi_square_z, problem_of, surface_patches};
 pub use heuristic::{GradientKind, Heuristic};

@@ -19,7 +19,7 @@ use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
 use crate::scene::Frame;
 use crate::search::PoseSearch;
-use crate::strategy::{Fused, FusedSettings, Posterior, Strategy};
+use crate::strategy::{Fused, Posterior, Strategy};
 
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
@@ -84,16 +84,12 @@ impl Tracker {
         frame: &Frame<'_>,
         initial: &State,
     ) -> Result<(Solved, Posterior), RefineError> {
-        // Costs must compare with those of frames that are followed: all evidence counts in these.
-        let fused = FusedSettings { let_off: false, ..self.settings.fused.clone() };
-        let fused = Fused::new(fused);
+        let fused = Fused::new(self.settings.fused.clone());
         let fused = self.factors.iter().cloned().fold(fused, Fused::with);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
-        let mut posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
-        // Frames that are followed are not tested: gates judge them.
-        posterior.fit = None;
+        let posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
         let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
         let solution = Solution { at, termination, iterations: estimate.iteration };
         Ok((Solved { solution, tried: true }, posterior))

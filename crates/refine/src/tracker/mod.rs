@@ -36,7 +36,9 @@ use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
 use crate::scene::{Frame, Hand, Object, Observation};
 use crate::search::PoseSearch;
-use crate::strategy::{Inconsistency, Posterior, chi_square_z, problem_of, surface_patches};
+use crate::strategy::{
+    Fit, FusedSettings, Inconsistency, Posterior, chi_square_z, problem_of, surface_patches,
+};
 
 /// Follows one object through the frames of a camera.
 ///
@@ -429,14 +431,18 @@ impl Tracker {
 
     /// The posterior of `solved`. Calibrations far from `nominal` are inconsistent, also where the frames before have led them there.
     fn posterior(&self, solved: &Solved, nominal: &State) -> Result<Posterior, RefineError> {
-        let (fused, at) = (&self.settings.fused, &solved.solution.at);
-        let calibrations = State { t_cam_object: nominal.t_cam_object, ..at.state.clone() };
-        let stated = GaussianPrior::independent(nominal.clone(), &fused.prior)?;
+        let at = &solved.solution.at;
+        let calibrations_of = State { t_cam_object: nominal.t_cam_object, ..at.state.clone() };
+        let stated = GaussianPrior::independent(nominal.clone(), &self.settings.fused.prior)?;
         let degrees = at.equations.gradient().len().saturating_sub(6);
-        let distance = chi_square_z(2.0 * stated.cost(&calibrations), degrees);
-        let also = Some(Inconsistency { factor: "calibrations", distance });
-        let found = slice::from_ref(&solved.solution);
-        Ok(Posterior::new(found, fused.inflation, self.object.radius, false, also))
+        let distance = chi_square_z(2.0 * stated.cost(&calibrations_of), degrees);
+        let mut posterior = Posterior::new(slice::from_ref(&solved.solution), self.object.radius);
+        let calibrations = Inconsistency { factor: "calibrations", distance };
+        posterior.inconsistencies.extend(calibrations.is_significant().then_some(calibrations));
+        let FusedSettings { scales, fit, .. } = &self.settings.fused;
+        let of_calibrations = ("calibration", 2.0 * stated.cost(&calibrations_of), degrees as f64);
+        posterior.fit = Some(Fit::of_tracked(at, of_calibrations, scales, fit));
+        Ok(posterior)
     }
 
     fn remember(

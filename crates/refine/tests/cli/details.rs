@@ -100,7 +100,7 @@ fn refined_frames_are_rows_of_a_numpy_archive() {
         assert!((center - rows[k].t_cam_model.translation.vector).norm() < 0.02);
     }
     assert!(column("iterations").integers().iter().all(|count| *count > 0));
-    assert_eq!((column("exact").kind.as_str(), column("exact").shape.as_str()), ("|b1", "2,"));
+    assert!(column("scales").texts().iter().all(|scales| scales.contains("camera")));
     assert!(!column("ending").texts()[0].is_empty());
     // What is not the same every time is there on demand.
     assert!(column("seconds").numbers().iter().all(|s| s.is_nan()));

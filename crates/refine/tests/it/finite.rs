@@ -110,7 +110,13 @@ fn of_posterior(posterior: &Posterior) -> Vec<f64> {
     );
     all.extend(posterior.inconsistencies.iter().map(|i| i.distance));
     all.extend(posterior.fit.iter().map(|fit| of(fit.probability)));
-    all.extend(posterior.fit.iter().flat_map(|fit| fit.misfits.iter().map(|m| m.1)));
+    all.extend(
+        posterior
+            .fit
+            .iter()
+            .flat_map(|fit| fit.consistency.iter().flat_map(|c| [c.log_scale, of(c.fault)])),
+    );
+    all.extend(posterior.scales.iter().flat_map(|(_, log, sigma)| [log, sigma]));
     all
 }
 

@@ -52,8 +52,5 @@ pub(crate) fn flags(confidence: &PosteriorSummary) -> Vec<String> {
         (rival, "ambiguous"),
         (!confidence.unobserved_mm.is_empty(), "unobserved direction"),
     ];
-    let mut flags: Vec<String> =
-        known.iter().filter(|(is, _)| *is).map(|(_, flag)| (*flag).to_owned()).collect();
-    flags.extend(confidence.let_off.iter().map(|what| format!("without {what}")));
-    flags
+    known.iter().filter(|(is, _)| *is).map(|(_, flag)| (*flag).to_owned()).collect()
 }

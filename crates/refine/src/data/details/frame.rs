@@ -92,9 +92,8 @@ fn of_posteriors(frames: &[FrameDetails]) -> Vec<Column> {
         array("weights", &[most], |p| p.weights.clone()),
         text("misfits", |p| pairs(&p.misfits)),
         text("disagreements", |p| pairs(&p.disagreements)),
-        text("let_off", |p| p.let_off.clone().unwrap_or_default()),
+        text("scales", |p| pairs(&p.scales)),
         text("ending", |p| p.ending.clone()),
-        Column::new("exact", rows().map(|p| p.is_some_and(|p| p.exact)), Values::Flags),
     ]
 }
 

@@ -209,6 +209,8 @@ impl Factor for PointToPlaneFactor {
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         let residuals = self.residuals(state);
         let fit = self.fit(&residuals);
+        let seen = residuals.iter().flatten().count() as f64;
+        equations.add_degrees(seen * self.weighting().degrees);
         let center = state.center();
         let row = |(point, residual): (&Point, &Option<Residual>)| {
             let mut row = [0.0; N];

@@ -1,12 +1,12 @@
 //! Where a skin is touched: taxels that feel force together.
 
 use nalgebra::{Point3, Vector3};
+use prehend_geometry::DistanceField;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
-use prehend_geometry::{DistanceField, RobustKernel};
 
 use super::probes::{Distance, Probe};
-use crate::problem::Weighting;
+use crate::problem::NoiseModel;
 use crate::scene::Hand;
 
 /// How touched taxels become contacts.
@@ -56,6 +56,7 @@ pub(super) fn contacts(
         let touched = Touched { link: *link, position: *position, normal: *normal, force };
         (force > least && force.is_finite()).then_some(touched)
     });
+    let noise = NoiseModel::cauchy(settings.sigma, settings.kernel_width, f64::INFINITY);
     groups(touched.collect(), settings.reach)
         .iter()
         .map(|group| {
@@ -67,10 +68,7 @@ pub(super) fn contacts(
                 link: group[0].link,
                 position: on_skin(robot, group[0].link, center),
                 distance: Distance::Is(0.0),
-                weighting: Weighting {
-                    information: trust / settings.sigma.powi(2),
-                    kernel: RobustKernel::Cauchy { scale: settings.kernel_width },
-                },
+                weighting: noise.weighting(1).shared(trust),
             }
         })
         .collect()

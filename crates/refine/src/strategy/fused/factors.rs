@@ -8,8 +8,8 @@ use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
     BinaryTouchFactor, ContactPatchFactor, FreeSpaceFactor, HandDepthFactor, NoiseEstimate,
-    PenetrationFactor, PointToPlaneFactor, PointToPlaneSettings, ProximityFactor, RenderingFactor,
-    SupportFactor, TactileFactor, TouchModel, ViewFactor,
+    PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
+    ProximityFactor, RenderingFactor, SupportFactor, TactileFactor, TouchModel, ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
 use crate::scene::{CameraView, Frame, TouchReading};
@@ -177,13 +177,20 @@ fn other_factors(
         depth.points = stage.points / 3;
         factors.push(Arc::new(HandDepthFactor::new(frame, &depth)?));
     }
+    // Where the surface may be elsewhere than the model has it, contact says as much less of the pose.
+    let surface = patches.map_or(0.0, |_| settings.model.gp_sigma);
+    let blurred = |noise: NoiseModel| NoiseModel { sigma: noise.sigma.hypot(surface), ..noise };
     let touch = wanted(Modality::Touch);
     let inactive = stage.contact && wanted(Modality::Quiet);
     if (touch || inactive) && !hand.forces.is_empty() {
         let mut tactile = settings.tactile.clone().widened(stage.kernel_scale);
-        if !touch {
-            tactile.touch = TouchModel::Nothing;
+        match &mut tactile.touch {
+            _ if !touch => tactile.touch = TouchModel::Nothing,
+            TouchModel::Nothing => {}
+            TouchModel::Taxels(noise) => *noise = blurred(*noise),
+            TouchModel::Contacts(contacts) => contacts.sigma = contacts.sigma.hypot(surface),
         }
+        tactile.no_contact = blurred(tactile.no_contact);
         if !inactive {
             tactile.no_contact = NoiseModel { sigma: f64::INFINITY, ..tactile.no_contact };
         }
@@ -191,19 +198,25 @@ fn other_factors(
     }
     let has = |kind: fn(&TouchReading) -> bool| hand.touch.iter().any(kind);
     if (touch || inactive) && has(|reading| matches!(reading, TouchReading::Binary(_))) {
-        let binary = settings.binary_touch.clone().widened(stage.kernel_scale);
+        let mut binary = settings.binary_touch.clone().widened(stage.kernel_scale);
+        binary.contact = blurred(binary.contact);
+        binary.no_contact = blurred(binary.no_contact);
         factors.push(Arc::new(BinaryTouchFactor::new(frame, &binary, [touch, inactive])?));
     }
     if touch && has(|reading| matches!(reading, TouchReading::Proximity(_))) {
-        let proximity = settings.proximity.clone().widened(stage.kernel_scale);
+        let mut proximity = settings.proximity.clone().widened(stage.kernel_scale);
+        proximity.noise = blurred(proximity.noise);
         factors.push(Arc::new(ProximityFactor::new(frame, &proximity)?));
     }
     if touch && has(|reading| matches!(reading, TouchReading::Patch(_))) {
-        let patch = settings.contact_patch.clone().widened(stage.kernel_scale);
+        let mut patch = settings.contact_patch.clone().widened(stage.kernel_scale);
+        patch.position = blurred(patch.position);
         factors.push(Arc::new(ContactPatchFactor::new(frame, &patch)?));
     }
     if stage.contact && wanted(Modality::Penetration) {
-        factors.push(Arc::new(PenetrationFactor::new(frame, &settings.penetration)?));
+        let sigma = settings.penetration.sigma.hypot(surface);
+        let penetration = PenetrationSettings { sigma, ..settings.penetration.clone() };
+        factors.push(Arc::new(PenetrationFactor::new(frame, &penetration)?));
     }
     if stage.contact && wanted(Modality::Support) && frame.observation().gravity.is_some() {
         factors.push(Arc::new(SupportFactor::new(frame, &settings.support)?));

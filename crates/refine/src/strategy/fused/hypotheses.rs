@@ -1,11 +1,14 @@
 //! Where solves start, and which of their ends are the same.
 
-use nalgebra::Isometry3;
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::so3_log;
 
 use super::posterior::principal_directions;
 use crate::factor::NoiseEstimate;
 use crate::problem::{Block, Linearization, Solution, State};
+use crate::scene::Object;
 use crate::symmetry::alternatives;
 
 /// The initial state, and those turned by `angle` \[rad\] about each axis of the camera frame, both ways; that alone if it is zero.
@@ -24,12 +27,33 @@ pub(super) fn restarts(initial: &State, angle: f64) -> Vec<State> {
 }
 
 /// The initial state, and the same with the object at each of the poses `others` \[m\] that differ from it and are in front of the camera.
-pub(super) fn rivals(initial: &State, others: &[Isometry3<f64>]) -> Vec<State> {
+pub(super) fn hypotheses(initial: &State, others: &[Isometry3<f64>]) -> Vec<State> {
     let at = |pose: &Isometry3<f64>| State { t_cam_object: *pose, ..initial.clone() };
     let seen = others.iter().map(at).filter(|state| state.center().z > 0.0);
     let differs = |state: &State| state.t_cam_object != initial.t_cam_object;
     std::iter::once(initial.clone()).chain(seen.filter(differs)).collect()
 }
+
+/// Half turns about the axes of the model's coordinates, through the center of the object.
+pub(super) fn half_turns(object: &Object) -> [Isometry3<f64>; 3] {
+    [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()].map(|axis| {
+        let turn = UnitQuaternion::from_axis_angle(&axis, PI);
+        let center = object.center.coords;
+        Isometry3::from_parts((center - turn * center).into(), turn)
+    })
+}
+
+/// `state` with the object turned as the transpose of the initial rotation says.
+pub(super) fn transposed(initial: &State, state: &State) -> Option<State> {
+    let rotation = initial.t_cam_object.rotation.inverse();
+    let place = state.center() - rotation * state.object_center.coords;
+    let t_cam_object = Isometry3::from_parts(place.into(), rotation);
+    let is_other = rotation.angle_to(&state.t_cam_object.rotation) > ANOTHER;
+    is_other.then(|| State { t_cam_object, ..state.clone() })
+}
+
+/// Rotations farther apart are not the same mode \[rad\].
+const ANOTHER: f64 = 0.2;
 
 /// What `motions` in object coordinates make of `states`, where it is turned otherwise than these and each other.
 pub(super) fn turned(states: &[State], motions: &[Isometry3<f64>]) -> Vec<State> {
@@ -121,12 +145,12 @@ mod tests {
     use crate::scene::{Frame, default_scene};
 
     #[test]
-    fn rivals_are_in_front_of_the_camera_and_the_cheapest_come_first() {
+    fn hypotheses_are_in_front_of_the_camera_and_the_cheapest_come_first() {
         let scene = default_scene(1).unwrap();
         let frame = Frame::new(&scene.observation, &scene.object, None).unwrap();
         let initial = State::new(&frame, &scene.initial).unwrap();
         let behind = Isometry3::translation(0.0, 0.0, -1.0);
-        let states = rivals(&initial, &[scene.initial, behind, scene.truth]);
+        let states = hypotheses(&initial, &[scene.initial, behind, scene.truth]);
         assert_eq!(states.len(), 2);
         assert_eq!(states[1].t_cam_object, scene.truth);
         let half = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);

@@ -6,6 +6,7 @@ use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 
 use super::fit::Fit;
+use super::scales::Scales;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
     Termination,
@@ -43,6 +44,13 @@ pub struct Inconsistency {
     pub distance: f64,
 }
 
+impl Inconsistency {
+    /// Whether it is farther away than chance has it.
+    pub(crate) fn is_significant(&self) -> bool {
+        self.distance > DISAGREES
+    }
+}
+
 /// What is known of how good a pose is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
@@ -52,34 +60,20 @@ pub struct Posterior {
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
     pub inconsistencies: Vec<Inconsistency>,
-    /// Evidence that did not fit and was let off, `color`, `depth`, `touch`, `views` or the name of a factor from outside: the pose is found without it.
-    pub let_off: Option<&'static str>,
-    /// Whether the best pose fits as right ones do, where that was asked.
+    /// The test of fit of the best pose, where that was asked.
     pub fit: Option<Fit>,
+    /// Scales of errors that the frame tells of.
+    pub scales: Scales,
     /// Why the search ended.
     pub termination: Termination,
-    /// Whether all calibrations were found to be exact, and believed to be so.
-    pub exact: bool,
     /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
     /// added for what the models of sensors and object leave out. Units are those of [`covariance`](Self::covariance).
     pub cramer_rao_bound: Matrix6<f64>,
     /// Center of the object, about which twists turn (camera frame) \[m\].
     center: Vector3<f64>,
-}
-
-/// What makes posteriors as wide as errors are, besides the information that there is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CovarianceInflation {
-    /// What covariances are multiplied by.
-    pub scale: f64,
-    /// Standard deviation that is added to the rotation about each axis, for what no term models \[rad\].
-    pub rotation_sigma: f64,
-}
-
-impl Default for CovarianceInflation {
-    fn default() -> Self {
-        Self { scale: 1.35, rotation_sigma: 0.39f64.to_radians() }
-    }
+    /// Components of each mode's density, of the same weight: displacements from the mode, and covariance less that of the mode. A mode is normal if
+    /// there are none.
+    components: Vec<(Vector6<f64>, Matrix6<f64>)>,
 }
 
 /// Random poses that stand for the posterior.
@@ -88,37 +82,22 @@ const SAMPLES: usize = 512;
 /// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
 const UNOBSERVED: f64 = 8e-3;
 
-/// [`Inconsistency::distance`] from which a sense counts as disagreeing, and from which deviations are widened in proportion: what is wrong
-/// with the observation, nobody knows, so this is a rule of thumb.
+/// [`Inconsistency::distance`] from which a sense counts as disagreeing: a rule of thumb.
 const DISAGREES: f64 = 5.0;
 
 impl Posterior {
-    /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion. Calibrations are `exact` or as accurate as stated.
-    /// `also` disagrees besides, if by enough.
-    pub(crate) fn new(
-        found: &[Solution],
-        inflation: CovarianceInflation,
-        radius: f64,
-        exact: bool,
-        also: Option<Inconsistency>,
-    ) -> Self {
+    /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion.
+    pub(crate) fn new(found: &[Solution], radius: f64) -> Self {
         let best = &found[0];
-        // Where calibrations are exact, as in simulation, so are models.
-        let turn = if exact { 0.0 } else { inflation.rotation_sigma.powi(2) };
-        let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|solution| laplace(&solution.at)).collect();
-        let mut inconsistencies = inconsistencies(&best.at);
-        inconsistencies.extend(also.filter(|also| also.distance > DISAGREES));
-        let apart = inconsistencies.iter().map(|d| d.distance / DISAGREES).fold(1.0, f64::max);
-        let scale = inflation.scale * apart.powi(2);
         let covariance = |k: usize| {
             // What was cut short has some way left to go.
             let left = match found[k].termination {
                 Termination::Iterations | Termination::Aborted => remaining(&found[k].at),
                 Termination::Converged | Termination::Stalled => Vector6::zeros(),
             };
-            bounds[k].0 * scale + more + left * left.transpose()
+            bounds[k].0 + left * left.transpose()
         };
         let first = bounds.iter().map(|bound| bound.1).fold(f64::NEG_INFINITY, f64::max);
         // A mode whose width is not known counts only where none is.
@@ -135,15 +114,33 @@ impl Posterior {
             .collect();
         Self {
             unobservable: unobservable(&hypotheses[0].covariance, radius),
-            inconsistencies,
-            let_off: None,
+            inconsistencies: inconsistencies(&best.at),
             fit: None,
+            scales: Scales::default(),
             hypotheses,
             termination: best.termination,
-            exact,
             cramer_rao_bound: bounds[0].0,
             center: best.at.state.center(),
+            components: Vec::new(),
         }
+    }
+
+    /// With a mixture over scales of errors in place of the best pose's normal density: mean and covariance of each component, as
+    /// [`ScaleEvidence::pose_moments`](super::scales::ScaleEvidence::pose_moments) has them. The other modes change by as much.
+    pub(super) fn mix(&mut self, moments: &[(Vector6<f64>, Matrix6<f64>)], radius: f64) {
+        let count = moments.len() as f64;
+        let mean = moments.iter().map(|component| component.0).sum::<Vector6<f64>>() / count;
+        let components: Vec<_> = moments
+            .iter()
+            .map(|(at, covariance)| (at - mean, covariance - self.cramer_rao_bound))
+            .collect();
+        let spread = |(off, more): &(Vector6<f64>, Matrix6<f64>)| more + off * off.transpose();
+        let more = components.iter().map(spread).sum::<Matrix6<f64>>() / count;
+        if self.hypotheses.iter().all(|h| (h.covariance + more).cholesky().is_some()) {
+            self.hypotheses.iter_mut().for_each(|h| h.covariance += more);
+            self.components = components.iter().map(|(off, own)| (*off, own - more)).collect();
+        }
+        self.unobservable = unobservable(&self.hypotheses[0].covariance, radius);
     }
 
     /// Covariance of the pose's error: a left twist about the object's center in the camera frame \[m², m rad, rad²\].
@@ -178,11 +175,18 @@ impl Posterior {
     pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
         let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
         let mut random = SplitMix64::new(0);
+        let normal = [(Vector6::zeros(), Matrix6::zeros())];
+        let components = if self.components.is_empty() { &normal } else { &self.components[..] };
         let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
-            let Some(factor) = hypothesis.covariance.cholesky() else { return 0.0 };
-            let root = factor.l();
-            let inside = (0..SAMPLES).filter(|_| {
-                let twist = root * Vector6::from_fn(|_, _| random.normal());
+            let roots: Vec<_> = components
+                .iter()
+                .filter_map(|(off, more)| {
+                    Some((*off, (hypothesis.covariance + more).cholesky()?.l()))
+                })
+                .collect();
+            let inside = (0..SAMPLES).filter(|k| {
+                let Some((off, root)) = roots.get(k % roots.len().max(1)) else { return false };
+                let twist = off + root * Vector6::from_fn(|_, _| random.normal());
                 let center = (hypothesis.t_cam_object * place).coords;
                 let pose = perturb_about(&hypothesis.t_cam_object, &center, &twist);
                 let (off, turn) = self.deviation(&pose);
@@ -293,7 +297,7 @@ fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
     };
     let of = |part: &Contribution| {
         let distance = distance(marginalized(part).as_ref().unwrap_or(&part.equations))?;
-        (distance > DISAGREES).then_some(Inconsistency { factor: part.name, distance })
+        Some(Inconsistency { factor: part.name, distance }).filter(Inconsistency::is_significant)
     };
     let parts: Vec<&Contribution> = point.prior.iter().chain(&point.factors).collect();
     parts.into_par_iter().filter_map(of).collect()

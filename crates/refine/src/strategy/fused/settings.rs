@@ -2,7 +2,8 @@
 
 use strum::IntoStaticStr;
 
-use super::posterior::CovarianceInflation;
+use super::fit::FitSettings;
+use super::scales::ScaleSettings;
 use crate::factor::{
     BinaryTouchSettings, ContactPatchSettings, ContactSettings, FreeSpaceSettings,
     HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings,
@@ -130,18 +131,16 @@ pub struct FusedSettings {
     pub restart_angle: f64,
     /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
     pub restart_spacing: f64,
-    /// Whether to ask the evidence if calibrations are exact.
-    pub calibration_test: bool,
-    /// Where the rig is known and nothing fits, search the frame from nothing and refine what that finds, too.
-    pub search_unfit: bool,
-    /// Where something does not fit, try without colors, depth, touch or other cameras, and let that off which was to blame.
-    pub let_off: bool,
-    /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
+    /// Independent measurements that depth points amount to beside the errors that neighbors share, at most.
     pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
     pub prune_margin: f64,
-    /// What makes the posterior as wide as errors are.
-    pub inflation: CovarianceInflation,
+    /// Whether nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
+    pub rotation_unknown: bool,
+    /// By which factors errors may be larger or smaller than their nominal sizes.
+    pub scales: ScaleSettings,
+    /// The test of fit.
+    pub fit: FitSettings,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
     pub model: ModelErrorSettings,
     /// Color and silhouette.
@@ -190,7 +189,7 @@ impl FusedSettings {
 
 impl Default for FusedSettings {
     fn default() -> Self {
-        let (depth, hand_depth) = (PointToPlaneSettings::default(), HandDepthSettings::default());
+        let depth = PointToPlaneSettings::default();
         Self {
             modalities: Modality::ALL.to_vec(),
             views: true,
@@ -241,15 +240,25 @@ impl Default for FusedSettings {
                     model_error: true,
                     contact: true,
                 },
+                Stage {
+                    downsample: 2,
+                    points: 1200,
+                    kernel_scale: 1.0,
+                    solver: Solver { iterations: 10, min_decrease: 0.02 },
+                    hypotheses: 3,
+                    color: true,
+                    measured_noise: true,
+                    model_error: true,
+                    contact: true,
+                },
             ],
             restart_angle: 20f64.to_radians(),
             restart_spacing: 10e-3,
-            calibration_test: true,
-            search_unfit: true,
-            let_off: true,
             max_effective_samples: 50.0,
             prune_margin: 15.0,
-            inflation: CovarianceInflation::default(),
+            rotation_unknown: false,
+            scales: ScaleSettings::default(),
+            fit: FitSettings::default(),
             model: ModelErrorSettings::default(),
             rendering: RenderingSettings {
                 downsample: 1,
@@ -262,10 +271,7 @@ impl Default for FusedSettings {
                 noise: NoiseModel { effective_samples: 20.0, ..depth.noise },
                 ..depth
             },
-            hand_depth: HandDepthSettings {
-                noise: NoiseModel { effective_samples: 200.0, ..hand_depth.noise },
-                ..hand_depth
-            },
+            hand_depth: HandDepthSettings::default(),
             free_space: FreeSpaceSettings::default(),
             tactile: TactileSettings {
                 touch: TouchModel::Contacts(ContactSettings::default()),

@@ -12,7 +12,7 @@ pub struct PosteriorSummary {
     pub probability: f64,
     /// Probability that model and data are right, where that was asked.
     pub fit: Option<f64>,
-    /// What fits worse than it does for right poses, and by how many standard deviations.
+    /// Evidence that agrees less with its model than usual, and how probable a fault of it is.
     pub misfits: Vec<(String, f64)>,
     /// Standard deviations of the place of the object's center in the camera frame \[mm\].
     pub deviation_mm: [f64; 3],
@@ -26,16 +26,13 @@ pub struct PosteriorSummary {
     pub unobserved_mm: Vec<f64>,
     /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
     pub disagreements: Vec<(String, f64)>,
-    /// Evidence that did not fit and was let off: `color`, `depth`, `touch`, `views` (other cameras) or the name of a
-    /// factor from outside.
+    /// Scales of errors: factors by which they are larger than their nominal sizes.
     #[serde(default)]
-    pub let_off: Option<String>,
+    pub scales: Vec<(String, f64)>,
     /// Shares of the posterior that the poses found have, the best first.
     pub weights: Vec<f64>,
     /// Why the search ended.
     pub ending: String,
-    /// Whether all calibrations were found to be exact, and believed to be so.
-    pub exact: bool,
 }
 
 impl From<&Posterior> for PosteriorSummary {
@@ -45,21 +42,24 @@ impl From<&Posterior> for PosteriorSummary {
             |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());
         let inconsistencies = posterior.inconsistencies.iter();
         let fit = posterior.fit.as_ref();
-        let misfits = fit.iter().flat_map(|fit| &fit.misfits);
+        let misfits = fit.iter().flat_map(|fit| fit.misfits());
         Self {
             probability: posterior.probability(),
             fit: fit.map(|fit| fit.probability),
-            misfits: misfits.map(|(what, z)| ((*what).to_owned(), *z)).collect(),
+            misfits: misfits.map(|(what, p)| (what.to_owned(), p)).collect(),
             deviation_mm: (deviation(0) * 1e3).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             covariance: std::array::from_fn(|r| std::array::from_fn(|c| covariance[(r, c)])),
             center_m: posterior.center().into(),
             unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),
             disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
-            let_off: posterior.let_off.map(str::to_owned),
+            scales: posterior
+                .scales
+                .iter()
+                .map(|(g, ln, _)| (g.name().to_owned(), ln.exp()))
+                .collect(),
             weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
             ending: posterior.termination.name().to_owned(),
-            exact: posterior.exact,
         }
     }
 }

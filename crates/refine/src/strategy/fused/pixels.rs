@@ -54,21 +54,6 @@ impl<'a> Pixels<'a> {
         eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN)
     }
 
-    /// Shares of the object's pixels that are in the middle of a patch that the mask lacks, and of one that it has too much, both away from
-    /// the hand.
-    pub(super) fn mask_misfit(&self) -> [f64; 2] {
-        let width = self.view.size().0;
-        let away = self.away_from_hand();
-        let [_, seen] = self.view.sums();
-        [true, false].map(|lacking| {
-            let differs = self.marked(false, |i, p| {
-                away[i] && p.shows_object() == lacking && p.masked != lacking
-            });
-            let patches = eroded(width, &differs, EDGE_MARGIN);
-            patches.iter().filter(|inside| **inside).count() as f64 / seen.z.max(1.0)
-        })
-    }
-
     /// How far the outlines of mask and object are apart, away from the hand \[px\]: the area between them by the length of the object's.
     /// `None` without an outline there.
     pub(crate) fn outline_distance(&self) -> Option<f64> {

@@ -1,0 +1,90 @@
+//! Fault isolation: which sensor, if any, contradicts the others.
+
+use std::ops::ControlFlow;
+
+use strum::IntoStaticStr;
+
+use super::{Fused, FusedSettings, Modality};
+use crate::error::RefineError;
+use crate::problem::State;
+use crate::scene::Frame;
+use crate::strategy::{Estimate, Strategy};
+
+/// A refinement with one kind of evidence excluded.
+#[derive(Clone, Debug)]
+pub struct Diagnosis {
+    /// The evidence left out, `color`, `depth`, `touch`, `views` (other cameras) or the name of a user-defined factor; `None` with all of it.
+    pub excluded: Option<&'static str>,
+    /// What is found without it.
+    pub estimate: Estimate,
+}
+
+/// Sensors that may be at fault: colors of another texture, depth of what shines or lets light through, a skin that feels what is not there, cameras
+/// that were moved. Outlines, and that things are not in the same place, are always evidence.
+const SENSORS: [Sensor; 4] = [Sensor::Color, Sensor::Depth, Sensor::Touch, Sensor::Views];
+
+#[derive(Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
+enum Sensor {
+    Color,
+    Depth,
+    Touch,
+    Views,
+}
+
+impl Sensor {
+    /// Its evidence.
+    fn modalities(self) -> &'static [Modality] {
+        match self {
+            Self::Color => &[Modality::Color],
+            Self::Depth => &[Modality::Depth, Modality::FreeSpace],
+            Self::Touch => &[Modality::Touch, Modality::Quiet],
+            Self::Views => &[],
+        }
+    }
+
+    /// Whether `frame` brings it, and it is used.
+    fn is_in(self, frame: &Frame<'_>, settings: &FusedSettings) -> bool {
+        let used = self.modalities().iter().any(|kind| settings.modalities.contains(kind));
+        match self {
+            Self::Color => used && frame.observation().has_colors(),
+            Self::Depth => used && frame.masked_depths(1000).is_ok(),
+            Self::Touch => {
+                let hand = frame.hand().map(|(_, hand)| hand);
+                used && hand.is_some_and(|h| !h.forces.is_empty() || !h.touch.is_empty())
+            }
+            Self::Views => settings.views && !frame.views().is_empty(),
+        }
+    }
+}
+
+impl Fused {
+    /// Refinements of `initial` in `frame` with all evidence, then without each sensor and without each user-defined factor: if one of them fits where
+    /// all evidence together does not, what it leaves out contradicts the rest.
+    ///
+    /// # Errors
+    /// Those of a run.
+    pub fn diagnose(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+    ) -> Result<Vec<Diagnosis>, RefineError> {
+        let run = |fused: &Self, excluded| {
+            let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()));
+            estimate.map(|estimate| Diagnosis { excluded, estimate })
+        };
+        let mut all = vec![run(self, None)?];
+        for k in 0..self.factors.len() {
+            let mut fused = self.clone();
+            let name = fused.factors.remove(k).name();
+            all.push(run(&fused, Some(name))?);
+        }
+        for sensor in SENSORS.into_iter().filter(|sensor| sensor.is_in(frame, &self.settings)) {
+            let mut fused = self.clone();
+            fused.settings.modalities.retain(|modality| !sensor.modalities().contains(modality));
+            fused.settings.views &= sensor != Sensor::Views;
+            all.push(run(&fused, Some(sensor.into()))?);
+        }
+        Ok(all)
+    }
+}

@@ -1,0 +1,133 @@
+//! The test of fit: whether model and data are what they are taken for, or something else.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use super::scales::{ScaleSettings, Scales};
+use crate::factor::NoiseEstimate;
+use crate::problem::{Contribution, Linearization};
+
+/// Settings of the test of fit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitSettings {
+    /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
+    pub fault: f64,
+    /// Standard deviation of the logarithm of the scale of its residuals then.
+    pub fault_scale: f64,
+}
+
+impl Default for FitSettings {
+    /// One in two hundred, of any size within a factor of ten.
+    fn default() -> Self {
+        Self { fault: 0.005, fault_scale: std::f64::consts::LN_10 }
+    }
+}
+
+/// How the residuals of one kind of evidence, or the errors of a group of calibrations, compare with their nominal size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Consistency {
+    /// The factor's name, `depth-noise`, or the name of a group of errors.
+    pub name: &'static str,
+    /// Logarithm of their scale: ½ ln(χ²/n) of n effective degrees of freedom.
+    pub log_scale: f64,
+    /// Its standard deviation where nothing is wrong.
+    pub sigma: f64,
+    /// Probability that the evidence is of something else.
+    pub fault: f64,
+}
+
+/// The test of fit of a pose.
+///
+/// Where nothing is wrong, the logarithm u of a scale is normal about zero, with the deviation of the prior of scales and that of an estimate by n degrees of
+/// freedom, τ² + 1/2n. Where the evidence is of something else, u > 0 is anything: a broad normal density. What fits better than usual is no fault. Kinds of
+/// evidence fail independently.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Probability that model and data are what they are taken for.
+    pub probability: f64,
+    /// What was compared.
+    pub consistency: Vec<Consistency>,
+}
+
+/// Probability from which a kind of evidence counts as a misfit.
+const MISFIT: f64 = 0.5;
+
+impl Fit {
+    /// Of the solution `point` with these scales; `noise` is that of depth with the nominal deviation of a point.
+    pub(super) fn new(
+        point: &Linearization,
+        scales: &Scales,
+        noise: Option<(NoiseEstimate, f64)>,
+        prior: &ScaleSettings,
+        settings: &FitSettings,
+    ) -> Self {
+        let mut logs = of_factors(point, prior);
+        if let Some((noise, nominal)) = noise {
+            let sigma = prior.noise.hypot((0.5 / noise.effective_samples).sqrt());
+            logs.push(("depth-noise", (noise.sigma / nominal).ln(), sigma));
+        }
+        let common = scales.common(prior);
+        let groups = scales.iter();
+        logs.extend(groups.map(|(group, log, _)| (group.name(), log - common, prior.own)));
+        logs.push(("calibration", common, prior.common));
+        Self::of_logs(&logs, settings)
+    }
+
+    /// Of a solution whose calibrations deviate from their nominal values by a χ² of so many degrees of freedom.
+    pub(crate) fn of_tracked(
+        point: &Linearization,
+        (name, chi_square, degrees): (&'static str, f64, f64),
+        prior: &ScaleSettings,
+        settings: &FitSettings,
+    ) -> Self {
+        let mut logs = of_factors(point, prior);
+        if degrees > 0.0 && chi_square > 0.0 {
+            // Their scale is not learnt: what they have in common counts, too.
+            let sigma = prior.own.hypot((0.5 / degrees).sqrt());
+            logs.push((name, 0.5 * (chi_square / degrees).ln(), sigma));
+        }
+        Self::of_logs(&logs, settings)
+    }
+
+    /// Of logarithms of scales, with their names and their standard deviations where nothing is wrong.
+    fn of_logs(logs: &[(&'static str, f64, f64)], settings: &FitSettings) -> Self {
+        let of = |&(name, log_scale, sigma): &(&'static str, f64, f64)| {
+            let fault = settings.probability_of_fault(log_scale, sigma);
+            Consistency { name, log_scale, sigma, fault }
+        };
+        let consistency: Vec<_> = logs.iter().map(of).collect();
+        let probability = consistency.iter().map(|of| 1.0 - of.fault).product();
+        Self { probability, consistency }
+    }
+
+    /// Evidence that is more probably of something else than not, and how probably, the most probable first.
+    pub fn misfits(&self) -> Vec<(&'static str, f64)> {
+        let mut misfits: Vec<_> = self.consistency.iter().map(|of| (of.name, of.fault)).collect();
+        misfits.retain(|(_, fault)| *fault > MISFIT);
+        misfits.sort_by(|a, b| b.1.total_cmp(&a.1));
+        misfits
+    }
+}
+
+/// The logarithm of the scale of each factor's residuals with its standard deviation; none of factors that amount to less than one measurement.
+fn of_factors(point: &Linearization, prior: &ScaleSettings) -> Vec<(&'static str, f64, f64)> {
+    let of = |part: &Contribution| {
+        let (chi_square, degrees) = (2.0 * part.cost / part.weight, part.equations.degrees());
+        let sigma = prior.noise.hypot((0.5 / degrees).sqrt());
+        let log = 0.5 * (chi_square / degrees).ln();
+        (degrees >= 1.0 && chi_square > 0.0).then_some((part.name, log, sigma))
+    };
+    point.factors.iter().filter_map(of).collect()
+}
+
+impl FitSettings {
+    /// The probability that evidence of this logarithm of a scale, of standard deviation `sigma` where nothing is wrong, is of something else.
+    fn probability_of_fault(&self, log_scale: f64, sigma: f64) -> f64 {
+        let density =
+            |sigma: f64| (-0.5 * (log_scale.max(0.0) / sigma).powi(2)).exp() / (sigma * TAU.sqrt());
+        let (fault, sound) =
+            (self.fault * 2.0 * density(self.fault_scale), (1.0 - self.fault) * density(sigma));
+        fault / (fault + sound)
+    }
+}

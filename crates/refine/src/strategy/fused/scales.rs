@@ -1,0 +1,273 @@
+//! Scales of errors: by which factors they are larger or smaller than their nominal sizes, learnt from each frame (empirical Bayes).
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
+
+use crate::problem::{Block, Linearization, RIDGE, ScaledCholesky};
+
+/// A group of errors that share a scale.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum ErrorGroup {
+    /// The hand's pose in the camera frame.
+    Hand,
+    /// The hand's joint positions.
+    Joints,
+    /// Intrinsics and depth calibration of the camera.
+    Camera,
+    /// Other cameras: where they are, and their calibration.
+    Views,
+    /// The object's surface, and what neighboring depth points have in common.
+    Surface,
+}
+
+impl ErrorGroup {
+    /// All groups.
+    pub const ALL: [Self; 5] = [Self::Hand, Self::Joints, Self::Camera, Self::Views, Self::Surface];
+
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    pub(crate) fn of(block: Block) -> Option<Self> {
+        match block {
+            Block::ObjectPose => None,
+            Block::HandPose => Some(Self::Hand),
+            Block::Joints(_) => Some(Self::Joints),
+            Block::Camera => Some(Self::Camera),
+            Block::View(_) => Some(Self::Views),
+        }
+    }
+}
+
+/// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScaleSettings {
+    /// Standard deviation of c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are known.
+    pub common: f64,
+    /// Standard deviation of each d.
+    pub own: f64,
+    /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
+    pub noise: f64,
+}
+
+impl Default for ScaleSettings {
+    /// Errors within a factor of 2.5 of what is usual, groups alike within a factor of 1.6.
+    fn default() -> Self {
+        Self { common: 0.9, own: 0.3, noise: 0.35 }
+    }
+}
+
+/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scales {
+    groups: Vec<ErrorGroup>,
+    log: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Largest change of a logarithm in one step.
+const LARGEST_STEP: f64 = 1.0;
+/// Steps at most, and the change that ends them.
+const STEPS: usize = 12;
+const CONVERGED: f64 = 1e-2;
+
+impl Default for Scales {
+    /// Nominal.
+    fn default() -> Self {
+        Self { groups: Vec::new(), log: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }
+    }
+}
+
+impl Scales {
+    /// The scale of `group`: 1 if nothing tells of it.
+    pub fn get(&self, group: ErrorGroup) -> f64 {
+        let at = self.groups.iter().position(|known| *known == group);
+        at.map_or(1.0, |k| self.log[k].exp())
+    }
+
+    /// The common part c of the logarithms: its posterior mean given them.
+    pub(super) fn common(&self, settings: &ScaleSettings) -> f64 {
+        let (common, own) = (settings.common.powi(2), settings.own.powi(2));
+        let count = self.log.len() as f64;
+        if count == 0.0 || common == 0.0 {
+            return 0.0;
+        }
+        self.log.sum() / (count + own / common)
+    }
+
+    /// Each group's logarithm of the scale with its standard deviation.
+    pub fn iter(&self) -> impl Iterator<Item = (ErrorGroup, f64, f64)> {
+        let of = |(k, group): (usize, &ErrorGroup)| {
+            (*group, self.log[k], self.covariance[(k, k)].max(0.0).sqrt())
+        };
+        self.groups.iter().enumerate().map(of)
+    }
+}
+
+/// The logarithm u of the scale of a factor's noise whose posterior density is the largest: its residuals have this `chi_square` by so many `degrees` of
+/// freedom at a scale of one, and ln p(u | χ²) = −n u − ½ χ² exp(−2u) − ½ u²/τ². Not below zero: residuals that are smaller than usual are no more independent.
+pub(super) fn log_noise_scale(chi_square: f64, degrees: f64, settings: &ScaleSettings) -> f64 {
+    let precision = settings.noise.powi(-2);
+    let mut log = 0.0;
+    for _ in 0..STEPS {
+        let expected = chi_square * f64::exp(-2.0 * log);
+        let gradient = expected - degrees - precision * log;
+        let step: f64 = gradient / (2.0 * expected + precision);
+        log += step.clamp(-LARGEST_STEP, LARGEST_STEP);
+    }
+    log.max(0.0)
+}
+
+/// The evidence of scales: the quadratic model of a frame's factors about a solution, with its priors apart.
+///
+/// With data of gradient g and Hessian H about the solution, whose calibrations deviate by e from their nominal values, and a prior of precision Λ(s),
+/// the marginal likelihood of the scales (MacKay, 1992) is p(D|s) ∝ |Λ|^½ |H + Λ|^−½ exp(−E), where E is the least value of
+/// gᵀδ + ½ δᵀHδ + ½ (e + δ)ᵀΛ(e + δ).
+pub(super) struct ScaleEvidence {
+    /// Data alone.
+    gradient: DVector<f64>,
+    hessian: DMatrix<f64>,
+    /// Precision at scales of one, and deviation from nominal values.
+    precision: DMatrix<f64>,
+    deviation: DVector<f64>,
+    /// Where the object's pose begins.
+    pose: usize,
+    /// The group of each parameter, as its place in `groups`.
+    of_parameters: Vec<Option<usize>>,
+    groups: Vec<ErrorGroup>,
+    /// Precision of the logarithms' prior.
+    hyperprior: DMatrix<f64>,
+}
+
+impl ScaleEvidence {
+    /// Of the solution `point`, found with errors of the scales `now`; `None` without a prior, or of scales that are known.
+    pub(super) fn new(
+        point: &Linearization,
+        now: &Scales,
+        settings: &ScaleSettings,
+    ) -> Option<Self> {
+        let prior = &point.prior.as_ref()?.equations;
+        let pose = point.equations.offset(Block::ObjectPose)?;
+        let mut of_parameters = Vec::new();
+        let mut groups: Vec<ErrorGroup> = Vec::new();
+        for block in point.equations.blocks() {
+            let group = ErrorGroup::of(*block).filter(|_| block.dimension() > 0);
+            let at = group.map(|group| {
+                groups.iter().position(|known| *known == group).unwrap_or_else(|| {
+                    groups.push(group);
+                    groups.len() - 1
+                })
+            });
+            of_parameters.extend(std::iter::repeat_n(at, block.dimension()));
+        }
+        // What a wrong surface does, a warp of depth does, too: its scale follows from the others' alone.
+        groups.push(ErrorGroup::Surface);
+        let n = groups.len();
+        let common = settings.common.powi(2);
+        let own = settings.own.powi(2);
+        let covariance = DMatrix::from_fn(n, n, |r, c| common + if r == c { own } else { 0.0 });
+        let hyperprior = covariance.cholesky().filter(|_| n > 0)?.inverse();
+        let scale = DVector::from_iterator(
+            of_parameters.len(),
+            of_parameters.iter().map(|at| at.map_or(1.0, |k| now.get(groups[k]))),
+        );
+        let current = prior.hessian();
+        let factor = ScaledCholesky::new(current, RIDGE)?;
+        let deviation = factor.inverse() * prior.gradient();
+        let precision = DMatrix::from_fn(current.nrows(), current.ncols(), |r, c| {
+            current[(r, c)] * scale[r] * scale[c]
+        });
+        Some(Self {
+            // The solution is stationary but for what the solver leaves, which would be blown up where a prior is wide.
+            gradient: -prior.gradient(),
+            hessian: point.equations.hessian() - current,
+            precision,
+            deviation,
+            pose,
+            of_parameters,
+            groups,
+            hyperprior,
+        })
+    }
+
+    /// The precision of the prior with scales of these logarithms.
+    fn precision_at(&self, log: &DVector<f64>) -> DMatrix<f64> {
+        let scale: Vec<f64> =
+            self.of_parameters.iter().map(|at| at.map_or(1.0, |k| (-log[k]).exp())).collect();
+        DMatrix::from_fn(scale.len(), scale.len(), |r, c| {
+            self.precision[(r, c)] * scale[r] * scale[c]
+        })
+    }
+
+    /// The step to the least value, covariance of the posterior, and the precision of the prior.
+    fn posterior(&self, log: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>, DMatrix<f64>)> {
+        let precision = self.precision_at(log);
+        let factor = ScaledCholesky::new(&(&self.hessian + &precision), RIDGE)?;
+        let covariance = factor.inverse();
+        let step = -(&covariance * (&self.gradient + &precision * &self.deviation));
+        Some((step, covariance, precision))
+    }
+
+    /// Gradient of the logarithm of the scales' posterior density by their logarithms, and the information about these. With n errors of a group, whose
+    /// posterior second moments are M, the likelihood's part of the gradient is tr(ΛM) − n over the group; that of Fisher's information about two groups is
+    /// 2 tr(GG), G = 1 − ΛC over both, C being the posterior covariance.
+    fn derivatives(&self, log: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (step, covariance, precision) = self.posterior(log)?;
+        let at = &self.deviation + &step;
+        let n = at.len();
+        let second = &precision * (&covariance + &at * at.transpose());
+        let told = DMatrix::identity(n, n) - &precision * &covariance;
+        let mut gradient = -(&self.hyperprior * log);
+        let mut information = self.hyperprior.clone();
+        let grouped = self.of_parameters.iter().enumerate();
+        let grouped: Vec<_> = grouped.filter_map(|(i, group)| Some((i, (*group)?))).collect();
+        for &(i, k) in &grouped {
+            gradient[k] += second[(i, i)] - 1.0;
+            for &(j, l) in &grouped {
+                information[(k, l)] += 2.0 * told[(i, j)] * told[(j, i)];
+            }
+        }
+        Some((gradient, information))
+    }
+
+    /// The scales of the largest posterior density, by Fisher scoring from `start`.
+    pub(super) fn learn(&self, start: &Scales) -> Option<Scales> {
+        let mut log = DVector::from_fn(self.groups.len(), |k, _| start.get(self.groups[k]).ln());
+        let mut information = self.hyperprior.clone();
+        for _ in 0..STEPS {
+            let (gradient, told) = self.derivatives(&log)?;
+            information = told;
+            let step = information.clone().cholesky()?.solve(&gradient);
+            let step = &step * (LARGEST_STEP / step.amax()).min(1.0);
+            log += &step;
+            if step.amax() < CONVERGED {
+                break;
+            }
+        }
+        let covariance = information.cholesky()?.inverse();
+        Some(Scales { groups: self.groups.clone(), log, covariance })
+    }
+
+    /// Mean (a step from the solution) and covariance of the object's pose under scales that stand for all that are probable, each with the same weight:
+    /// the sigma points of the unscented transform (Julier and Uhlmann, 1997).
+    pub(super) fn pose_moments(
+        &self,
+        scales: &Scales,
+    ) -> Option<Vec<(Vector6<f64>, Matrix6<f64>)>> {
+        let n = scales.log.len();
+        let moments = |log: &DVector<f64>| {
+            let (step, covariance, _) = self.posterior(log)?;
+            let mean: Vector6<f64> = step.fixed_rows::<6>(self.pose).into_owned();
+            Some((mean, covariance.fixed_view::<6, 6>(self.pose, self.pose).into_owned()))
+        };
+        let root = scales.covariance.clone().cholesky()?.l() * (n as f64).sqrt();
+        let columns = (0..n).flat_map(|k| [root.column(k) * 1.0, root.column(k) * -1.0]);
+        columns.map(|off| moments(&(&scales.log + off))).collect()
+    }
+}
