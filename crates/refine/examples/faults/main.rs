@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p prehend-refine --example faults -- DATASET POSES OUT.csv [KIND ...]`
 //!
-//! Without kinds all of them take turns. OUT.csv gets a row a trial, for `docs/scripts/reliability.py`. A pose is wrong if it is more than 5 mm or 5° from the truth, and always with another model; it is
+//! Without kinds all of them take turns. OUT.csv gets a row a trial. A pose is wrong if it is more than 5 mm or 5° from the truth, and always with another model; it is
 //! called right if its probability is above 0.9. The last lines weigh frames with faults and without alike.
 
 mod fault;

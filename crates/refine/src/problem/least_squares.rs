@@ -70,6 +70,13 @@ pub(crate) struct Marginal {
     pub(crate) log_determinant: f64,
 }
 
+impl Contribution {
+    /// χ² of its residuals at a noise scale of one.
+    pub(crate) fn chi_square(&self) -> f64 {
+        2.0 * self.cost / self.weight
+    }
+}
+
 impl Linearization {
     /// The undamped step to the minimum of the quadratic model, by all blocks; `None` if it is not determined.
     pub fn gauss_newton_step(&self) -> Option<DVector<f64>> {

@@ -113,7 +113,7 @@ impl Fit {
 /// The logarithm of the scale of each factor's residuals with its standard deviation; none of factors that amount to less than one measurement.
 fn of_factors(point: &Linearization, prior: &ScaleSettings) -> Vec<(&'static str, f64, f64)> {
     let of = |part: &Contribution| {
-        let (chi_square, degrees) = (2.0 * part.cost / part.weight, part.equations.degrees());
+        let (chi_square, degrees) = (part.chi_square(), part.equations.degrees());
         let sigma = prior.noise.hypot((0.5 / degrees).sqrt());
         let log = 0.5 * (chi_square / degrees).ln();
         (degrees >= 1.0 && chi_square > 0.0).then_some((part.name, log, sigma))

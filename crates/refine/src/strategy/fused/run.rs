@@ -126,7 +126,7 @@ impl<'a> Run<'a> {
     /// Learns the scales of the factors' noise at `solution`.
     fn learn_noise(&mut self, solution: &Solution) {
         for part in &solution.at.factors {
-            let (chi_square, degrees) = (2.0 * part.cost / part.weight, part.equations.degrees());
+            let (chi_square, degrees) = (part.chi_square(), part.equations.degrees());
             let log = log_noise_scale(chi_square, degrees, &self.settings.scales);
             self.noise.insert(part.name, log.exp());
         }

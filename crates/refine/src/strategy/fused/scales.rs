@@ -26,9 +26,6 @@ pub enum ErrorGroup {
 }
 
 impl ErrorGroup {
-    /// All groups.
-    pub const ALL: [Self; 5] = [Self::Hand, Self::Joints, Self::Camera, Self::Views, Self::Surface];
-
     /// The name used in reports.
     pub fn name(self) -> &'static str {
         self.into()
