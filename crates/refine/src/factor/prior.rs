@@ -1,6 +1,6 @@
 //! What is known beforehand: of the pose, and of how accurate calibrations are.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 use prehend_geometry::RobustKernel;
 
@@ -19,6 +19,8 @@ pub struct PriorSettings {
     pub object_rotation: [f64; 3],
     /// From how many of these deviations on errors of the initial pose are outliers (Cauchy's kernel).
     pub object_tails: f64,
+    /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
+    pub object_turned: f64,
     /// The hand at the object's place, in each direction \[m\].
     pub hand_translation: f64,
     /// The hand's rotation about each axis \[rad\].
@@ -102,6 +104,7 @@ impl Default for PriorSettings {
             object_translation: [0.03; 3],
             object_rotation: [0.4; 3],
             object_tails: 3.0,
+            object_turned: 0.2,
             hand_translation: 2.1e-3,
             hand_rotation: 7e-3,
             joints: 0.014,
@@ -173,6 +176,9 @@ pub struct GaussianPrior {
     object_information: Matrix6<f64>,
     /// Width of Cauchy's kernel of the object's displacement and rotation \[standard deviations\]; infinite for none.
     tails: f64,
+    /// Other rotations that the object may have in place of that of the mean, and what each costs \[nat\].
+    others: Vec<UnitQuaternion<f64>>,
+    cost_of_others: f64,
 }
 
 /// The square root of the information.
@@ -216,6 +222,8 @@ impl GaussianPrior {
             whitener: Whitener::Diagonal(sigmas.map(f64::recip)),
             object_information: Matrix6::from_diagonal(&information),
             tails: settings.object_tails,
+            others: Vec::new(),
+            cost_of_others: 0.0,
         })
     }
 
@@ -230,7 +238,39 @@ impl GaussianPrior {
         let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
         let object_information = object;
         let tails = f64::INFINITY;
-        Some(Self { center: mean.center(), mean, layout, whitener, object_information, tails })
+        Some(Self {
+            center: mean.center(),
+            mean,
+            layout,
+            whitener,
+            object_information,
+            tails,
+            others: Vec::new(),
+            cost_of_others: 0.0,
+        })
+    }
+
+    /// A mixture: with this `probability`, the object has one of the rotations `others` in place of that of the mean. Where components overlap, the nearest
+    /// one counts (max-mixture, Olson and Agarwal, 2013).
+    pub(crate) fn with_others(self, others: Vec<UnitQuaternion<f64>>, probability: f64) -> Self {
+        let each = probability / others.len() as f64;
+        Self { others, cost_of_others: ((1.0 - probability) / each).ln(), ..self }
+    }
+
+    /// Where the object is in the component of the mixture that is nearest to `state`, and what that costs \[nat\].
+    fn component(&self, state: &State) -> (Isometry3<f64>, f64) {
+        let rotation = &state.t_cam_object.rotation;
+        let mean = &self.mean.t_cam_object;
+        let mut nearest = (rotation.angle_to(&mean.rotation), *mean, 0.0);
+        for other in &self.others {
+            let angle = rotation.angle_to(other);
+            if angle < nearest.0 {
+                let place = self.center - other * self.mean.object_center.coords;
+                let pose = Isometry3::from_parts(place.into(), *other);
+                nearest = (angle, pose, self.cost_of_others);
+            }
+        }
+        (nearest.1, nearest.2)
     }
 
     /// With outliers of the object's pose from so many standard deviations on: of an object whose deviations are independent of the rest.
@@ -288,8 +328,9 @@ impl Factor for GaussianPrior {
     }
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        let (object, by_object) =
-            self.deviation(&state.t_cam_object, &self.mean.t_cam_object, state);
+        let (expected, cost) = self.component(state);
+        rows.add_constant(cost);
+        let (object, by_object) = self.deviation(&state.t_cam_object, &expected, state);
         let (hand, by_hand) = self.deviation(&state.t_cam_hand, &self.mean.t_cam_hand, state);
         let joints = state.joints.iter().zip(&self.mean.joints).take(self.layout.joints);
         let camera = state.camera.parameters().into_iter().zip(self.mean.camera.parameters());

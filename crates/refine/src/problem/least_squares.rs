@@ -25,8 +25,28 @@ pub struct Problem {
     blocks: Vec<Block>,
     /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
     patches: Option<Arc<SurfacePatches>>,
-    /// Scales of the factors' noise, by name: standard deviations are larger by these.
-    noise: BTreeMap<&'static str, f64>,
+    noise: NoiseScales,
+}
+
+/// Scales of the factors' noise, by name.
+pub(crate) type NoiseScales = BTreeMap<&'static str, NoiseScale>;
+
+/// The scale of a factor's noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NoiseScale {
+    /// By which the standard deviation is larger than usual.
+    pub(crate) scale: f64,
+    /// Negative logarithm of its prior density and of the residuals' normalization, less that at a scale of one \[nat\].
+    pub(crate) cost: f64,
+}
+
+impl NoiseScale {
+    pub(crate) const ONE: Self = Self { scale: 1.0, cost: 0.0 };
+
+    /// What costs are multiplied by.
+    fn weight(&self) -> f64 {
+        self.scale.powi(-2)
+    }
 }
 
 /// A state, the cost there, and its derivatives.
@@ -56,8 +76,8 @@ pub struct Contribution {
     pub name: &'static str,
     /// Its cost \[nat\].
     pub cost: f64,
-    /// What costs were multiplied by: the inverse square of the scale of its noise.
-    pub weight: f64,
+    /// The scale of its noise.
+    pub(crate) noise: NoiseScale,
     /// Its derivatives.
     pub(crate) equations: NormalEquations,
 }
@@ -73,7 +93,7 @@ pub(crate) struct Marginal {
 impl Contribution {
     /// χ² of its residuals at a noise scale of one.
     pub(crate) fn chi_square(&self) -> f64 {
-        2.0 * self.cost / self.weight
+        2.0 * self.cost / self.noise.weight()
     }
 }
 
@@ -82,16 +102,6 @@ impl Linearization {
     pub fn gauss_newton_step(&self) -> Option<DVector<f64>> {
         let factor = ScaledCholesky::new(self.equations.hessian(), RIDGE)?;
         Some(-factor.inverse() * self.equations.gradient())
-    }
-
-    /// Takes the cost as it is with these scales of the factors' noise; derivatives stay.
-    pub(crate) fn reweigh(&mut self, noise: &BTreeMap<&'static str, f64>) {
-        for part in &mut self.factors {
-            let weight = noise.get(part.name).map_or(1.0, |scale| scale.powi(-2));
-            let cost = part.cost / part.weight * weight;
-            self.cost += cost - part.cost;
-            (part.cost, part.weight) = (cost, weight);
-        }
     }
 
     /// Cost of all factors but the prior, of the model as it is \[nat\].
@@ -173,29 +183,33 @@ impl Problem {
     }
 
     /// With standard deviations of the factors' noise larger by these scales.
-    pub(crate) fn with_noise(self, noise: BTreeMap<&'static str, f64>) -> Self {
+    pub(crate) fn with_noise(self, noise: NoiseScales) -> Self {
         Self { noise, ..self }
     }
 
-    /// What the costs of the factor `name` are multiplied by.
-    fn weight(&self, name: &str) -> f64 {
-        self.noise.get(name).map_or(1.0, |scale| scale.powi(-2))
+    fn noise(&self, name: &str) -> NoiseScale {
+        self.noise.get(name).copied().unwrap_or(NoiseScale::ONE)
+    }
+
+    /// A `factor`'s cost where it is `cost` at a noise scale of one.
+    fn scaled(&self, factor: &dyn Factor, cost: f64) -> f64 {
+        let noise = self.noise(factor.name());
+        noise.weight() * cost + noise.cost
     }
 
     /// The cost at `state` of the model as it is \[nat\]. No derivative is computed.
     pub fn cost(&self, state: &State) -> f64 {
-        let cost = |factor: &Arc<dyn Factor>| self.weight(factor.name()) * factor.cost(state);
+        let cost = |factor: &Arc<dyn Factor>| self.scaled(factor.as_ref(), factor.cost(state));
         self.prior.iter().chain(&self.factors).map(cost).sum()
     }
 
     /// The [`cost`](Self::cost) at each of several states.
     pub(crate) fn cost_all(&self, states: &[State]) -> Vec<f64> {
         let factors: Vec<_> = self.prior.iter().chain(&self.factors).collect();
-        let costs: Vec<(f64, Vec<f64>)> = factors
-            .into_par_iter()
-            .map(|factor| (self.weight(factor.name()), factor.cost_all(states)))
-            .collect();
-        let sum = |i: usize| costs.iter().map(|(weight, of_factor)| weight * of_factor[i]).sum();
+        let costs: Vec<(_, Vec<f64>)> =
+            factors.into_par_iter().map(|factor| (factor, factor.cost_all(states))).collect();
+        let sum =
+            |i: usize| costs.iter().map(|(factor, of)| self.scaled(factor.as_ref(), of[i])).sum();
         (0..states.len()).map(sum).collect()
     }
 
@@ -271,11 +285,24 @@ impl Problem {
         cost: f64,
         mut equations: NormalEquations,
     ) -> Contribution {
-        let (name, weight) = (factor.name(), self.weight(factor.name()));
-        if weight != 1.0 {
-            equations *= weight;
+        let (name, noise) = (factor.name(), self.noise(factor.name()));
+        if noise.scale != 1.0 {
+            equations *= noise.weight();
         }
-        Contribution { name, cost: weight * cost, weight, equations }
+        Contribution { name, cost: noise.weight() * cost, noise, equations }
+    }
+
+    /// `at`, with other scales of the factors' noise.
+    pub(crate) fn rescale(&self, at: Linearization, noise: &NoiseScales) -> Linearization {
+        let rescale = |mut part: Contribution| {
+            let noise = noise.get(part.name).copied().unwrap_or(part.noise);
+            let ratio = noise.weight() / part.noise.weight();
+            part.cost *= ratio;
+            part.equations *= ratio;
+            Contribution { noise, ..part }
+        };
+        let factors = at.factors.into_iter().map(rescale).collect();
+        self.sum(&at.state, at.prior, factors)
     }
 
     /// Nothing yet of the derivatives of a sum.
@@ -295,7 +322,7 @@ impl Problem {
         let mut cost = 0.0;
         for part in prior.iter().chain(&factors) {
             equations += &part.equations;
-            cost += part.cost;
+            cost += part.cost + part.noise.cost;
         }
         let mut marginal = None;
         if let Some(patches) = &self.patches {

@@ -22,6 +22,7 @@ pub use factor::Factor;
 pub(crate) use image_warp::{ImageWarp, RADIAL, radial_as_camera};
 pub(crate) use inducing_points::far_apart;
 pub use least_squares::{Contribution, Linearization, Problem, Solution, Solver, Termination};
+pub(crate) use least_squares::{NoiseScale, NoiseScales};
 pub use noise::{NoiseModel, Weighting};
 pub use patches::ModelErrorSettings;
 pub(crate) use patches::SurfacePatches;

@@ -11,9 +11,9 @@ mod trace;
 pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
-    Consistency, Diagnosis, ErrorGroup, Fit, FitSettings, Fused, FusedSettings, Hypothesis,
-    Inconsistency, Modality, Nuisance, Posterior, PosteriorSummary, ScaleSettings, Scales, Stage,
-    UnobservableDirection,
+    Consistency, Diagnosis, DiagnosisSummary, ErrorGroup, Fit, FitSettings, Fused, FusedSettings,
+    Hypothesis, Inconsistency, Modality, NominalSizeError, Nuisance, Posterior, PosteriorSummary,
+    ScaleSettings, Scales, Stage, UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, chi_square_z, problem_of, surface_patches};
 pub use heuristic::{GradientKind, Heuristic};

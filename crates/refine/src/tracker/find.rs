@@ -64,8 +64,8 @@ impl Tracker {
         };
         let frame = &frame;
         let nominal = State::new(frame, &initial)?;
-        let stated = self.stated.of_hand(frame.observation().hand.as_ref());
-        self.settings.fused.prior = match frame.rig() {
+        let stated = self.settings.fused.prior.of_hand(frame.observation().hand.as_ref());
+        self.prior = match frame.rig() {
             Some(rig) => rig.marginal_prior(&nominal, &frame.observation().camera, &stated)?,
             None => stated,
         };
@@ -87,7 +87,7 @@ impl Tracker {
         let fused = Fused::new(self.settings.fused.clone());
         let fused = self.factors.iter().cloned().fold(fused, Fused::with);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
-        let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
+        let prior = GaussianPrior::independent(initial.clone(), &self.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
         let posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
         let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);

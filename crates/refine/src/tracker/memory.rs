@@ -164,6 +164,7 @@ impl TrackState {
         time: Duration,
         nominal: &State,
         in_hand: bool,
+        prior: &PriorSettings,
         settings: &TrackerSettings,
     ) -> Prediction {
         let seconds = time.saturating_sub(self.time).as_secs_f64();
@@ -197,7 +198,7 @@ impl TrackState {
                 *view = view.changed(&before.parameters().map(|p| kept * p));
             }
         }
-        let stated = variances(&settings.fused.prior, layout);
+        let stated = variances(prior, layout);
         let covariance = if layout == self.layout {
             let transition = transition(&with_hand.rotation, kept, layout);
             &transition * &self.covariance * transition.transpose()
@@ -210,8 +211,8 @@ impl TrackState {
         // does is not bounded.
         let mut growth = stated * (1.0 - kept * kept);
         for k in 0..3 {
-            growth[k] = (motion.translation * seconds).powi(2);
-            growth[3 + k] = (motion.rotation * seconds).powi(2);
+            growth[k] = motion.translation.powi(2) * seconds;
+            growth[3 + k] = motion.rotation.powi(2) * seconds;
         }
         let covariance = covariance + DMatrix::from_diagonal(&growth);
         Prediction { state, covariance, layout, zero_velocity_pose: rest, velocity, seconds }

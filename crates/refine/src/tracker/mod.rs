@@ -79,8 +79,8 @@ pub struct Tracker {
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<Arc<Rig>>,
-    /// How accurate calibrations are without one.
-    stated: PriorSettings,
+    /// How accurate the first frame's initial pose and calibrations are.
+    prior: PriorSettings,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
     track: Option<TrackState>,
@@ -125,7 +125,7 @@ impl Tracker {
             factors: Vec::new(),
             backend: None,
             rig: None,
-            stated: settings.fused.prior.clone(),
+            prior: settings.fused.prior.clone(),
             settings,
             initial: None,
             track: None,
@@ -204,7 +204,7 @@ impl Tracker {
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
-        let prediction = track.predict(time, &nominal, in_hand, &self.settings);
+        let prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
@@ -433,7 +433,7 @@ impl Tracker {
     fn posterior(&self, solved: &Solved, nominal: &State) -> Result<Posterior, RefineError> {
         let at = &solved.solution.at;
         let calibrations_of = State { t_cam_object: nominal.t_cam_object, ..at.state.clone() };
-        let stated = GaussianPrior::independent(nominal.clone(), &self.settings.fused.prior)?;
+        let stated = GaussianPrior::independent(nominal.clone(), &self.prior)?;
         let degrees = at.equations.gradient().len().saturating_sub(6);
         let distance = chi_square_z(2.0 * stated.cost(&calibrations_of), degrees);
         let mut posterior = Posterior::new(slice::from_ref(&solved.solution), self.object.radius);
@@ -453,7 +453,6 @@ impl Tracker {
         in_hand: bool,
         level: f64,
     ) -> TrackState {
-        let prior = &self.settings.fused.prior;
-        TrackState::new(time, &solved.solution.at, nominal, in_hand, prior, level)
+        TrackState::new(time, &solved.solution.at, nominal, in_hand, &self.prior, level)
     }
 }

@@ -12,9 +12,9 @@ use crate::strategy::{FusedSettings, Stage};
 /// What is known of how an object moves from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessNoise {
-    /// Standard deviation of a velocity that was not foreseen, in each direction \[m/s\].
+    /// Motion that was not foreseen, a random walk in each direction: its variance grows by the square of this in a second \[m/√s\].
     pub translation: f64,
-    /// Of a rate of rotation that was not foreseen, about each axis \[rad/s\].
+    /// Rotation that was not foreseen, about each axis alike \[rad/√s\].
     pub rotation: f64,
     /// How much of the difference between measured and believed velocity is believed, between 0 and 1.
     pub gain: f64,
@@ -103,8 +103,8 @@ impl Default for TrackerSettings {
                 model_error: true,
                 contact: true,
             },
-            in_hand: ProcessNoise { translation: 0.02, rotation: 0.2, gain: 0.1 },
-            free: ProcessNoise { translation: 0.3, rotation: 2.0, gain: 0.5 },
+            in_hand: ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
+            free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
             calibration_time_constant: 0.2,
             turn_sigma: 0.8f64.to_radians(),
             budget: None,

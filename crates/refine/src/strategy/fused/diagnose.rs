@@ -1,7 +1,9 @@
 //! Fault isolation: which sensor, if any, contradicts the others.
 
+use std::fmt::{self, Display, Formatter};
 use std::ops::ControlFlow;
 
+use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::{Fused, FusedSettings, Modality};
@@ -17,6 +19,52 @@ pub struct Diagnosis {
     pub excluded: Option<&'static str>,
     /// What is found without it.
     pub estimate: Estimate,
+}
+
+/// A [`Diagnosis`] in numbers that fit a line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosisSummary {
+    /// The evidence left out; `None` with all of it.
+    pub excluded: Option<String>,
+    /// Probability that model, data and pose are right.
+    pub probability: f64,
+    /// Distance of the object's origin from where it is with all evidence \[mm\].
+    pub distance_mm: f64,
+    /// Angle between the rotations \[°\].
+    pub angle_deg: f64,
+}
+
+impl DiagnosisSummary {
+    /// Of all that [`Fused::diagnose`] has found.
+    pub fn of(diagnoses: &[Diagnosis]) -> Vec<Self> {
+        let Some(all) = diagnoses.first().map(|all| all.estimate.t_cam_object()) else {
+            return Vec::new();
+        };
+        let of = |diagnosis: &Diagnosis| {
+            let pose = diagnosis.estimate.t_cam_object();
+            let posterior = diagnosis.estimate.posterior.as_ref();
+            Self {
+                excluded: diagnosis.excluded.map(str::to_owned),
+                probability: posterior.map_or(0.0, |posterior| posterior.probability()),
+                distance_mm: 1e3 * (pose.translation.vector - all.translation.vector).norm(),
+                angle_deg: pose.rotation.angle_to(&all.rotation).to_degrees(),
+            }
+        };
+        diagnoses.iter().map(of).collect()
+    }
+}
+
+impl Display for DiagnosisSummary {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { excluded, probability, distance_mm, angle_deg } = self;
+        match excluded {
+            None => write!(f, "with all evidence: probability {probability:.3}"),
+            Some(what) => write!(
+                f,
+                "without {what}: probability {probability:.3}, {distance_mm:.2} mm and {angle_deg:.2}° away"
+            ),
+        }
+    }
 }
 
 /// Sensors that may be at fault: colors of another texture, depth of what shines or lets light through, a skin that feels what is not there, cameras

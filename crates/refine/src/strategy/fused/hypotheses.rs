@@ -8,7 +8,6 @@ use prehend_autodiff::lie::so3_log;
 use super::posterior::principal_directions;
 use crate::factor::NoiseEstimate;
 use crate::problem::{Block, Linearization, Solution, State};
-use crate::scene::Object;
 use crate::symmetry::alternatives;
 
 /// The initial state, and those turned by `angle` \[rad\] about each axis of the camera frame, both ways; that alone if it is zero.
@@ -34,22 +33,29 @@ pub(super) fn hypotheses(initial: &State, others: &[Isometry3<f64>]) -> Vec<Stat
     std::iter::once(initial.clone()).chain(seen.filter(differs)).collect()
 }
 
-/// Half turns about the axes of the model's coordinates, through the center of the object.
-pub(super) fn half_turns(object: &Object) -> [Isometry3<f64>; 3] {
-    [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()].map(|axis| {
-        let turn = UnitQuaternion::from_axis_angle(&axis, PI);
-        let center = object.center.coords;
-        Isometry3::from_parts((center - turn * center).into(), turn)
-    })
+/// Other rotations that files of other conventions have in place of `rotation`: half a turn about each axis of the model, and the transpose.
+pub(super) fn conventions(rotation: &UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>> {
+    let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+    let mut all = axes.map(|axis| rotation * UnitQuaternion::from_axis_angle(&axis, PI)).to_vec();
+    let transposed = rotation.inverse();
+    if all.iter().chain([rotation]).all(|other| transposed.angle_to(other) > ANOTHER) {
+        all.push(transposed);
+    }
+    all
 }
 
-/// `state` with the object turned as the transpose of the initial rotation says.
-pub(super) fn transposed(initial: &State, state: &State) -> Option<State> {
-    let rotation = initial.t_cam_object.rotation.inverse();
-    let place = state.center() - rotation * state.object_center.coords;
-    let t_cam_object = Isometry3::from_parts(place.into(), rotation);
-    let is_other = rotation.angle_to(&state.t_cam_object.rotation) > ANOTHER;
-    is_other.then(|| State { t_cam_object, ..state.clone() })
+/// `state` with the object turned to each of `rotations` about its center, where that is not as it is turned there or by those before.
+pub(super) fn with_rotations(state: &State, rotations: &[UnitQuaternion<f64>]) -> Vec<State> {
+    let mut states: Vec<State> = Vec::new();
+    for rotation in rotations {
+        let is_other = |known: &State| rotation.angle_to(&known.t_cam_object.rotation) > ANOTHER;
+        if states.iter().chain([state]).all(is_other) {
+            let place = state.center() - rotation * state.object_center.coords;
+            let t_cam_object = Isometry3::from_parts(place.into(), *rotation);
+            states.push(State { t_cam_object, ..state.clone() });
+        }
+    }
+    states
 }
 
 /// Rotations farther apart are not the same mode \[rad\].

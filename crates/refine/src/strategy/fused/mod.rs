@@ -4,6 +4,7 @@ mod diagnose;
 mod factors;
 mod fit;
 mod hypotheses;
+mod nominal;
 mod pixels;
 mod posterior;
 mod run;
@@ -16,10 +17,12 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use prehend_autodiff::optimize::LeastSquares;
 
-pub use self::diagnose::Diagnosis;
+pub use self::diagnose::{Diagnosis, DiagnosisSummary};
 use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
 pub use self::fit::{Consistency, Fit, FitSettings};
+use self::hypotheses::conventions;
+pub use self::nominal::NominalSizeError;
 pub(crate) use self::pixels::Pixels;
 pub(crate) use self::posterior::chi_square_z;
 pub use self::posterior::{Hypothesis, Inconsistency, Posterior, UnobservableDirection};
@@ -73,11 +76,17 @@ impl Fused {
         scales: &Scales,
     ) -> Result<GaussianPrior, RefineError> {
         let mut settings = self.settings.prior.of_hand(frame.observation().hand.as_ref());
-        if self.is_rotation_unknown(frame) {
+        let unknown = self.is_rotation_unknown(frame);
+        if unknown {
             settings.object_rotation = [UNKNOWN_ROTATION; 3];
         }
+        let turned = settings.object_turned;
+        let with_others = |prior: GaussianPrior| match turned > 0.0 && !unknown {
+            true => prior.with_others(conventions(&initial.t_cam_object.rotation), turned),
+            false => prior,
+        };
         let Some(rig) = frame.rig() else {
-            return GaussianPrior::scaled(initial.clone(), &settings, scales);
+            return GaussianPrior::scaled(initial.clone(), &settings, scales).map(with_others);
         };
         let object = settings.sigmas(Block::ObjectPose);
         let by_rig = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
@@ -95,7 +104,7 @@ impl Fused {
             let problem = "the covariance is not positive definite".into();
             RefineError::Setting { name: "rig", problem }
         })?;
-        Ok(prior.with_tails(settings.object_tails))
+        Ok(with_others(prior.with_tails(settings.object_tails)))
     }
 
     /// Whether nothing is known of the object's rotation.

@@ -1,6 +1,5 @@
 //! A run of the fused estimator: stages from coarse to fine, and the hypotheses that they take up.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -10,14 +9,14 @@ use super::Fused;
 use super::factors::depth_noise;
 use super::fit::Fit;
 use super::hypotheses::{
-    distinct, half_turns, hypotheses, lowest, restarts, settled, spread, transposed, turned,
+    conventions, distinct, hypotheses, lowest, restarts, settled, spread, turned, with_rotations,
 };
 use super::posterior::{Posterior, log_mass};
-use super::scales::{ErrorGroup, ScaleEvidence, Scales, log_noise_scale};
+use super::scales::{ErrorGroup, ScaleEvidence, Scales, noise_scale};
 use super::settings::{FusedSettings, Stage};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
-use crate::problem::{Problem, Solution, Solver, State, Termination};
+use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
 use crate::scene::Frame;
 use crate::strategy::estimate::Recorder;
 use crate::strategy::{Estimate, Iteration, Observer};
@@ -30,8 +29,11 @@ const MOST_ALTERNATIVES: usize = 64;
 /// … and later ones so many times as many as else.
 const WITH_ALTERNATIVES: usize = 2;
 
-/// Steps of geometry alone that an alternative pose is given before it is compared.
+/// Steps of geometry alone that a pose of another convention is given before it is compared, and from how many times the best one's cost on it is given up.
 const ALTERNATIVE_STEPS: usize = 4;
+const HOPELESS: f64 = 4.0;
+/// The factor of color and silhouette.
+const IMAGE: &str = "rendering";
 
 /// A refinement under way.
 pub(super) struct Run<'a> {
@@ -43,8 +45,7 @@ pub(super) struct Run<'a> {
     settings: FusedSettings,
     scales: Scales,
     prior: Arc<GaussianPrior>,
-    /// Scales of the factors' noise.
-    noise: BTreeMap<&'static str, f64>,
+    noise: NoiseScales,
 }
 
 impl<'a> Run<'a> {
@@ -62,7 +63,7 @@ impl<'a> Run<'a> {
             frame,
             initial,
             scales,
-            noise: BTreeMap::new(),
+            noise: NoiseScales::new(),
         })
     }
 
@@ -77,13 +78,21 @@ impl<'a> Run<'a> {
         }
         let mut found = Vec::new();
         let mut flow = ControlFlow::Continue(());
+        let mut before = None;
         for index in 0..count {
-            found = self.stage(index, &states)?;
-            states = self.next_starts(index, &found);
+            let problem = self.problem(index, &states[0])?;
+            found = self.solve(index, &problem, &states);
+            if let (1, Some(geometry)) = (index, &before) {
+                found.extend(self.other_conventions(geometry, &problem, &found[0]));
+                found = distinct(found, self.radius());
+            }
+            found = self.conclude(index, found)?;
+            states = self.next_starts(index, self.initial, &found);
             flow = record(&mut recorder, &found[0]);
             if flow.is_break() {
                 break;
             }
+            before = Some(problem);
         }
         let radius = self.radius();
         let evidence = match self.frame.rig() {
@@ -123,13 +132,24 @@ impl<'a> Run<'a> {
         ScaleEvidence::new(&solution.at, &self.scales, &self.settings.scales)
     }
 
-    /// Learns the scales of the factors' noise at `solution`.
-    fn learn_noise(&mut self, solution: &Solution) {
-        for part in &solution.at.factors {
-            let (chi_square, degrees) = (part.chi_square(), part.equations.degrees());
-            let log = log_noise_scale(chi_square, degrees, &self.settings.scales);
-            self.noise.insert(part.name, log.exp());
-        }
+    /// Scales of the factors' noise at `solution`.
+    fn noise_at(&self, solution: &Solution) -> NoiseScales {
+        let parts = solution.at.factors.iter();
+        let scale = |chi, degrees| noise_scale(chi, degrees, &self.settings.scales);
+        parts.map(|p| (p.name, scale(p.chi_square(), p.equations.degrees()))).collect()
+    }
+
+    /// Solutions of `problem`, each with the scales of noise that fit it best, and no two the same, that of the lowest cost first.
+    fn compared(&self, problem: &Problem, found: Vec<Solution>) -> Vec<Solution> {
+        let with_own = |solution: Solution| {
+            let noise = self.noise_at(&solution);
+            let mut at = problem.rescale(solution.at, &noise);
+            let image = at.factors.iter().filter(|part| part.name == IMAGE);
+            let of_image: f64 = image.map(|part| part.cost + part.noise.cost).sum();
+            at.cost += (self.settings.image_between_modes - 1.0) * of_image;
+            Solution { at, ..solution }
+        };
+        distinct(found.into_iter().map(with_own).collect(), self.radius())
     }
 
     /// Learns scales at `solution`, and takes errors to be of these sizes from here on.
@@ -159,34 +179,31 @@ impl<'a> Run<'a> {
         Ok(problem.with_prior(self.prior.clone()))
     }
 
-    /// The distinct solutions of stage `index` from `states`, the best one first.
-    fn stage(&mut self, index: usize, states: &[State]) -> Result<Vec<Solution>, RefineError> {
-        let problem = self.problem(index, &states[0])?;
+    /// The distinct solutions of `problem`, that of stage `index`, from `states`, the best one first.
+    fn solve(&self, index: usize, problem: &Problem, states: &[State]) -> Vec<Solution> {
         let solver = &self.stages()[index].solver;
-        let states = &self.taken_up(index, states, &problem);
-        let found = if index == 0 && !self.is_rotation_unknown {
-            let mut all = problem.solve_all(&states[..1], solver);
-            let noise = || depth_noise(self.frame, &all[0].at.state, &self.fused.settings);
-            if !settled(&all[0].at, noise, self.radius()) {
-                all.extend(problem.solve_all(&states[1..], solver));
-            }
-            all
-        } else {
-            problem.solve_all(states, solver)
-        };
-        let mut found = distinct(found, self.radius());
-        // Not by the first stage, which sees no colors.
+        let states = &self.taken_up(index, states, problem);
         if index > 0 {
-            self.learn_noise(&found[0]);
-            for solution in &mut found {
-                solution.at.reweigh(&self.noise);
-            }
-            if index == 1 {
-                let problem = problem.with_noise(self.noise.clone());
-                let others = self.alternatives(&problem, &found[0], solver)?;
-                found.extend(others);
-            }
-            found = distinct(found, self.radius());
+            return self.compared(problem, problem.solve_all(states, solver));
+        }
+        // Not so in the first stage, which sees no colors.
+        let first = if self.is_rotation_unknown { states.len() } else { 1 };
+        let mut found = problem.solve_all(&states[..first], solver);
+        let noise = || depth_noise(self.frame, &found[0].at.state, &self.fused.settings);
+        if first < states.len() && !settled(&found[0].at, noise, self.radius()) {
+            found.extend(problem.solve_all(&states[first..], solver));
+        }
+        distinct(found, self.radius())
+    }
+
+    /// Of what stage `index` has found, the modes that are taken further, the best one first; sizes of errors are learnt there.
+    fn conclude(
+        &mut self,
+        index: usize,
+        mut found: Vec<Solution>,
+    ) -> Result<Vec<Solution>, RefineError> {
+        if index > 0 {
+            self.noise = self.noise_at(&found[0]);
             let limit = found[0].at.cost + self.settings.prune_margin;
             // One that is still on its way down is not judged yet, and the best stays whatever its cost.
             let mut best = true;
@@ -208,32 +225,43 @@ impl<'a> Run<'a> {
         Ok(found)
     }
 
-    /// Other modes than `best`, a solution of `problem`: half turns about the model's axes, and the transpose of the initial rotation, which some
-    /// files have in its place. Those are given up that are not within reach of it after a few steps of geometry alone.
-    fn alternatives(
-        &mut self,
+    /// Modes beside `best`, a solution of `problem`, that of the second stage, with initial rotations of other conventions. After a few steps of
+    /// `geometry`, that of the first stage, the best of them is found as that of a right initial rotation is, if it is better than `best`.
+    fn other_conventions(
+        &self,
+        geometry: &Problem,
         problem: &Problem,
         best: &Solution,
-        solver: &Solver,
-    ) -> Result<Vec<Solution>, RefineError> {
+    ) -> Vec<Solution> {
         if self.is_rotation_unknown {
-            return Ok(Vec::new());
+            return Vec::new();
         }
+        let others =
+            with_rotations(self.initial, &conventions(&self.initial.t_cam_object.rotation));
         let state = &best.at.state;
-        let mut others = turned(std::slice::from_ref(state), &half_turns(self.frame.object()));
-        others.extend(transposed(self.initial, state));
-        let settings = self.settings.clone();
-        let coarse = self.problem(0, state)?;
-        self.settings = settings;
+        let of_best = with_rotations(state, &conventions(&state.t_cam_object.rotation)[..3]);
+        let starts = [others.clone(), of_best].concat();
         let steps = Solver { iterations: ALTERNATIVE_STEPS, ..self.stages()[0].solver };
-        let near: Vec<State> =
-            coarse.solve_all(&others, &steps).into_iter().map(|s| s.at.state).collect();
-        let costs = problem.cost_all(&near);
-        let limit = best.at.cost + self.settings.prune_margin;
-        let all = near.into_iter().zip(costs);
-        let kept: Vec<State> =
-            all.filter(|(_, cost)| *cost < limit).map(|(state, _)| state).collect();
-        Ok(problem.solve_all(&kept, solver))
+        let near = geometry.solve_all(&starts, &steps).into_iter().map(|found| found.at.state);
+        let near: Vec<State> = near.collect();
+        let (costs, limit) = (problem.cost_all(&near), HOPELESS * problem.cost(&best.at.state));
+        let hopeful = near.into_iter().zip(costs).filter(|(_, cost)| *cost < limit);
+        let (near, costs): (Vec<State>, Vec<f64>) = hopeful.unzip();
+        let near = lowest(&near, &costs, others.len());
+        let mut found = self.compared(problem, problem.solve_all(&near, &self.stages()[1].solver));
+        let limit = best.at.cost + 2.0 * self.settings.prune_margin;
+        found.retain(|other| other.at.cost < limit);
+        if let Some(winner) = found.first().filter(|other| other.at.cost < best.at.cost) {
+            let rotation = winner.at.state.t_cam_object.rotation;
+            let angle = |state: &&State| state.t_cam_object.rotation.angle_to(&rotation);
+            let start = others.iter().min_by(|a, b| angle(a).total_cmp(&angle(b)));
+            if let Some(start) = start {
+                let starts = restarts(start, self.settings.restart_angle);
+                let first = self.solve(0, geometry, &starts);
+                found.extend(self.solve(1, problem, &self.next_starts(0, start, &first)));
+            }
+        }
+        found
     }
 
     /// Those of `states` that stage `index`, which solves `problem`, takes up.
@@ -249,13 +277,12 @@ impl<'a> Run<'a> {
         lowest(states, &problem.cost_all(states), limit)
     }
 
-    /// Where the stage after `index` starts, which found these solutions.
-    fn next_starts(&self, index: usize, found: &[Solution]) -> Vec<State> {
+    /// Where the stage after `index` starts, which found these solutions from `initial`.
+    fn next_starts(&self, index: usize, initial: &State, found: &[Solution]) -> Vec<State> {
         let mut states: Vec<State> = found.iter().map(|found| found.at.state.clone()).collect();
         let Some(next) = self.stages().get(1).filter(|_| index == 0) else { return states };
         // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
         // what little is seen of the object may have led astray.
-        let initial = self.initial;
         if self.is_rotation_unknown {
             // Which of them it is, colors say, that were not considered yet.
             states.extend(turned(&states, self.frame.object().near_symmetries()));

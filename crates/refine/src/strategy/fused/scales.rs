@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-use crate::problem::{Block, Linearization, RIDGE, ScaledCholesky};
+use crate::problem::{Block, Linearization, NoiseScale, RIDGE, ScaledCholesky};
 
 /// A group of errors that share a scale.
 #[derive(
@@ -107,9 +107,12 @@ impl Scales {
     }
 }
 
-/// The logarithm u of the scale of a factor's noise whose posterior density is the largest: its residuals have this `chi_square` by so many `degrees` of
-/// freedom at a scale of one, and ln p(u | χ²) = −n u − ½ χ² exp(−2u) − ½ u²/τ². Not below zero: residuals that are smaller than usual are no more independent.
-pub(super) fn log_noise_scale(chi_square: f64, degrees: f64, settings: &ScaleSettings) -> f64 {
+/// The scale exp(u) of a factor's noise whose posterior density is the largest: its residuals have this `chi_square` by so many `degrees` of freedom at a
+/// scale of one, and −ln p(u | χ²) = n u + ½ χ² exp(−2u) + ½ u²/τ². Not below one: residuals that are smaller than usual are no more independent.
+pub(super) fn noise_scale(chi_square: f64, degrees: f64, settings: &ScaleSettings) -> NoiseScale {
+    if settings.noise == 0.0 {
+        return NoiseScale::ONE;
+    }
     let precision = settings.noise.powi(-2);
     let mut log = 0.0;
     for _ in 0..STEPS {
@@ -118,7 +121,8 @@ pub(super) fn log_noise_scale(chi_square: f64, degrees: f64, settings: &ScaleSet
         let step: f64 = gradient / (2.0 * expected + precision);
         log += step.clamp(-LARGEST_STEP, LARGEST_STEP);
     }
-    log.max(0.0)
+    let log = log.max(0.0);
+    NoiseScale { scale: log.exp(), cost: degrees * log + 0.5 * precision * log * log }
 }
 
 /// The evidence of scales: the quadratic model of a frame's factors about a solution, with its priors apart.

@@ -135,6 +135,9 @@ pub struct FusedSettings {
     pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
     pub prune_margin: f64,
+    /// By how much more color and silhouette tell of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as errors of
+    /// light and shape, is nearly the same in all modes.
+    pub image_between_modes: f64,
     /// Whether nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
     pub rotation_unknown: bool,
     /// By which factors errors may be larger or smaller than their nominal sizes.
@@ -256,6 +259,7 @@ impl Default for FusedSettings {
             restart_spacing: 10e-3,
             max_effective_samples: 50.0,
             prune_margin: 15.0,
+            image_between_modes: 2.0,
             rotation_unknown: false,
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),

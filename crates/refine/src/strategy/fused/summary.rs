@@ -31,6 +31,9 @@ pub struct PosteriorSummary {
     pub scales: Vec<(String, f64)>,
     /// Shares of the posterior that the poses found have, the best first.
     pub weights: Vec<f64>,
+    /// The poses that have them: object → camera, homogeneous, row by row \[m\].
+    #[serde(default)]
+    pub modes: Vec<[[f64; 4]; 4]>,
     /// Why the search ended.
     pub ending: String,
 }
@@ -59,6 +62,11 @@ impl From<&Posterior> for PosteriorSummary {
                 .map(|(g, ln, _)| (g.name().to_owned(), ln.exp()))
                 .collect(),
             weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
+            modes: posterior
+                .hypotheses
+                .iter()
+                .map(|h| h.t_cam_object.to_homogeneous().transpose().into())
+                .collect(),
             ending: posterior.termination.name().to_owned(),
         }
     }

@@ -17,8 +17,8 @@ use prehend_refine::data::{
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::scene::Warning;
-use prehend_refine::strategy::{PosteriorSummary, Trace};
-use prehend_refine::{Method, refine};
+use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
+use prehend_refine::{Method, State, refine};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -55,6 +55,9 @@ struct Refined {
     object_warnings: Vec<String>,
     /// How sure the pose is, where the method knows.
     confidence: Option<PosteriorSummary>,
+    /// What is found without each sensor, if that was asked.
+    #[serde(default)]
+    diagnosis: Vec<DiagnosisSummary>,
     /// Kept only if something will be made of it: it is long.
     trace: Option<Trace>,
 }
@@ -95,6 +98,10 @@ impl DatasetRun<'_> {
                             done.object_warnings.iter().for_each(|w| warn(&bar, &object, w));
                         }
                         done.warnings.iter().for_each(|w| warn(&bar, target, w));
+                        if !json {
+                            let lines = done.diagnosis.iter().map(|d| format!("{target}: {d}"));
+                            bar.suspend(|| lines.into_iter().try_for_each(say))?;
+                        }
                         // First the time: of a frame whose record is lost, a second line is no harm.
                         times.add(index, &target.to_string(), name, seconds)?;
                         refined.insert(index, journal.append(index, &done)?);
@@ -170,6 +177,7 @@ impl DatasetRun<'_> {
             "seed": self.options.seed,
             "backend": self.backend.name(),
             "history kept": self.keeps_trace(),
+            "diagnosed": self.output.diagnose,
         })))
     }
 
@@ -187,6 +195,12 @@ impl DatasetRun<'_> {
         }
         let found = refine(&frame, initial, &self.method)?;
         let seconds = start.elapsed().as_secs_f64();
+        let diagnosis = match &self.method {
+            Method::Fused(fused) if self.output.diagnose => {
+                DiagnosisSummary::of(&fused.diagnose(&frame, &State::new(&frame, initial)?)?)
+            }
+            _ => Vec::new(),
+        };
         let [object_warnings, warnings] = input
             .warnings(initial)
             .map(|warnings| warnings.iter().map(Warning::to_string).collect());
@@ -197,6 +211,7 @@ impl DatasetRun<'_> {
             warnings,
             object_warnings,
             confidence: found.posterior.as_ref().map(PosteriorSummary::from),
+            diagnosis,
             trace: self.keeps_trace().then_some(found.trace),
         };
         if !refined.pose.is_finite() {
@@ -288,12 +303,13 @@ fn frame_report(
         report::SECONDS.figure(seconds),
         report::ITERATIONS.figure(Some(refined.iterations as f64)),
     ]);
-    let remarks: Vec<String> =
+    let mut remarks: Vec<String> =
         refined.object_warnings.iter().chain(&refined.warnings).cloned().collect();
     let mut flags = confidence.map_or_else(Vec::new, report::flags);
     if !remarks.is_empty() {
         flags.push("warning".to_owned());
     }
+    remarks.extend(refined.diagnosis.iter().map(DiagnosisSummary::to_string));
     let posterior = refined.confidence.clone();
     let (name, status) = (job.target.to_string(), String::new());
     (FrameReport { name, status, flags, remarks, figures, posterior }, fault)
@@ -327,6 +343,7 @@ fn summary(job: &Job, refined: &Refined, seconds: Option<f64>) -> serde_json::Va
         "quaternion_wxyz": refined.pose.quaternion_wxyz,
         "warnings": warnings,
         "confidence": refined.confidence,
+        "diagnosis": refined.diagnosis,
         "trace": refined.trace,
     })
 }

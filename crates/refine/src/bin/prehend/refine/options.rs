@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 use prehend_refine::strategy::GradientKind;
 use prehend_refine::{Method, NamedMethod};
@@ -39,6 +39,10 @@ pub(super) struct OutputOptions {
     /// with all threads
     #[arg(long, conflicts_with = "frame")]
     pub(super) time: bool,
+    /// Also refine each frame without each of its sensors, and write how sure these poses are and how far away: a pose that fits without one
+    /// of them alone says which is at fault
+    #[arg(long, conflicts_with = "frame")]
+    pub(super) diagnose: bool,
     /// Discard what an interrupted run with other settings left, instead of refusing
     #[arg(long, conflicts_with = "frame")]
     pub(super) restart: bool,
@@ -55,6 +59,13 @@ pub(super) struct MethodOptions {
     /// [default: up to 10 a stage; robust-icp: 60; others: 400]
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
+    /// How large errors of one kind are if nothing else is known, of the fused method: such as hand.translation=5mm, joints=0.3deg, depth.scale=1% or
+    /// model=0 for an exact one; may be repeated. By what factor they are larger or smaller in a frame is learnt from it
+    #[arg(long, value_name = "NAME=SIZE", value_parser = name_and_size)]
+    noise: Vec<(String, String)>,
+    /// Trust no initial rotation: the fused method then tries all that look alike by shape
+    #[arg(long)]
+    rotation_unknown: bool,
     /// Run all the iterations, however small the steps become
     #[arg(long)]
     exhaustive: bool,
@@ -81,6 +92,12 @@ fn method_help() -> String {
     }
     text + "\n\n[default: fused; with --terms, combined]"
         + "\n\nAlso fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
+}
+
+/// A name and a size with = between them.
+fn name_and_size(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').ok_or("not of the form NAME=SIZE")?;
+    Ok((parts.0.to_owned(), parts.1.to_owned()))
 }
 
 impl MethodOptions {
@@ -117,6 +134,17 @@ impl MethodOptions {
         }
         if self.exhaustive {
             method.set_exhaustive();
+        }
+        if self.rotation_unknown || !self.noise.is_empty() {
+            let Method::Fused(fused) = &mut method else {
+                let option = if self.rotation_unknown { "--rotation-unknown" } else { "--noise" };
+                bail!("{option}: is of the fused method, not of {}", named.name);
+            };
+            fused.settings.rotation_unknown = self.rotation_unknown;
+            for (name, size) in &self.noise {
+                let set = fused.settings.set_nominal_size(name, size);
+                set.with_context(|| format!("--noise {name}={size}"))?;
+            }
         }
         Ok(method)
     }

@@ -1,0 +1,151 @@
+//! Nominal sizes of errors by name, as `--noise` has them.
+
+use thiserror::Error;
+
+use super::FusedSettings;
+
+/// Why a nominal size is not taken.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NominalSizeError {
+    /// No size has this name.
+    #[error("there is no size {name:?}: one of {}", names().join(", "))]
+    Name {
+        /// What was given.
+        name: String,
+    },
+    /// It is not a number with a unit that fits.
+    #[error("{value:?} is not a size: a number that is not negative, with one of the units {}", units.join(", "))]
+    Value {
+        /// What was given.
+        value: String,
+        /// What fits.
+        units: Vec<&'static str>,
+    },
+}
+
+/// What a size is a size of.
+#[derive(Clone, Copy)]
+enum Quantity {
+    Length,
+    Angle,
+    Ratio,
+}
+
+impl Quantity {
+    /// Its units, with what they are in SI units. A joint may have either of two kinds.
+    fn units(self) -> &'static [(&'static str, f64)] {
+        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+        match self {
+            Self::Length => &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
+            Self::Angle => &[("deg", DEGREE), ("mrad", 1e-3), ("rad", 1.0)],
+            Self::Ratio => &[("%", 1e-2), ("", 1.0)],
+        }
+    }
+}
+
+type Field = fn(&mut FusedSettings) -> Vec<&mut f64>;
+
+/// All sizes: standard deviations of the errors, for most objects and rigs.
+const SIZES: [(&str, Quantity, Field); 15] = [
+    ("object.translation", Quantity::Length, |s| s.prior.object_translation.iter_mut().collect()),
+    ("object.rotation", Quantity::Angle, |s| s.prior.object_rotation.iter_mut().collect()),
+    ("hand.translation", Quantity::Length, |s| vec![&mut s.prior.hand_translation]),
+    ("hand.rotation", Quantity::Angle, |s| vec![&mut s.prior.hand_rotation]),
+    ("joints", Quantity::Angle, |s| vec![&mut s.prior.joints]),
+    ("depth.scale", Quantity::Ratio, |s| vec![&mut s.prior.depth_scale]),
+    ("depth.bias", Quantity::Length, |s| vec![&mut s.prior.depth_bias]),
+    ("depth.noise", Quantity::Length, |s| vec![&mut s.depth.noise.sigma]),
+    ("camera.principal-point", Quantity::Ratio, |s| vec![&mut s.prior.principal_point]),
+    ("camera.focal-length", Quantity::Ratio, |s| vec![&mut s.prior.focal_scale]),
+    ("camera.aspect", Quantity::Ratio, |s| vec![&mut s.prior.aspect]),
+    ("view.translation", Quantity::Length, |s| vec![&mut s.prior.view_translation]),
+    ("view.rotation", Quantity::Angle, |s| vec![&mut s.prior.view_rotation]),
+    ("model", Quantity::Length, |s| vec![&mut s.model.gp_sigma]),
+    ("touch", Quantity::Length, |s| match &mut s.tactile.touch {
+        crate::factor::TouchModel::Contacts(contacts) => vec![&mut contacts.sigma],
+        crate::factor::TouchModel::Taxels(noise) => vec![&mut noise.sigma],
+        crate::factor::TouchModel::Nothing => Vec::new(),
+    }),
+];
+
+/// Standard deviation of what is exact, as a share of the nominal one.
+const EXACT: f64 = 1e-4;
+
+fn names() -> Vec<&'static str> {
+    SIZES.iter().map(|size| size.0).collect()
+}
+
+impl FusedSettings {
+    /// Replaces the nominal size of the errors called `name` by `value`, a number with a unit such as `5mm`, `0.3deg` or `1%`; `0` for exact.
+    ///
+    /// By which factor they are larger or smaller is still learnt, as far as [`scales`](Self::scales) lets it.
+    ///
+    /// # Errors
+    /// [`NominalSizeError`] if there is no such size, or `value` is none.
+    ///
+    /// ```
+    /// use prehend_refine::strategy::FusedSettings;
+    ///
+    /// let mut settings = FusedSettings::default();
+    /// settings.set_nominal_size("hand.translation", "5mm")?;
+    /// assert_eq!(settings.prior.hand_translation, 5e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn set_nominal_size(&mut self, name: &str, value: &str) -> Result<(), NominalSizeError> {
+        let Some((_, quantity, field)) = SIZES.iter().find(|size| size.0 == name) else {
+            return Err(NominalSizeError::Name { name: name.to_owned() });
+        };
+        let units = quantity.units();
+        let end = value.find(|c: char| c.is_alphabetic() && c != 'e' || c == '%');
+        let (number, unit) = value.split_at(end.unwrap_or(value.len()));
+        let number = number.trim().parse::<f64>().ok().filter(|n| n.is_finite() && *n >= 0.0);
+        let factor = units.iter().find(|known| known.0 == unit).map(|known| known.1);
+        let size = match (number, factor) {
+            (Some(0.0), _) if unit.is_empty() => Some(0.0),
+            (Some(number), Some(factor)) => Some(number * factor),
+            _ => None,
+        };
+        let size = size.ok_or_else(|| NominalSizeError::Value {
+            value: value.to_owned(),
+            units: units.iter().map(|known| known.0).filter(|unit| !unit.is_empty()).collect(),
+        })?;
+        for field in field(self) {
+            *field = if size > 0.0 { size } else { EXACT * *field };
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_size_is_set_in_its_units() {
+        for (name, quantity, field) in SIZES {
+            let mut settings = FusedSettings::default();
+            for &(unit, factor) in quantity.units() {
+                settings.set_nominal_size(name, &format!("2.5{unit}")).unwrap();
+                assert!(!field(&mut settings).is_empty());
+                assert!(field(&mut settings).iter().all(|size| **size == 2.5 * factor));
+            }
+            settings.set_nominal_size(name, "0").unwrap();
+            assert!(field(&mut settings).iter().all(|size| **size > 0.0 && **size < 1e-3));
+        }
+    }
+
+    #[test]
+    fn what_is_no_size_is_refused() {
+        let mut settings = FusedSettings::default();
+        for value in ["", "mm", "-1mm", "nanmm", "1", "1deg", "1e400mm"] {
+            let error = settings.set_nominal_size("hand.translation", value).unwrap_err();
+            assert!(error.to_string().ends_with("one of the units mm, cm, m"), "{value} {error}");
+        }
+        let error = settings.set_nominal_size("hand.rotaton", "1deg").unwrap_err();
+        assert!(error.to_string().contains("hand.rotation"));
+        assert_eq!(settings, FusedSettings::default());
+        settings.set_nominal_size("depth.bias", "1e-3m").unwrap();
+        assert_eq!(settings.prior.depth_bias, 1e-3);
+    }
+}
