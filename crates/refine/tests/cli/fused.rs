@@ -70,3 +70,45 @@ fn a_hypothesis_that_fits_better_is_returned() {
     place.succeed(refine);
     assert_right(&place, 0.1, 1.0);
 }
+
+#[test]
+fn sizes_of_errors_are_taken_from_the_command_line() {
+    let place = Workplace::new();
+    let deviation = |options: &str| {
+        let json = place.succeed(&format!("{REFINE} --restart --json --image 0 {options}"));
+        let told: Value = serde_json::from_str(&json).unwrap();
+        let all = told["frames"][0]["confidence"]["deviation_mm"].as_array().unwrap().clone();
+        all.iter().map(|d| d.as_f64().unwrap()).sum::<f64>()
+    };
+    let (nominal, rough) = (deviation(""), deviation("--noise depth.scale=4% --noise model=3mm"));
+    assert!(rough > 1.2 * nominal, "{nominal} {rough}");
+    for (options, expected) in [
+        ("--noise hand.translation=5", "--noise hand.translation=5: \"5\" is not a size: "),
+        ("--noise hand=5mm", "there is no size \"hand\": one of object.translation, "),
+        ("--noise joints", "not of the form NAME=SIZE"),
+        ("--method icp --noise joints=1deg", "--noise: is of the fused method, not of icp"),
+        ("--method icp --rotation-unknown", "--rotation-unknown: is of the fused method"),
+    ] {
+        let said = place.prehend(&format!("{REFINE} --restart {options}"));
+        assert!(said.code != 0 && said.err.contains(expected), "{options}: {}", said.err);
+    }
+}
+
+#[test]
+fn what_contradicts_the_other_sensors_is_told() {
+    let place = Workplace::new();
+    let options = "--image 0 --rotation-unknown --diagnose";
+    let said = place.succeed(&format!("{REFINE} {options}"));
+    assert!(said.contains("with all evidence: probability 0."), "{said}");
+    assert!(said.contains("without depth: probability 0."), "{said}");
+    let json = place.succeed(&format!("{REFINE} {options} --restart --json"));
+    let told: Value = serde_json::from_str(&json).unwrap();
+    let frame = &told["frames"][0];
+    assert!(frame["diagnosis"][0]["excluded"].is_null());
+    assert_eq!(frame["diagnosis"][0]["distance_mm"], 0.0);
+    // All poses that fit are told.
+    let confidence = &frame["confidence"];
+    let [weights, modes] = ["weights", "modes"].map(|key| confidence[key].as_array().unwrap());
+    assert_eq!(weights.len(), modes.len());
+    assert_eq!(modes[0][3], serde_json::json!([0.0, 0.0, 0.0, 1.0]));
+}

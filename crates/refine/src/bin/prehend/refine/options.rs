@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::{anyhow, bail};
 use clap::Args;
 use prehend_refine::strategy::GradientKind;
 use prehend_refine::{Method, NamedMethod};
@@ -143,7 +143,7 @@ impl MethodOptions {
             fused.settings.rotation_unknown = self.rotation_unknown;
             for (name, size) in &self.noise {
                 let set = fused.settings.set_nominal_size(name, size);
-                set.with_context(|| format!("--noise {name}={size}"))?;
+                set.map_err(|error| anyhow!("--noise {name}={size}: {error}"))?;
             }
         }
         Ok(method)
