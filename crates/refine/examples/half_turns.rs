@@ -79,7 +79,7 @@ fn main() -> anyhow::Result<()> {
         };
         Ok(Outcome {
             initial: errors(&initial)?,
-            refined: errors(&found.t_cam_object())?,
+            refined: errors(found.t_cam_object())?,
             probability: found.posterior.as_ref().map_or(0.0, |p| p.probability()),
             row: row.clone(),
             turn,
