@@ -1,4 +1,4 @@
-//! Whether the fused estimator finds the object where the initial rotation is that of another file convention: turned by half a turn, or transposed.
+//! Poses found by the fused estimator where the initial rotation is that of another file convention: turned by half a turn, or transposed.
 //!
 //! `cargo run --release -p prehend-refine --example half_turns -- DATASET POSES OUT.csv`
 //!
@@ -71,7 +71,7 @@ fn main() -> anyhow::Result<()> {
         let frame = Frame::new(&input.observation, &input.object, input.hand.as_ref())?;
         let initial = turned(&row.t_cam_model, &input.object, turn);
         let found = refine(&frame, &initial, &Fused::default())?;
-        // Of a symmetric object the nearest of its true poses.
+        // A symmetric object has several true poses: the nearest one counts.
         let errors = |pose: &Isometry3<f64>| -> anyhow::Result<[f64; 2]> {
             let truth = truth.pose(scene_id, im_id, obj_id, pose)?;
             let off = (pose * input.object.center - truth * input.object.center).norm();

@@ -259,18 +259,14 @@ impl GaussianPrior {
 
     /// Where the object is in the component of the mixture that is nearest to `state`, and what that costs \[nat\].
     fn component(&self, state: &State) -> (Isometry3<f64>, f64) {
-        let rotation = &state.t_cam_object.rotation;
         let mean = &self.mean.t_cam_object;
-        let mut nearest = (rotation.angle_to(&mean.rotation), *mean, 0.0);
-        for other in &self.others {
-            let angle = rotation.angle_to(other);
-            if angle < nearest.0 {
-                let place = self.center - other * self.mean.object_center.coords;
-                let pose = Isometry3::from_parts(place.into(), *other);
-                nearest = (angle, pose, self.cost_of_others);
-            }
+        let angle =
+            |rotation: &UnitQuaternion<f64>| rotation.angle_to(&state.t_cam_object.rotation);
+        let other = self.others.iter().min_by(|a, b| angle(a).total_cmp(&angle(b)));
+        match other.filter(|other| angle(other) < angle(&mean.rotation)) {
+            Some(other) => (self.mean.rotated_to(other), self.cost_of_others),
+            None => (*mean, 0.0),
         }
-        (nearest.1, nearest.2)
     }
 
     /// With outliers of the object's pose from so many standard deviations on: of an object whose deviations are independent of the rest.
@@ -429,6 +425,26 @@ mod tests {
             for block in blocks {
                 assert_gradient(&prior, &state, block, 1e-6, 1e-5);
             }
+        }
+    }
+
+    #[test]
+    fn a_mixture_is_the_component_that_is_nearest_and_its_cost() {
+        let (_, start) = fixture(0);
+        let half = start.t_cam_object.rotation
+            * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
+        let one = GaussianPrior::independent(start.clone(), &settings()).unwrap();
+        let mixed = GaussianPrior::independent(start.clone(), &settings()).unwrap();
+        let mixed = mixed.with_others(vec![half], 0.2);
+        let turned = State { t_cam_object: start.rotated_to(&half), ..start.clone() };
+        assert!((turned.center() - start.center()).norm() < 1e-15);
+        assert!((mixed.cost(&turned) - 4f64.ln()).abs() < 1e-9);
+        let off = [0.01, -0.02, 0.005, 0.2, 0.1, -0.3];
+        let near = start.retract(&[Block::ObjectPose], &off);
+        assert_eq!(mixed.cost(&near), one.cost(&near));
+        for scale in [1e-3, 1.0] {
+            let state = turned.retract(&[Block::ObjectPose], &off.map(|v| v * scale));
+            assert_gradient(&mixed, &state, Block::ObjectPose, 1e-6, 1e-5);
         }
     }
 

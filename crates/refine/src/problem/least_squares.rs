@@ -1,6 +1,5 @@
 //! A sum of factors, and the way to its least value.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -12,8 +11,8 @@ use rayon::prelude::*;
 use strum::IntoStaticStr;
 
 use super::{
-    Block, Factor, ImageWarp, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State,
-    SurfacePatches,
+    Block, Factor, ImageWarp, NoiseScale, NoiseScales, NormalEquations, RIDGE, ScaledCholesky,
+    SchurComplement, State, SurfacePatches,
 };
 
 /// Factors, and the blocks of the state that are solved for.
@@ -26,27 +25,6 @@ pub struct Problem {
     /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
     patches: Option<Arc<SurfacePatches>>,
     noise: NoiseScales,
-}
-
-/// Scales of the factors' noise, by name.
-pub(crate) type NoiseScales = BTreeMap<&'static str, NoiseScale>;
-
-/// The scale of a factor's noise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct NoiseScale {
-    /// By which the standard deviation is larger than usual.
-    pub(crate) scale: f64,
-    /// Negative logarithm of its prior density and of the residuals' normalization, less that at a scale of one \[nat\].
-    pub(crate) cost: f64,
-}
-
-impl NoiseScale {
-    pub(crate) const ONE: Self = Self { scale: 1.0, cost: 0.0 };
-
-    /// What costs are multiplied by.
-    fn weight(&self) -> f64 {
-        self.scale.powi(-2)
-    }
 }
 
 /// A state, the cost there, and its derivatives.
@@ -169,7 +147,7 @@ pub struct Solution {
 impl Problem {
     /// The sum of `factors` over `blocks`.
     pub fn new(factors: Vec<Arc<dyn Factor>>, blocks: Vec<Block>) -> Self {
-        Self { prior: None, factors, blocks, patches: None, noise: BTreeMap::new() }
+        Self { prior: None, factors, blocks, patches: None, noise: NoiseScales::new() }
     }
 
     /// With what is known beforehand.

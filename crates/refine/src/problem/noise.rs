@@ -1,5 +1,7 @@
 //! How residuals scatter.
 
+use std::collections::BTreeMap;
+
 use prehend_geometry::RobustKernel;
 
 /// How the residuals of a factor scatter: what makes costs in nats of residuals.
@@ -69,6 +71,27 @@ impl Weighting {
     pub(crate) fn shared(&self, share: f64) -> Self {
         let (information, degrees) = (share * self.information, share * self.degrees);
         Self { information, degrees, ..*self }
+    }
+}
+
+/// Scales of the factors' noise, by name.
+pub(crate) type NoiseScales = BTreeMap<&'static str, NoiseScale>;
+
+/// The scale of a factor's noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NoiseScale {
+    /// By which the standard deviation is larger than usual.
+    pub(crate) scale: f64,
+    /// Negative logarithm of its prior density and of the residuals' normalization, less that at a scale of one \[nat\].
+    pub(crate) cost: f64,
+}
+
+impl NoiseScale {
+    pub(crate) const ONE: Self = Self { scale: 1.0, cost: 0.0 };
+
+    /// What costs are multiplied by.
+    pub(super) fn weight(&self) -> f64 {
+        self.scale.powi(-2)
     }
 }
 

@@ -99,6 +99,12 @@ impl State {
         (self.t_cam_object * self.object_center).coords
     }
 
+    /// The object's pose with another rotation, its center where it is.
+    pub(crate) fn rotated_to(&self, rotation: &UnitQuaternion<f64>) -> Isometry3<f64> {
+        let origin = self.center() - rotation * self.object_center.coords;
+        Isometry3::from_parts(origin.into(), *rotation)
+    }
+
     /// How far the surface of an object of this `radius` is from here to `other`, at most \[m\].
     pub(crate) fn surface_motion(&self, other: &Self, radius: f64) -> f64 {
         let turn = self.t_cam_object.rotation.angle_to(&other.t_cam_object.rotation);

@@ -35,7 +35,7 @@ pub struct DiagnosisSummary {
 }
 
 impl DiagnosisSummary {
-    /// Of all that [`Fused::diagnose`] has found.
+    /// Numbers of all that [`Fused::diagnose`] has found.
     pub fn of(diagnoses: &[Diagnosis]) -> Vec<Self> {
         let Some(all) = diagnoses.first().map(|all| all.estimate.t_cam_object()) else {
             return Vec::new();
@@ -117,21 +117,35 @@ impl Fused {
         frame: &Frame<'_>,
         initial: &State,
     ) -> Result<Vec<Diagnosis>, RefineError> {
+        let estimate = self.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
+        self.diagnose_estimate(frame, initial, estimate)
+    }
+
+    /// As [`diagnose`](Self::diagnose), where `estimate` was found with all evidence already.
+    ///
+    /// # Errors
+    /// Those of a run.
+    pub fn diagnose_estimate(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        estimate: Estimate,
+    ) -> Result<Vec<Diagnosis>, RefineError> {
         let run = |fused: &Self, excluded| {
             let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()));
-            estimate.map(|estimate| Diagnosis { excluded, estimate })
+            estimate.map(|estimate| Diagnosis { excluded: Some(excluded), estimate })
         };
-        let mut all = vec![run(self, None)?];
+        let mut all = vec![Diagnosis { excluded: None, estimate }];
         for k in 0..self.factors.len() {
             let mut fused = self.clone();
             let name = fused.factors.remove(k).name();
-            all.push(run(&fused, Some(name))?);
+            all.push(run(&fused, name)?);
         }
         for sensor in SENSORS.into_iter().filter(|sensor| sensor.is_in(frame, &self.settings)) {
             let mut fused = self.clone();
             fused.settings.modalities.retain(|modality| !sensor.modalities().contains(modality));
             fused.settings.views &= sensor != Sensor::Views;
-            all.push(run(&fused, Some(sensor.into()))?);
+            all.push(run(&fused, sensor.into())?);
         }
         Ok(all)
     }

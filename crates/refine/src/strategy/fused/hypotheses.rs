@@ -50,9 +50,7 @@ pub(super) fn with_rotations(state: &State, rotations: &[UnitQuaternion<f64>]) -
     for rotation in rotations {
         let is_other = |known: &State| rotation.angle_to(&known.t_cam_object.rotation) > ANOTHER;
         if states.iter().chain([state]).all(is_other) {
-            let place = state.center() - rotation * state.object_center.coords;
-            let t_cam_object = Isometry3::from_parts(place.into(), *rotation);
-            states.push(State { t_cam_object, ..state.clone() });
+            states.push(State { t_cam_object: state.rotated_to(rotation), ..state.clone() });
         }
     }
     states

@@ -11,20 +11,20 @@ pub enum NominalSizeError {
     /// No size has this name.
     #[error("there is no size {name:?}: one of {}", names().join(", "))]
     Name {
-        /// What was given.
+        /// The name given.
         name: String,
     },
     /// It is not a number with a unit that fits.
     #[error("{value:?} is not a size: a number that is not negative, with one of the units {}", units.join(", "))]
     Value {
-        /// What was given.
+        /// The text given.
         value: String,
-        /// What fits.
+        /// Units of this size.
         units: Vec<&'static str>,
     },
 }
 
-/// What a size is a size of.
+/// Physical dimension of a size.
 #[derive(Clone, Copy)]
 enum Quantity {
     Length,
@@ -33,7 +33,7 @@ enum Quantity {
 }
 
 impl Quantity {
-    /// Its units, with what they are in SI units. A joint may have either of two kinds.
+    /// Its units, with their values in SI units.
     fn units(self) -> &'static [(&'static str, f64)] {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         match self {

@@ -196,7 +196,7 @@ impl<'a> Run<'a> {
         distinct(found, self.radius())
     }
 
-    /// Of what stage `index` has found, the modes that are taken further, the best one first; sizes of errors are learnt there.
+    /// Modes among those `found` by stage `index` that are taken further, the best one first; sizes of errors are learnt there.
     fn conclude(
         &mut self,
         index: usize,

@@ -197,7 +197,8 @@ impl DatasetRun<'_> {
         let seconds = start.elapsed().as_secs_f64();
         let diagnosis = match &self.method {
             Method::Fused(fused) if self.output.diagnose => {
-                DiagnosisSummary::of(&fused.diagnose(&frame, &State::new(&frame, initial)?)?)
+                let initial = State::new(&frame, initial)?;
+                DiagnosisSummary::of(&fused.diagnose_estimate(&frame, &initial, found.clone())?)
             }
             _ => Vec::new(),
         };
