@@ -15,7 +15,7 @@ pub use fused::{
     Hypothesis, Inconsistency, Modality, NominalSizeError, Nuisance, Posterior, PosteriorSummary,
     ScaleSettings, Scales, Stage, UnobservableDirection,
 };
-pub(crate) use fused::{Pixels, chi_square_z, problem_of, surface_patches};
+pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
 pub use heuristic::{GradientKind, Heuristic};
 pub use icp::Icp;
 pub use robust_icp::RobustIcp;

@@ -71,7 +71,9 @@ impl Tracker {
         };
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
-        self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
+        let mut track = self.remember(time, &solved, &nominal, in_hand, level);
+        self.begin_anew(&mut track, sight, &posterior);
+        self.track = Some(track);
         self.learn(sight, &solved);
         let timing = Timing { recovery: clock.lap(), ..Timing::default() };
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))

@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
+use super::keyframe::Keyframe;
+use super::modes::Modes;
 use super::settings::{ProcessNoise, TrackerSettings};
 use super::turned::TurnedPoses;
 use crate::factor::{Layout, PriorSettings};
@@ -56,6 +58,10 @@ pub(super) struct TrackState {
     followed: u32,
     /// Whether it may be turned otherwise.
     pub(super) turned: TurnedPoses,
+    /// Other poses that fit.
+    pub(super) modes: Modes,
+    /// What the object looks like.
+    pub(super) keyframe: Option<Keyframe>,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -66,7 +72,19 @@ pub(super) struct Prediction {
     /// Where the object would be without its velocity.
     zero_velocity_pose: Isometry3<f64>,
     velocity: Vector6<f64>,
-    seconds: f64,
+    pub(super) seconds: f64,
+    /// Covariance of the motion from the last frame: a left twist about the object's center \[m², rad²\].
+    pub(super) motion_covariance: Matrix6<f64>,
+}
+
+impl Prediction {
+    /// With the object moved from `before` by a motion that was measured with an error of this covariance.
+    pub(super) fn measure(&mut self, t_cam_object: Isometry3<f64>, covariance: &Matrix6<f64>) {
+        self.state.t_cam_object = t_cam_object;
+        let mut block = self.covariance.fixed_view_mut::<6, 6>(0, 0);
+        block += covariance - self.motion_covariance;
+        self.motion_covariance = *covariance;
+    }
 }
 
 impl TrackState {
@@ -96,6 +114,8 @@ impl TrackState {
             unseen: false,
             followed: 0,
             turned: TurnedPoses::default(),
+            modes: Modes::default(),
+            keyframe: None,
         }
     }
 
@@ -103,6 +123,7 @@ impl TrackState {
     pub(super) fn missed(&mut self, seen: bool) {
         self.unseen = !seen;
         self.turned = TurnedPoses::default();
+        self.keyframe = None;
         self.misses = self.misses.saturating_add(1);
         self.lost = self.lost.saturating_add(u32::from(seen));
     }
@@ -214,8 +235,18 @@ impl TrackState {
             growth[k] = motion.translation.powi(2) * seconds;
             growth[3 + k] = motion.rotation.powi(2) * seconds;
         }
+        let motion_covariance = Matrix6::from_diagonal(&growth.fixed_rows::<6>(0).into_owned());
         let covariance = covariance + DMatrix::from_diagonal(&growth);
-        Prediction { state, covariance, layout, zero_velocity_pose: rest, velocity, seconds }
+        let zero_velocity_pose = rest;
+        Prediction {
+            state,
+            covariance,
+            layout,
+            zero_velocity_pose,
+            velocity,
+            seconds,
+            motion_covariance,
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod clock;
 mod find;
+mod keyframe;
 mod memory;
+mod modes;
 mod segmentation;
 mod settings;
 mod sight;
@@ -17,13 +19,16 @@ use std::slice;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6};
 use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
 
 use self::clock::Clock;
 pub use self::clock::Timing;
+pub use self::keyframe::KeyframeSettings;
+use self::keyframe::{Alignment, Keyframe};
 use self::memory::{Prediction, TrackState};
+use self::modes::Modes;
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
@@ -204,12 +209,13 @@ impl Tracker {
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
-        let prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
+        let mut prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
         self.with_sight(observation, |tracker, sight| {
-            tracker.look(sight, &track, &prediction, &nominal, time, &mut clock)
+            let aligned = tracker.align(sight, &track, &mut prediction);
+            tracker.look(sight, &track, &prediction, aligned.as_ref(), &nominal, time, &mut clock)
         })
     }
 
@@ -226,12 +232,64 @@ impl Tracker {
         done
     }
 
+    /// Takes the motion since the last frame from the images, as far as they tell it.
+    fn align(
+        &self,
+        sight: &Sight,
+        track: &TrackState,
+        prediction: &mut Prediction,
+    ) -> Option<Alignment> {
+        let keyframe = track.keyframe.as_ref()?;
+        let before = track.state.t_cam_object;
+        let motion = prediction.state.t_cam_object * before.inverse();
+        let settings = &self.settings.keyframe;
+        let expected = &prediction.motion_covariance;
+        let aligned = keyframe.align(sight, &self.object, &motion, expected, settings)?;
+        let drift = settings.drift.powi(2) * prediction.seconds;
+        let turn = drift / self.object.radius.powi(2);
+        let drift = Matrix6::from_diagonal(&[drift, drift, drift, turn, turn, turn].into());
+        prediction.measure(keyframe.motion(&aligned) * before, &(aligned.covariance + drift));
+        Some(aligned)
+    }
+
+    /// A full estimate has another look at what else fits, and its frame is a keyframe.
+    fn begin_anew(&self, next: &mut TrackState, sight: &Sight, posterior: &Posterior) {
+        next.modes = Modes::new(posterior);
+        next.keyframe = self.keyframe(sight, &next.state.t_cam_object);
+    }
+
+    /// A keyframe of an object that is in no hand: a hand that is known says better how what it holds has moved, than images that show half of it.
+    fn keyframe(&self, sight: &Sight, pose: &Isometry3<f64>) -> Option<Keyframe> {
+        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
+        let settings = &self.settings.keyframe;
+        (!in_hand).then(|| Keyframe::new(sight, &self.object, pose, settings)).flatten()
+    }
+
+    /// The keyframe of the frame after this one.
+    fn next_keyframe(
+        &self,
+        sight: &Sight,
+        track: &TrackState,
+        aligned: Option<&Alignment>,
+        pose: &Isometry3<f64>,
+    ) -> Option<Keyframe> {
+        match (track.keyframe.clone(), aligned) {
+            (Some(mut keyframe), Some(aligned)) => {
+                keyframe.advance(aligned);
+                Some(keyframe)
+            }
+            _ => self.keyframe(sight, pose),
+        }
+    }
+
     /// Looks for the object: where it should be, and elsewhere.
+    #[allow(clippy::too_many_arguments)] // all that a frame has
     fn look(
         &mut self,
         sight: &mut Sight,
         track: &TrackState,
         prediction: &Prediction,
+        aligned: Option<&Alignment>,
         nominal: &State,
         time: Duration,
         clock: &mut Clock,
@@ -246,7 +304,16 @@ impl Tracker {
         if seen && long_lost {
             rejection = Rejection::LongLost;
         } else if seen {
-            match self.follow(sight, track, prediction, nominal, time, clock, &mut timing)? {
+            match self.follow(
+                sight,
+                track,
+                prediction,
+                aligned,
+                nominal,
+                time,
+                clock,
+                &mut timing,
+            )? {
                 Ok(tracked) => return Ok(tracked),
                 Err(own) => rejection = own,
             }
@@ -262,6 +329,7 @@ impl Tracker {
             let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
             let mut next = self.remember(time, &solved, nominal, in_hand, level);
             next.lost = track.lost;
+            self.begin_anew(&mut next, sight, &posterior);
             self.track = Some(next);
             let status = TrackStatus::Relocalized;
             return Ok(Tracked::solved(solved, posterior, status, Some(rejection), timing));
@@ -279,6 +347,7 @@ impl Tracker {
         sight: &Sight,
         track: &TrackState,
         prediction: &Prediction,
+        aligned: Option<&Alignment>,
         nominal: &State,
         time: Duration,
         clock: &mut Clock,
@@ -316,11 +385,25 @@ impl Tracker {
             }
             timing.steps += clock.lap();
         }
+        let mut modes = track.modes.clone();
+        let rotation = solved.solution.at.state.t_cam_object.rotation;
+        if modes.is_new_view(&rotation) && clock.has(timing.steps) {
+            let followed =
+                Followed { problem: &problem, prediction, nominal, level: track.allowance() };
+            if let Some(other) = self.weigh(&followed, &solved, &mut modes)? {
+                (solved, posterior) = other;
+                (motion.gain, is_turned) = (0.0, true);
+            }
+            timing.steps += clock.lap();
+        }
+        modes.add_to(&mut posterior, self.object.radius);
         let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
-        next.turned = turned;
+        (next.turned, next.modes) = (turned, modes);
+        let aligned = aligned.filter(|_| !is_turned);
+        next.keyframe = self.next_keyframe(sight, track, aligned, &next.state.t_cam_object);
         if next.is_time_to_learn() {
             self.learn(sight, &solved);
         }

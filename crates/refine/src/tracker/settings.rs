@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
+use super::keyframe::KeyframeSettings;
 use crate::error::RefineError;
 use crate::problem::Solver;
 use crate::search::SearchSettings;
@@ -74,6 +75,8 @@ pub struct TrackerSettings {
     /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
     /// led astray.
     pub calibration_time_constant: f64,
+    /// How far the object has moved by the images.
+    pub keyframe: KeyframeSettings,
     /// Poses turned about the least certain axis of rotation are tried, too, where its standard deviation in
     /// [`Posterior::covariance`](crate::strategy::Posterior::covariance) exceeds this \[rad\]; infinity for never.
     pub turn_sigma: f64,
@@ -106,6 +109,7 @@ impl Default for TrackerSettings {
             in_hand: ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
             free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
             calibration_time_constant: 0.2,
+            keyframe: KeyframeSettings::default(),
             turn_sigma: 0.8f64.to_radians(),
             budget: None,
             gating: GatingSettings {

@@ -10,6 +10,7 @@ mod data_contact;
 mod data_localization;
 mod data_metrics;
 mod data_search;
+mod data_still;
 mod device;
 mod factors;
 mod finite;

@@ -71,9 +71,17 @@ pub struct Posterior {
     pub cramer_rao_bound: Matrix6<f64>,
     /// Center of the object, about which twists turn (camera frame) \[m\].
     center: Vector3<f64>,
-    /// Components of each mode's density, of the same weight: displacements from the mode, and covariance less that of the mode. A mode is normal if
-    /// there are none.
+    /// Uncertainty of scales in each mode's density.
+    mixture: ScaleMixture,
+}
+
+/// Density of a mode as a mixture over scales of errors in place of a normal density.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ScaleMixture {
+    /// Components of the same weight: displacements from the mode, and covariance less that of the mode. A mode is normal if there are none.
     components: Vec<(Vector6<f64>, Matrix6<f64>)>,
+    /// Covariance of the mixture less that of the normal density.
+    excess: Matrix6<f64>,
 }
 
 /// Random poses that stand for the posterior.
@@ -121,7 +129,7 @@ impl Posterior {
             termination: best.termination,
             cramer_rao_bound: bounds[0].0,
             center: best.at.state.center(),
-            components: Vec::new(),
+            mixture: ScaleMixture::default(),
         }
     }
 
@@ -135,12 +143,37 @@ impl Posterior {
             .map(|(at, covariance)| (at - mean, covariance - self.cramer_rao_bound))
             .collect();
         let spread = |(off, more): &(Vector6<f64>, Matrix6<f64>)| more + off * off.transpose();
-        let more = components.iter().map(spread).sum::<Matrix6<f64>>() / count;
-        if self.hypotheses.iter().all(|h| (h.covariance + more).cholesky().is_some()) {
-            self.hypotheses.iter_mut().for_each(|h| h.covariance += more);
-            self.components = components.iter().map(|(off, own)| (*off, own - more)).collect();
+        let excess = components.iter().map(spread).sum::<Matrix6<f64>>() / count;
+        let components = components.iter().map(|(off, own)| (*off, own - excess)).collect();
+        self.widen(&ScaleMixture { components, excess }, radius);
+    }
+
+    /// With the uncertainty of scales that another posterior of the same object in the same hand has.
+    pub(crate) fn widen(&mut self, mixture: &ScaleMixture, radius: f64) {
+        let excess = mixture.excess;
+        if self.hypotheses.iter().all(|h| (h.covariance + excess).cholesky().is_some()) {
+            self.hypotheses.iter_mut().for_each(|h| h.covariance += excess);
+            self.mixture = mixture.clone();
         }
         self.unobservable = unobservable(&self.hypotheses[0].covariance, radius);
+    }
+
+    /// Uncertainty of scales.
+    pub(crate) fn mixture(&self) -> &ScaleMixture {
+        &self.mixture
+    }
+
+    /// Adds poses that fit, too: each by the motion in object coordinates that takes the best pose there, and by the logarithm of its odds.
+    pub(crate) fn add_modes(&mut self, modes: impl Iterator<Item = (Isometry3<f64>, f64)>) {
+        let best = self.hypotheses[0].clone();
+        self.hypotheses.extend(modes.map(|(motion, log_odds)| Hypothesis {
+            t_cam_object: best.t_cam_object * motion,
+            weight: best.weight * log_odds.exp(),
+            cost: best.cost - log_odds,
+            covariance: best.covariance,
+        }));
+        let total: f64 = self.hypotheses.iter().map(|h| h.weight).sum();
+        self.hypotheses.iter_mut().for_each(|h| h.weight /= total);
     }
 
     /// Covariance of the pose's error: a left twist about the object's center in the camera frame \[m², m rad, rad²\].
@@ -176,7 +209,8 @@ impl Posterior {
         let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
         let mut random = SplitMix64::new(0);
         let normal = [(Vector6::zeros(), Matrix6::zeros())];
-        let components = if self.components.is_empty() { &normal } else { &self.components[..] };
+        let mixture = &self.mixture.components[..];
+        let components = if mixture.is_empty() { &normal } else { mixture };
         let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
             let roots: Vec<_> = components
                 .iter()

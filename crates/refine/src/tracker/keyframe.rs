@@ -1,0 +1,472 @@
+//! Motion of an object since a keyframe, by direct alignment of images.
+
+use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+use prehend_autodiff::lie::{perturb_about, so3_log, twist_row};
+use prehend_render::{Camera, DepthImage, draw_depth};
+
+use super::sight::Sight;
+use crate::scene::Object;
+
+/// Settings of the alignment of images to a keyframe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyframeSettings {
+    /// Points at most; zero for no alignment.
+    pub points: usize,
+    /// Independent measurements that their intensities amount to at most: shading and interpolation err alike in neighbors.
+    pub effective_samples: f64,
+    /// Share of the points that must be seen as in the keyframe, or this frame is the next one.
+    pub least_inliers: f64,
+    /// Share of the variance of intensities that must be explained, likewise.
+    pub least_explained: f64,
+    /// Drift of an object that seems to stand still, a random walk \[m/√s\]: errors that frames share are not averaged away.
+    pub drift: f64,
+}
+
+impl Default for KeyframeSettings {
+    fn default() -> Self {
+        Self {
+            points: 300,
+            effective_samples: 12.0,
+            least_inliers: 0.6,
+            least_explained: 0.8,
+            drift: 8e-4,
+        }
+    }
+}
+
+/// Levels of image pyramids, each of half the resolution of the one before.
+const LEVELS: usize = 3;
+/// Gauss–Newton steps in a level at most.
+const STEPS: usize = 6;
+/// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
+const DEGREES: f64 = 4.0;
+/// Pixels about a point in which the object must be seen, too.
+const MARGIN: usize = 2;
+/// Depth that is farther from the surface is another thing's \[m\].
+const OFF_SURFACE: f64 = 10e-3;
+/// Intensity that is resolved: the smallest deviation of residuals, and of neighbors of a point that is of use.
+const RESOLUTION: f32 = 4e-3;
+
+/// Part of an image in gray, and half and quarter as large.
+struct Pyramid {
+    /// Camera, columns and intensities (0 to 1) of each level.
+    levels: [(Camera, Vec<f32>); LEVELS],
+}
+
+impl Pyramid {
+    /// The part of the image of `sight` that shows what is within `reach` \[m\] of `center` (camera frame); none if that is out of the image.
+    fn about(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option<Self> {
+        let full = &sight.observation.camera;
+        let at = full.project(center)?;
+        let extent = reach * full.fx.max(full.fy) / (center.z - reach).max(0.1 * center.z);
+        // Sizes are multiples of the coarsest level's pixels.
+        let unit = 1 << (LEVELS - 1);
+        let range = |middle: f64, size: usize| {
+            let from = (middle - extent).clamp(0.0, size as f64) as usize / unit;
+            let to = (middle + extent).clamp(0.0, size as f64) as usize / unit;
+            (from * unit, to.saturating_sub(from) * unit)
+        };
+        let ((left, width), (top, height)) = (range(at.x, full.width), range(at.y, full.height));
+        if width < 4 * unit || height < 4 * unit {
+            return None;
+        }
+        let color = &sight.observation.color;
+        let line = |y: usize| &color.pixels()[y * full.width + left..][..width];
+        let gray = |[r, g, b]: &[f32; 3]| (r + g + b) / 3.0;
+        let pixels = (top..top + height).flat_map(|y| line(y).iter().map(gray)).collect();
+        let mut level = (full.cropped(left, top, width, height), pixels);
+        let mut next = || {
+            let half = halved(&level);
+            std::mem::replace(&mut level, half)
+        };
+        Some(Self { levels: [next(), next(), next()] })
+    }
+}
+
+/// An image of half the resolution.
+fn halved((camera, pixels): &(Camera, Vec<f32>)) -> (Camera, Vec<f32>) {
+    let half = camera.scaled(0.5);
+    let mean = |k: usize| {
+        let at = 2 * (k / half.width) * camera.width + 2 * (k % half.width);
+        let below = at + camera.width;
+        0.25 * (pixels[at] + pixels[at + 1] + pixels[below] + pixels[below + 1])
+    };
+    (half, (0..half.width * half.height).map(mean).collect())
+}
+
+/// Intensity at a place \[px\] by bilinear interpolation, with its gradient \[1/px\]; none beyond the image.
+fn sample((camera, pixels): &(Camera, Vec<f32>), u: f64, v: f64) -> Option<(f64, [f64; 2])> {
+    let inside = |at: f64, size: usize| at >= 0.0 && at < (size - 1) as f64;
+    if !(inside(u, camera.width) && inside(v, camera.height)) {
+        return None;
+    }
+    let (x, y) = (u as usize, v as usize);
+    let (s, t) = (u - x as f64, v - y as f64);
+    let at = |dx: usize, dy: usize| f64::from(pixels[(y + dy) * camera.width + x + dx]);
+    let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+    let value = (1.0 - t) * ((1.0 - s) * a + s * b) + t * ((1.0 - s) * c + s * d);
+    Some((value, [(1.0 - t) * (b - a) + t * (d - c), (1.0 - s) * (c - a) + s * (d - b)]))
+}
+
+/// Points of an object's surface with their intensities in an image.
+#[derive(Clone, Debug)]
+pub(super) struct Keyframe {
+    /// In the object's frame \[m\].
+    points: Vec<Point3<f64>>,
+    intensities: [Vec<f32>; LEVELS],
+    /// Object → camera in the last frame, by alignment with the keyframe alone.
+    aligned: Isometry3<f64>,
+}
+
+/// Object → camera by alignment, and how that is moved from what was expected.
+pub(super) struct Alignment {
+    pub(super) pose: Isometry3<f64>,
+    /// Covariance of a left twist about the object's center \[m², m rad, rad²\].
+    pub(super) covariance: Matrix6<f64>,
+}
+
+impl Keyframe {
+    /// Points on `object` at `pose` that differ from their neighbors, spread over what is seen of it; none if these are too few.
+    pub(super) fn new(
+        sight: &Sight,
+        object: &Object,
+        pose: &Isometry3<f64>,
+        settings: &KeyframeSettings,
+    ) -> Option<Self> {
+        let center = pose * object.center;
+        let pyramid = Pyramid::about(sight, &center, object.radius)?;
+        let (camera, pixels) = &pyramid.levels[0];
+        let mut drawn = DepthImage::default();
+        draw_depth(&mut drawn, camera, &[(&object.model, *pose)]);
+        let full = &sight.observation.camera;
+        let (left, top) = ((full.cx - camera.cx) as usize, (full.cy - camera.cy) as usize);
+        let depth = drawn.pixels();
+        let shows = |x: usize, y: usize| {
+            let z = depth[y * camera.width + x];
+            let at = (top + y) * full.width + left + x;
+            let [hand, sensed] = [&sight.hand_depth, &sight.depth].map(|image| image.pixels()[at]);
+            let off = f64::from((sensed - z).abs());
+            z > 0.0
+                && sight.observation.mask.pixels()[at]
+                && !(hand > 0.0 && hand < z)
+                && !(sensed > 0.0 && off > OFF_SURFACE)
+        };
+        let area = depth.iter().filter(|z| **z > 0.0).count();
+        let cell = ((area as f64 / settings.points as f64).sqrt().ceil() as usize).max(1);
+        let contrast = |x: usize, y: usize| {
+            let at = y * camera.width + x;
+            let across = (pixels[at + 1] - pixels[at - 1]).abs();
+            across.max((pixels[at + camera.width] - pixels[at - camera.width]).abs())
+        };
+        let strongest = |(column, row): (usize, usize)| {
+            let within = |from: usize, size: usize| {
+                (from * cell).max(MARGIN)..((from + 1) * cell).min(size - MARGIN)
+            };
+            let places = within(row, camera.height)
+                .flat_map(|y| within(column, camera.width).map(move |x| (x, y)));
+            let best = places
+                .filter(|&(x, y)| depth[y * camera.width + x] > 0.0)
+                .max_by(|a, b| contrast(a.0, a.1).total_cmp(&contrast(b.0, b.1)))?;
+            let around =
+                [(0, 0), (MARGIN, 0), (0, MARGIN), (2 * MARGIN, MARGIN), (MARGIN, 2 * MARGIN)];
+            let seen = around.iter().all(|(dx, dy)| {
+                let (x, y) = match (dx, dy) {
+                    (0, 0) => best,
+                    _ => (best.0 + dx - MARGIN, best.1 + dy - MARGIN),
+                };
+                shows(x, y)
+            });
+            (seen && contrast(best.0, best.1) > RESOLUTION).then_some(best)
+        };
+        let to_object = pose.inverse();
+        let cells = (0..camera.height.div_ceil(cell))
+            .flat_map(|row| (0..camera.width.div_ceil(cell)).map(move |column| (column, row)));
+        let points: Vec<Point3<f64>> = cells
+            .filter_map(strongest)
+            .map(|(x, y)| {
+                let z = f64::from(depth[y * camera.width + x]);
+                to_object * camera.unproject(x as f64, y as f64, z)
+            })
+            .collect();
+        if (points.len() as f64) < settings.effective_samples {
+            return None;
+        }
+        let intensities = [0, 1, 2].map(|k| {
+            let level = &pyramid.levels[k];
+            let at = |point: &Point3<f64>| {
+                let place = level.0.project(&(pose * point))?;
+                sample(level, place.x, place.y).map(|(value, _)| value as f32)
+            };
+            points.iter().map(|point| at(point).unwrap_or(f32::NAN)).collect()
+        });
+        Some(Self { points, intensities, aligned: *pose })
+    }
+
+    /// Where the object is in `sight`, where it has moved by `motion` since the last frame but for an error of that covariance (a left twist about the
+    /// object's center).
+    pub(super) fn align(
+        &self,
+        sight: &Sight,
+        object: &Object,
+        motion: &Isometry3<f64>,
+        covariance: &Matrix6<f64>,
+        settings: &KeyframeSettings,
+    ) -> Option<Alignment> {
+        let expected = motion * self.aligned;
+        let precision = covariance.try_inverse()?;
+        let pyramid = Pyramid::about(sight, &(expected * object.center), 1.2 * object.radius)?;
+        let mut pose = expected;
+        let mut found = None;
+        for (level, intensities) in pyramid.levels.iter().zip(&self.intensities).rev() {
+            let mut brightness = [1.0, 0.0];
+            let mut variance = f64::INFINITY;
+            for _ in 0..STEPS {
+                let system =
+                    Normal::new(self, intensities, level, &pose, object, &brightness, variance);
+                variance = system.variance;
+                let share = (settings.effective_samples / system.samples).min(1.0);
+                let off = deviation(&pose, &expected, object);
+                let mut hessian = system.hessian * share;
+                let mut gradient = system.gradient * share;
+                let mut block = hessian.fixed_view_mut::<6, 6>(0, 0);
+                block += precision;
+                let mut part = gradient.fixed_rows_mut::<6>(0);
+                part += precision * off;
+                let factor = hessian.cholesky()?;
+                let step = -factor.solve(&gradient);
+                let twist: Vector6<f64> = step.fixed_rows::<6>(0).into_owned();
+                pose = perturb_about(&pose, &(pose * object.center).coords, &twist);
+                brightness = [brightness[0] + step[6], brightness[1] + step[7]];
+                let moved = twist.fixed_rows::<3>(0).norm()
+                    + object.radius * twist.fixed_rows::<3>(3).norm();
+                let pixel = (pose * object.center).z / level.0.fx;
+                let all: SMatrix<f64, 8, 8> = factor.inverse();
+                found = Some((all.fixed_view::<6, 6>(0, 0).into_owned(), system));
+                if moved < 0.02 * pixel {
+                    break;
+                }
+            }
+        }
+        let (covariance, system) = found?;
+        let inliers = system.inliers / self.points.len() as f64;
+        let is_seen =
+            system.explained > settings.least_explained && inliers >= settings.least_inliers;
+        is_seen.then_some(Alignment { pose, covariance })
+    }
+
+    /// How `aligned` is moved from the last frame.
+    pub(super) fn motion(&self, aligned: &Alignment) -> Isometry3<f64> {
+        aligned.pose * self.aligned.inverse()
+    }
+
+    /// The frame that was aligned is the last one now.
+    pub(super) fn advance(&mut self, aligned: &Alignment) {
+        self.aligned = aligned.pose;
+    }
+}
+
+/// Twist about the object's center that takes `from` to `pose`.
+fn deviation(pose: &Isometry3<f64>, from: &Isometry3<f64>, object: &Object) -> Vector6<f64> {
+    let off = pose * object.center - from * object.center;
+    let turn = so3_log(&(pose.rotation * from.rotation.inverse()));
+    Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z)
+}
+
+/// Normal equations of an alignment: of a twist, and of gain and offset of the brightness.
+struct Normal {
+    hessian: SMatrix<f64, 8, 8>,
+    gradient: SVector<f64, 8>,
+    /// Points within the image.
+    samples: f64,
+    /// Of residuals.
+    variance: f64,
+    inliers: f64,
+    /// Share of the variance of intensities.
+    explained: f64,
+}
+
+impl Normal {
+    fn new(
+        keyframe: &Keyframe,
+        intensities: &[f32],
+        level: &(Camera, Vec<f32>),
+        pose: &Isometry3<f64>,
+        object: &Object,
+        [gain, offset]: &[f64; 2],
+        before: f64,
+    ) -> Self {
+        let camera = &level.0;
+        let center = (pose * object.center).coords;
+        let mut rows: Vec<(f64, SVector<f64, 8>, f64)> = Vec::with_capacity(intensities.len());
+        for (point, &intensity) in keyframe.points.iter().zip(intensities) {
+            let place = pose * point;
+            let Some(at) = camera.project(&place) else { continue };
+            let Some((value, [across, down])) = sample(level, at.x, at.y) else { continue };
+            if intensity.is_nan() {
+                continue;
+            }
+            let intensity = f64::from(intensity);
+            let (x, y) = (across * camera.fx / place.z, down * camera.fy / place.z);
+            let direction = Vector3::new(x, y, -(x * place.x + y * place.y) / place.z);
+            let row = twist_row(&(place.coords - center), &direction);
+            let row = SVector::from_fn(|k, _| match k {
+                6 => -intensity,
+                7 => -1.0,
+                _ => row[k],
+            });
+            rows.push((value - gain * intensity - offset, row, value));
+        }
+        let samples = rows.len().max(1) as f64;
+        // Of a normal distribution, by the median; and then the maximum likelihood by fixed point iterations.
+        let mut variance = before;
+        if before.is_infinite() {
+            let mut sizes: Vec<f64> = rows.iter().map(|row| row.0.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            variance = sizes.get(sizes.len() / 2).map_or(1.0, |median| (1.48 * median).powi(2));
+        }
+        let least = f64::from(RESOLUTION).powi(2);
+        let weight = |residual: f64, variance: f64| {
+            (DEGREES + 1.0) / (DEGREES + residual * residual / variance)
+        };
+        for _ in 0..3 {
+            variance = variance.max(least);
+            let sum: f64 = rows.iter().map(|(r, ..)| weight(*r, variance) * r * r).sum();
+            variance = (sum / samples).max(least);
+        }
+        let mut hessian = SMatrix::<f64, 8, 8>::zeros();
+        let mut gradient = SVector::<f64, 8>::zeros();
+        let (mut inliers, mut weights, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (residual, row, value) in &rows {
+            let w = weight(*residual, variance);
+            hessian.ger(w / variance, row, row, 1.0);
+            gradient.axpy(w * residual / variance, row, 1.0);
+            inliers += f64::from(u8::from(residual * residual < 9.0 * variance));
+            weights += w;
+            sum += w * value;
+            squares += w * value * value;
+            left += w * residual * residual;
+        }
+        // Something is known of the brightness where no point is.
+        hessian[(6, 6)] += 1.0;
+        hessian[(7, 7)] += 1.0;
+        let spread = squares - sum * sum / weights.max(1e-9);
+        let explained = if spread > 0.0 { 1.0 - left / spread } else { 0.0 };
+        Self { hessian, gradient, samples, variance, inliers, explained }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use prehend_autodiff::lie::se3_exp;
+
+    use super::*;
+    use crate::scene::{Sequence, default_sequence};
+    use crate::tracker::sight::Images;
+
+    /// The first frames of a sequence, as they are without a hand.
+    fn sights(sequence: &Sequence) -> [Sight; 2] {
+        [0, 2].map(|k| {
+            let observation = sequence.frames[k].observation.clone();
+            let mut sight = Sight::new(observation, Some(&sequence.hand), Images::default());
+            sight.observation.mask.copy_from(&sight.given);
+            sight
+        })
+    }
+
+    #[test]
+    fn alignment_finds_the_motion_between_two_frames() {
+        let sequence = default_sequence(1, 3).unwrap();
+        let [first, second] = sights(&sequence);
+        let [before, after] = [0, 2].map(|k| sequence.frames[k].truth);
+        let (object, settings) = (&sequence.object, KeyframeSettings::default());
+        let keyframe = Keyframe::new(&first, object, &before, &settings).unwrap();
+        let truth = after * before.inverse();
+        let errors = [2e-3, -1e-3, 2e-3, 0.02, -0.01, 0.02];
+        let expected = perturb_about(&after, &(after * object.center).coords, &errors.into())
+            * before.inverse();
+        let covariance = Matrix6::from_diagonal(&[9e-6, 9e-6, 9e-6, 9e-4, 9e-4, 9e-4].into());
+        let aligned = keyframe.align(&second, object, &expected, &covariance, &settings).unwrap();
+        let off = deviation(&aligned.pose, &(truth * before), object);
+        let squared = off.dot(&(aligned.covariance.try_inverse().unwrap() * off));
+        assert!(squared < 20.0, "χ² of six degrees of freedom: {squared}");
+        for (k, error) in [(0, 3e-3), (3, 0.03)] {
+            assert!(off.fixed_rows::<3>(k).norm() < 0.4 * error, "{off}");
+        }
+        // Another object's image is no motion.
+        let mut other = second.observation.clone();
+        other
+            .color
+            .pixels_mut()
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, p)| *p = [(k % 7) as f32 / 7.0; 3]);
+        let other = Sight::new(other, Some(&sequence.hand), Images::default());
+        assert!(keyframe.align(&other, object, &expected, &covariance, &settings).is_none());
+    }
+
+    #[test]
+    fn the_gradient_is_the_derivative_of_the_residuals() {
+        let sequence = default_sequence(1, 3).unwrap();
+        let [first, _] = sights(&sequence);
+        let (object, settings) = (&sequence.object, KeyframeSettings::default());
+        let pose = sequence.frames[0].truth;
+        let keyframe = Keyframe::new(&first, object, &pose, &settings).unwrap();
+        let pyramid = Pyramid::about(&first, &(pose * object.center), object.radius).unwrap();
+        let residuals = |twist: &Vector6<f64>| -> Vec<f64> {
+            let moved = perturb_about(&pose, &(pose * object.center).coords, twist);
+            let sampled = |(point, intensity): (&Point3<f64>, &f32)| {
+                let (camera, _) = &pyramid.levels[1];
+                let at = camera.project(&(moved * point)).unwrap();
+                sample(&pyramid.levels[1], at.x, at.y).unwrap().0 - f64::from(*intensity)
+            };
+            keyframe.points.iter().zip(&keyframe.intensities[1]).map(sampled).collect()
+        };
+        let start = Vector6::from([1e-3, 2e-3, -1e-3, 1e-2, 2e-2, -1e-2]);
+        let moved = perturb_about(&pose, &(pose * object.center).coords, &start);
+        let level = &pyramid.levels[1];
+        // With so large a variance, all weights are alike.
+        let system = Normal::new(
+            &keyframe,
+            &keyframe.intensities[1],
+            level,
+            &moved,
+            object,
+            &[1.0, 0.0],
+            1.0,
+        );
+        let step = 1e-7;
+        for k in 0..6 {
+            let along = |h: f64| {
+                let mut twist = Vector6::zeros();
+                twist[k] = h;
+                let twice = se3_exp(&twist);
+                let center = (moved * object.center).coords;
+                let shift = Isometry3::translation(center.x, center.y, center.z);
+                let pose = shift * twice * shift.inverse() * moved;
+                keyframe
+                    .points
+                    .iter()
+                    .zip(&keyframe.intensities[1])
+                    .map(|(point, intensity)| {
+                        let at = level.0.project(&(pose * point)).unwrap();
+                        sample(level, at.x, at.y).unwrap().0 - f64::from(*intensity)
+                    })
+                    .collect::<Vec<f64>>()
+            };
+            let (plus, minus, middle) = (along(step), along(-step), residuals(&start));
+            let expected: f64 = (0..middle.len())
+                .map(|i| {
+                    let w = (DEGREES + 1.0) / (DEGREES + middle[i] * middle[i] / system.variance);
+                    w * middle[i] * (plus[i] - minus[i]) / (2.0 * step) / system.variance
+                })
+                .sum();
+            let found = system.gradient[k];
+            assert!(
+                (found - expected).abs() < 1e-3 * expected.abs().max(1.0),
+                "{k}: {found} {expected}"
+            );
+        }
+        let _ = Vector3::<f64>::zeros();
+    }
+}
