@@ -5,7 +5,7 @@ use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh, VolumeError, contact_area};
 
 /// Surface samples closer to the hand than this count as contact \[m\].
-pub(crate) const CONTACT_DISTANCE: f64 = 0.005;
+const CONTACT_DISTANCE: f64 = 0.005;
 
 /// Surface samples the contact area is estimated from.
 pub const CONTACT_SAMPLES: usize = 100_000;

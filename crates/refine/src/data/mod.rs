@@ -26,7 +26,6 @@ mod workers;
 pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
-pub(crate) use contact::CONTACT_DISTANCE;
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;

@@ -1,11 +1,6 @@
-//! Poses in files for other programs: a film of hand and object for viewers ([`SceneFilm`], GLB), and where they touch ([`contacts`], PLY).
-//! `docs/EXPORT.md` describes both.
+//! Poses in files for other programs: a film of hand and object for viewers ([`SceneFilm`], GLB). `docs/EXPORT.md` describes it.
 
-mod contact;
-mod contact_file;
 mod film;
 mod upright;
 
-pub use contact::{ContactKind, ContactPoint, contacts};
-pub use contact_file::{ContactRow, write_contacts};
 pub use film::SceneFilm;

@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::deviation::SurfaceDeviation;
 use super::information::{Eliminated, Elimination, FrameInformation};
-use super::observability::{HandMotion, UnobservedDirection, unobserved_directions};
 use super::parameters::{Play, Rig};
 use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
@@ -153,8 +152,7 @@ impl Calibrator {
         let disagreement = information.disagreement(&self.prior, errors).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
-        let object = (*obj_id, &self.model(*obj_id)?.given);
-        let skin = SkinReading::new(&frame, &found.state, object);
+        let skin = SkinReading::new(&frame, &found.state, *obj_id);
         let obj_id = *obj_id;
         Ok(Visit { obj_id, information, disagreement, skin, left_out, has_mask, t_cam_object })
     }
@@ -170,38 +168,6 @@ impl Calibrator {
         let object = self.object(frame.obj_id)?;
         let corrected = Frame::new(&observation, object, Some(&frame.hand))?;
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings.tactile, has_mask)
-    }
-
-    /// The rig's directions that frames have hardly determined yet, the least known first, and for each which motion of the hand of `frame` would
-    /// tell most; [`CalibrationFrame::initial`] should be the pose that a visit has found.
-    ///
-    /// # Errors
-    /// Those of a visit.
-    pub fn unobserved(
-        &self,
-        frame: &CalibrationFrame,
-    ) -> Result<Vec<UnobservedDirection>, RefineError> {
-        let CalibrationFrame { obj_id, hand, initial, .. } = frame;
-        let (observation, fused) = self.corrected(frame)?;
-        let object = self.object(*obj_id)?;
-        let seen = Frame::new(&observation, object, Some(hand))?;
-        let mut fused = fused.with_noise_of(&seen, &State::new(&seen, initial)?);
-        // Nobody knows what colors would be.
-        fused.settings.modalities.retain(|modality| *modality != Modality::Color);
-        let [_, visible] = View::of_observation(&observation, object, hand, initial)?.sums();
-        let mut motions = Vec::new();
-        for motion in HandMotion::all(&(initial * object.center)) {
-            let predicted = motion.predict(&observation, object, hand, initial, visible.z);
-            let Some((predicted, pose)) = predicted else {
-                continue;
-            };
-            let frame = Frame::new(&predicted, object, Some(hand))?.with_rig(&self.rig);
-            let state = State::new(&frame, &pose)?;
-            let information = self.information(&frame, &fused, *obj_id, &state)?;
-            let (hessian, _) = information.of_rig(self.rig.len()).ok_or_else(not_finite)?;
-            motions.push((motion, hessian));
-        }
-        unobserved_directions(&self.rig, &self.prior, &motions).ok_or_else(not_finite)
     }
 
     /// What a frame shows when the rig is corrected, and how it is refined.

@@ -80,20 +80,12 @@ impl Rig {
         })
     }
 
-    /// Object `id` with its surface displaced and its mass corrected; `None` if the rig knows nothing of it.
+    /// Object `id` with its surface displaced; `None` if the rig knows nothing of it.
     ///
     /// # Errors
     /// If its mesh cannot be used any more.
     pub fn corrected_object(&self, id: u32, given: &Object) -> Result<Option<Object>, RefineError> {
-        let corrected = match self.objects.get(&id) {
-            Some(deviation) => deviation.corrected(given)?,
-            None if self.skin.masses.contains_key(&id) => {
-                given.with_surface(given.mesh.clone(), given.deviation.clone())?
-            }
-            None => return Ok(None),
-        };
-        let inertial = self.skin.inertial(id, &given.inertial);
-        Ok(Some(Object { inertial, ..corrected }))
+        self.objects.get(&id).map(|deviation| deviation.corrected(given)).transpose()
     }
 }
 

@@ -51,7 +51,7 @@ pub struct Rig {
     pub covariance: DMatrix<f64>,
     /// By what the surface of each object differs from its model, by the object's number.
     pub objects: BTreeMap<u32, SurfaceDeviation>,
-    /// What is wrong with the skin, and the masses that it tells.
+    /// Calibration of the skin.
     pub skin: SkinCalibration,
 }
 
@@ -105,11 +105,6 @@ impl Rig {
     /// Where the coefficients of depth's field begin.
     pub(super) fn first_offset(&self) -> usize {
         self.first_warp() + RADIAL
-    }
-
-    /// Where depth's bias is among them.
-    pub(super) fn depth_bias(&self) -> usize {
-        POSES + self.joints.len() + CameraCalibrationError::DEPTH_BIAS
     }
 
     /// The parameters, zero where nothing is corrected.

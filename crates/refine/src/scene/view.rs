@@ -79,20 +79,6 @@ impl<'a> View<'a> {
         mask
     }
 
-    /// Depth images of object and hand together, and the mask that the object would have \[m\].
-    pub(crate) fn expected(&self) -> (DepthImage, Mask) {
-        let (width, height) = self.size();
-        let mut depth = DepthImage::filled(width, height, 0.0);
-        let mut mask = Mask::filled(width, height, false);
-        for ([x, y], pixel) in self.pixels() {
-            let shows_object = pixel.shows_object();
-            depth.pixels_mut()[y * width + x] =
-                if shows_object { pixel.object } else { pixel.hand };
-            mask.pixels_mut()[y * width + x] = shows_object;
-        }
-        (depth, mask)
-    }
-
     /// Width and height \[px\].
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.hand.width(), self.hand.height())

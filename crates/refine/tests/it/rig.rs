@@ -263,15 +263,6 @@ fn what_frames_have_said_is_kept_and_masks_may_be_missing() {
         println!("{before:?} → {after:?}");
         assert!(after.size < 0.8 * before.size, "{before:?} → {after:?}");
     }
-    // The hand's motion in this sequence does not change its distance: which motion would tell is said.
-    let unobserved = in_windows.unobserved(&frames[0]).unwrap();
-    assert!(!unobserved.is_empty());
-    for direction in &unobserved {
-        println!("{direction:?}");
-        assert!((0.5..1.001).contains(&direction.deviation));
-        assert!(direction.motion.is_none_or(|(_, left)| left < direction.deviation));
-    }
-    assert!(unobserved.iter().any(|direction| direction.motion.is_some()));
 }
 
 #[test]

@@ -85,10 +85,10 @@ pub const COMMANDS: &[LongCommand] = &[
     },
     LongCommand {
         name: "export",
-        words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb --contacts c.ply",
+        words: "export --dataset ds --scene 21 --poses ds/init_low.csv --glb f.glb",
         inputs: &["ds/test/000021", "ds/models", "ds/hand"],
-        outputs: &["f.glb", "c.ply"],
-        blockable: &["f.glb", "c.ply"],
+        outputs: &["f.glb"],
+        blockable: &["f.glb"],
         tables: &[],
         growing: &[],
     },

@@ -9,7 +9,7 @@ use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, DatasetError, check_writable};
-use prehend_refine::export::{ContactRow, SceneFilm, contacts, write_contacts};
+use prehend_refine::export::SceneFilm;
 
 use crate::options::{Input, Job, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
@@ -28,26 +28,18 @@ pub(crate) struct Export {
     ///
     /// One node a link and one an object, upright and in meters; the camera is a node, too. The frame is that of the world where scene_camera.json has
     /// cam_R_w2c and cam_t_w2c of all images, else the camera's.
-    #[arg(
-        long,
-        value_name = "FILE",
-        required_unless_present = "contacts",
-        help_heading = "Output"
-    )]
-    glb: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    glb: PathBuf,
     /// Images a second of the film, in order of their ids; ids that are missing count
     #[arg(long, value_name = "HZ", default_value_t = 30.0, help_heading = "Output")]
     rate: f64,
-    /// Write the points where hand and object touch here, as a point cloud with normals and forces (.ply): what is felt, and what the poses say
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    contacts: Option<PathBuf>,
 }
 
 impl Export {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { input: Input { selection, poses }, rig, glb, rate, contacts: ply } = &self;
-        glb.iter().chain(ply).try_for_each(|file| check_writable(file))?;
-        let mut film = glb.as_ref().map(|_| SceneFilm::new(*rate)).transpose()?;
+        let Self { input: Input { selection, poses }, rig, glb, rate } = &self;
+        check_writable(glb)?;
+        let mut film = SceneFilm::new(*rate)?;
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses)?;
         let mut images = Images::new();
@@ -55,13 +47,13 @@ impl Export {
             images.entry((job.row.scene_id, job.row.im_id)).or_default().push(job);
         }
         let first = images.keys().next().map(|(scene, _)| *scene);
-        if film.is_some() && images.keys().any(|(scene, _)| Some(*scene) != first) {
+        if images.keys().any(|(scene, _)| Some(*scene) != first) {
             bail!("--glb has one scene, and there are poses of several: --scene says which");
         }
-        let world = if film.is_some() { world(&dataset, &images)? } else { None };
+        let world = world(&dataset, &images)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         assets = assets.with_rig(open_rig(rig.as_deref())?).with_optional_masks();
-        let (mut done, mut touching) = (0, Vec::new());
+        let mut done = 0;
         for (&(scene_id, im_id), jobs) in
             progress(images.len(), "exporting").wrap_iter(images.iter())
         {
@@ -73,21 +65,11 @@ impl Export {
                     .collect::<Result<_, _>>()?;
                 let (observation, hand) =
                     assets.observation(&dataset.frame(scene_id, im_id)?, 0, &[])?;
-                if let Some(film) = &mut film {
-                    let t_base_cam = world.as_ref().map(|known| known[&im_id].inverse());
-                    let t_base_cam = t_base_cam.unwrap_or_else(Isometry3::identity);
-                    film.add_image(im_id, &observation, hand.as_ref(), &t_base_cam)?;
-                }
+                let t_base_cam = world.as_ref().map(|known| known[&im_id].inverse());
+                let t_base_cam = t_base_cam.unwrap_or_else(Isometry3::identity);
+                film.add_image(im_id, &observation, hand.as_ref(), &t_base_cam)?;
                 for (Job { target, row, .. }, object) in jobs.iter().zip(&models) {
-                    let pose = &row.t_cam_model;
-                    if let Some(film) = &mut film {
-                        film.add_object(target, object, pose);
-                    }
-                    if ply.is_some() {
-                        let found = contacts(&observation, hand.as_deref(), object, pose)?;
-                        let row = |contact| ContactRow { target: *target, contact };
-                        touching.extend(found.into_iter().map(row));
-                    }
+                    film.add_object(target, object, &row.t_cam_model);
                     done += 1;
                 }
                 Ok(())
@@ -97,16 +79,9 @@ impl Export {
             }
         }
         if done > 0 {
-            if let Some((film, file)) = film.zip(glb.as_ref()) {
-                film.save(file)?;
-                let frame =
-                    if world.is_some() { "the world's frame" } else { "the camera's frame" };
-                say(format!("{done} poses in {frame}, written to {}", file.display()))?;
-            }
-            if let Some(file) = ply {
-                write_contacts(file, &touching)?;
-                say(format!("{} contacts, written to {}", touching.len(), file.display()))?;
-            }
+            film.save(glb)?;
+            let frame = if world.is_some() { "the world's frame" } else { "the camera's frame" };
+            say(format!("{done} poses in {frame}, written to {}", glb.display()))?;
         }
         Ok(exit_code(done, &failures))
     }

@@ -1,48 +1,28 @@
-//! What is wrong with a skin.
-
-use std::collections::BTreeMap;
+//! Calibration of a skin.
 
 use nalgebra::Vector3;
 
 use crate::error::RefineError;
-use crate::scene::{HandMeasurement, Inertial};
+use crate::scene::HandMeasurement;
 
-/// A taxel reads gain · force + offset, or nothing.
+/// A taxel reads force + offset, or nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaxelCalibration {
-    /// What forces are multiplied by.
-    pub gain: f64,
-    /// Its standard deviation.
-    pub gain_sigma: f64,
-    /// What is added then, in the frame of the link: zero but for taxels that ring false \[N\].
+    /// Constant force that it reads, in the frame of the link: zero but for taxels that ring false \[N\].
     pub offset: Vector3<f64>,
     /// Probability that it is dead.
     pub dead: f64,
 }
 
-/// The mass of an object, as touch has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectMass {
-    /// Mass \[kg\].
-    pub mass: f64,
-    /// Its standard deviation \[kg\].
-    pub sigma: f64,
-}
-
-/// A skin, and what it says of masses.
+/// Calibration of all taxels of a hand.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinCalibration {
     /// In the order of the hand's taxels; none where nothing is known of them.
     pub taxels: Vec<TaxelCalibration>,
-    /// By the object's number.
-    pub masses: BTreeMap<u32, ObjectMass>,
 }
 
 /// Forces below that are none \[N\]: noise of a few units, and what is left of an offset.
 pub(super) const FELT: f64 = 0.05;
-
-/// Standard deviation of a gain before anything is known of it.
-pub(super) const GAIN_SIGMA: f64 = 0.15;
 
 impl TaxelCalibration {
     /// The force \[N\] behind a reading \[N\]; the silence of one that is probably dead says nothing of the force.
@@ -50,7 +30,7 @@ impl TaxelCalibration {
         if self.is_dead() && reading.norm() <= FELT {
             return HandMeasurement::UNKNOWN_FORCE;
         }
-        (reading - self.offset) / self.gain
+        reading - self.offset
     }
 
     /// Whether it is probably dead.
@@ -62,11 +42,6 @@ impl TaxelCalibration {
     pub fn rings_false(&self) -> bool {
         self.offset != Vector3::zeros()
     }
-
-    /// Whether its gain is known better than beforehand.
-    pub fn has_known_gain(&self) -> bool {
-        self.gain_sigma < 0.8 * GAIN_SIGMA
-    }
 }
 
 impl SkinCalibration {
@@ -74,10 +49,9 @@ impl SkinCalibration {
     pub(in crate::rig) fn numbers(&self) -> impl Iterator<Item = f64> {
         let taxel = |t: &TaxelCalibration| {
             let [x, y, z] = t.offset.into();
-            [t.gain, t.gain_sigma, t.dead, x, y, z]
+            [t.dead, x, y, z]
         };
-        let masses = self.masses.values().flat_map(|told| [told.mass, told.sigma]);
-        self.taxels.iter().flat_map(taxel).chain(masses)
+        self.taxels.iter().flat_map(taxel)
     }
 
     /// Corrects the forces of a hand, if it has a skin.
@@ -98,13 +72,6 @@ impl SkinCalibration {
         }
         Ok(())
     }
-
-    /// `given`, of object `id`, with the mass that touch tells.
-    pub(in crate::rig) fn inertial(&self, id: u32, given: &Inertial) -> Inertial {
-        let Some(ObjectMass { mass, .. }) = self.masses.get(&id) else { return given.clone() };
-        let inertia = given.inertia * (mass / given.mass);
-        Inertial { mass: *mass, inertia, ..given.clone() }
-    }
 }
 
 #[cfg(test)]
@@ -113,24 +80,11 @@ mod tests {
     use crate::scene::default_scene;
 
     #[test]
-    fn a_mass_that_touch_tells_scales_inertia() {
-        let given = default_scene(1).unwrap().object.inertial.clone();
-        let told = ObjectMass { mass: 2.0 * given.mass, sigma: 0.1 };
-        let skin = SkinCalibration { masses: BTreeMap::from([(5, told)]), ..Default::default() };
-        assert_eq!(skin.inertial(6, &given), given);
-        let Inertial { mass, center_of_mass, inertia } = skin.inertial(5, &given);
-        assert_eq!((mass, center_of_mass), (told.mass, given.center_of_mass));
-        assert!((inertia - given.inertia * 2.0).norm() < 1e-12 * inertia.norm());
-    }
-
-    #[test]
     fn forces_are_corrected_and_the_silence_of_dead_taxels_is_no_silence() {
         let mut hand = default_scene(1).unwrap().observation.hand.unwrap();
-        let alive =
-            TaxelCalibration { gain: 1.0, gain_sigma: 0.15, offset: Vector3::zeros(), dead: 0.1 };
-        let mut skin = SkinCalibration { taxels: vec![alive.clone(); 368], ..Default::default() };
-        skin.taxels[3] =
-            TaxelCalibration { gain: 0.5, offset: Vector3::x() * 0.2, ..alive.clone() };
+        let alive = TaxelCalibration { offset: Vector3::zeros(), dead: 0.1 };
+        let mut skin = SkinCalibration { taxels: vec![alive; 368] };
+        skin.taxels[3].offset = Vector3::x() * 0.2;
         skin.taxels[4].dead = 0.9;
         skin.taxels[5].dead = 0.9;
         hand.forces[3] = Vector3::new(0.2, 0.0, -1.0);
@@ -138,7 +92,7 @@ mod tests {
         hand.forces[5] = Vector3::new(0.0, 0.0, -1.0);
         let before = hand.forces.clone();
         skin.correct(&mut hand).unwrap();
-        assert_eq!(hand.forces[3], Vector3::new(0.0, 0.0, -2.0));
+        assert_eq!(hand.forces[3], Vector3::new(0.0, 0.0, -1.0));
         assert!(hand.forces[4].iter().all(|f| f.is_nan()));
         assert_eq!((hand.forces[5], hand.forces[6]), (before[5], before[6]));
         hand.forces.pop();

@@ -1,14 +1,12 @@
-//! The skin of a rig, learnt from its own frames: taxels that are dead, that ring false, whose gain is off; and the masses of objects.
+//! The skin of a rig, learnt from its own frames: taxels that are dead, and those that read a constant force.
 
-mod balance;
 mod calibration;
 mod layout;
 mod offset;
 mod reading;
 mod silence;
 
-use self::balance::BalanceSums;
-pub use self::calibration::{ObjectMass, SkinCalibration, TaxelCalibration};
+pub use self::calibration::{SkinCalibration, TaxelCalibration};
 pub(super) use self::layout::SkinLayout;
 use self::offset::OffsetSums;
 pub(super) use self::reading::SkinReading;
@@ -22,7 +20,6 @@ use self::silence::SilenceSums;
 pub(super) struct SkinEvidence {
     offsets: OffsetSums,
     silence: SilenceSums,
-    balance: BalanceSums,
 }
 
 impl SkinEvidence {
@@ -40,7 +37,6 @@ impl SkinEvidence {
         for (reading, weight) in readings.iter().zip(&weights) {
             let forces: Vec<_> = reading.forces.iter().zip(&offsets).map(|(f, o)| f - o).collect();
             self.silence.add(reading, &forces, *weight);
-            self.balance.add(reading, &forces, *weight);
         }
     }
 
@@ -48,14 +44,7 @@ impl SkinEvidence {
     pub(super) fn solve(&self) -> SkinCalibration {
         let offsets = self.offsets.solve();
         let dead = self.silence.solve(&offsets);
-        let (gains, masses) = self.balance.solve(offsets.len());
-        let all = offsets.into_iter().zip(dead).zip(gains);
-        let taxel = |((offset, dead), (gain, gain_sigma))| TaxelCalibration {
-            gain,
-            gain_sigma,
-            offset,
-            dead,
-        };
-        SkinCalibration { taxels: all.map(taxel).collect(), masses }
+        let taxel = |(offset, dead)| TaxelCalibration { offset, dead };
+        SkinCalibration { taxels: offsets.into_iter().zip(dead).map(taxel).collect() }
     }
 }

@@ -5,23 +5,20 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::problem::State;
-use crate::scene::{Frame, Hand, HandMeasurement, Object};
+use crate::scene::{Frame, Hand, HandMeasurement};
 
 /// The skin in a frame, in coordinates of the object where a visit has found it.
 #[derive(Clone)]
 pub(in crate::rig) struct SkinReading {
     pub(super) obj_id: u32,
-    /// With the mass that is given.
-    pub(super) object: Arc<Object>,
     hand: Arc<Hand>,
     t_object_hand: Isometry3<f64>,
     /// Of each taxel's link.
-    pub(super) t_object_links: Vec<Isometry3<f64>>,
+    t_object_links: Vec<Isometry3<f64>>,
     /// As they are read, in frames of links \[N\].
     pub(super) forces: Vec<Vector3<f64>>,
     /// Of taxels from the object's surface, positive outside \[m\].
     pub(super) distances: Vec<f64>,
-    pub(super) gravity: Option<Vector3<f64>>,
 }
 
 /// Frames in which the hand is so near on the object \[m, rad\] are of one grasp.
@@ -31,12 +28,8 @@ const SAME_GRASP: (f64, f64) = (10e-3, 0.1);
 const REACH: f64 = 8e-3;
 
 impl SkinReading {
-    /// Of a frame at `state`, whose forces are as they were read, of `object` as it is given; `None` without a skin, or if it cannot be posed.
-    pub(in crate::rig) fn new(
-        frame: &Frame<'_>,
-        state: &State,
-        (obj_id, object): (u32, &Arc<Object>),
-    ) -> Option<Self> {
+    /// Of a frame at `state`, whose forces are as they were read, of the object with this number; `None` without a skin, or if it cannot be posed.
+    pub(in crate::rig) fn new(frame: &Frame<'_>, state: &State, obj_id: u32) -> Option<Self> {
         let (hand, HandMeasurement { forces, .. }) = frame.hand()?;
         if forces.is_empty() || forces.len() != hand.taxels.len() {
             return None;
@@ -47,13 +40,11 @@ impl SkinReading {
         let t_object_links: Vec<_> = hand.taxels.iter().map(link).collect::<Option<_>>()?;
         let mut reading = Self {
             obj_id,
-            object: Arc::clone(object),
             hand: Arc::clone(hand),
             t_object_hand: t_object_cam * state.t_cam_hand,
             t_object_links,
             forces: forces.clone(),
             distances: Vec::new(),
-            gravity: frame.observation().gravity.map(|gravity| t_object_cam * gravity),
         };
         let surface = &frame.object().surface;
         let distance = |taxel| surface.signed_distance(&reading.place(taxel)).0;
@@ -62,7 +53,7 @@ impl SkinReading {
     }
 
     /// Where a taxel is, in coordinates of the object.
-    pub(super) fn place(&self, taxel: usize) -> Point3<f64> {
+    fn place(&self, taxel: usize) -> Point3<f64> {
         self.t_object_links[taxel] * self.hand.taxels[taxel].position
     }
 
@@ -119,7 +110,7 @@ pub(super) mod tests {
         let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
         let mut state = State::new(&frame, &scene.truth).unwrap();
         state.t_cam_object.translation.vector += displaced;
-        SkinReading::new(&frame, &state, (5, &scene.object)).unwrap()
+        SkinReading::new(&frame, &state, 5).unwrap()
     }
 
     #[test]

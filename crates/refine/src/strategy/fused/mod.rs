@@ -171,20 +171,6 @@ impl Fused {
         Ok(Some(Posterior::new(&[solution], frame.object().radius)))
     }
 
-    /// The same, with depth's noise in the last stage as it is in `frame` about `state`, whatever a frame shows.
-    pub(crate) fn with_noise_of(&self, frame: &Frame<'_>, state: &State) -> Self {
-        let mut fused = self.clone();
-        let settings = &mut fused.settings;
-        if let Some(stage) = settings.stages.last_mut().filter(|stage| stage.measured_noise) {
-            stage.measured_noise = false;
-            let with_patches = stage.model_error && settings.nuisances.contains(&Nuisance::Model);
-            if let Some(noise) = depth_noise(frame, state, &self.settings) {
-                take_noise(settings, &noise, with_patches);
-            }
-        }
-        fused
-    }
-
     /// The problem of the last stage about `state`, from where noise is measured; `None` without stages.
     fn last_problem(
         &self,

@@ -15,9 +15,7 @@ use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{ResultRow, check_writable};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::evaluate::report::Report;
-use prehend_refine::rig::{
-    Calibrated, CalibrationFrames, Calibrator, CalibratorSettings, Passes, UnobservedDirection,
-};
+use prehend_refine::rig::{CalibrationFrames, Calibrator, CalibratorSettings, Passes};
 use prehend_refine::scene::Object;
 
 use crate::options::{Input, Job, limit_threads, write_poses};
@@ -100,49 +98,15 @@ impl Calibrate {
         for [name, found] in report::skin_rows(calibrator) {
             say(format!("{name:31} {found}"))?;
         }
-        let unobserved = unobserved(&frames, &done).unwrap_or_else(|error| {
-            failures.push(format!("what is unobserved: {error}"));
-            Vec::new()
-        });
-        if !unobserved.is_empty() {
-            say("\nhardly determined by these frames:")?;
-        }
-        for direction in unobserved.iter().take(LINES) {
-            say(report::told(direction))?;
-        }
-        if unobserved.len() > LINES {
-            say(format!("  and {} more", unobserved.len() - LINES))?;
-        }
         save_models(calibrator, &objects, &models)?;
         let (used, out) = (count - done.left_out.len(), self.out.display());
         say(format!("\nrig of {used} frames written to {out}, models to {}", models.display()))?;
         if let Some(report) = report {
-            let page = report::write(
-                report,
-                &frames,
-                (&nominal, size),
-                &done,
-                &unobserved,
-                &mut failures,
-            )?;
+            let page = report::write(report, &frames, (&nominal, size), &done, &mut failures)?;
             say(format!("report: open {}", page.display()))?;
         }
         Ok(exit_code(count, &failures))
     }
-}
-
-/// Directions that are printed at most.
-const LINES: usize = 6;
-
-/// What `done` leaves open, seen from a frame in the middle, as an example of where the hand is.
-fn unobserved(
-    frames: &CalibrationFrames<'_>,
-    done: &Calibrated,
-) -> anyhow::Result<Vec<UnobservedDirection>> {
-    let used = done.poses.iter().filter(|(index, _)| !done.left_out.contains_key(index));
-    let used: Vec<_> = used.collect();
-    let Some((index, pose)) = used.get(used.len() / 2) else { return Ok(Vec::new()) };
-    Ok(done.calibrator.unobserved(&frames.load(**index, pose)?)?)
 }
 
 /// Rows of a results file with these poses, by the frames' indices.

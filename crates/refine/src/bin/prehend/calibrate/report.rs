@@ -7,8 +7,8 @@ use nalgebra::Isometry3;
 use prehend_refine::data::Workers;
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_refine::rig::{
-    Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, ObjectMass,
-    Residuals, SensorResidual, SkinCalibration, TaxelCalibration, UnobservedDirection,
+    Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, Residuals,
+    SensorResidual, SkinCalibration, TaxelCalibration,
 };
 use prehend_render::RgbImage;
 
@@ -41,39 +41,16 @@ pub(super) fn parameter_rows(calibrator: &Calibrator) -> Vec<[String; 4]> {
 
 /// What touch has told of the skin, name and finding each; nothing where there is none.
 pub(super) fn skin_rows(calibrator: &Calibrator) -> Vec<[String; 2]> {
-    let SkinCalibration { taxels, masses } = &calibrator.rig().skin;
+    let SkinCalibration { taxels } = &calibrator.rig().skin;
     if taxels.is_empty() {
         return Vec::new();
     }
     let count = |is: fn(&TaxelCalibration) -> bool| taxels.iter().filter(|t| is(t)).count();
     let of = |count: usize| format!("{count} of {}", taxels.len());
-    let mut rows = vec![
+    vec![
         ["taxels probably dead".to_owned(), of(count(TaxelCalibration::is_dead))],
         ["taxels that ring false".to_owned(), of(count(TaxelCalibration::rings_false))],
-        ["gains known better than before".to_owned(), of(count(TaxelCalibration::has_known_gain))],
-    ];
-    rows.extend(masses.iter().map(|(id, ObjectMass { mass, sigma })| {
-        [format!("mass of object {id}"), format!("{mass:.3} kg, deviation {sigma:.3} kg")]
-    }));
-    if masses.is_empty() {
-        rows.push(["masses told by touch".to_owned(), "none".to_owned()]);
-    }
-    rows
-}
-
-/// A direction in a line.
-pub(super) fn told(direction: &UnobservedDirection) -> String {
-    let shares = direction.shares.iter().map(|(name, share)| format!("{share:+.2} {name}"));
-    let shares: Vec<String> = shares.collect();
-    let motion = match &direction.motion {
-        Some((motion, left)) => {
-            let (frames, left) = (UnobservedDirection::FRAMES, 1e2 * left);
-            format!("{frames} frames with the hand {motion} would leave {left:.0} %")
-        }
-        None => "no motion of the hand that was tried tells it".to_owned(),
-    };
-    let left = 1e2 * direction.deviation;
-    format!("  {}: {left:.0} % of its deviation beforehand is left; {motion}", shares.join(", "))
+    ]
 }
 
 /// Writes the report of `done`, which began with the `nominal` rig, of images of this size, and returns its page; of frames that cannot be shown `failures` hears.
@@ -82,7 +59,6 @@ pub(super) fn write(
     frames: &CalibrationFrames<'_>,
     (nominal, size): (&Calibrator, (usize, usize)),
     done: &Calibrated,
-    unobserved: &[UnobservedDirection],
     failures: &mut Vec<String>,
 ) -> anyhow::Result<PathBuf> {
     let used = |index: &&usize| !done.left_out.contains_key(index);
@@ -141,10 +117,6 @@ pub(super) fn write(
     let skin: Vec<Vec<String>> = skin_rows(&done.calibrator).into_iter().map(Vec::from).collect();
     if !skin.is_empty() {
         report.add_table("Skin", ["what", "found"], skin);
-    }
-    let open: Vec<Vec<String>> = unobserved.iter().map(|direction| vec![told(direction)]).collect();
-    if !open.is_empty() {
-        report.add_table("Hardly determined by these frames", ["direction"], open);
     }
     let left_out: Vec<Vec<String>> =
         done.left_out.values().map(|frame| vec![frame.clone()]).collect();
