@@ -104,7 +104,7 @@ impl Default for PriorSettings {
             object_translation: [0.03; 3],
             object_rotation: [0.4; 3],
             object_tails: 3.0,
-            object_turned: 0.01,
+            object_turned: 0.02,
             hand_translation: 2.1e-3,
             hand_rotation: 7e-3,
             joints: 0.014,

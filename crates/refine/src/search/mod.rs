@@ -2,7 +2,6 @@
 
 mod distance_lattice;
 mod evidence;
-mod fine;
 mod rough;
 mod settings;
 
@@ -16,20 +15,20 @@ pub use self::settings::SearchSettings;
 
 use self::distance_lattice::DistanceLattice;
 use self::evidence::Evidence;
-use self::fine::FineScorer;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
+use crate::problem::State;
 use crate::scene::{Frame, Object};
+use crate::strategy::problem_of;
 
 /// A pose that a search ends with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseCandidate {
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_object: Isometry3<f64>,
-    /// The sum of the costs there \[nat\]; the lower the better.
+    /// Cost of the estimator's factors with nominal calibrations \[nat\].
     pub cost: f64,
-    /// Its share among the poses that the search ended with, in proportion to exp(−cost / 10 nat); they sum to one. The search holds calibrations
-    /// and models for exact, so that costs differ by far more than they should.
+    /// Its share among the poses that the search ended with, in proportion to exp(−cost); they sum to one.
     pub weight: f64,
 }
 
@@ -42,13 +41,12 @@ pub struct PoseCandidate {
 ///    and the hand outside of it. The score is of depth points and their normals, touched taxels, the hand inside the
 ///    object, and surface where the camera sees something else: all by a lattice of signed distances.
 /// 2. The best that differ from each other turn too, and are scored again on more points.
-/// 3. Those left are scored by the factors of the refinement at a low resolution. Only here color counts, which
-///    tells the front of a carton from its back; therefore stage 2 keeps many.
-/// 4. Gauss–Newton steps of the sum of the factors, at a low and then at the full resolution.
+/// 3. Those left are scored by the factors of the [estimator](SearchSettings::estimator) in its first stage with colors, at nominal calibrations; the
+///    best that differ from each other take some steps down the same cost. Only here color counts, which tells the front of a carton from its back;
+///    therefore stage 2 keeps many.
 ///
-/// The factors are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
-/// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
-/// nothing in the factors: without it, small and much hidden objects are often found turned.
+/// Only what an estimator may know is read: nothing here takes a pose of the object. A hand that is not known hides what its depth says it hides in
+/// stages 1 and 2, and nothing in the factors: without it, small and much hidden objects are often found turned.
 ///
 /// How a pose is turned is often wrong where an object looks much the same from both sides: what begins at the best one should try the others, too
 /// ([`Frame::with_rivals`]).
@@ -80,24 +78,16 @@ impl PoseSearch {
     /// # Errors
     /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
     pub fn run(&self, frame: &Frame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
-        let settings = &self.settings;
-        let evidence = Evidence::new(frame, settings.contact_threshold)?;
+        let evidence = Evidence::new(frame, self.settings.estimator.tactile.contact_threshold)?;
         let rough =
             CoarseScorer { object: &self.object, lattice: &self.lattice, evidence: &evidence };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
-        let judge = |resolution| FineScorer::new(frame, resolution, settings);
-        let coarse = judge(settings.coarse_resolution)?;
-        let seen = distinct(coarse.judge(&turned), settings.seen, 6e-3, 6.0);
-        let middle = judge(settings.middle_resolution)?;
-        let moved =
-            distinct(middle.descend(&seen, settings.middle_steps), settings.last, 3e-3, 3.0);
-        let full = judge(1)?;
-        let last = distinct(full.descend(&moved, settings.last_steps), settings.last, 1e-3, 1.0);
-        if last.is_empty() {
+        let found = self.descend(frame, &turned)?;
+        if found.is_empty() {
             return Err(RefineError::NothingFits);
         }
-        Ok(weighted(&last))
+        Ok(weighted(&found))
     }
 
     /// Stage 1.
@@ -139,15 +129,31 @@ impl PoseSearch {
         });
         distinct(turned, settings.turned, 6e-3, 6.0)
     }
-}
 
-/// Differences of costs over this are logarithms of ratios of probabilities \[nat\].
-const TEMPERATURE: f64 = 10.0;
+    /// Stage 3.
+    fn descend(&self, frame: &Frame<'_>, turned: &[Scored]) -> Result<Vec<Scored>, RefineError> {
+        let mut settings = self.settings.estimator.for_frame(frame);
+        settings.nuisances.clear();
+        let states = |poses: &[Scored]| -> Vec<State> {
+            poses.iter().filter_map(|(pose, _)| State::new(frame, pose).ok()).collect()
+        };
+        let starts = states(turned);
+        let stage = settings.stages.iter().find(|stage| stage.color);
+        let (Some(first), Some(stage)) = (starts.first(), stage) else { return Ok(Vec::new()) };
+        let problem = problem_of(frame, first, stage, &settings, None, &[])?;
+        let costs = problem.cost_all(&starts);
+        let poses = starts.iter().map(|state| state.t_cam_object);
+        let seen = distinct(poses.zip(costs).collect(), self.settings.seen, 6e-3, 6.0);
+        let found = problem.solve_all(&states(&seen), &stage.solver);
+        let found = found.into_iter().map(|found| (found.at.state.t_cam_object, found.at.cost));
+        Ok(distinct(found.collect(), self.settings.last, 3e-3, 3.0))
+    }
+}
 
 /// `poses`, best first, with their shares.
 fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
     let least = poses.first().map_or(0.0, |(_, cost)| *cost);
-    let share = |cost: f64| ((least - cost) / TEMPERATURE).exp();
+    let share = |cost: f64| (least - cost).exp();
     let total: f64 = poses.iter().map(|(_, cost)| share(*cost)).sum();
     let candidate = |&(t_cam_object, cost): &Scored| {
         let weight = share(cost) / total;
@@ -190,7 +196,7 @@ mod tests {
     #[test]
     fn shares_sum_to_one_and_the_best_has_the_largest() {
         let pose = Isometry3::identity();
-        let found = weighted(&[(pose, 700.0), (pose, 710.0), (pose, 1e5)]);
+        let found = weighted(&[(pose, 700.0), (pose, 701.0), (pose, 1e5)]);
         let weights: Vec<f64> = found.iter().map(|c| c.weight).collect();
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         assert!((weights[0] / weights[1] - 1f64.exp()).abs() < 1e-9, "{weights:?}");

@@ -1,6 +1,7 @@
 //! Settings of the search.
 
 use crate::error::RefineError;
+use crate::strategy::FusedSettings;
 
 /// Settings of [`PoseSearch`](super::PoseSearch), chosen on made-up scenes and on kinematic grasps of nine objects.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,20 +25,12 @@ pub struct SearchSettings {
     pub turns: usize,
     /// Hypotheses that stage 2 keeps.
     pub turned: usize,
-    /// The image is made smaller by this factor, beyond that of the rendering factor, in stage 3.
-    pub coarse_resolution: usize,
-    /// Hypotheses that stage 3 keeps.
+    /// Hypotheses that stage 3 solves.
     pub seen: usize,
-    /// As `coarse_resolution`, in the first half of stage 4.
-    pub middle_resolution: usize,
-    /// Steps of the first half of stage 4.
-    pub middle_steps: usize,
-    /// Hypotheses that the first half of stage 4 keeps.
+    /// Poses found, at most.
     pub last: usize,
-    /// Steps of its second half.
-    pub last_steps: usize,
-    /// Force above which a taxel counts as touched \[N\].
-    pub contact_threshold: f64,
+    /// Factors of stage 3, and the force above which a taxel counts as touched.
+    pub estimator: FusedSettings,
 }
 
 impl Default for SearchSettings {
@@ -52,13 +45,9 @@ impl Default for SearchSettings {
             points: 300,
             turns: 8,
             turned: 160,
-            coarse_resolution: 4,
             seen: 24,
-            middle_resolution: 2,
-            middle_steps: 10,
             last: 4,
-            last_steps: 12,
-            contact_threshold: 0.1,
+            estimator: FusedSettings::default(),
         }
     }
 }
@@ -73,9 +62,7 @@ impl SearchSettings {
             ("placed", self.placed),
             ("points", self.points),
             ("turned", self.turned),
-            ("coarse_resolution", self.coarse_resolution),
             ("seen", self.seen),
-            ("middle_resolution", self.middle_resolution),
             ("last", self.last),
         ];
         if let Some((name, _)) = counts.iter().find(|(_, value)| *value == 0) {
@@ -85,12 +72,9 @@ impl SearchSettings {
             let problem = format!("is {}, must be from 8 to 256", self.cells);
             return Err(RefineError::Setting { name: "cells", problem });
         }
-        for (name, value) in [("reach", self.reach), ("contact_threshold", self.contact_threshold)]
-        {
-            if !(value.is_finite() && value >= 0.0) {
-                let problem = format!("is {value}, must be finite and not negative");
-                return Err(RefineError::Setting { name, problem });
-            }
+        if !(self.reach.is_finite() && self.reach >= 0.0) {
+            let problem = format!("is {}, must be finite and not negative", self.reach);
+            return Err(RefineError::Setting { name: "reach", problem });
         }
         Ok(())
     }
