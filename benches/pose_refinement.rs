@@ -5,9 +5,10 @@ use std::hint::black_box;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
+use prehend::refine::baselines::{GradientKind, Heuristic};
 use prehend::refine::problem::{Block, NormalEquations, State};
 use prehend::refine::scene::{Scene, Sequence, default_scene, default_sequence};
-use prehend::refine::strategy::{Fused, GradientKind, Heuristic};
+use prehend::refine::strategy::Fused;
 use prehend::refine::tracker::{Timing, TrackStatus, Tracked, Tracker, TrackerSettings};
 use prehend::refine::{Frame, RefineError, Strategy, refine};
 

@@ -5,11 +5,12 @@
 use std::ops::ControlFlow;
 
 use prehend::geometry::SplitMix64;
+use prehend::refine::baselines::RobustIcp;
 use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend::refine::factor::{PointToPlaneFactor, PointToPlaneSettings};
 use prehend::refine::problem::{Block, Factor, State};
 use prehend::refine::scene::default_scene;
-use prehend::refine::strategy::{Observer, RobustIcp};
+use prehend::refine::strategy::Observer;
 use prehend::refine::{Estimate, Frame, RefineError, Strategy, refine};
 
 /// Random restarts, then ICP.

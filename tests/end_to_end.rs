@@ -4,9 +4,10 @@ use std::sync::LazyLock;
 
 use nalgebra::Vector6;
 use prehend::autodiff::lie::perturb_about;
+use prehend::refine::baselines::{GradientKind, Heuristic};
 use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend::refine::scene::{Scene, default_scene};
-use prehend::refine::strategy::{Fused, GradientKind, Heuristic};
+use prehend::refine::strategy::Fused;
 use prehend::refine::{Estimate, Frame, RefineError, Strategy, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));

@@ -22,16 +22,18 @@
 //! | [`problem`] | state, factors, noise models, normal equations, solver |
 //! | [`factor`] | one kind of evidence a file |
 //! | [`strategy`] | ways from an initial pose to a refined one; [`Method`] names them |
+//! | [`baselines`] | methods that the estimator is compared with: the paper's heuristic, ICPs |
 //! | [`search`] | poses to start from, by sensors alone |
 //! | [`tracker`] | an object followed through frames |
 //! | [`data`] | BOP datasets and other files |
-//! | [`export`] | poses for other programs: films, contacts |
+//! | [`export`] | poses for other programs: films |
 //! | [`info`] | what a file or folder is and holds |
 //! | [`evaluate`] | metrics, reports, studies |
 //! | [`synth`] | made-up datasets whose truth is known |
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+pub mod baselines;
 pub mod data;
 mod error;
 pub mod evaluate;

@@ -1,12 +1,10 @@
 //! Ways to refine a pose, and their names: what `--method` picks and what studies compare.
 
+use crate::baselines::{GradientKind, Heuristic, Icp, RobustIcp};
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::scene::Frame;
-use crate::strategy::{
-    Estimate, Fused, FusedSettings, GradientKind, Heuristic, Icp, Modality, Nuisance, Observer,
-    RobustIcp, Strategy,
-};
+use crate::strategy::{Estimate, Fused, FusedSettings, Modality, Nuisance, Observer, Strategy};
 
 /// A strategy with all of its settings.
 #[derive(Clone, Debug)]

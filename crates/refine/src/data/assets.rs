@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_geometry::{GridCache, TriMesh};
 
+use crate::baselines::GradientKind;
 use crate::data::bop::{BodyKind, Dataset, DatasetError, Frame, Models, SceneBodies};
 use crate::data::guard::Panicked;
 use crate::data::robots::Robots;
@@ -15,7 +16,6 @@ use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{self, Hand, Inertial, Object, Observation, StatedSize, Warning, check_gravity};
-use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
 const MILLIMETER: f64 = 1e-3;

@@ -1,6 +1,5 @@
 //! The evidence, one kind a file: each factor is a negative log-likelihood of the state, up to a constant.
 
-mod chamfer_depth;
 mod facing;
 mod free_space;
 mod hand_depth;
@@ -9,12 +8,10 @@ mod penetration;
 mod point_to_plane;
 mod prior;
 mod rendering;
-mod stability;
 mod support;
 mod tactile;
 mod view;
 
-pub use chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
 pub use free_space::{FreeSpaceFactor, FreeSpaceSettings};
 pub use hand_depth::{HandDepthFactor, HandDepthSettings};
 pub use penetration::{PenetrationFactor, PenetrationSettings};
@@ -23,7 +20,6 @@ pub use point_to_plane::{PointToPlaneFactor, PointToPlaneSettings};
 pub(crate) use prior::Layout;
 pub use prior::{GaussianPrior, PriorSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
-pub use stability::{StabilityFactor, StabilitySettings};
 pub use support::{SupportFactor, SupportSettings};
 pub use tactile::{
     BinaryTouchFactor, BinaryTouchSettings, ContactPatchFactor, ContactPatchSettings,
@@ -33,7 +29,7 @@ pub use tactile::{
 pub use view::ViewFactor;
 
 #[cfg(test)]
-mod gradient_check {
+pub(crate) mod gradient_check {
     use std::sync::{Arc, LazyLock};
 
     use nalgebra::{Isometry3, Vector6};
@@ -47,18 +43,18 @@ mod gradient_check {
     static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
     /// The built-in scene.
-    pub(super) fn scene() -> &'static Scene {
+    pub(crate) fn scene() -> &'static Scene {
         &SCENE
     }
 
     /// Its frame.
-    pub(super) fn frame() -> Frame<'static> {
+    pub(crate) fn frame() -> Frame<'static> {
         let scene = scene();
         Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap()
     }
 
     /// The frame, and a state a little off its truth.
-    pub(super) fn fixture(seed: usize) -> (Frame<'static>, State) {
+    pub(crate) fn fixture(seed: usize) -> (Frame<'static>, State) {
         let frame = frame();
         let state = State::new(&frame, &scene().truth).unwrap();
         let turn = [0.05, -0.08, 0.06, 0.02, -0.03, 0.01];
@@ -82,7 +78,7 @@ mod gradient_check {
     }
 
     /// Compares the factor's gradient by `block` with differences of its value over `step`.
-    pub(super) fn assert_gradient(
+    pub(crate) fn assert_gradient(
         factor: &dyn Factor,
         state: &State,
         block: Block,
@@ -111,7 +107,7 @@ mod gradient_check {
     }
 
     /// Where the fixture's object may be off, by tiles of whole pixels in images that are smaller by `unit`.
-    pub(super) fn patches(unit: usize) -> Arc<SurfacePatches> {
+    pub(crate) fn patches(unit: usize) -> Arc<SurfacePatches> {
         let settings = ModelErrorSettings::default();
         Arc::new(
             SurfacePatches::new(&SCENE.observation, SCENE.truth.translation.z, &settings, unit)
@@ -121,7 +117,7 @@ mod gradient_check {
 
     /// Asserts that by pose and camera `factor` has the derivatives that it has without `patches`, that what these have adds up to what the
     /// object's place has but for a share of `elsewhere`, and that the matrix is not indefinite.
-    pub(super) fn assert_by_patches(
+    pub(crate) fn assert_by_patches(
         factor: &dyn Factor,
         state: &State,
         patches: &SurfacePatches,

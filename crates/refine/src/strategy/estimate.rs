@@ -62,7 +62,7 @@ impl Estimate {
 }
 
 /// Records a walk: its trace, and the state that it is to return.
-pub(super) struct Recorder<'a, 'b> {
+pub(crate) struct Recorder<'a, 'b> {
     observe: &'a mut Observer<'b>,
     iterations: usize,
     /// What decides which state is the best, if not the last one.
@@ -76,7 +76,7 @@ pub(super) struct Recorder<'a, 'b> {
 impl<'a, 'b> Recorder<'a, 'b> {
     /// Of a walk from `initial` of at most `iterations`, whose values are called `names`. With a `judge`, the state of the lowest
     /// cost by it is the best; else the last one is.
-    pub(super) fn new<'n>(
+    pub(crate) fn new<'n>(
         names: impl Iterator<Item = &'n str>,
         initial: &State,
         iterations: usize,
@@ -91,7 +91,7 @@ impl<'a, 'b> Recorder<'a, 'b> {
     ///
     /// # Errors
     /// If the images do not fit the camera.
-    pub(super) fn judge(
+    pub(crate) fn judge(
         frame: &Frame<'_>,
         checkpoint: bool,
         settings: &RenderingSettings,
@@ -100,7 +100,7 @@ impl<'a, 'b> Recorder<'a, 'b> {
     }
 
     /// Records that the walk is at `state`, with the judge's cost there if it is known already.
-    pub(super) fn visit(
+    pub(crate) fn visit(
         &mut self,
         state: &State,
         iteration: Iteration,
@@ -121,12 +121,12 @@ impl<'a, 'b> Recorder<'a, 'b> {
     }
 
     /// Iterations recorded.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.trace.iterations.len()
     }
 
     /// The outcome.
-    pub(super) fn estimate(self, posterior: Option<Posterior>) -> Estimate {
+    pub(crate) fn estimate(self, posterior: Option<Posterior>) -> Estimate {
         Estimate { state: self.best, iteration: self.at, posterior, trace: self.trace }
     }
 }

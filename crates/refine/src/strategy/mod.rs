@@ -2,12 +2,9 @@
 
 mod estimate;
 mod fused;
-mod heuristic;
-mod icp;
-mod robust_icp;
-mod step;
 mod trace;
 
+pub(crate) use estimate::Recorder;
 pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
@@ -16,7 +13,4 @@ pub use fused::{
     ScaleSettings, Scales, Stage, UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
-pub use heuristic::{GradientKind, Heuristic};
-pub use icp::Icp;
-pub use robust_icp::RobustIcp;
 pub use trace::{Iteration, Trace};

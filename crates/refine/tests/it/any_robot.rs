@@ -7,10 +7,10 @@ use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree;
 use prehend_refine::Frame;
+use prehend_refine::baselines::{GradientKind, Heuristic};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
 use prehend_refine::scene::{Hand, HandMeasurement, Object, Observation};
-use prehend_refine::strategy::{GradientKind, Heuristic};
 use prehend_render::{Camera, Light, Mask, RenderModel, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">

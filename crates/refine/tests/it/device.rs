@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::Isometry3;
+use prehend_refine::baselines::Heuristic;
 use prehend_refine::scene::{Frame, default_scene};
 use prehend_refine::search::{PoseSearch, SearchSettings};
-use prehend_refine::strategy::Heuristic;
 use prehend_refine::{Method, refine};
 use prehend_render::{
     Backend, BackendError, Hypothesis, Linearized, Loss, PoseImage, PoseProblem, Session, Tile,

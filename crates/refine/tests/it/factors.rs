@@ -5,13 +5,15 @@ use std::sync::{Arc, LazyLock};
 
 use nalgebra::Vector6;
 use prehend_autodiff::optimize::LeastSquares;
+use prehend_refine::baselines::{
+    ChamferDepthFactor, ChamferDepthSettings, StabilityFactor, StabilitySettings,
+};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::factor::{
-    ChamferDepthFactor, ChamferDepthSettings, ContactSettings, FreeSpaceFactor, FreeSpaceSettings,
-    GaussianPrior, HandDepthFactor, HandDepthSettings, PenetrationFactor, PenetrationSettings,
-    PointToPlaneFactor, PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings,
-    StabilityFactor, StabilitySettings, SupportFactor, SupportSettings, TactileFactor,
-    TactileSettings, TouchModel,
+    ContactSettings, FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor,
+    HandDepthSettings, PenetrationFactor, PenetrationSettings, PointToPlaneFactor,
+    PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings, SupportFactor,
+    SupportSettings, TactileFactor, TactileSettings, TouchModel,
 };
 use prehend_refine::problem::{Block, NormalEquations, Problem, Solver, Termination};
 use prehend_refine::scene::{Scene, default_scene};

@@ -4,15 +4,17 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_refine::baselines::{
+    ChamferDepthFactor, ChamferDepthSettings, StabilityFactor, StabilitySettings,
+};
 use prehend_refine::evaluate::metrics::{
     PoseScore, ScoredModel, ScoredRow, oe_deg, oe_symmetric_deg, pe_cm, summarize,
 };
 use prehend_refine::factor::{
-    ChamferDepthFactor, ChamferDepthSettings, ContactSettings, FreeSpaceFactor, FreeSpaceSettings,
-    GaussianPrior, HandDepthFactor, HandDepthSettings, PenetrationFactor, PenetrationSettings,
-    PointToPlaneFactor, PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings,
-    StabilityFactor, StabilitySettings, SupportFactor, SupportSettings, TactileFactor,
-    TactileSettings, TouchModel,
+    ContactSettings, FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor,
+    HandDepthSettings, PenetrationFactor, PenetrationSettings, PointToPlaneFactor,
+    PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings, SupportFactor,
+    SupportSettings, TactileFactor, TactileSettings, TouchModel,
 };
 use prehend_refine::problem::{Block, NormalEquations};
 use prehend_refine::scene::{Scene, default_scene};

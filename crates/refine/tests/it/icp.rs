@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Isometry3;
+use prehend_refine::baselines::{Icp, RobustIcp};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::problem::Block;
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::strategy::{Icp, RobustIcp};
 use prehend_refine::{Frame, RefineError, State, Strategy};
 
 #[test]

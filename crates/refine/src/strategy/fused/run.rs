@@ -18,7 +18,7 @@ use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
 use crate::scene::Frame;
-use crate::strategy::estimate::Recorder;
+use crate::strategy::Recorder;
 use crate::strategy::{Estimate, Iteration, Observer};
 
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use prehend_refine::strategy::GradientKind;
+use prehend_refine::baselines::GradientKind;
 use prehend_refine::{Method, NamedMethod};
 
 use crate::options::named;

@@ -7,16 +7,14 @@ use prehend_autodiff::Quadratic;
 use rayon::prelude::*;
 use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 
-use super::estimate::Recorder;
+use super::chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
+use super::stability::{StabilityFactor, StabilitySettings};
 use super::step::damped_step;
-use super::{Estimate, Fused, Iteration, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::{
-    ChamferDepthFactor, ChamferDepthSettings, RenderingFactor, RenderingSettings, StabilityFactor,
-    StabilitySettings, TactileFactor, TactileSettings,
-};
+use crate::factor::{RenderingFactor, RenderingSettings, TactileFactor, TactileSettings};
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::Frame;
+use crate::strategy::{Estimate, Fused, Iteration, Observer, Recorder, Strategy};
 
 /// Damping of candidate steps, as a part of the mean curvature.
 const DAMPING: f64 = 1e-3;

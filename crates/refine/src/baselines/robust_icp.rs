@@ -4,12 +4,11 @@ use nalgebra::{Point3, Vector3};
 use prehend_geometry::{RobustKernel, icp};
 use rayon::prelude::*;
 
-use super::estimate::Recorder;
 use super::step::{StepRule, walk};
-use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::scene::{Frame, Object};
+use crate::strategy::{Estimate, Observer, Recorder, Strategy};
 
 /// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
 ///

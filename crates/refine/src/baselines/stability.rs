@@ -188,8 +188,8 @@ impl Factor for StabilityFactor {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
+    use crate::factor::gradient_check::{assert_gradient, fixture, scene};
 
     #[test]
     fn gradient_matches_differences_without_the_leak() {

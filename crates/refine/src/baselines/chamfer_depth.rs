@@ -146,8 +146,8 @@ impl Factor for ChamferDepthFactor {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
+    use crate::factor::gradient_check::{assert_gradient, fixture, scene};
     use crate::problem::Block;
 
     fn factor(frame: &Frame<'_>) -> ChamferDepthFactor {

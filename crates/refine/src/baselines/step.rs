@@ -3,9 +3,8 @@
 use nalgebra::Vector6;
 use prehend_autodiff::Quadratic;
 
-use super::Iteration;
-use super::estimate::Recorder;
 use crate::problem::{Block, State};
+use crate::strategy::{Iteration, Recorder};
 
 /// The damped Gauss–Newton step in units where a radian counts `radius` meters, no longer than `limit`; and its length in these
 /// units \[m\].

@@ -5,13 +5,12 @@ use prehend_autodiff::Quadratic;
 use prehend_geometry::{KdTree, RobustKernel, icp};
 use rayon::prelude::*;
 
-use super::estimate::Recorder;
 use super::step::{StepRule, walk};
-use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::RenderingSettings;
 use crate::problem::State;
 use crate::scene::Frame;
+use crate::strategy::{Estimate, Observer, Recorder, Strategy};
 
 /// Point-to-point ICP (Besl and McKay, 1992) between the masked depth points P and the whole surface of the model.
 ///
