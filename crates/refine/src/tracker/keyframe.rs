@@ -36,8 +36,9 @@ impl Default for KeyframeSettings {
 
 /// Levels of image pyramids, each of half the resolution of the one before.
 const LEVELS: usize = 3;
-/// Gauss–Newton steps in a level at most.
+/// Gauss–Newton steps in a level at most, and the displacement that ends them \[px\].
 const STEPS: usize = 6;
+const STEP: f64 = 0.02;
 /// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
 const DEGREES: f64 = 4.0;
 /// Pixels about a point in which the object must be seen, too.
@@ -58,7 +59,7 @@ impl Pyramid {
     fn about(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option<Self> {
         let full = &sight.observation.camera;
         let at = full.project(center)?;
-        let extent = reach * full.fx.max(full.fy) / (center.z - reach).max(0.1 * center.z);
+        let extent = reach * full.fx.max(full.fy) / (center.z - reach).max(reach);
         // Sizes are multiples of the coarsest level's pixels.
         let unit = 1 << (LEVELS - 1);
         let range = |middle: f64, size: usize| {
@@ -72,7 +73,7 @@ impl Pyramid {
         }
         let color = &sight.observation.color;
         let line = |y: usize| &color.pixels()[y * full.width + left..][..width];
-        let gray = |[r, g, b]: &[f32; 3]| (r + g + b) / 3.0;
+        let gray = |color: &[f32; 3]| color.iter().sum::<f32>() / color.len() as f32;
         let pixels = (top..top + height).flat_map(|y| line(y).iter().map(gray)).collect();
         let mut level = (full.cropped(left, top, width, height), pixels);
         let mut next = || {
@@ -89,7 +90,7 @@ fn halved((camera, pixels): &(Camera, Vec<f32>)) -> (Camera, Vec<f32>) {
     let mean = |k: usize| {
         let at = 2 * (k / half.width) * camera.width + 2 * (k % half.width);
         let below = at + camera.width;
-        0.25 * (pixels[at] + pixels[at + 1] + pixels[below] + pixels[below + 1])
+        0.5 * 0.5 * (pixels[at] + pixels[at + 1] + pixels[below] + pixels[below + 1])
     };
     (half, (0..half.width * half.height).map(mean).collect())
 }
@@ -214,7 +215,7 @@ impl Keyframe {
     ) -> Option<Alignment> {
         let expected = motion * self.aligned;
         let precision = covariance.try_inverse()?;
-        let pyramid = Pyramid::about(sight, &(expected * object.center), 1.2 * object.radius)?;
+        let pyramid = Pyramid::about(sight, &(expected * object.center), 2.0 * object.radius)?;
         let mut pose = expected;
         let mut found = None;
         for (level, intensities) in pyramid.levels.iter().zip(&self.intensities).rev() {
@@ -242,7 +243,7 @@ impl Keyframe {
                 let pixel = (pose * object.center).z / level.0.fx;
                 let all: SMatrix<f64, 8, 8> = factor.inverse();
                 found = Some((all.fixed_view::<6, 6>(0, 0).into_owned(), system));
-                if moved < 0.02 * pixel {
+                if moved < STEP * pixel {
                     break;
                 }
             }
@@ -317,12 +318,12 @@ impl Normal {
             rows.push((value - gain * intensity - offset, row, value));
         }
         let samples = rows.len().max(1) as f64;
-        // Of a normal distribution, by the median; and then the maximum likelihood by fixed point iterations.
+        // About that of a normal distribution, by the median; then the maximum likelihood by fixed point iterations.
         let mut variance = before;
         if before.is_infinite() {
             let mut sizes: Vec<f64> = rows.iter().map(|row| row.0.abs()).collect();
             sizes.sort_by(f64::total_cmp);
-            variance = sizes.get(sizes.len() / 2).map_or(1.0, |median| (1.48 * median).powi(2));
+            variance = sizes.get(sizes.len() / 2).map_or(1.0, |median| (2.0 * median).powi(2));
         }
         let least = f64::from(RESOLUTION).powi(2);
         let weight = |residual: f64, variance: f64| {
@@ -340,7 +341,7 @@ impl Normal {
             let w = weight(*residual, variance);
             hessian.ger(w / variance, row, row, 1.0);
             gradient.axpy(w * residual / variance, row, 1.0);
-            inliers += f64::from(u8::from(residual * residual < 9.0 * variance));
+            inliers += f64::from(u8::from(residual * residual < 2.0 * DEGREES * variance));
             weights += w;
             sum += w * value;
             squares += w * value * value;
@@ -349,7 +350,7 @@ impl Normal {
         // Something is known of the brightness where no point is.
         hessian[(6, 6)] += 1.0;
         hessian[(7, 7)] += 1.0;
-        let spread = squares - sum * sum / weights.max(1e-9);
+        let spread = squares - sum * sum / weights.max(f64::EPSILON);
         let explained = if spread > 0.0 { 1.0 - left / spread } else { 0.0 };
         Self { hessian, gradient, samples, variance, inliers, explained }
     }

@@ -8,7 +8,6 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 use super::keyframe::Keyframe;
 use super::modes::Modes;
 use super::settings::{ProcessNoise, TrackerSettings};
-use super::turned::TurnedPoses;
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
@@ -56,8 +55,6 @@ pub(super) struct TrackState {
     unseen: bool,
     /// Frames in which it was followed.
     followed: u32,
-    /// Whether it may be turned otherwise.
-    pub(super) turned: TurnedPoses,
     /// Other poses that fit.
     pub(super) modes: Modes,
     /// What the object looks like.
@@ -113,7 +110,6 @@ impl TrackState {
             misses: 0,
             unseen: false,
             followed: 0,
-            turned: TurnedPoses::default(),
             modes: Modes::default(),
             keyframe: None,
         }
@@ -122,7 +118,6 @@ impl TrackState {
     /// A frame in which the object was not followed, though something was `seen` where it should be.
     pub(super) fn missed(&mut self, seen: bool) {
         self.unseen = !seen;
-        self.turned = TurnedPoses::default();
         self.keyframe = None;
         self.misses = self.misses.saturating_add(1);
         self.lost = self.lost.saturating_add(u32::from(seen));
@@ -131,11 +126,6 @@ impl TrackState {
     /// Whether colors are to be learnt from this frame: they change slowly.
     pub(super) fn is_time_to_learn(&self) -> bool {
         self.followed.is_multiple_of(LEARN_EVERY)
-    }
-
-    /// Whether poses that are turned are to be tried in this frame: not in one that colors are learnt from, too.
-    pub(super) fn is_time_to_turn(&self) -> bool {
-        self.followed % LEARN_EVERY == LEARN_EVERY / 2
     }
 
     /// Whether it was lost for so long that much may have happened to it.

@@ -11,7 +11,6 @@ mod sight;
 #[cfg(test)]
 mod tests;
 mod tracked;
-mod turned;
 
 use std::mem;
 use std::ops::ControlFlow;
@@ -28,12 +27,11 @@ pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
 use self::keyframe::{Alignment, Keyframe};
 use self::memory::{Prediction, TrackState};
-use self::modes::Modes;
+use self::modes::{Followed, Modes};
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
-use self::turned::Followed;
 use crate::data::guard;
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
@@ -53,8 +51,9 @@ use crate::strategy::{
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
 /// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
 ///
-/// Where a rotation is uncertain, poses turned about that axis are tried every few frames, and one is taken that has fitted better in several of them
-/// ([`turn_sigma`](TrackerSettings::turn_sigma), [`Tracked::turned`]). A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]).
+/// Other modes of the last full estimate move with the object, and are weighed where it is seen from a new side; where a rotation is uncertain, so are poses
+/// turned about that axis ([`turn_sigma`](TrackerSettings::turn_sigma), [`Tracked::turned`]). A pose that does not fit is not believed ([`GatingSettings`]); the
+/// object is then looked for ([`Recovery`]).
 ///
 /// Full-size images and what tells the object from the rest live in the memory of the frame before, so that following touches no new pages
 /// for them. The terms of the problem, their normal equations and the renderer's small buffers are made anew in every frame:
@@ -373,25 +372,15 @@ impl Tracker {
             return Ok(Err(rejection));
         }
         timing.validation = clock.lap();
-        let (mut turned, mut motion) = (track.turned.clone(), *self.settings.motion(in_hand));
+        let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(in_hand));
+        let rotation = solved.solution.at.state.t_cam_object.rotation;
         let mut is_turned = false;
-        if track.is_time_to_turn() && clock.has(self.time_of_turned(&solved, timing.steps)) {
+        if modes.is_new_view(&rotation) && clock.has(2 * timing.steps) {
             let level = track.allowance();
             let followed = Followed { problem: &problem, prediction, nominal, level };
-            if let Some(other) = self.try_turned(&followed, &solved, &posterior, &mut turned)? {
+            if let Some(other) = self.weigh(&followed, &solved, &posterior, &mut modes)? {
                 (solved, posterior) = other;
                 // The way there is not a motion.
-                (motion.gain, is_turned) = (0.0, true);
-            }
-            timing.steps += clock.lap();
-        }
-        let mut modes = track.modes.clone();
-        let rotation = solved.solution.at.state.t_cam_object.rotation;
-        if modes.is_new_view(&rotation) && clock.has(timing.steps) {
-            let followed =
-                Followed { problem: &problem, prediction, nominal, level: track.allowance() };
-            if let Some(other) = self.weigh(&followed, &solved, &mut modes)? {
-                (solved, posterior) = other;
                 (motion.gain, is_turned) = (0.0, true);
             }
             timing.steps += clock.lap();
@@ -401,7 +390,7 @@ impl Tracker {
         let next = self.remember(time, &solved, nominal, in_hand, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
-        (next.turned, next.modes) = (turned, modes);
+        next.modes = modes;
         let aligned = aligned.filter(|_| !is_turned);
         next.keyframe = self.next_keyframe(sight, track, aligned, &next.state.t_cam_object);
         if next.is_time_to_learn() {

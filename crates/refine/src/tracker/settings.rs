@@ -77,7 +77,7 @@ pub struct TrackerSettings {
     pub calibration_time_constant: f64,
     /// How far the object has moved by the images.
     pub keyframe: KeyframeSettings,
-    /// Poses turned about the least certain axis of rotation are tried, too, where its standard deviation in
+    /// Poses turned by 10° about the least certain axis of rotation are modes, too, where its standard deviation in
     /// [`Posterior::covariance`](crate::strategy::Posterior::covariance) exceeds this \[rad\]; infinity for never.
     pub turn_sigma: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is

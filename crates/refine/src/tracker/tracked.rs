@@ -74,7 +74,7 @@ pub struct Tracked {
     pub status: TrackStatus,
     /// How uncertain it is, unless it was only predicted.
     pub posterior: Option<Posterior>,
-    /// Whether the pose has left a wrong minimum: it is turned by some 10° from where it was followed.
+    /// Whether the pose has left that which was followed for another mode.
     pub turned: bool,
     /// Why the object was not tracked, if it was tried.
     pub rejection: Option<Rejection>,

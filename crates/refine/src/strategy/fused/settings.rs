@@ -193,6 +193,18 @@ impl FusedSettings {
 impl Default for FusedSettings {
     fn default() -> Self {
         let depth = PointToPlaneSettings::default();
+        // Twice, because noise, scales and the modes that are left are found anew in each.
+        let last = Stage {
+            downsample: 2,
+            points: 1200,
+            kernel_scale: 1.0,
+            solver: Solver { iterations: 10, min_decrease: 0.02 },
+            hypotheses: 3,
+            color: true,
+            measured_noise: true,
+            model_error: true,
+            contact: true,
+        };
         Self {
             modalities: Modality::ALL.to_vec(),
             views: true,
@@ -232,28 +244,8 @@ impl Default for FusedSettings {
                     model_error: false,
                     contact: true,
                 },
-                Stage {
-                    downsample: 2,
-                    points: 1200,
-                    kernel_scale: 1.0,
-                    solver: Solver { iterations: 10, min_decrease: 0.02 },
-                    hypotheses: 3,
-                    color: true,
-                    measured_noise: true,
-                    model_error: true,
-                    contact: true,
-                },
-                Stage {
-                    downsample: 2,
-                    points: 1200,
-                    kernel_scale: 1.0,
-                    solver: Solver { iterations: 10, min_decrease: 0.02 },
-                    hypotheses: 3,
-                    color: true,
-                    measured_noise: true,
-                    model_error: true,
-                    contact: true,
-                },
+                last.clone(),
+                last,
             ],
             restart_angle: 20f64.to_radians(),
             restart_spacing: 10e-3,

@@ -53,8 +53,6 @@ pub(super) struct Segmenter {
     false_alarms: f32,
     /// What each color tells \[nat\]; empty before any is known.
     color_evidence: Vec<f32>,
-    /// See [`visible_share`](Self::visible_share).
-    visible: f32,
     /// How much of the object is seen, in squares of depth by pixels.
     seen_area: f32,
     /// Where the last frame was looked at; its memory serves the next one.
@@ -86,10 +84,8 @@ impl Segmenter {
         let mask = &mut sight.observation.mask;
         mask.refill(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
-        let (mut visible, mut silhouette) = (0.0, 0.0);
-        for (pixel, covered) in window.pixels().zip(window.silhouette()) {
+        for pixel in window.pixels() {
             expected += pixel.share;
-            silhouette += f32::from(u8::from(covered));
             // Most pixels.
             if pixel.is_elsewhere() {
                 continue;
@@ -100,17 +96,10 @@ impl Segmenter {
                 continue;
             }
             seen += 1.0;
-            visible += f32::from(u8::from(covered));
             fill(mask, pixel.at);
         }
         sight.focus = Some(window.range());
-        self.visible = visible / f32::max(silhouette, 1.0);
         seen >= LEAST_SHARE * expected && seen > 0.0
-    }
-
-    /// What share of the object's silhouette within the picture showed it in the frame looked at last; the rest is hidden.
-    pub(super) fn visible_share(&self) -> f32 {
-        self.visible
     }
 
     /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of

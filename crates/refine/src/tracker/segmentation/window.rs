@@ -161,11 +161,6 @@ impl Window {
         (count > 0.0).then(|| sum / count)
     }
 
-    /// Whether the object covers each pixel where it should be, hidden or not.
-    pub(super) fn silhouette(&self) -> impl Iterator<Item = bool> {
-        self.drawn.pixels().iter().map(|z| *z > 0.0)
-    }
-
     /// Its columns and rows in the picture.
     pub(super) fn range(&self) -> [Range<usize>; 2] {
         self.range.clone()
