@@ -47,9 +47,6 @@ pub enum AssetError {
     /// The program is at fault.
     #[error(transparent)]
     Panicked(#[from] Panicked),
-    /// A rig is of a camera and a hand.
-    #[error("nothing is known of a hand, which is part of the rig")]
-    NoHand,
     /// A frame is at fault.
     #[error("{target}: {error}")]
     Frame {

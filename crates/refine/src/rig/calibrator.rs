@@ -27,8 +27,8 @@ pub struct CalibrationFrame {
     pub observation: Observation,
     /// The object's number.
     pub obj_id: u32,
-    /// The hand.
-    pub hand: Arc<Hand>,
+    /// The hand, where there is one.
+    pub hand: Option<Arc<Hand>>,
     /// Object → camera \[m\].
     pub initial: Isometry3<f64>,
     /// Whether that is where a visit has found the object, with a rig that has hardly changed since: the next visit then refines it
@@ -77,7 +77,7 @@ struct Model {
 }
 
 impl Calibrator {
-    /// Of a rig with a hand of so many joints and images of so many columns and rows, which sees `objects`, by their numbers.
+    /// Of a rig with a hand of so many joints, none without one, and images of so many columns and rows, which sees `objects`, by their numbers.
     ///
     /// # Errors
     /// If a standard deviation is not a positive number.
@@ -143,7 +143,7 @@ impl Calibrator {
             fused.settings.restart_angle = 0.0;
         }
         let frame =
-            Frame::new(&observation, self.object(*obj_id)?, Some(hand))?.with_rig(&self.rig);
+            Frame::new(&observation, self.object(*obj_id)?, hand.as_ref())?.with_rig(&self.rig);
         let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
         let information = self.information(&frame, &fused, *obj_id, &found.state)?;
@@ -166,7 +166,7 @@ impl Calibrator {
         let has_mask = frame.observation.mask.count() > 0;
         let (observation, fused) = self.corrected(frame)?;
         let object = self.object(frame.obj_id)?;
-        let corrected = Frame::new(&observation, object, Some(&frame.hand))?;
+        let corrected = Frame::new(&observation, object, frame.hand.as_ref())?;
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings.tactile, has_mask)
     }
 
@@ -178,7 +178,7 @@ impl Calibrator {
         let mut observation = self.rig.corrected_geometry(observation)?;
         if observation.mask.count() == 0 {
             observation.mask =
-                View::of_observation(&observation, object, hand, initial)?.likely_mask();
+                View::of_observation(&observation, object, hand.as_deref(), initial)?.likely_mask();
             fused.settings.modalities.retain(|modality| *modality != Modality::Silhouette);
         }
         Ok((observation, fused))

@@ -5,7 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::Isometry3;
 
 use super::calibrator::CalibrationFrame;
-use crate::data::{AssetError, Assets, FrameInput, Sensor, Target};
+use crate::data::{AssetError, Assets, FrameInput, Target};
+use crate::error::RefineError;
 use crate::scene::Observation;
 
 /// Frames of a dataset, each with a rough pose (object → camera \[m\]); they are read when they are visited.
@@ -21,36 +22,38 @@ impl<'a> CalibrationFrames<'a> {
         Self { poses, assets: Mutex::new(assets) }
     }
 
-    /// Joints of the hand, and columns and rows of the images, of the first frame that can be read.
+    /// Joints of the hand, if any frame has one, and columns and rows of images.
     ///
     /// # Errors
-    /// What is wrong with the first frame if none can be read, or that there is no hand.
-    pub fn layout(&self) -> Result<(usize, (usize, usize)), AssetError> {
+    /// If no frame can be read, that of the first.
+    pub fn layout(&self) -> Result<(Option<usize>, (usize, usize)), AssetError> {
         let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut fault = None;
+        let (mut fault, mut size) = (None, None);
         for (target, _) in &self.poses {
-            match assets.load(target, &[Sensor::Hand]) {
-                Ok(FrameInput {
-                    observation: Observation { camera, .. },
-                    hand: Some(hand),
-                    ..
-                }) => {
-                    return Ok((hand.tree.joint_names().len(), (camera.width, camera.height)));
+            match assets.load(target, &[]) {
+                Ok(FrameInput { observation: Observation { camera, .. }, hand, .. }) => {
+                    let size = *size.get_or_insert((camera.width, camera.height));
+                    if let Some(hand) = hand {
+                        return Ok((Some(hand.tree.joint_names().len()), size));
+                    }
                 }
-                Ok(_) => {}
                 Err(error) => {
                     let (target, error) = (*target, Box::new(error));
                     fault.get_or_insert(AssetError::Frame { target, error });
                 }
             }
         }
-        Err(fault.unwrap_or(AssetError::NoHand))
+        match (size, fault) {
+            (Some(size), _) => Ok((None, size)),
+            (None, Some(fault)) => Err(fault),
+            (None, None) => Err(RefineError::NothingFits.into()),
+        }
     }
 
     /// The frame of that index, with its object at `pose`.
     ///
     /// # Errors
-    /// If it cannot be read, or nothing is known of a hand.
+    /// If it cannot be read.
     pub fn load(
         &self,
         index: usize,
@@ -59,10 +62,10 @@ impl<'a> CalibrationFrames<'a> {
         let target = &self.poses[index].0;
         let input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(target, &[Sensor::Hand])?
+            assets.load(target, &[])?
         };
         let FrameInput { observation, hand, .. } = input;
-        let (obj_id, hand) = (target.obj_id, hand.ok_or(AssetError::NoHand)?);
+        let obj_id = target.obj_id;
         Ok(CalibrationFrame { observation, obj_id, hand, initial: *pose, is_refined: false })
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct FramePlay {
 
 impl FrameInformation {
     /// Of `evidence`, in a frame that says `said` of its calibrations when corrected by `rig`, of an object whose surface has a `field` of
-    /// deviations; `sigmas` are the standard deviations of the object's pose. `None` if the evidence lacks a block.
+    /// deviations; `sigmas` are the standard deviations of the object's pose. `None` if the evidence lacks the camera.
     pub(super) fn new(
         evidence: &Evidence,
         said: &State,
@@ -35,11 +35,17 @@ impl FrameInformation {
     ) -> Option<Self> {
         let Evidence { state, equations, patches } = evidence;
         let joints = Block::Joints(state.joints.len());
-        let mut calibrations = Vec::new();
+        // Places of calibrations in the equations, and in the state; of a hand that is not known there are none.
+        let (mut calibrations, mut in_state) = (Vec::new(), Vec::new());
+        let mut first = 0;
         for block in [Block::HandPose, joints, Block::Camera] {
-            let at = equations.offset(block)?;
-            calibrations.extend(at..at + block.dimension());
+            if let Some(at) = equations.offset(block) {
+                calibrations.extend(at..at + block.dimension());
+                in_state.extend(first..first + block.dimension());
+            }
+            first += block.dimension();
         }
+        equations.offset(Block::Camera)?;
         let pose = equations.offset(Block::ObjectPose)?;
         let (_, first_warp) = equations.image_warp()?;
         let (gradient, hessian) = equations.dense();
@@ -47,7 +53,8 @@ impl FrameInformation {
         // What the evidence is about, by the rig's parameters and the object's coefficients.
         let coefficients = field.map_or(0, |field| 3 * field.count());
         let mut by_shared = DMatrix::zeros(n, rig.len() + coefficients);
-        for (row, at) in rig.jacobian(said).row_iter().zip(&calibrations) {
+        let jacobian = rig.jacobian(said).select_rows(&in_state);
+        for (row, at) in jacobian.row_iter().zip(&calibrations) {
             by_shared.view_mut((*at, 0), row.shape()).copy_from(&row);
         }
         for k in 0..n - first_warp {
@@ -70,13 +77,13 @@ impl FrameInformation {
             .chain(first_patch..first_warp)
             .collect();
         let mut variances: Vec<f64> = sigmas.iter().map(|sigma| sigma * sigma).collect();
-        variances.extend(rig.play.variances(state.joints.len()));
+        variances.extend(rig.play.variances(state.joints.len()).take(in_play));
         // Patches there are where there is a field.
         variances.resize(own.len(), field.map_or(1.0, SurfaceDeviation::own_variance));
         // The evidence is linear about its state, not about what the frame says.
         let mut offset = DVector::zeros(n);
         let deviation = state.calibration_deviation(said);
-        calibrations.iter().zip(&deviation).for_each(|(at, off)| offset[*at] = *off);
+        calibrations.iter().zip(&in_state).for_each(|(at, from)| offset[*at] = deviation[*from]);
         let gradient = gradient - &hessian * offset;
         let by_all = &hessian * &by_shared;
         let mut of_own = hessian.select_rows(&own).select_columns(&own);

@@ -114,6 +114,9 @@ impl Pass {
         self.squares = PlaySquares::default();
         for (id, play) in &self.play {
             let squares = play.expected_squares(change, covariance, objects.get(id));
+            if squares.is_empty() {
+                continue;
+            }
             let joints = squares.rows(6, squares.len() - 6);
             let of_joints = if joints.is_empty() { 0.0 } else { joints.mean() };
             let sums = [squares.rows(0, 3).mean(), squares.rows(3, 3).mean(), of_joints];

@@ -56,12 +56,12 @@ impl<'a> View<'a> {
     pub(crate) fn of_observation(
         observation: &'a Observation,
         object: &Object,
-        hand: &Hand,
+        hand: Option<&Hand>,
         t_cam_object: &Isometry3<f64>,
     ) -> Result<Self, RefineError> {
         observation.require_sizes()?;
         let camera = &observation.camera;
-        let hand = observation.hand.as_ref().map(|measured| {
+        let hand = hand.zip(observation.hand.as_ref()).map(|(hand, measured)| {
             hand.check_joints(&measured.joints)?;
             Ok::<_, RefineError>(hand_depth(camera, Some((hand, measured))))
         });

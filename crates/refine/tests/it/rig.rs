@@ -53,7 +53,7 @@ fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
         observation: said(&frame.observation),
         // As if two objects were held: of one grasp alone a taxel may touch anything.
         obj_id: 7 + index as u32 % 2,
-        hand: Arc::clone(&sequence.hand),
+        hand: Some(Arc::clone(&sequence.hand)),
         initial: frame.truth,
         is_refined: false,
     };
@@ -288,4 +288,46 @@ fn faults_of_a_file_are_named() {
         let error = Rig::load(&path).unwrap_err().to_string();
         assert!(error.contains("rig.json") && error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn a_camera_is_calibrated_without_a_hand() {
+    let sequence = default_sequence(1, 61).unwrap();
+    let mut frames = frames(&sequence);
+    for frame in &mut frames {
+        (frame.hand, frame.observation.hand) = (None, None);
+    }
+    let objects = [7, 8].map(|id| (id, Arc::clone(&sequence.object)));
+    let mut calibrator =
+        Calibrator::new(0, (640, 480), objects.into(), CalibratorSettings::default()).unwrap();
+    learn(&mut calibrator, &mut frames, 3);
+    let rig = calibrator.rig();
+    let sigmas = rig.covariance.diagonal().map(f64::sqrt);
+    for (k, (name, found)) in rig.parameters().iter().enumerate() {
+        let expected = if name == "depth scale" { DEPTH_SCALE - 1.0 } else { 0.0 };
+        let (sigma, before) = (sigmas[k], calibrator.prior_sigmas()[k]);
+        println!("{name}: {found} ± {sigma} (± {before}), is {expected}");
+        // A shifted image is a shifted object where nothing else is seen.
+        let is_seen = name != "principal point x";
+        assert!(!is_seen || (found - expected).abs() < 4.0 * sigma, "{name}: {found} ± {sigma}");
+        assert!(sigma <= 1.001 * before);
+        // Of a hand that nobody has seen, nothing is learnt.
+        assert!(
+            !name.contains("axes") || (sigma / before - 1.0).abs() < 1e-6 && *found == 0.0,
+            "{name}"
+        );
+    }
+    let scale = rig.parameters().iter().position(|(name, _)| name == "depth scale").unwrap();
+    assert!(sigmas[scale] < 0.9 * calibrator.prior_sigmas()[scale]);
+    let file = tempfile::tempdir().unwrap();
+    let path = file.path().join("rig.json");
+    rig.save(&path).unwrap();
+    let rig = Rig::load(&path).unwrap();
+    let SequenceFrame { observation, truth, .. } = &sequence.frames[39];
+    let mut observation = said(observation);
+    observation.hand = None;
+    let corrected = rig.corrected(&observation).unwrap();
+    let frame = Frame::new(&corrected, &sequence.object, None).unwrap().with_rig(&rig);
+    let found = refine(&frame, truth, &Fused::default()).unwrap();
+    assert!(found.posterior.unwrap().probability() > 0.5);
 }

@@ -56,13 +56,13 @@ pub(super) fn image_and_outline(
 pub fn rig_picture(
     before: (&Observation, &Object, &Isometry3<f64>),
     after: (&Observation, &Object, &Isometry3<f64>),
-    hand: &Hand,
+    hand: Option<&Hand>,
 ) -> [RgbImage; 2] {
     let window = window(before.0, before.1, before.2);
     [(before, BEFORE), (after, AFTER)].map(|((observation, object, pose), color)| {
         // Undistorted images are others than those before.
         let image = brightened(observation);
-        cut(&outlined(image, observation, object, Some(hand), pose, color), window)
+        cut(&outlined(image, observation, object, hand, pose, color), window)
     })
 }
 

@@ -72,8 +72,11 @@ impl Calibrate {
         let told = jobs.iter().map(|job| (job.target, job.row.t_cam_model)).collect();
         let frames = CalibrationFrames::new(assets, told);
         let (joints, size) = frames.layout()?;
+        if joints.is_none() {
+            log::warn!("no frame has a hand: camera and models are calibrated alone");
+        }
         let settings = CalibratorSettings::default();
-        let nominal = Calibrator::new(joints, size, objects.clone(), settings)?;
+        let nominal = Calibrator::new(joints.unwrap_or(0), size, objects.clone(), settings)?;
         let bar = progress(self.passes.get() * jobs.len(), "calibrating");
         let passes = Passes::new(&frames, self.passes, self.window);
         let done = passes.run(nominal.clone(), &mut |visits| bar.inc(visits as u64))?;
