@@ -80,18 +80,7 @@ impl HandDepthFactor {
                 before.is_some_and(|p| mask[p]) || after.is_some_and(|m| *m)
             })
         };
-        // Beside a depth edge the nearer side is fattened.
-        let at_edge = |pixel: usize| {
-            let here = depth.pixels()[pixel];
-            let differs = |other: Option<usize>| {
-                let other = other.and_then(|p| depth.pixels().get(p));
-                other.is_some_and(|z| f64::from((z - here).abs()) > settings.reach)
-            };
-            [MARGIN, MARGIN * width]
-                .iter()
-                .any(|step| differs(pixel.checked_sub(*step)) || differs(Some(pixel + step)))
-        };
-        let of_hand: Vec<usize> = on_hand.filter(|p| !of_object(*p) && !at_edge(*p)).collect();
+        let of_hand: Vec<usize> = on_hand.filter(|p| !of_object(*p)).collect();
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
             Point {

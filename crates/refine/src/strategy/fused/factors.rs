@@ -177,8 +177,9 @@ fn other_factors(
         depth.points = stage.points / 3;
         factors.push(Arc::new(HandDepthFactor::new(frame, &depth)?));
     }
-    // Where the surface may be elsewhere than the model has it, contact says as much less of the pose.
-    let surface = patches.map_or(0.0, |_| settings.model.gp_sigma);
+    // Where the surface may be elsewhere than the model has it, contact says as much less of the pose; a rig has the surface as it is.
+    let is_uncertain = patches.is_some() && frame.rig().is_none();
+    let surface = if is_uncertain { settings.model.gp_sigma } else { 0.0 };
     let blurred = |noise: NoiseModel| NoiseModel { sigma: noise.sigma.hypot(surface), ..noise };
     let touch = wanted(Modality::Touch);
     let inactive = stage.contact && wanted(Modality::Quiet);

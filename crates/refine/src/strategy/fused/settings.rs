@@ -138,6 +138,8 @@ pub struct FusedSettings {
     /// By how much more color and silhouette tell of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as errors of
     /// light and shape, is nearly the same in all modes.
     pub image_between_modes: f64,
+    /// Independent measurements that the hand's depth amounts to at most in frames of a known rig: what depth is off by in all frames is in the rig.
+    pub samples_with_rig: f64,
     /// Whether nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
     pub rotation_unknown: bool,
     /// By which factors errors may be larger or smaller than their nominal sizes.
@@ -170,11 +172,14 @@ pub struct FusedSettings {
 }
 
 impl FusedSettings {
-    /// The same, with what is known of how good the model of `frame` is.
+    /// The same, with what is known of how good the model and the rig of `frame` are.
     pub(crate) fn for_frame(&self, frame: &Frame<'_>) -> Self {
         let mut settings = self.clone();
         if let Some(deviation) = &frame.object().deviation {
             settings.model.gp_sigma = settings.model.gp_sigma.min(deviation.left());
+        }
+        if frame.rig().is_some() {
+            settings.hand_depth.noise.effective_samples = settings.samples_with_rig;
         }
         settings.prior = settings.prior.of_hand(frame.observation().hand.as_ref());
         settings
@@ -252,6 +257,7 @@ impl Default for FusedSettings {
             max_effective_samples: 50.0,
             prune_margin: 15.0,
             image_between_modes: 2.0,
+            samples_with_rig: 200.0,
             rotation_unknown: false,
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),
