@@ -146,7 +146,7 @@ fn a_rig() {
             let frame = CalibrationFrame {
                 observation,
                 obj_id: 7,
-                hand: Arc::clone(&sequence.hand),
+                hand: Some(Arc::clone(&sequence.hand)),
                 initial: frame.truth,
                 is_refined,
             };
