@@ -48,7 +48,8 @@ pub(crate) fn _calibrate(
             .collect::<Result<_, AssetError>>()?;
         let frames = CalibrationFrames::new(assets, told);
         let (joints, size) = frames.layout()?;
-        let nominal = Calibrator::new(joints, size, objects, CalibratorSettings::default())?;
+        let nominal =
+            Calibrator::new(joints.unwrap_or(0), size, objects, CalibratorSettings::default())?;
         Passes::new(&frames, passes, window).run(nominal, &mut |_| ())
     };
     let done = py.detach(learn).raise()?;
