@@ -77,7 +77,7 @@ struct Model {
 }
 
 impl Calibrator {
-    /// Of a rig with a hand of so many joints, none without one, and images of so many columns and rows, which sees `objects`, by their numbers.
+    /// A calibrator of a rig with a hand of `joints` joints (zero without a hand) and images of `width` by `height` pixels, which sees `objects`, by their numbers.
     ///
     /// # Errors
     /// If a standard deviation is not a positive number.

@@ -28,26 +28,26 @@ impl<'a> CalibrationFrames<'a> {
     /// If no frame can be read, that of the first.
     pub fn layout(&self) -> Result<(Option<usize>, (usize, usize)), AssetError> {
         let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-        let (mut fault, mut size) = (None, None);
-        for (target, _) in &self.poses {
-            match assets.load(target, &[]) {
+        let dataset = assets.dataset();
+        let has_bodies = |(target, _): &&(Target, Isometry3<f64>)| {
+            let frame = dataset.frame(target.scene_id, target.im_id);
+            frame.and_then(|frame| frame.bodies()).is_ok_and(|found| !found.bodies.is_empty())
+        };
+        let (held, free): (Vec<_>, Vec<_>) = self.poses.iter().partition(has_bodies);
+        let mut fault = None;
+        for (target, _) in held.into_iter().chain(free) {
+            match assets.load(&target, &[]) {
                 Ok(FrameInput { observation: Observation { camera, .. }, hand, .. }) => {
-                    let size = *size.get_or_insert((camera.width, camera.height));
-                    if let Some(hand) = hand {
-                        return Ok((Some(hand.tree.joint_names().len()), size));
-                    }
+                    let joints = hand.map(|hand| hand.tree.joint_names().len());
+                    return Ok((joints, (camera.width, camera.height)));
                 }
                 Err(error) => {
-                    let (target, error) = (*target, Box::new(error));
+                    let error = Box::new(error);
                     fault.get_or_insert(AssetError::Frame { target, error });
                 }
             }
         }
-        match (size, fault) {
-            (Some(size), _) => Ok((None, size)),
-            (None, Some(fault)) => Err(fault),
-            (None, None) => Err(RefineError::NothingFits.into()),
-        }
+        Err(fault.unwrap_or(AssetError::Refine(RefineError::NothingFits)))
     }
 
     /// The frame of that index, with its object at `pose`.

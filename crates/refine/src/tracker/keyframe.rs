@@ -1,9 +1,14 @@
 //! Motion of an object since a keyframe, by direct alignment of images.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log, twist_row};
-use prehend_render::{Camera, DepthImage, draw_depth};
+use prehend_render::{DepthImage, draw_depth};
 
+use super::Tracker;
+use super::memory::{Prediction, TrackState};
+use super::pyramid::{LEVELS, Level, pyramid};
 use super::sight::Sight;
 use crate::scene::Object;
 
@@ -34,8 +39,6 @@ impl Default for KeyframeSettings {
     }
 }
 
-/// Levels of image pyramids, each of half the resolution of the one before.
-const LEVELS: usize = 3;
 /// Gauss–Newton steps in a level at most, and the displacement that ends them \[px\].
 const STEPS: usize = 6;
 const STEP: f64 = 0.02;
@@ -48,95 +51,35 @@ const OFF_SURFACE: f64 = 10e-3;
 /// Intensity that is resolved: the smallest deviation of residuals, and of neighbors of a point that is of use.
 const RESOLUTION: f32 = 4e-3;
 
-/// Part of an image in gray, and half and quarter as large.
-struct Pyramid {
-    /// Camera, columns and intensities (0 to 1) of each level.
-    levels: [(Camera, Vec<f32>); LEVELS],
-}
-
-impl Pyramid {
-    /// The part of the image of `sight` that shows what is within `reach` \[m\] of `center` (camera frame); none if that is out of the image.
-    fn about(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option<Self> {
-        let full = &sight.observation.camera;
-        let at = full.project(center)?;
-        let extent = reach * full.fx.max(full.fy) / (center.z - reach).max(reach);
-        // Sizes are multiples of the coarsest level's pixels.
-        let unit = 1 << (LEVELS - 1);
-        let range = |middle: f64, size: usize| {
-            let from = (middle - extent).clamp(0.0, size as f64) as usize / unit;
-            let to = (middle + extent).clamp(0.0, size as f64) as usize / unit;
-            (from * unit, to.saturating_sub(from) * unit)
-        };
-        let ((left, width), (top, height)) = (range(at.x, full.width), range(at.y, full.height));
-        if width < 4 * unit || height < 4 * unit {
-            return None;
-        }
-        let color = &sight.observation.color;
-        let line = |y: usize| &color.pixels()[y * full.width + left..][..width];
-        let gray = |color: &[f32; 3]| color.iter().sum::<f32>() / color.len() as f32;
-        let pixels = (top..top + height).flat_map(|y| line(y).iter().map(gray)).collect();
-        let mut level = (full.cropped(left, top, width, height), pixels);
-        let mut next = || {
-            let half = halved(&level);
-            std::mem::replace(&mut level, half)
-        };
-        Some(Self { levels: [next(), next(), next()] })
-    }
-}
-
-/// An image of half the resolution.
-fn halved((camera, pixels): &(Camera, Vec<f32>)) -> (Camera, Vec<f32>) {
-    let half = camera.scaled(0.5);
-    let mean = |k: usize| {
-        let at = 2 * (k / half.width) * camera.width + 2 * (k % half.width);
-        let below = at + camera.width;
-        0.5 * 0.5 * (pixels[at] + pixels[at + 1] + pixels[below] + pixels[below + 1])
-    };
-    (half, (0..half.width * half.height).map(mean).collect())
-}
-
-/// Intensity at a place \[px\] by bilinear interpolation, with its gradient \[1/px\]; none beyond the image.
-fn sample((camera, pixels): &(Camera, Vec<f32>), u: f64, v: f64) -> Option<(f64, [f64; 2])> {
-    let inside = |at: f64, size: usize| at >= 0.0 && at < (size - 1) as f64;
-    if !(inside(u, camera.width) && inside(v, camera.height)) {
-        return None;
-    }
-    let (x, y) = (u as usize, v as usize);
-    let (s, t) = (u - x as f64, v - y as f64);
-    let at = |dx: usize, dy: usize| f64::from(pixels[(y + dy) * camera.width + x + dx]);
-    let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
-    let value = (1.0 - t) * ((1.0 - s) * a + s * b) + t * ((1.0 - s) * c + s * d);
-    Some((value, [(1.0 - t) * (b - a) + t * (d - c), (1.0 - s) * (c - a) + s * (d - b)]))
-}
-
 /// Points of an object's surface with their intensities in an image.
 #[derive(Clone, Debug)]
 pub(super) struct Keyframe {
     /// In the object's frame \[m\].
-    points: Vec<Point3<f64>>,
-    intensities: [Vec<f32>; LEVELS],
+    points: Arc<[Point3<f64>]>,
+    /// At each resolution, in the order of the points.
+    intensities: [Arc<[f32]>; LEVELS],
     /// Object → camera in the last frame, by alignment with the keyframe alone.
     aligned: Isometry3<f64>,
 }
 
-/// Object → camera by alignment, and how that is moved from what was expected.
-pub(super) struct Alignment {
-    pub(super) pose: Isometry3<f64>,
+/// Object → camera by alignment.
+struct Alignment {
+    pose: Isometry3<f64>,
     /// Covariance of a left twist about the object's center \[m², m rad, rad²\].
-    pub(super) covariance: Matrix6<f64>,
+    covariance: Matrix6<f64>,
 }
 
 impl Keyframe {
     /// Points on `object` at `pose` that differ from their neighbors, spread over what is seen of it; none if these are too few.
-    pub(super) fn new(
+    fn new(
         sight: &Sight,
         object: &Object,
         pose: &Isometry3<f64>,
         settings: &KeyframeSettings,
     ) -> Option<Self> {
         let center = pose * object.center;
-        let pyramid = Pyramid::about(sight, &center, object.radius)?;
-        let (camera, pixels) = &pyramid.levels[0];
+        let levels = pyramid(sight, &center, object.radius)?;
+        let Level { camera, pixels } = &levels[0];
         let mut drawn = DepthImage::default();
         draw_depth(&mut drawn, camera, &[(&object.model, *pose)]);
         let full = &sight.observation.camera;
@@ -168,21 +111,16 @@ impl Keyframe {
             let best = places
                 .filter(|&(x, y)| depth[y * camera.width + x] > 0.0)
                 .max_by(|a, b| contrast(a.0, a.1).total_cmp(&contrast(b.0, b.1)))?;
+            let (x, y) = best;
             let around =
-                [(0, 0), (MARGIN, 0), (0, MARGIN), (2 * MARGIN, MARGIN), (MARGIN, 2 * MARGIN)];
-            let seen = around.iter().all(|(dx, dy)| {
-                let (x, y) = match (dx, dy) {
-                    (0, 0) => best,
-                    _ => (best.0 + dx - MARGIN, best.1 + dy - MARGIN),
-                };
-                shows(x, y)
-            });
-            (seen && contrast(best.0, best.1) > RESOLUTION).then_some(best)
+                [(x, y), (x - MARGIN, y), (x + MARGIN, y), (x, y - MARGIN), (x, y + MARGIN)];
+            let seen = around.into_iter().all(|(x, y)| shows(x, y));
+            (seen && contrast(x, y) > RESOLUTION).then_some(best)
         };
         let to_object = pose.inverse();
         let cells = (0..camera.height.div_ceil(cell))
             .flat_map(|row| (0..camera.width.div_ceil(cell)).map(move |column| (column, row)));
-        let points: Vec<Point3<f64>> = cells
+        let points: Arc<[Point3<f64>]> = cells
             .filter_map(strongest)
             .map(|(x, y)| {
                 let z = f64::from(depth[y * camera.width + x]);
@@ -192,11 +130,10 @@ impl Keyframe {
         if (points.len() as f64) < settings.effective_samples {
             return None;
         }
-        let intensities = [0, 1, 2].map(|k| {
-            let level = &pyramid.levels[k];
+        let intensities = levels.each_ref().map(|level| {
             let at = |point: &Point3<f64>| {
-                let place = level.0.project(&(pose * point))?;
-                sample(level, place.x, place.y).map(|(value, _)| value as f32)
+                let place = level.camera.project(&(pose * point))?;
+                level.sample(place.x, place.y).map(|(value, _)| value as f32)
             };
             points.iter().map(|point| at(point).unwrap_or(f32::NAN)).collect()
         });
@@ -205,7 +142,7 @@ impl Keyframe {
 
     /// Where the object is in `sight`, where it has moved by `motion` since the last frame but for an error of that covariance (a left twist about the
     /// object's center).
-    pub(super) fn align(
+    fn align(
         &self,
         sight: &Sight,
         object: &Object,
@@ -215,10 +152,10 @@ impl Keyframe {
     ) -> Option<Alignment> {
         let expected = motion * self.aligned;
         let precision = covariance.try_inverse()?;
-        let pyramid = Pyramid::about(sight, &(expected * object.center), 2.0 * object.radius)?;
+        let levels = pyramid(sight, &(expected * object.center), 2.0 * object.radius)?;
         let mut pose = expected;
         let mut found = None;
-        for (level, intensities) in pyramid.levels.iter().zip(&self.intensities).rev() {
+        for (level, intensities) in levels.iter().zip(&self.intensities).rev() {
             let mut brightness = [1.0, 0.0];
             let mut variance = f64::INFINITY;
             for _ in 0..STEPS {
@@ -240,29 +177,45 @@ impl Keyframe {
                 brightness = [brightness[0] + step[6], brightness[1] + step[7]];
                 let moved = twist.fixed_rows::<3>(0).norm()
                     + object.radius * twist.fixed_rows::<3>(3).norm();
-                let pixel = (pose * object.center).z / level.0.fx;
-                let all: SMatrix<f64, 8, 8> = factor.inverse();
-                found = Some((all.fixed_view::<6, 6>(0, 0).into_owned(), system));
+                let pixel = (pose * object.center).z / level.camera.fx;
+                found = Some((factor, system));
                 if moved < STEP * pixel {
                     break;
                 }
             }
         }
-        let (covariance, system) = found?;
+        let (factor, system) = found?;
+        let covariance = factor.inverse().fixed_view::<6, 6>(0, 0).into_owned();
         let inliers = system.inliers / self.points.len() as f64;
         let is_seen =
             system.explained > settings.least_explained && inliers >= settings.least_inliers;
         is_seen.then_some(Alignment { pose, covariance })
     }
+}
 
-    /// How `aligned` is moved from the last frame.
-    pub(super) fn motion(&self, aligned: &Alignment) -> Isometry3<f64> {
-        aligned.pose * self.aligned.inverse()
+impl Tracker {
+    /// Takes the motion since the last frame from the images, as far as they tell it.
+    pub(super) fn align(&self, sight: &Sight, track: &TrackState, prediction: &mut Prediction) {
+        let Some(keyframe) = &track.keyframe else { return };
+        let before = track.state.t_cam_object;
+        let motion = prediction.state.t_cam_object * before.inverse();
+        let settings = &self.settings.keyframe;
+        let expected = &prediction.motion_covariance;
+        let aligned = keyframe.align(sight, &self.object, &motion, expected, settings);
+        let Some(Alignment { pose, covariance }) = aligned else { return };
+        let drift = settings.drift.powi(2) * prediction.seconds;
+        let turn = drift / self.object.radius.powi(2);
+        let drift = Matrix6::from_diagonal(&[drift, drift, drift, turn, turn, turn].into());
+        let measured = pose * keyframe.aligned.inverse() * before;
+        prediction.measure(measured, &(covariance + drift));
+        prediction.keyframe = Some(Keyframe { aligned: pose, ..keyframe.clone() });
     }
 
-    /// The frame that was aligned is the last one now.
-    pub(super) fn advance(&mut self, aligned: &Alignment) {
-        self.aligned = aligned.pose;
+    /// A keyframe of an object that is in no hand: a hand that is known says better how what it holds has moved, than images that show half of it.
+    pub(super) fn keyframe(&self, sight: &Sight, pose: &Isometry3<f64>) -> Option<Keyframe> {
+        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
+        let settings = &self.settings.keyframe;
+        (!in_hand).then(|| Keyframe::new(sight, &self.object, pose, settings)).flatten()
     }
 }
 
@@ -279,7 +232,7 @@ struct Normal {
     gradient: SVector<f64, 8>,
     /// Points within the image.
     samples: f64,
-    /// Of residuals.
+    /// Variance of residuals.
     variance: f64,
     inliers: f64,
     /// Share of the variance of intensities.
@@ -290,19 +243,19 @@ impl Normal {
     fn new(
         keyframe: &Keyframe,
         intensities: &[f32],
-        level: &(Camera, Vec<f32>),
+        level: &Level,
         pose: &Isometry3<f64>,
         object: &Object,
         [gain, offset]: &[f64; 2],
         before: f64,
     ) -> Self {
-        let camera = &level.0;
+        let camera = &level.camera;
         let center = (pose * object.center).coords;
         let mut rows: Vec<(f64, SVector<f64, 8>, f64)> = Vec::with_capacity(intensities.len());
         for (point, &intensity) in keyframe.points.iter().zip(intensities) {
             let place = pose * point;
             let Some(at) = camera.project(&place) else { continue };
-            let Some((value, [across, down])) = sample(level, at.x, at.y) else { continue };
+            let Some((value, [across, down])) = level.sample(at.x, at.y) else { continue };
             if intensity.is_nan() {
                 continue;
             }
@@ -358,9 +311,6 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-    use prehend_autodiff::lie::se3_exp;
-
     use super::*;
     use crate::scene::{Sequence, default_sequence};
     use crate::tracker::sight::Images;
@@ -396,12 +346,8 @@ mod tests {
         }
         // Another object's image is no motion.
         let mut other = second.observation.clone();
-        other
-            .color
-            .pixels_mut()
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, p)| *p = [(k % 7) as f32 / 7.0; 3]);
+        let stripes = other.color.pixels_mut().iter_mut().enumerate();
+        stripes.for_each(|(k, pixel)| *pixel = [(k % 7) as f32 / 7.0; 3]);
         let other = Sight::new(other, Some(&sequence.hand), Images::default());
         assert!(keyframe.align(&other, object, &expected, &covariance, &settings).is_none());
     }
@@ -413,49 +359,24 @@ mod tests {
         let (object, settings) = (&sequence.object, KeyframeSettings::default());
         let pose = sequence.frames[0].truth;
         let keyframe = Keyframe::new(&first, object, &pose, &settings).unwrap();
-        let pyramid = Pyramid::about(&first, &(pose * object.center), object.radius).unwrap();
-        let residuals = |twist: &Vector6<f64>| -> Vec<f64> {
-            let moved = perturb_about(&pose, &(pose * object.center).coords, twist);
-            let sampled = |(point, intensity): (&Point3<f64>, &f32)| {
-                let (camera, _) = &pyramid.levels[1];
-                let at = camera.project(&(moved * point)).unwrap();
-                sample(&pyramid.levels[1], at.x, at.y).unwrap().0 - f64::from(*intensity)
+        let [_, level, _] = pyramid(&first, &(pose * object.center), object.radius).unwrap();
+        let intensities = &keyframe.intensities[1];
+        let residuals = |pose: &Isometry3<f64>| -> Vec<f64> {
+            let residual = |(point, intensity): (&Point3<f64>, &f32)| {
+                let at = level.camera.project(&(pose * point)).unwrap();
+                level.sample(at.x, at.y).unwrap().0 - f64::from(*intensity)
             };
-            keyframe.points.iter().zip(&keyframe.intensities[1]).map(sampled).collect()
+            keyframe.points.iter().zip(&intensities[..]).map(residual).collect()
         };
-        let start = Vector6::from([1e-3, 2e-3, -1e-3, 1e-2, 2e-2, -1e-2]);
-        let moved = perturb_about(&pose, &(pose * object.center).coords, &start);
-        let level = &pyramid.levels[1];
-        // With so large a variance, all weights are alike.
-        let system = Normal::new(
-            &keyframe,
-            &keyframe.intensities[1],
-            level,
-            &moved,
-            object,
-            &[1.0, 0.0],
-            1.0,
-        );
-        let step = 1e-7;
+        let moved_by = |pose: &Isometry3<f64>, twist: &Vector6<f64>| {
+            perturb_about(pose, &(pose * object.center).coords, twist)
+        };
+        let moved = moved_by(&pose, &[1e-3, 2e-3, -1e-3, 1e-2, 2e-2, -1e-2].into());
+        let system = Normal::new(&keyframe, intensities, &level, &moved, object, &[1.0, 0.0], 1.0);
+        let (step, middle) = (1e-7, residuals(&moved));
         for k in 0..6 {
-            let along = |h: f64| {
-                let mut twist = Vector6::zeros();
-                twist[k] = h;
-                let twice = se3_exp(&twist);
-                let center = (moved * object.center).coords;
-                let shift = Isometry3::translation(center.x, center.y, center.z);
-                let pose = shift * twice * shift.inverse() * moved;
-                keyframe
-                    .points
-                    .iter()
-                    .zip(&keyframe.intensities[1])
-                    .map(|(point, intensity)| {
-                        let at = level.0.project(&(pose * point)).unwrap();
-                        sample(level, at.x, at.y).unwrap().0 - f64::from(*intensity)
-                    })
-                    .collect::<Vec<f64>>()
-            };
-            let (plus, minus, middle) = (along(step), along(-step), residuals(&start));
+            let along = |h: f64| residuals(&moved_by(&moved, &(Vector6::ith(k, h))));
+            let (plus, minus) = (along(step), along(-step));
             let expected: f64 = (0..middle.len())
                 .map(|i| {
                     let w = (DEGREES + 1.0) / (DEGREES + middle[i] * middle[i] / system.variance);
@@ -468,6 +389,5 @@ mod tests {
                 "{k}: {found} {expected}"
             );
         }
-        let _ = Vector3::<f64>::zeros();
     }
 }

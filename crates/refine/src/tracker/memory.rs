@@ -72,10 +72,12 @@ pub(super) struct Prediction {
     pub(super) seconds: f64,
     /// Covariance of the motion from the last frame: a left twist about the object's center \[m², rad²\].
     pub(super) motion_covariance: Matrix6<f64>,
+    /// The last keyframe, where images have measured the motion since.
+    pub(super) keyframe: Option<Keyframe>,
 }
 
 impl Prediction {
-    /// With the object moved from `before` by a motion that was measured with an error of this covariance.
+    /// With the object moved to `t_cam_object` by a motion that was measured with an error of this covariance.
     pub(super) fn measure(&mut self, t_cam_object: Isometry3<f64>, covariance: &Matrix6<f64>) {
         self.state.t_cam_object = t_cam_object;
         let mut block = self.covariance.fixed_view_mut::<6, 6>(0, 0);
@@ -227,15 +229,15 @@ impl TrackState {
         }
         let motion_covariance = Matrix6::from_diagonal(&growth.fixed_rows::<6>(0).into_owned());
         let covariance = covariance + DMatrix::from_diagonal(&growth);
-        let zero_velocity_pose = rest;
         Prediction {
             state,
             covariance,
             layout,
-            zero_velocity_pose,
+            zero_velocity_pose: rest,
             velocity,
             seconds,
             motion_covariance,
+            keyframe: None,
         }
     }
 }

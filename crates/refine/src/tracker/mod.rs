@@ -5,6 +5,7 @@ mod find;
 mod keyframe;
 mod memory;
 mod modes;
+mod pyramid;
 mod segmentation;
 mod settings;
 mod sight;
@@ -18,14 +19,13 @@ use std::slice;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
 
 use self::clock::Clock;
 pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
-use self::keyframe::{Alignment, Keyframe};
 use self::memory::{Prediction, TrackState};
 use self::modes::{Followed, Modes};
 use self::segmentation::Segmenter;
@@ -213,8 +213,8 @@ impl Tracker {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
         self.with_sight(observation, |tracker, sight| {
-            let aligned = tracker.align(sight, &track, &mut prediction);
-            tracker.look(sight, &track, &prediction, aligned.as_ref(), &nominal, time, &mut clock)
+            tracker.align(sight, &track, &mut prediction);
+            tracker.look(sight, &track, &prediction, &nominal, time, &mut clock)
         })
     }
 
@@ -231,64 +231,18 @@ impl Tracker {
         done
     }
 
-    /// Takes the motion since the last frame from the images, as far as they tell it.
-    fn align(
-        &self,
-        sight: &Sight,
-        track: &TrackState,
-        prediction: &mut Prediction,
-    ) -> Option<Alignment> {
-        let keyframe = track.keyframe.as_ref()?;
-        let before = track.state.t_cam_object;
-        let motion = prediction.state.t_cam_object * before.inverse();
-        let settings = &self.settings.keyframe;
-        let expected = &prediction.motion_covariance;
-        let aligned = keyframe.align(sight, &self.object, &motion, expected, settings)?;
-        let drift = settings.drift.powi(2) * prediction.seconds;
-        let turn = drift / self.object.radius.powi(2);
-        let drift = Matrix6::from_diagonal(&[drift, drift, drift, turn, turn, turn].into());
-        prediction.measure(keyframe.motion(&aligned) * before, &(aligned.covariance + drift));
-        Some(aligned)
-    }
-
     /// A full estimate has another look at what else fits, and its frame is a keyframe.
     fn begin_anew(&self, next: &mut TrackState, sight: &Sight, posterior: &Posterior) {
         next.modes = Modes::new(posterior);
         next.keyframe = self.keyframe(sight, &next.state.t_cam_object);
     }
 
-    /// A keyframe of an object that is in no hand: a hand that is known says better how what it holds has moved, than images that show half of it.
-    fn keyframe(&self, sight: &Sight, pose: &Isometry3<f64>) -> Option<Keyframe> {
-        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
-        let settings = &self.settings.keyframe;
-        (!in_hand).then(|| Keyframe::new(sight, &self.object, pose, settings)).flatten()
-    }
-
-    /// The keyframe of the frame after this one.
-    fn next_keyframe(
-        &self,
-        sight: &Sight,
-        track: &TrackState,
-        aligned: Option<&Alignment>,
-        pose: &Isometry3<f64>,
-    ) -> Option<Keyframe> {
-        match (track.keyframe.clone(), aligned) {
-            (Some(mut keyframe), Some(aligned)) => {
-                keyframe.advance(aligned);
-                Some(keyframe)
-            }
-            _ => self.keyframe(sight, pose),
-        }
-    }
-
     /// Looks for the object: where it should be, and elsewhere.
-    #[allow(clippy::too_many_arguments)] // all that a frame has
     fn look(
         &mut self,
         sight: &mut Sight,
         track: &TrackState,
         prediction: &Prediction,
-        aligned: Option<&Alignment>,
         nominal: &State,
         time: Duration,
         clock: &mut Clock,
@@ -303,16 +257,7 @@ impl Tracker {
         if seen && long_lost {
             rejection = Rejection::LongLost;
         } else if seen {
-            match self.follow(
-                sight,
-                track,
-                prediction,
-                aligned,
-                nominal,
-                time,
-                clock,
-                &mut timing,
-            )? {
+            match self.follow(sight, track, prediction, nominal, time, clock, &mut timing)? {
                 Ok(tracked) => return Ok(tracked),
                 Err(own) => rejection = own,
             }
@@ -346,7 +291,6 @@ impl Tracker {
         sight: &Sight,
         track: &TrackState,
         prediction: &Prediction,
-        aligned: Option<&Alignment>,
         nominal: &State,
         time: Duration,
         clock: &mut Clock,
@@ -391,8 +335,8 @@ impl Tracker {
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
         next.modes = modes;
-        let aligned = aligned.filter(|_| !is_turned);
-        next.keyframe = self.next_keyframe(sight, track, aligned, &next.state.t_cam_object);
+        let keyframe = prediction.keyframe.clone().filter(|_| !is_turned);
+        next.keyframe = keyframe.or_else(|| self.keyframe(sight, &next.state.t_cam_object));
         if next.is_time_to_learn() {
             self.learn(sight, &solved);
         }

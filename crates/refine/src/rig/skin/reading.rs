@@ -28,7 +28,7 @@ const SAME_GRASP: (f64, f64) = (10e-3, 0.1);
 const REACH: f64 = 8e-3;
 
 impl SkinReading {
-    /// Of a frame at `state`, whose forces are as they were read, of the object with this number; `None` without a skin, or if it cannot be posed.
+    /// The skin in `frame` at `state`, with its forces as they were read, on object `obj_id`; `None` without a skin, or if it cannot be posed.
     pub(in crate::rig) fn new(frame: &Frame<'_>, state: &State, obj_id: u32) -> Option<Self> {
         let (hand, HandMeasurement { forces, .. }) = frame.hand()?;
         if forces.is_empty() || forces.len() != hand.taxels.len() {

@@ -18,8 +18,7 @@ use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
 use crate::scene::Frame;
-use crate::strategy::Recorder;
-use crate::strategy::{Estimate, Iteration, Observer};
+use crate::strategy::{Estimate, Iteration, Observer, Recorder};
 
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;

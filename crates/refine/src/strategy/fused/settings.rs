@@ -172,7 +172,7 @@ pub struct FusedSettings {
 }
 
 impl FusedSettings {
-    /// The same, with what is known of how good the model and the rig of `frame` are.
+    /// These settings with the accuracy of the model and the rig of `frame`.
     pub(crate) fn for_frame(&self, frame: &Frame<'_>) -> Self {
         let mut settings = self.clone();
         if let Some(deviation) = &frame.object().deviation {
