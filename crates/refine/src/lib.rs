@@ -52,6 +52,9 @@ pub mod symmetry;
 pub mod synth;
 pub mod tracker;
 
+/// Millimeters in a meter, for what is told to people and written to BOP files.
+pub(crate) const MM_PER_M: f64 = 1e3;
+
 pub use error::RefineError;
 pub use method::{Method, NamedMethod};
 pub use problem::{Factor, State};

@@ -23,7 +23,7 @@ pub struct ChamferDepthSettings {
 
 impl Default for ChamferDepthSettings {
     fn default() -> Self {
-        Self { points: 1500, noise: NoiseModel::cauchy(1.5e-3, 10e-3, 200.0) }
+        Self { points: 1500, noise: NoiseModel::cauchy(4e-3, 200.0) }
     }
 }
 

@@ -10,6 +10,7 @@ use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 use super::chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
 use super::stability::{StabilityFactor, StabilitySettings};
 use super::step::damped_step;
+use super::{rendering_settings, tactile_settings};
 use crate::error::RefineError;
 use crate::factor::{RenderingFactor, RenderingSettings, TactileFactor, TactileSettings};
 use crate::problem::{Block, Factor, NormalEquations, State};
@@ -99,9 +100,9 @@ impl Heuristic {
             step_tolerance: 2e-6,
             exhaustive: false,
             stability: StabilitySettings::default(),
-            rendering: RenderingSettings::default(),
+            rendering: rendering_settings(),
             depth: ChamferDepthSettings::default(),
-            tactile: TactileSettings::default(),
+            tactile: tactile_settings(),
             factors: Vec::new(),
         }
     }

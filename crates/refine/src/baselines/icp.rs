@@ -5,9 +5,9 @@ use prehend_autodiff::Quadratic;
 use prehend_geometry::{KdTree, RobustKernel, icp};
 use rayon::prelude::*;
 
+use super::rendering_settings;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
-use crate::factor::RenderingSettings;
 use crate::problem::State;
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
@@ -49,7 +49,7 @@ impl Strategy for Icp {
         let object = frame.object();
         let cloud = KdTree::new(&frame.masked_points(self.points)?);
         let cloud = cloud.map_err(|_| RefineError::NoDepth)?;
-        let judge = Recorder::judge(frame, self.checkpoint, &RenderingSettings::default())?;
+        let judge = Recorder::judge(frame, self.checkpoint, &rendering_settings())?;
         let names = std::iter::once("icp");
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         let rule =

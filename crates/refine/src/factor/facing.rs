@@ -1,5 +1,7 @@
 //! Whether a camera can see a surface.
 
+use std::f64::consts::PI;
+
 use nalgebra::Vector3;
 
 /// Surface that is inclined to the line of sight by less than this sine counts less, down to nothing where it looks away.
@@ -11,7 +13,7 @@ pub(super) fn facing(normal: &Vector3<f64>, place: &Vector3<f64>) -> f64 {
     let cosine = -normal.dot(place) / (normal.norm() * place.norm());
     // Nothing where there is no normal, either.
     let x = if cosine > 0.0 { (cosine / INCLINED).min(1.0) } else { 0.0 };
-    x * x * (3.0 - 2.0 * x)
+    0.5 - 0.5 * (PI * x).cos()
 }
 
 #[cfg(test)]

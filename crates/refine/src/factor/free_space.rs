@@ -22,7 +22,7 @@ pub struct FreeSpaceSettings {
 
 impl Default for FreeSpaceSettings {
     fn default() -> Self {
-        Self { samples: 400, margin: 3e-3, noise: NoiseModel::cauchy(2e-3, 5e-3, 10.0) }
+        Self { samples: 400, margin: 3e-3, noise: NoiseModel::cauchy(2e-3, 10.0) }
     }
 }
 

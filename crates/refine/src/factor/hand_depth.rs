@@ -24,7 +24,7 @@ pub struct HandDepthSettings {
 
 impl Default for HandDepthSettings {
     fn default() -> Self {
-        Self { points: 500, noise: NoiseModel::cauchy(1e-3, 3e-3, 60.0), reach: 15e-3 }
+        Self { points: 500, noise: NoiseModel::cauchy(1e-3, 60.0), reach: 15e-3 }
     }
 }
 

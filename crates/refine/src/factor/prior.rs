@@ -5,7 +5,7 @@ use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 use prehend_geometry::RobustKernel;
 
 use crate::error::RefineError;
-use crate::problem::{Block, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
+use crate::problem::{Block, CAUCHY_WIDTH, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
 use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError};
 use crate::strategy::{ErrorGroup, Scales};
 
@@ -13,12 +13,10 @@ use crate::strategy::{ErrorGroup, Scales};
 /// tiny one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorSettings {
-    /// The object's center in each direction of the camera frame \[m\].
-    pub object_translation: [f64; 3],
-    /// The object's rotation about each axis of the camera frame \[rad\].
-    pub object_rotation: [f64; 3],
-    /// From how many of these deviations on errors of the initial pose are outliers (Cauchy's kernel).
-    pub object_tails: f64,
+    /// The object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
+    pub object_translation: f64,
+    /// The object's rotation about each axis \[rad\].
+    pub object_rotation: f64,
     /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
     pub object_turned: f64,
     /// The hand at the object's place, in each direction \[m\].
@@ -49,7 +47,7 @@ impl PriorSettings {
     /// Standard deviations of the parameters of `block`, in their order.
     pub(crate) fn sigmas(&self, block: Block) -> Vec<f64> {
         match block {
-            Block::ObjectPose => [self.object_translation, self.object_rotation].concat(),
+            Block::ObjectPose => [[self.object_translation; 3], [self.object_rotation; 3]].concat(),
             Block::HandPose => [[self.hand_translation; 3], [self.hand_rotation; 3]].concat(),
             Block::Joints(count) => (0..count)
                 .map(|k| self.known_joints.get(k).copied().flatten().unwrap_or(self.joints))
@@ -101,9 +99,8 @@ impl Default for PriorSettings {
     /// An initial pose that is good to some centimeters and some tens of degrees, and a robot of common accuracy.
     fn default() -> Self {
         Self {
-            object_translation: [0.03; 3],
-            object_rotation: [0.4; 3],
-            object_tails: 3.0,
+            object_translation: 0.03,
+            object_rotation: 0.4,
             object_turned: 0.02,
             hand_translation: 2.1e-3,
             hand_rotation: 7e-3,
@@ -174,8 +171,8 @@ pub struct GaussianPrior {
     whitener: Whitener,
     /// Inverse of the covariance of the object's deviation.
     object_information: Matrix6<f64>,
-    /// Width of Cauchy's kernel of the object's displacement and rotation \[standard deviations\]; infinite for none.
-    tails: f64,
+    /// Whether the object's displacement and rotation may be outliers (Cauchy's kernel).
+    has_outliers: bool,
     /// Other rotations that the object may have in place of that of the mean, and what each costs \[nat\].
     others: Vec<UnitQuaternion<f64>>,
     cost_of_others: f64,
@@ -221,7 +218,7 @@ impl GaussianPrior {
             layout,
             whitener: Whitener::Diagonal(sigmas.map(f64::recip)),
             object_information: Matrix6::from_diagonal(&information),
-            tails: settings.object_tails,
+            has_outliers: true,
             others: Vec::new(),
             cost_of_others: 0.0,
         })
@@ -237,14 +234,13 @@ impl GaussianPrior {
         let whitener = Whitener::Full(ScaledCholesky::new(covariance, RIDGE)?.whitener()?);
         let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
         let object_information = object;
-        let tails = f64::INFINITY;
         Some(Self {
             center: mean.center(),
             mean,
             layout,
             whitener,
             object_information,
-            tails,
+            has_outliers: false,
             others: Vec::new(),
             cost_of_others: 0.0,
         })
@@ -269,17 +265,17 @@ impl GaussianPrior {
         }
     }
 
-    /// With outliers of the object's pose from so many standard deviations on: of an object whose deviations are independent of the rest.
-    pub(crate) fn with_tails(self, tails: f64) -> Self {
-        Self { tails, ..self }
+    /// With outliers of the object's pose: of an object whose deviations are independent of the rest.
+    pub(crate) fn with_outliers(self) -> Self {
+        Self { has_outliers: true, ..self }
     }
 
     /// Weights of the object's whitened displacement and rotation, and what their costs are beyond those with these weights \[nat\].
     fn object_weights(&self, residuals: [f64; 6]) -> ([f64; 6], f64) {
-        if self.tails.is_infinite() {
+        if !self.has_outliers {
             return ([1.0; 6], 0.0);
         }
-        let kernel = RobustKernel::Cauchy { scale: self.tails };
+        let kernel = RobustKernel::Cauchy { scale: CAUCHY_WIDTH };
         let (mut weights, mut beyond) = ([1.0; 6], 0.0);
         for part in [0..3, 3..6] {
             let squared: f64 = residuals[part.clone()].iter().map(|r| r * r).sum();
@@ -396,8 +392,8 @@ mod tests {
 
     fn settings() -> PriorSettings {
         PriorSettings {
-            object_translation: [0.01, 0.02, 0.03],
-            object_rotation: [0.1, 0.2, 0.3],
+            object_translation: 0.02,
+            object_rotation: 0.2,
             hand_translation: 2e-3,
             hand_rotation: 7e-3,
             joints: 0.014,
@@ -462,7 +458,7 @@ mod tests {
         let variances = settings().all_sigmas(layout).map(|sigma| sigma.powi(2));
         let covariance = DMatrix::from_diagonal(&variances);
         let full = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
-        let full = full.with_tails(settings().object_tails);
+        let full = full.with_outliers();
         let diagonal = GaussianPrior::independent(start.clone(), &settings()).unwrap();
         let off: Vec<f64> = (0..layout.len()).map(|k| 0.01 * (k as f64 * 1.3).cos()).collect();
         let state = start.retract(&layout.blocks(), &off);

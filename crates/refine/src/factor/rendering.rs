@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::patch_sums::PatchSums;
 use crate::error::RefineError;
-use crate::problem::{Factor, NormalEquations, State, SurfacePatches};
+use crate::problem::{CAUCHY_WIDTH, Factor, NormalEquations, State, SurfacePatches};
 use crate::scene::{Frame, Object, Occluders};
 
 /// Settings of [`RenderingFactor`].
@@ -29,8 +29,8 @@ pub struct RenderingSettings {
     pub sigma: f64,
     /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
     pub mask_sigma: f64,
-    /// Width of Cauchy's kernel of a color \[standard deviations\].
-    pub kernel_width: f64,
+    /// Width of Cauchy's kernel of a color, beside [`CAUCHY_WIDTH`] standard deviations.
+    pub kernel_scale: f64,
     /// How many independent measurements the pixels amount to: the errors of shading, texture and
     /// segmentation reach over whole patches.
     pub effective_pixels: f64,
@@ -41,20 +41,19 @@ pub struct RenderingSettings {
 /// Half-width of the contour band \[px\] that is nearest to how a box-filtered edge fades.
 const HALF_WIDTH: f64 = 0.645;
 
-/// Distance from where the object is not seen of the pixels that the light is solved from \[px\], and their number at most.
-const LIGHT_MARGIN: usize = 1;
+/// Pixels that the light is solved from at most, none of them beside one where the object is not seen.
 const LIGHT_SAMPLES: usize = 1000;
 
 impl Default for RenderingSettings {
     fn default() -> Self {
         Self {
-            downsample: 2,
+            downsample: 1,
             color: true,
-            occluders: Occluders::Hand,
+            occluders: Occluders::Measured,
             sigma: 0.15,
-            mask_sigma: 0.3,
-            kernel_width: 2.0,
-            effective_pixels: 200.0,
+            mask_sigma: 0.6,
+            kernel_scale: 1.0,
+            effective_pixels: 80.0,
             light_ridge: 1e-2,
         }
     }
@@ -93,7 +92,7 @@ impl RenderingFactor {
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
             penalize_occluded: true,
-            kernel: RobustKernel::Cauchy { scale: settings.kernel_width * sigma },
+            kernel: RobustKernel::Cauchy { scale: settings.kernel_scale * CAUCHY_WIDTH * sigma },
             ..LossOptions::default()
         };
         let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
@@ -131,7 +130,7 @@ impl RenderingFactor {
         // Four unknowns a channel do not need every pixel.
         let PoseProblem { model, target, .. } = &self.problem;
         let seen = reprojected(state);
-        let samples = light_samples(model, &seen, target, LIGHT_MARGIN, LIGHT_SAMPLES);
+        let samples = light_samples(model, &seen, target, 1, LIGHT_SAMPLES);
         Light::fit(&samples, self.light_ridge).unwrap_or_else(|_| Light::ambient(1.0))
     }
 

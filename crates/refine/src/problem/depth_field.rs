@@ -59,9 +59,17 @@ impl DepthField {
 fn place(t: f64, knots: usize) -> (usize, [f64; SUPPORT]) {
     let first = (t.max(0.0) as usize).min(knots - SUPPORT);
     let f = (t - first as f64).clamp(0.0, 1.0);
-    let g = 1.0 - f;
-    let near = |f: f64| (4.0 + f * f * (3.0 * f - 6.0)) / 6.0;
-    (first, [g * g * g / 6.0, near(f), near(g), f * f * f / 6.0])
+    // From each degree to the next (de Boor, 1972).
+    let mut weights = [1.0, 0.0, 0.0, 0.0];
+    for degree in 1..SUPPORT {
+        let mut passed = 0.0;
+        for (k, weight) in weights[..degree].iter_mut().enumerate() {
+            let share = (f + (degree - 1 - k) as f64) / degree as f64;
+            (*weight, passed) = (passed + (1.0 - share) * *weight, share * *weight);
+        }
+        weights[degree] = passed;
+    }
+    (first, weights)
 }
 
 #[cfg(test)]

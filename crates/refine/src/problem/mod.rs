@@ -22,7 +22,7 @@ pub use factor::Factor;
 pub(crate) use image_warp::{ImageWarp, RADIAL, radial_as_camera};
 pub(crate) use inducing_points::far_apart;
 pub use least_squares::{Contribution, Linearization, Problem, Solution, Solver, Termination};
-pub use noise::{NoiseModel, Weighting};
+pub use noise::{CAUCHY_WIDTH, NoiseModel, Weighting};
 pub(crate) use noise::{NoiseScale, NoiseScales};
 pub use patches::ModelErrorSettings;
 pub(crate) use patches::SurfacePatches;

@@ -18,16 +18,26 @@ pub struct NoiseModel {
     pub effective_samples: f64,
 }
 
+/// Width of Cauchy's kernel in standard deviations with which estimates from normal errors are 95 % as efficient as least squares (Holland and
+/// Welsch, 1977).
+pub const CAUCHY_WIDTH: f64 = 2.385;
+
 impl NoiseModel {
     /// Independent residuals of standard deviation `sigma`, normally distributed.
     pub fn gaussian(sigma: f64) -> Self {
         Self { sigma, kernel: RobustKernel::Squared, effective_samples: f64::INFINITY }
     }
 
-    /// Residuals of standard deviation `sigma`; those beyond `width` are more and more forgiven (Cauchy). They amount to
-    /// at most `effective_samples` independent ones.
-    pub fn cauchy(sigma: f64, width: f64, effective_samples: f64) -> Self {
-        Self { sigma, kernel: RobustKernel::Cauchy { scale: width }, effective_samples }
+    /// Residuals of standard deviation `sigma` with outliers, forgiven by Cauchy's kernel of width [`CAUCHY_WIDTH`]; they amount to at most
+    /// `effective_samples` independent ones.
+    pub fn cauchy(sigma: f64, effective_samples: f64) -> Self {
+        let kernel = RobustKernel::Cauchy { scale: CAUCHY_WIDTH * sigma };
+        Self { sigma, kernel, effective_samples }
+    }
+
+    /// With this standard deviation, and a kernel as wide as before.
+    pub(crate) fn with_sigma(self, sigma: f64) -> Self {
+        Self { sigma, ..self }
     }
 
     /// With a kernel `factor` times as wide: graduated non-convexity (Blake and Zisserman, 1987).
@@ -101,7 +111,7 @@ mod tests {
 
     #[test]
     fn many_residuals_amount_to_the_effective_number() {
-        let noise = NoiseModel::cauchy(2e-3, 1e-2, 10.0);
+        let noise = NoiseModel::cauchy(2e-3, 10.0);
         assert_eq!(noise.weighting(5).information, 2e-3f64.powi(-2));
         assert_eq!(noise.weighting(40).information, 0.25 * 2e-3f64.powi(-2));
         assert_eq!(NoiseModel::gaussian(f64::INFINITY).weighting(3).cost(1.0), 0.0);

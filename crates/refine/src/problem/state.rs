@@ -105,12 +105,6 @@ impl State {
         Isometry3::from_parts(origin.into(), *rotation)
     }
 
-    /// How far the surface of an object of this `radius` is from here to `other`, at most \[m\].
-    pub(crate) fn surface_motion(&self, other: &Self, radius: f64) -> f64 {
-        let turn = self.t_cam_object.rotation.angle_to(&other.t_cam_object.rotation);
-        (self.center() - other.center()).norm() + radius * turn
-    }
-
     /// How far the calibrations are from those `said`: displacement of the point that is said to be at the object's center and rotation
     /// vector of the hand \[m; rad\], joints, camera, other cameras.
     pub(crate) fn calibration_deviation(&self, said: &Self) -> DVector<f64> {

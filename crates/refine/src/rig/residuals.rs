@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
 
+use crate::MM_PER_M;
 use crate::error::RefineError;
 use crate::factor::{TactileFactor, TactileSettings};
 use crate::problem::State;
@@ -56,12 +57,12 @@ impl FrameResiduals {
     pub fn sensors(&self) -> Vec<SensorResidual> {
         let Self { depth: [on_object, on_hand], outline, touch } = self;
         let millimeters =
-            |pixels: &[([usize; 2], f64)]| pixels.iter().map(|(_, r)| r * 1e3).collect();
+            |pixels: &[([usize; 2], f64)]| pixels.iter().map(|(_, r)| r * MM_PER_M).collect();
         let kinds: [(&str, &str, Vec<f64>); 4] = [
             ("depth on the object", "mm", millimeters(on_object)),
             ("depth on the hand", "mm", millimeters(on_hand)),
             ("outline", PIXELS, outline.iter().copied().collect()),
-            ("touched skin", "mm", touch.iter().map(|r| r * 1e3).collect()),
+            ("touched skin", "mm", touch.iter().map(|r| r * MM_PER_M).collect()),
         ];
         let residual = |(sensor, unit, values): (&'static str, &'static str, Vec<f64>)| {
             let size = median(values.iter().map(|v| v.abs()))?;

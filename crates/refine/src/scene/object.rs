@@ -124,6 +124,12 @@ impl Object {
         })
     }
 
+    /// Distance between the object's surfaces at two poses, at most \[m\]: that of its centers and, times its radius, the angle.
+    pub(crate) fn surface_motion(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
+        (from * self.center - to * self.center).norm()
+            + self.radius * from.rotation.angle_to(&to.rotation)
+    }
+
     /// Motions in object coordinates after which the object looks much the same by shape, the identity left out; found when they are first
     /// asked for, which takes about a second. None where the mesh is so broken that they cannot be found.
     pub(crate) fn near_symmetries(&self) -> &[Isometry3<f64>] {

@@ -14,15 +14,12 @@ pub(super) struct DistanceLattice {
     nodes: Vec<f32>,
 }
 
-/// How far the lattice reaches beyond the object's box \[m\].
-const MARGIN: f64 = 0.03;
-
 impl DistanceLattice {
-    /// A lattice with `cells` cells along the longest side.
-    pub(super) fn new(object: &Object, cells: usize) -> Self {
+    /// A lattice with `cells` cells along the longest side, that reaches `margin` \[m\] beyond the object's box.
+    pub(super) fn new(object: &Object, cells: usize, margin: f64) -> Self {
         let (low, high) = object.surface.bounds();
-        let low = low - Vector3::repeat(MARGIN);
-        let extent = high - low + Vector3::repeat(MARGIN);
+        let low = low - Vector3::repeat(margin);
+        let extent = high - low + Vector3::repeat(margin);
         let spacing = extent.max() / cells as f64;
         let counts = [0, 1, 2].map(|k| (extent[k] / spacing).ceil() as usize + 1);
         let row = |at: usize| {
@@ -84,7 +81,7 @@ mod tests {
     fn distances_are_nearly_exact_and_gradients_their_derivatives() {
         let mesh = cuboid(Vector3::new(0.06, 0.08, 0.2));
         let object = Object::new("box", mesh, None, 0).unwrap();
-        let lattice = DistanceLattice::new(&object, 48);
+        let lattice = DistanceLattice::new(&object, 48, 0.03);
         let mut random = SplitMix64::new(2);
         for _ in 0..2000 {
             let p = Point3::from(Vector3::from_fn(|_, _| random.uniform() - 0.5) * 0.22);

@@ -1,9 +1,9 @@
 //! What the sensors say, in the form that very many hypotheses are judged by.
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::KdTree;
 use prehend_geometry::cloud::estimate_normals;
 use prehend_geometry::sample::surface_samples;
+use prehend_geometry::{KdTree, SplitMix64};
 use prehend_render::{Camera, DepthImage};
 
 use crate::error::RefineError;
@@ -13,8 +13,6 @@ use crate::scene::{Frame, HandMeasurement, Observation};
 const POINTS: usize = 2500;
 /// Neighbors that a normal is estimated from.
 const NEIGHBORS: usize = 24;
-/// Points on the hand's surface that the object must not reach.
-const HAND_POINTS: usize = 300;
 /// Columns at most of the map of what is seen where.
 const MAP_WIDTH: usize = 160;
 
@@ -31,11 +29,15 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// What `frame` shows; taxels with more than `contact_threshold` \[N\] are touched.
+    /// What `frame` shows; taxels with more than `contact_threshold` \[N\] are touched, and the hand's surface is so many points.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
-    pub(super) fn new(frame: &Frame<'_>, contact_threshold: f64) -> Result<Self, RefineError> {
+    pub(super) fn new(
+        frame: &Frame<'_>,
+        hand_points: usize,
+        contact_threshold: f64,
+    ) -> Result<Self, RefineError> {
         let places = frame.masked_points(POINTS)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
         let normals = estimate_normals(&tree, NEIGHBORS, &Point3::origin());
@@ -45,7 +47,7 @@ impl Evidence {
                 robot.check_forces(&reading.forces)?;
             }
             let posed = robot.posed(&reading.t_cam_hand, &reading.joints)?;
-            let surface = surface_samples(&posed.mesh(), HAND_POINTS, 0);
+            let surface = surface_samples(&posed.mesh(), hand_points, 0);
             outside.extend(surface.iter().map(|s| s.point));
             for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
                 let link = posed.t_world_links()[robot.link_of(taxel)?];
@@ -67,14 +69,12 @@ impl Evidence {
     }
 }
 
-/// `items` in an order of which every beginning is spread over all of them.
-fn shuffled<T: Copy>(items: Vec<T>) -> Vec<T> {
-    let mut order: Vec<usize> = (0..items.len()).collect();
-    // Multiples of the golden ratio fill the unit interval evenly.
-    let key = |i: usize| (i as f64 * 0.618_033_988_749_895).fract();
-    order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
-    // Neighbors in that order are far apart in the list; a stride makes beginnings even too.
-    order.into_iter().map(|i| items[i]).collect()
+/// `items` in a random order: every beginning is spread over all of them.
+fn shuffled<T>(items: Vec<T>) -> Vec<T> {
+    let mut random = SplitMix64::new(0);
+    let mut keyed: Vec<(f64, T)> = items.into_iter().map(|item| (random.uniform(), item)).collect();
+    keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    keyed.into_iter().map(|(_, item)| item).collect()
 }
 
 /// What the camera sees where, at a low resolution.
@@ -130,8 +130,6 @@ impl SightMap {
     /// 0 where something hides it, or outside the image.
     #[inline]
     pub(super) fn conflict(&self, point: &Point3<f64>) -> f64 {
-        /// Surface this far behind what is seen there is hidden by it \[m\].
-        const HIDDEN: f64 = 5e-3;
         let Some(pixel) = self.camera.project(point) else { return 1.0 };
         let (u, v) = (pixel.x.round(), pixel.y.round());
         let (width, height) = (self.camera.width as f64, self.camera.height as f64);
@@ -149,7 +147,7 @@ impl SightMap {
                 false => 0.0,
             };
         }
-        if depth > 0.0 && depth < point.z - HIDDEN {
+        if depth > 0.0 && depth < point.z {
             return 0.0;
         }
         f64::from(sight.away) * point.z / self.camera.fx
@@ -190,7 +188,7 @@ mod tests {
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
         let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
-        let evidence = Evidence::new(&frame, 0.1).unwrap();
+        let evidence = Evidence::new(&frame, 300, 0.1).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
             let facing = scene.object.samples.iter().filter_map(|s| {
@@ -214,7 +212,7 @@ mod tests {
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
         let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
-        let unfelt = Evidence::new(&frame, 0.1).unwrap();
+        let unfelt = Evidence::new(&frame, 300, 0.1).unwrap();
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();
         assert_eq!((unfelt.outside.len(), unfelt.touched.len()), (all - taxels, 0));

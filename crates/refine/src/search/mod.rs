@@ -69,7 +69,8 @@ impl PoseSearch {
     /// [`RefineError::Setting`] for a setting out of range.
     pub fn new(object: Arc<Object>, settings: SearchSettings) -> Result<Self, RefineError> {
         settings.check()?;
-        let lattice = DistanceLattice::new(&object, settings.cells);
+        // Beyond the margin all distances count alike.
+        let lattice = DistanceLattice::new(&object, settings.cells, 2.0 * settings.scale);
         Ok(Self { object, lattice, settings })
     }
 
@@ -78,9 +79,10 @@ impl PoseSearch {
     /// # Errors
     /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
     pub fn run(&self, frame: &Frame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
-        let evidence = Evidence::new(frame, self.settings.estimator.tactile.contact_threshold)?;
-        let rough =
-            CoarseScorer { object: &self.object, lattice: &self.lattice, evidence: &evidence };
+        let Self { object, lattice, settings } = self;
+        let threshold = settings.estimator.tactile.contact_threshold;
+        let evidence = Evidence::new(frame, settings.points, threshold)?;
+        let rough = CoarseScorer { object, lattice, evidence: &evidence, scale: settings.scale };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
         let found = self.descend(frame, &turned)?;
@@ -92,21 +94,22 @@ impl PoseSearch {
 
     /// Stage 1.
     fn place(&self, rough: &CoarseScorer) -> Vec<Scored> {
-        let settings = &self.settings;
-        let reach = settings.reach * self.object.radius;
+        let &SearchSettings { rotations, points, steps, placed, .. } = &self.settings;
+        let (points, steps) = (points.div_ceil(4), steps / 2);
+        // The hand may hide so much that the visible part is far from the middle.
+        let reach = 0.5 * self.object.radius;
         let shifts: Vec<Vector3<f64>> = (0..9)
             .map(|i| Vector3::new(f64::from(i % 3 - 1), f64::from(i / 3 - 1), 0.0) * reach)
             .collect();
-        let placed: Vec<Scored> = spread_rotations(settings.rotations)
+        let scored: Vec<Scored> = spread_rotations(rotations)
             .par_iter()
             .flat_map_iter(|rotation| {
                 let centered = rough.centered(rotation);
-                let points = settings.rough_points;
                 let scored = shifts.iter().map(|shift| {
                     let mut start = centered;
                     start.translation.vector += shift;
-                    let pose = rough.settle(&start, points, 20e-3, settings.slides, true);
-                    (pose, rough.score(&pose, points, 15e-3))
+                    let pose = rough.settle(&start, points, steps, true);
+                    (pose, rough.score(&pose, points))
                 });
                 // Two of the places a rotation: nearly all end in the same one.
                 let mut scored: Vec<Scored> = scored.collect();
@@ -115,19 +118,17 @@ impl PoseSearch {
                 scored
             })
             .collect();
-        distinct(placed, settings.placed, 10e-3, 8.0)
+        self.distinct(scored, placed)
     }
 
     /// Stage 2.
     fn turn(&self, rough: &CoarseScorer, placed: &[Scored]) -> Vec<Scored> {
-        let settings = &self.settings;
-        let points = settings.points;
-        let turned = evaluate(placed, |pose| {
-            let pose = rough.settle(pose, points / 2, 15e-3, settings.turns, false);
-            let pose = rough.settle(&pose, points, 7e-3, settings.turns / 2, false);
-            (pose, rough.score(&pose, points, 10e-3))
+        let &SearchSettings { points, steps, turned, .. } = &self.settings;
+        let scored = placed.par_iter().with_max_len(1).map(|(pose, _)| {
+            let pose = rough.settle(pose, points, steps, false);
+            (pose, rough.score(&pose, points))
         });
-        distinct(turned, settings.turned, 6e-3, 6.0)
+        self.distinct(scored.collect(), turned)
     }
 
     /// Stage 3.
@@ -143,10 +144,30 @@ impl PoseSearch {
         let problem = problem_of(frame, first, stage, &settings, None, &[])?;
         let costs = problem.cost_all(&starts);
         let poses = starts.iter().map(|state| state.t_cam_object);
-        let seen = distinct(poses.zip(costs).collect(), self.settings.seen, 6e-3, 6.0);
+        let seen = self.distinct(poses.zip(costs).collect(), self.settings.seen);
         let found = problem.solve_all(&states(&seen), &stage.solver);
         let found = found.into_iter().map(|found| (found.at.state.t_cam_object, found.at.cost));
-        Ok(distinct(found.collect(), self.settings.last, 3e-3, 3.0))
+        Ok(self.distinct(found.collect(), self.settings.last))
+    }
+
+    /// The best `limit` of `poses`, best first, without those that are within [`SearchSettings::separation`] of a better one.
+    fn distinct(&self, mut poses: Vec<Scored>, limit: usize) -> Vec<Scored> {
+        poses.retain(|(_, score)| score.is_finite());
+        // The sort keeps the order of equals, so the result is always the same.
+        poses.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut kept: Vec<Scored> = Vec::new();
+        for (pose, score) in poses {
+            if kept.len() >= limit {
+                break;
+            }
+            let near = |(other, _): &Scored| {
+                self.object.surface_motion(&pose, other) < self.settings.separation
+            };
+            if !kept.iter().any(near) {
+                kept.push((pose, score));
+            }
+        }
+        kept
     }
 }
 
@@ -160,33 +181,6 @@ fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
         PoseCandidate { t_cam_object, cost, weight }
     };
     poses.iter().map(candidate).collect()
-}
-
-/// `f` of every pose, in the same order.
-fn evaluate(poses: &[Scored], f: impl Fn(&Isometry3<f64>) -> Scored + Sync) -> Vec<Scored> {
-    poses.par_iter().with_max_len(1).map(|(pose, _)| f(pose)).collect()
-}
-
-/// The best `limit` of `poses`, best first, without those within `distance` \[m\] and `angle` \[°\] of a better one.
-fn distinct(mut poses: Vec<Scored>, limit: usize, distance: f64, angle: f64) -> Vec<Scored> {
-    poses.retain(|(_, score)| score.is_finite());
-    // The sort keeps the order of equals, so the result is always the same.
-    poses.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let least = (0.5 * angle.to_radians()).cos();
-    let mut kept: Vec<Scored> = Vec::new();
-    for (pose, score) in poses {
-        if kept.len() >= limit {
-            break;
-        }
-        let near = |(other, _): &Scored| {
-            let apart = (other.translation.vector - pose.translation.vector).norm();
-            apart < distance && other.rotation.coords.dot(&pose.rotation.coords).abs() > least
-        };
-        if !kept.iter().any(near) {
-            kept.push((pose, score));
-        }
-    }
-    kept
 }
 
 #[cfg(test)]

@@ -9,22 +9,16 @@ use super::distance_lattice::DistanceLattice;
 use super::evidence::Evidence;
 use crate::scene::Object;
 
-/// What a mismatch of normals by one radian counts as \[m\].
-const NORMAL_LENGTH: f64 = 10e-3;
-/// A touched taxel may be this far from the surface, for a contact spreads over those around it \[m\].
-const TOUCH_SLACK: f64 = 2e-3;
-/// What counts, against the depth points: the object's own surface where it could be seen, …
-const SIGHT_WEIGHT: f64 = 1.0;
-/// … touched taxels, …
-const TOUCH_WEIGHT: f64 = 0.3;
-/// … and the hand inside the object.
-const OUTSIDE_WEIGHT: f64 = 2.0;
+/// Damping of a step: what is left open by a few points must not lead far.
+const DAMPING: f64 = 0.03;
 
 /// An object and what is known of where it is.
 pub(super) struct CoarseScorer<'a> {
     pub(super) object: &'a Object,
     pub(super) lattice: &'a DistanceLattice,
     pub(super) evidence: &'a Evidence,
+    /// Distances beyond this count alike \[m\].
+    pub(super) scale: f64,
 }
 
 impl CoarseScorer<'_> {
@@ -34,7 +28,7 @@ impl CoarseScorer<'_> {
         let points = &self.evidence.points;
         let mean = points.iter().map(|(p, _)| p.coords).sum::<Vector3<f64>>() / points.len() as f64;
         let towards = -mean.normalize();
-        let (mut sum, mut weight) = (Vector3::zeros(), 1e-12);
+        let (mut sum, mut weight) = (Vector3::zeros(), f64::MIN_POSITIVE);
         for sample in self.object.samples.iter().step_by(7) {
             // Surface counts by the pixels it fills.
             let facing = (rotation * sample.normal).dot(&towards).max(0.0);
@@ -44,17 +38,17 @@ impl CoarseScorer<'_> {
         Isometry3::from_parts((mean - sum / weight).into(), *rotation)
     }
 
-    /// How badly the pose fits: 0 not at all, 1 and more for one that has nothing to do with what is seen. Residuals
-    /// beyond `scale` \[m\] all count alike. `points` depth points and as many surface samples are looked at.
-    pub(super) fn score(&self, pose: &Isometry3<f64>, points: usize, scale: f64) -> f64 {
-        let loss = |r: f64| (r / scale).powi(2).min(1.0);
+    /// How badly the pose fits: 0 not at all, 1 and more for one that has nothing to do with what is seen. `points` depth points and as
+    /// many surface samples are looked at. A radian between normals counts as the scale of distances.
+    pub(super) fn score(&self, pose: &Isometry3<f64>, points: usize) -> f64 {
+        let loss = |r: f64| (r / self.scale).powi(2).min(1.0);
         let inverse = pose.inverse();
         let distance = |p: &Point3<f64>| self.lattice.sample(&(inverse * p)).0;
         let depth = mean(self.evidence.points.iter().take(points).map(|(p, normal)| {
             let (distance, gradient) = self.lattice.sample(&(inverse * p));
             let mismatch = match *normal == Vector3::zeros() {
                 true => 0.0,
-                false => (pose.rotation * gradient - normal).norm() * NORMAL_LENGTH,
+                false => (pose.rotation * gradient - normal).norm() * self.scale,
             };
             loss(distance.hypot(mismatch))
         }));
@@ -62,15 +56,14 @@ impl CoarseScorer<'_> {
         let facing = samples.iter().step_by((samples.len() / (2 * points).max(1)).max(1));
         let sight = mean(facing.filter_map(|sample| {
             let (p, n) = (pose * sample.point, pose.rotation * sample.normal);
-            let faces = n.dot(&p.coords) < -0.2 * p.coords.norm();
-            faces.then(|| loss(self.evidence.map.conflict(&p)))
+            (n.dot(&p.coords) < 0.0).then(|| loss(self.evidence.map.conflict(&p)))
         }));
         let touched = self.evidence.touched.iter();
-        let touch = mean(touched.map(|p| loss((distance(p).abs() - TOUCH_SLACK).max(0.0))));
+        let touch = mean(touched.map(|p| loss(distance(p))));
         let stride = self.evidence.outside.len().div_ceil((2 * points).max(1)).max(1);
         let outside = self.evidence.outside.iter().step_by(stride);
         let outside = mean(outside.map(|p| loss(distance(p).min(0.0))));
-        depth + SIGHT_WEIGHT * sight + TOUCH_WEIGHT * touch + OUTSIDE_WEIGHT * outside
+        depth + sight + touch + outside
     }
 
     /// `pose` after `steps` robust Gauss–Newton steps of the distances of `points` depth points and the touched
@@ -79,19 +72,17 @@ impl CoarseScorer<'_> {
         &self,
         pose: &Isometry3<f64>,
         points: usize,
-        scale: f64,
         steps: usize,
         slide: bool,
     ) -> Isometry3<f64> {
         // Radians count by how far they move the surface.
         let turn = if slide { 0.0 } else { 1.0 / self.object.radius };
         let units = Vector6::new(1.0, 1.0, 1.0, turn, turn, turn);
-        let damping = if slide { 6e-2 } else { 1.2e-2 };
         let mut pose = *pose;
         for _ in 0..steps {
             let center = (pose * self.object.center).coords;
-            let equations = self.equations(&pose, &center, points, scale);
-            let step = equations.in_units(&units).damped_step(damping).component_mul(&units);
+            let equations = self.equations(&pose, &center, points);
+            let step = equations.in_units(&units).damped_step(DAMPING).component_mul(&units);
             pose = perturb_about(&pose, &center, &step);
             pose.rotation.renormalize();
         }
@@ -103,9 +94,8 @@ impl CoarseScorer<'_> {
         pose: &Isometry3<f64>,
         center: &Vector3<f64>,
         points: usize,
-        scale: f64,
     ) -> Quadratic<6> {
-        let kernel = RobustKernel::Cauchy { scale };
+        let kernel = RobustKernel::Cauchy { scale: self.scale };
         let inverse = pose.inverse();
         let mut sum = Quadratic::zeros();
         let mut add = |p: &Point3<f64>, share: f64, inside_only: bool| {
@@ -119,13 +109,13 @@ impl CoarseScorer<'_> {
         };
         let evidence = self.evidence;
         let used = evidence.points.len().min(points);
-        let share = |weight: f64, count: usize| weight / count.max(1) as f64;
-        evidence.points[..used].iter().for_each(|(p, _)| add(p, share(1.0, used), false));
-        let touched = share(TOUCH_WEIGHT, evidence.touched.len());
+        let share = |count: usize| 1.0 / count.max(1) as f64;
+        evidence.points[..used].iter().for_each(|(p, _)| add(p, share(used), false));
+        let touched = share(evidence.touched.len());
         evidence.touched.iter().for_each(|p| add(p, touched, false));
         let outside =
             evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points.max(1)).max(1));
-        let weight = share(OUTSIDE_WEIGHT, points.min(evidence.outside.len()));
+        let weight = share(points.min(evidence.outside.len()));
         outside.for_each(|p| add(p, weight, true));
         sum
     }

@@ -8,21 +8,19 @@ use crate::strategy::FusedSettings;
 pub struct SearchSettings {
     /// Rotations tried; 3000 leave no rotation more than some 17° from one of them.
     pub rotations: usize,
-    /// How far the places tried are from the depth points' mean, across the view, in radii of the object: the hand
-    /// may hide so much that the visible part is far from the middle.
-    pub reach: f64,
     /// Cells of the distance lattice along the object's longest side.
     pub cells: usize,
-    /// Depth points and surface samples that stage 1 looks at.
-    pub rough_points: usize,
-    /// Steps of stage 1.
-    pub slides: usize,
+    /// Distances \[m\] beyond this count alike in stages 1 and 2: some millimeters of hand, model and depth, and what a rotation off by half
+    /// the spacing of rotations moves the surface.
+    pub scale: f64,
+    /// Poses whose surfaces are nearer to each other \[m\] are one hypothesis.
+    pub separation: f64,
+    /// Depth points, surface samples and points of the hand that stage 2 looks at; a quarter of them in stage 1.
+    pub points: usize,
+    /// Steps of stage 2; half as many in stage 1.
+    pub steps: usize,
     /// Hypotheses that stage 1 keeps.
     pub placed: usize,
-    /// Depth points and surface samples that stage 2 looks at.
-    pub points: usize,
-    /// Steps of stage 2.
-    pub turns: usize,
     /// Hypotheses that stage 2 keeps.
     pub turned: usize,
     /// Hypotheses that stage 3 solves.
@@ -37,13 +35,12 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             rotations: 3000,
-            reach: 0.4,
             cells: 56,
-            rough_points: 80,
-            slides: 4,
-            placed: 400,
+            scale: 15e-3,
+            separation: 8e-3,
             points: 300,
-            turns: 8,
+            steps: 8,
+            placed: 400,
             turned: 160,
             seen: 24,
             last: 4,
@@ -58,9 +55,8 @@ impl SearchSettings {
     pub(super) fn check(&self) -> Result<(), RefineError> {
         let counts = [
             ("rotations", self.rotations),
-            ("rough_points", self.rough_points),
-            ("placed", self.placed),
             ("points", self.points),
+            ("placed", self.placed),
             ("turned", self.turned),
             ("seen", self.seen),
             ("last", self.last),
@@ -72,9 +68,11 @@ impl SearchSettings {
             let problem = format!("is {}, must be from 8 to 256", self.cells);
             return Err(RefineError::Setting { name: "cells", problem });
         }
-        if !(self.reach.is_finite() && self.reach >= 0.0) {
-            let problem = format!("is {}, must be finite and not negative", self.reach);
-            return Err(RefineError::Setting { name: "reach", problem });
+        for (name, length) in [("scale", self.scale), ("separation", self.separation)] {
+            if !(length.is_finite() && length > 0.0) {
+                let problem = format!("is {length}, must be finite and above zero");
+                return Err(RefineError::Setting { name, problem });
+            }
         }
         Ok(())
     }

@@ -24,13 +24,6 @@ use crate::strategy::{Fused, Posterior, Strategy};
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
-/// What share of the pixels that should show an object that was found again must do so.
-const LEAST_SHOWN: f64 = 0.5;
-/// The same of an object that is found where it was expected: fingers that hide most of it are known to some millimeters only.
-const LEAST_SHOWN_OF_EXPECTED: f64 = 0.25;
-/// By how much the surface of an object that is where it was expected has moved at most, as a share of the object's radius.
-const EXPECTED_WITHIN: f64 = 0.5;
-
 impl Tracker {
     /// The first frame.
     pub(super) fn begin(
@@ -158,16 +151,16 @@ impl Tracker {
             let (solved, posterior) = self.estimate(&frame, &start)?;
             let state = &solved.solution.at.state;
             let shown = self.segmenter.shown(sight, &object, &state.t_cam_object);
-            let is_expected = reach == Recovery::Near
-                && predicted.surface_motion(state, object.radius)
-                    <= EXPECTED_WITHIN * object.radius;
-            let least = if is_expected { LEAST_SHOWN_OF_EXPECTED } else { LEAST_SHOWN };
+            let moved = object.surface_motion(&predicted.t_cam_object, &state.t_cam_object);
+            let is_expected = reach == Recovery::Near && moved <= 0.5 * object.radius;
+            // Fingers that hide most of it are known to some millimeters only.
+            let least = self.settings.gating.least_shown * if is_expected { 0.5 } else { 1.0 };
             let doubt = self.gate(&solved, &posterior, None, level);
             if shown >= least && doubt.is_none() {
                 return Ok(Some((solved, posterior)));
             }
             let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
-            debug!("not found {reach:?}: {:.0} % of it are seen{doubt}", 100.0 * shown);
+            debug!("not found {reach:?}: {shown:.2} of it are seen{doubt}");
         }
         Ok(None)
     }

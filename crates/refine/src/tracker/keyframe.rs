@@ -32,7 +32,7 @@ impl Default for KeyframeSettings {
         Self {
             points: 300,
             effective_samples: 12.0,
-            least_inliers: 0.6,
+            least_inliers: 0.5,
             least_explained: 0.8,
             drift: 8e-4,
         }

@@ -12,20 +12,11 @@ use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
 
-/// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
-const COASTING: f64 = 0.25;
-
 /// By how much of itself the level grows with every frame that the object is lost. Slowly, or what is wrong for a moment would soon pass for right.
 const GROWTH: f64 = 0.02;
 
-/// Frames between two times that a lost object is looked for.
-const LOOK_EVERY: u32 = 8;
-
-/// Frames between two that colors are learnt from.
-const LEARN_EVERY: u32 = 4;
-
-/// Frames after which an object may be held in another way than before.
-const LONG: u32 = 5;
+/// Frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than before.
+const LONG: u32 = 6;
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
@@ -127,7 +118,7 @@ impl TrackState {
 
     /// Whether colors are to be learnt from this frame: they change slowly.
     pub(super) fn is_time_to_learn(&self) -> bool {
-        self.followed.is_multiple_of(LEARN_EVERY)
+        self.followed.is_multiple_of(LONG)
     }
 
     /// Whether it was lost for so long that much may have happened to it.
@@ -141,8 +132,7 @@ impl TrackState {
         if seen && self.unseen {
             return true;
         }
-        self.misses.is_multiple_of(LOOK_EVERY)
-            || self.misses.is_power_of_two() && self.misses < LOOK_EVERY
+        self.misses.is_multiple_of(LONG) || self.misses.is_power_of_two() && self.misses < LONG
     }
 
     /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.
@@ -171,11 +161,12 @@ impl TrackState {
         next
     }
 
-    /// What is expected at `time` where the hand is said to be as in `nominal`, and known if `in_hand`.
+    /// What is expected at `time` of an object of this `radius` \[m\] where the hand is said to be as in `nominal`, and known if `in_hand`.
     pub(super) fn predict(
         &self,
         time: Duration,
         nominal: &State,
+        radius: f64,
         in_hand: bool,
         prior: &PriorSettings,
         settings: &TrackerSettings,
@@ -183,7 +174,7 @@ impl TrackState {
         let seconds = time.saturating_sub(self.time).as_secs_f64();
         let motion = settings.motion(in_hand);
         let layout = layout_of(nominal, in_hand);
-        let kept = (-seconds / settings.calibration_time_constant).exp();
+        let kept = (-seconds / settings.time_constant).exp();
         let (with_hand, velocity) = if in_hand == self.in_hand {
             let moved = match in_hand {
                 true => nominal.t_cam_hand * self.hand_error * self.state.t_cam_hand.inverse(),
@@ -196,7 +187,7 @@ impl TrackState {
         };
         let rest = with_hand * self.state.t_cam_object;
         let center = (rest * self.state.object_center).coords;
-        let coasting = COASTING * (1.0 - (-seconds / COASTING).exp());
+        let coasting = settings.time_constant * (1.0 - kept);
         let mut state = nominal.clone();
         state.t_cam_object = perturb_about(&rest, &center, &(velocity * coasting));
         if in_hand {
@@ -224,8 +215,8 @@ impl TrackState {
         // does is not bounded.
         let mut growth = stated * (1.0 - kept * kept);
         for k in 0..3 {
-            growth[k] = motion.translation.powi(2) * seconds;
-            growth[3 + k] = motion.rotation.powi(2) * seconds;
+            growth[k] = motion.sigma.powi(2) * seconds;
+            growth[3 + k] = growth[k] / radius.powi(2);
         }
         let motion_covariance = Matrix6::from_diagonal(&growth.fixed_rows::<6>(0).into_owned());
         let covariance = covariance + DMatrix::from_diagonal(&growth);

@@ -49,7 +49,7 @@ use crate::strategy::{
 /// if it went on as it did, relative to the hand where that is known, because the hand moves the object. What was learnt
 /// before comes in as a Gaussian about that prediction, with all its correlations: poses, calibration of the hand, errors of
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
-/// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
+/// that return to what is said of them within [`time_constant`](TrackerSettings::time_constant).
 ///
 /// Other modes of the last full estimate move with the object, and are weighed where it is seen from a new side; where a rotation is uncertain, so are poses
 /// turned about that axis ([`turn_sigma`](TrackerSettings::turn_sigma), [`Tracked::turned`]). A pose that does not fit is not believed ([`GatingSettings`]); the
@@ -109,8 +109,8 @@ impl Solved {
     }
 }
 
-/// Part of the way that the running mean of costs goes to the next one.
-const LEVEL_GAIN: f64 = 0.1;
+/// Part of the way that running means go to the next value: they remember some ten frames.
+const GAIN: f32 = 0.1;
 
 impl Tracker {
     /// A tracker that begins by searching, unless [`start_from`](Self::start_from) says where.
@@ -208,7 +208,8 @@ impl Tracker {
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
-        let mut prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
+        let mut prediction =
+            track.predict(time, &nominal, self.object.radius, in_hand, &self.prior, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
@@ -270,7 +271,7 @@ impl Tracker {
         timing.recovery = clock.lap();
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
-            let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
+            let level = track.level + f64::from(GAIN) * (solved.cost() - track.level);
             let mut next = self.remember(time, &solved, nominal, in_hand, level);
             next.lost = track.lost;
             self.begin_anew(&mut next, sight, &posterior);
@@ -330,7 +331,7 @@ impl Tracker {
             timing.steps += clock.lap();
         }
         modes.add_to(&mut posterior, self.object.radius);
-        let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
+        let level = track.level + f64::from(GAIN) * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);

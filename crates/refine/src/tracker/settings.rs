@@ -6,17 +6,15 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 
 use super::keyframe::KeyframeSettings;
 use crate::error::RefineError;
-use crate::problem::Solver;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
 /// What is known of how an object moves from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessNoise {
-    /// Motion that was not foreseen, a random walk in each direction: its variance grows by the square of this in a second \[m/√s\].
-    pub translation: f64,
-    /// Rotation that was not foreseen, about each axis alike \[rad/√s\].
-    pub rotation: f64,
+    /// Motion that was not foreseen, a random walk of the object's center in each direction, and of its surface by rotation about each axis: variances
+    /// grow by the square of this in a second \[m/√s\].
+    pub sigma: f64,
     /// How much of the difference between measured and believed velocity is believed, between 0 and 1.
     pub gain: f64,
 }
@@ -32,6 +30,8 @@ pub struct GatingSettings {
     pub innovation_gate: f64,
     /// Standard deviation of the pose in the direction in which it is largest \[m of surface motion\].
     pub max_sigma: f64,
+    /// Share of the pixels that should show an object that was found again that must do so; half of it where it was expected.
+    pub least_shown: f64,
 }
 
 /// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
@@ -71,10 +71,10 @@ pub struct TrackerSettings {
     pub in_hand: ProcessNoise,
     /// Motion in the camera frame, where no hand is known.
     pub free: ProcessNoise,
-    /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\]. Errors that frames share, such as a warp of depth or a
-    /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
-    /// led astray.
-    pub calibration_time_constant: f64,
+    /// Time within which what was learnt of calibrations is forgotten, and an object that is not seen comes to rest, all but 1/e \[s\]. Errors that
+    /// frames share, such as a warp of depth or a wrong model, count as new in every one of them: the longer they are remembered while nothing
+    /// moves, the farther calibrations are led astray.
+    pub time_constant: f64,
     /// How far the object has moved by the images.
     pub keyframe: KeyframeSettings,
     /// Poses turned by 10° about the least certain axis of rotation are modes, too, where its standard deviation in
@@ -96,19 +96,15 @@ impl Default for TrackerSettings {
         Self {
             fused: FusedSettings::default(),
             stage: Stage {
-                downsample: 4,
-                points: 400,
                 kernel_scale: 1.0,
-                solver: Solver { iterations: 4, min_decrease: 0.02 },
                 hypotheses: 1,
-                color: true,
                 measured_noise: false,
                 model_error: true,
-                contact: true,
+                ..Stage::octaves(1)
             },
-            in_hand: ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
-            free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
-            calibration_time_constant: 0.2,
+            in_hand: ProcessNoise { sigma: 3.7e-3, gain: 0.1 },
+            free: ProcessNoise { sigma: 0.05, gain: 0.5 },
+            time_constant: 0.2,
             keyframe: KeyframeSettings::default(),
             turn_sigma: 0.8f64.to_radians(),
             budget: None,
@@ -117,6 +113,7 @@ impl Default for TrackerSettings {
                 cost_margin: 40.0,
                 innovation_gate: 8.0,
                 max_sigma: 12e-3,
+                least_shown: 0.5,
             },
             recovery: Recovery::Anywhere,
             search: SearchSettings::default(),
@@ -132,16 +129,15 @@ impl TrackerSettings {
 
     pub(super) fn check(&self) -> Result<(), RefineError> {
         let positive = [
-            ("in_hand.translation", self.in_hand.translation),
-            ("in_hand.rotation", self.in_hand.rotation),
-            ("free.translation", self.free.translation),
-            ("free.rotation", self.free.rotation),
-            ("calibration_time_constant", self.calibration_time_constant),
+            ("in_hand.sigma", self.in_hand.sigma),
+            ("free.sigma", self.free.sigma),
+            ("time_constant", self.time_constant),
             ("turn_sigma", self.turn_sigma),
             ("gating.cost_ratio", self.gating.cost_ratio),
             ("gating.cost_margin", self.gating.cost_margin),
             ("gating.innovation_gate", self.gating.innovation_gate),
             ("gating.max_sigma", self.gating.max_sigma),
+            ("gating.least_shown", self.gating.least_shown),
         ];
         for (name, value) in positive {
             if value.is_nan() || value <= 0.0 {
@@ -166,8 +162,8 @@ mod tests {
     fn settings_out_of_range_are_named() {
         let mut settings = TrackerSettings::default();
         assert!(settings.check().is_ok());
-        settings.calibration_time_constant = 0.0;
-        assert_eq!(settings.check().unwrap_err().to_string(), "calibration_time_constant is 0");
+        settings.time_constant = 0.0;
+        assert_eq!(settings.check().unwrap_err().to_string(), "time_constant is 0");
         settings = TrackerSettings::default();
         settings.free.gain = f64::NAN;
         assert!(settings.check().unwrap_err().to_string().contains("free.gain is NaN"));

@@ -39,7 +39,7 @@ fn a_jump_is_noticed_and_recovered_from() {
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
     };
-    let careful = ProcessNoise { translation: 0.009, rotation: 0.09, gain: 0.5 };
+    let careful = ProcessNoise { sigma: 0.009, gain: 0.5 };
     let settings = TrackerSettings { free: careful, ..Default::default() };
     let mut hopeless = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
     let lost = jump(&mut hopeless);
@@ -85,8 +85,7 @@ fn a_moment_s_loss_makes_little_pass_for_right() {
 
 #[test]
 fn calibrations_carry_over() {
-    let mut tracker =
-        tracker(TrackerSettings { calibration_time_constant: 3.0, ..Default::default() });
+    let mut tracker = tracker(TrackerSettings { time_constant: 3.0, ..Default::default() });
     let wrong = 0.03;
     let observation = |index: usize| {
         let mut observation = SEQUENCE.frames[index].observation.clone();
@@ -184,10 +183,11 @@ fn what_is_found_where_it_was_expected_may_be_hidden_by_more_than_half() {
 fn what_has_slipped_is_expected_and_what_is_held_in_another_way_is_not() {
     let frame = &SEQUENCE.frames[0];
     let state = State::measured(&frame.observation, &SEQUENCE.object, &frame.truth).unwrap();
-    let radius = SEQUENCE.object.radius;
+    let object = &SEQUENCE.object;
+    let radius = object.radius;
     let share = |twist: &[f64]| {
         let after = state.retract(&[Block::ObjectPose], twist);
-        state.surface_motion(&after, radius) / radius
+        object.surface_motion(&state.t_cam_object, &after.t_cam_object) / radius
     };
     assert!((share(&[3e-3, 0.0, 4e-3, 0.0, 0.0, 0.0]) * radius - 5e-3).abs() < 1e-9);
     assert!((share(&[0.0, 0.0, 0.0, 0.0, 0.1, 0.0]) - 0.1).abs() < 1e-6);
@@ -204,7 +204,14 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let SequenceFrame { observation, time, truth } = &SEQUENCE.frames[index];
     let remembered = tracker.track.clone().unwrap();
     let nominal = State::measured(observation, &object, truth).unwrap();
-    let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
+    let prediction = remembered.predict(
+        *time,
+        &nominal,
+        SEQUENCE.object.radius,
+        true,
+        &tracker.prior,
+        &tracker.settings,
+    );
     let mut sight = Sight::new(observation.clone(), Some(&hand), Images::default());
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
     let frame = tracker.frame(&sight, &object, Some(&hand), None).unwrap();

@@ -6,6 +6,7 @@ use nalgebra::Isometry3;
 use strum::IntoStaticStr;
 
 use super::{Solved, Timing};
+use crate::MM_PER_M;
 use crate::problem::State;
 use crate::strategy::Posterior;
 
@@ -58,7 +59,7 @@ impl fmt::Display for Rejection {
             Self::Innovation(sigmas) => {
                 write!(f, "{sigmas:.0} standard deviations from where it should be")
             }
-            Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * 1e3),
+            Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * MM_PER_M),
         }
     }
 }

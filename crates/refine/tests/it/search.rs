@@ -52,8 +52,8 @@ fn bad_input_is_an_error() {
     let none = SearchSettings { rotations: 0, ..SearchSettings::default() };
     let error = search(none).unwrap_err().to_string();
     assert!(error.contains("rotations must be above zero"), "{error}");
-    let nan = SearchSettings { reach: f64::NAN, ..SearchSettings::default() };
-    assert!(search(nan).unwrap_err().to_string().contains("reach is NaN"));
+    let nan = SearchSettings { scale: f64::NAN, ..SearchSettings::default() };
+    assert!(search(nan).unwrap_err().to_string().contains("scale is NaN"));
 
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
     let refused = |change: &dyn Fn(&mut Observation)| {

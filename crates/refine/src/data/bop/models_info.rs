@@ -9,6 +9,7 @@ use super::files::{read_bytes, write_atomically};
 use super::models::Models;
 use super::pose::{rotation_to_row_major, translation_to_mm};
 use super::unique::parse_json;
+use crate::MM_PER_M;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// Diameter and bounds of a model of these `vertices` \[m\], as `models_info.json` has them, in millimeters.
@@ -17,10 +18,10 @@ pub(crate) fn extent_to_bop(vertices: &[Point3<f64>]) -> Map<String, Value> {
     let (low, high) =
         vertices.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v)));
     let mut fields = Map::new();
-    fields.insert("diameter".into(), json!(diameter(vertices) * 1e3));
+    fields.insert("diameter".into(), json!(diameter(vertices) * MM_PER_M));
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        fields.insert(format!("min_{name}"), json!(low[axis] * 1e3));
-        fields.insert(format!("size_{name}"), json!((high[axis] - low[axis]) * 1e3));
+        fields.insert(format!("min_{name}"), json!(low[axis] * MM_PER_M));
+        fields.insert(format!("size_{name}"), json!((high[axis] - low[axis]) * MM_PER_M));
     }
     fields
 }
@@ -74,7 +75,7 @@ impl Symmetries {
             let rows = r.chunks(3).zip(&t).flat_map(|(row, t)| [row[0], row[1], row[2], *t]);
             rows.chain([0.0, 0.0, 0.0, 1.0]).collect::<Vec<f64>>()
         };
-        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * 1e3).as_slice() });
+        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * MM_PER_M).as_slice() });
         let mut fields = Map::new();
         if !self.discrete.is_empty() {
             fields.insert("symmetries_discrete".into(), self.discrete.iter().map(motion).collect());

@@ -8,6 +8,7 @@ use prehend_render::Camera;
 
 use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 use super::score::PoseScore;
+use crate::MM_PER_M;
 use crate::symmetry::Symmetries;
 
 /// What scoring needs to know of an object, prepared once for many poses.
@@ -42,9 +43,9 @@ impl ScoredModel {
             pe_cm: Some(pe_cm(estimate, truth)),
             oe_deg: Some(oe_deg(estimate, truth)),
             oe_symmetric_deg: Some(oe_symmetric_deg(estimate, truth, &self.symmetries)),
-            add_mm: of_points(1e3 * self.add(estimate, truth)),
-            adi_mm: of_points(1e3 * self.adi(estimate, truth)),
-            mssd_mm: of_points(1e3 * self.mssd(estimate, truth)),
+            add_mm: of_points(MM_PER_M * self.add(estimate, truth)),
+            adi_mm: of_points(MM_PER_M * self.adi(estimate, truth)),
+            mssd_mm: of_points(MM_PER_M * self.mssd(estimate, truth)),
             mspd_px: of_points(self.mspd(estimate, truth, camera)),
             ..PoseScore::default()
         }

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::so3_log;
 use serde::{Deserialize, Serialize};
 
+use crate::MM_PER_M;
 use crate::scene::Object;
 use crate::strategy::Posterior;
 
@@ -69,9 +70,9 @@ impl PredictedPosterior {
             posterior.cramer_rao_bound.fixed_view::<3, 3>(first, first).trace().sqrt()
         };
         Self {
-            distance_mm: 1e3 * off.norm(),
+            distance_mm: MM_PER_M * off.norm(),
             angle_deg: turn.norm().to_degrees(),
-            bounds: [1e3 * bound(0), bound(3).to_degrees()],
+            bounds: [MM_PER_M * bound(0), bound(3).to_degrees()],
             squared: squared_distances(&posterior.covariance(), &off, &turn),
             within: EVENTS.map(|event| {
                 posterior.probability_within(event.distance, event.angle_deg.to_radians())
@@ -162,7 +163,7 @@ mod tests {
         // Nothing is as sure as the bound.
         let covariance = posterior.covariance();
         let deviation = |first: usize| covariance.fixed_view::<3, 3>(first, first).trace().sqrt();
-        assert!(belief.bounds[0] > 0.0 && belief.bounds[0] < 1e3 * deviation(0));
+        assert!(belief.bounds[0] > 0.0 && belief.bounds[0] < MM_PER_M * deviation(0));
         assert!(belief.bounds[1] > 0.0 && belief.bounds[1] < deviation(3).to_degrees());
         let expected = posterior.mahalanobis(&scene.truth).powi(2);
         assert!((belief.squared[0].unwrap() / expected - 1.0).abs() < 1e-6);

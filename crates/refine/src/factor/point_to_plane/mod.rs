@@ -31,7 +31,7 @@ pub struct PointToPlaneSettings {
     pub gp_sigma: f64,
     /// Length scale of that field, a Gaussian process over space \[m\].
     pub length_scale: f64,
-    /// Points so near to the mask's border are left out \[px\], if at least a quarter of all is left then: there depth is of what
+    /// Points so near to the mask's border are left out \[px\], if at least half of all is left then: there depth is of what
     /// is in front or behind, or of both.
     pub margin: usize,
 }
@@ -40,7 +40,7 @@ impl Default for PointToPlaneSettings {
     fn default() -> Self {
         Self {
             points: 1000,
-            noise: NoiseModel::cauchy(1e-3, 4e-3, 60.0),
+            noise: NoiseModel::cauchy(1.5e-3, 20.0),
             gp_sigma: 0.0,
             length_scale: 20e-3,
             margin: 2,
@@ -91,9 +91,6 @@ struct Residual {
 /// How far in front of the hand a point must be to be of something else \[m\].
 const IN_FRONT: f64 = 6e-3;
 
-/// The share of points that must be left without those near the border.
-const LEAST_SHARE: f64 = 0.25;
-
 /// Points that are worth a task of their own.
 const TASK: usize = 64;
 
@@ -122,7 +119,7 @@ impl PointToPlaneFactor {
         let central: Vec<_> = depths.iter().copied().filter(inside).collect();
         // Of an object that is hardly more than border, that must do.
         let depths =
-            if central.len() as f64 > LEAST_SHARE * depths.len() as f64 { central } else { depths };
+            if central.len() as f64 > 0.5 * depths.len() as f64 { central } else { depths };
         let points: Vec<Point> = depths.into_iter().map(point).collect();
         if points.is_empty() {
             return Err(RefineError::NoDepth);
@@ -154,7 +151,7 @@ impl PointToPlaneFactor {
             let smooth: Vector3<f64> =
                 corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
             let facing = facing(&(state.t_cam_object * smooth), &surface);
-            let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
+            let away = if distance.abs() > f64::EPSILON { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
         self.points.par_iter().with_min_len(TASK).map(residual).collect()

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
-use crate::problem::far_apart;
+use crate::problem::{RIDGE, far_apart};
 
 /// Coefficients that the field is described by, at most.
 const MOST_COEFFICIENTS: usize = 24;
@@ -55,7 +55,7 @@ impl SmoothField {
         let chosen = far_apart(places, SPACING * smoothness, MOST_COEFFICIENTS);
         let among = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
             // What makes it certainly positive definite.
-            kernel(&chosen[i], &chosen[j]) + if i == j { 1e-6 } else { 0.0 }
+            kernel(&chosen[i], &chosen[j]) + if i == j { RIDGE } else { 0.0 }
         });
         let to = DMatrix::from_fn(chosen.len(), places.len(), |i, j| {
             deviation * kernel(&chosen[i], &places[j])

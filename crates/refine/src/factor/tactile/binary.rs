@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::probes::{Distance, Probe, Probes};
+use super::{NO_CONTACT_SIGMA, TOUCH_SAMPLES};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{BinaryContact, Frame, TouchReading};
@@ -19,8 +20,8 @@ pub struct BinaryTouchSettings {
 impl Default for BinaryTouchSettings {
     fn default() -> Self {
         Self {
-            contact: NoiseModel::cauchy(2.5e-3, 5e-3, 8.0),
-            no_contact: NoiseModel::cauchy(1e-3, 10e-3, f64::INFINITY),
+            contact: NoiseModel::cauchy(2.5e-3, TOUCH_SAMPLES),
+            no_contact: NoiseModel::cauchy(NO_CONTACT_SIGMA, f64::INFINITY),
         }
     }
 }

@@ -15,18 +15,16 @@ pub struct ContactSettings {
     /// Taxels of one link that feel force are of one contact if each is no farther from the next \[m\], and none is twice as far from the
     /// strongest, or faces away from it.
     pub reach: f64,
-    /// Standard deviation of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of
+    /// Distances of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of
     /// its taxels, and how far the object is off from its model.
-    pub sigma: f64,
-    /// Width of Cauchy's kernel, which forgives contacts far from the surface \[m\].
-    pub kernel_width: f64,
+    pub noise: NoiseModel,
     /// A contact of this force \[N\] counts half: taxels that ring false feel less.
     pub force: f64,
 }
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self { reach: 8e-3, sigma: 1.8e-3, kernel_width: 3e-3, force: 2.0 }
+        Self { reach: 8e-3, noise: NoiseModel::cauchy(1.8e-3, f64::INFINITY), force: 2.0 }
     }
 }
 
@@ -56,7 +54,7 @@ pub(super) fn contacts(
         let touched = Touched { link: *link, position: *position, normal: *normal, force };
         (force > least && force.is_finite()).then_some(touched)
     });
-    let noise = NoiseModel::cauchy(settings.sigma, settings.kernel_width, f64::INFINITY);
+    let noise = settings.noise;
     groups(touched.collect(), settings.reach)
         .iter()
         .map(|group| {
@@ -138,7 +136,7 @@ mod tests {
         assert!(lifted.coords.dot(&corner.normal) > 2e-4 && lifted.coords.norm() < 1e-3);
         assert!(lifted.coords.cross(&corner.normal).norm() < 1e-4, "{lifted}");
         // Four newtons count four fifths with half at two.
-        let full = ContactSettings::default().sigma.powi(-2);
+        let full = ContactSettings::default().noise.sigma.powi(-2);
         assert!((contact.weighting.information / full - 0.8).abs() < 1e-12);
     }
 

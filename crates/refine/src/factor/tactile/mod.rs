@@ -33,6 +33,12 @@ pub enum TouchModel {
     Contacts(ContactSettings),
 }
 
+/// Independent measurements that the places of one sensor amount to at most: neighbors are off alike, by the skin and the object's model.
+const TOUCH_SAMPLES: f64 = 10.0;
+
+/// Standard deviation of the depth of skin that feels nothing inside the object \[m\].
+const NO_CONTACT_SIGMA: f64 = 1e-3;
+
 /// Settings of [`TactileFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TactileSettings {
@@ -48,8 +54,8 @@ impl Default for TactileSettings {
     fn default() -> Self {
         Self {
             contact_threshold: 0.1,
-            touch: TouchModel::Taxels(NoiseModel::cauchy(3e-3, 10e-3, 8.0)),
-            no_contact: NoiseModel::cauchy(1e-3, 10e-3, f64::INFINITY),
+            touch: TouchModel::Contacts(ContactSettings::default()),
+            no_contact: NoiseModel::cauchy(NO_CONTACT_SIGMA, f64::INFINITY),
         }
     }
 }
@@ -61,7 +67,7 @@ impl TactileSettings {
         match &mut self.touch {
             TouchModel::Nothing => {}
             TouchModel::Taxels(noise) => *noise = noise.widened(factor),
-            TouchModel::Contacts(contacts) => contacts.kernel_width *= factor,
+            TouchModel::Contacts(contacts) => contacts.noise = contacts.noise.widened(factor),
         }
         self
     }

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::ArticulatedRobot;
 
+use super::TOUCH_SAMPLES;
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
@@ -24,11 +25,10 @@ pub struct ContactPatchSettings {
 
 impl Default for ContactPatchSettings {
     fn default() -> Self {
-        let degrees = |angle: f64| angle.to_radians();
         Self {
             points: 60,
-            position: NoiseModel::cauchy(4e-4, 2e-3, 20.0),
-            normal: NoiseModel::cauchy(degrees(6.0), degrees(15.0), 10.0),
+            position: NoiseModel::cauchy(4e-4, TOUCH_SAMPLES),
+            normal: NoiseModel::cauchy(6f64.to_radians(), TOUCH_SAMPLES),
         }
     }
 }

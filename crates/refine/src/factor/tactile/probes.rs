@@ -68,8 +68,9 @@ impl Probes {
             return None;
         }
         let along = (local - closest.point) * distance.signum();
-        let outward =
-            along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
+        let outward = along
+            .try_normalize(f64::EPSILON)
+            .map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
         Some(Measured { distance, outward, point })
     }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::TOUCH_SAMPLES;
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
@@ -18,7 +19,7 @@ pub struct ProximitySettings {
 
 impl Default for ProximitySettings {
     fn default() -> Self {
-        Self { noise: NoiseModel::cauchy(1e-3, 5e-3, 20.0), relative: 0.05 }
+        Self { noise: NoiseModel::cauchy(1e-3, TOUCH_SAMPLES), relative: 0.05 }
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use prehend_geometry::cloud::diameter;
 
 use super::warning::{Subject, Warning};
+use crate::MM_PER_M;
 use crate::scene::{Object, StatedSize};
 
 /// Sizes between which an object's extent is believed to be in meters \[m\].
@@ -65,7 +66,7 @@ fn size(vertices: &[Point3<f64>], stated: &StatedSize) -> Option<Warning> {
     let found = diameter(vertices);
     let ratio = found / stated.diameter;
     if (ratio - 1.0).abs() > SIZE_TOLERANCE {
-        let [found, said] = [found, stated.diameter].map(|d| d * 1e3);
+        let [found, said] = [found, stated.diameter].map(|d| d * MM_PER_M);
         let finding = format!(
             "the mesh is {found:.4} mm across, {ratio:.4} times the {said:.4} mm that models_info.json says"
         );
@@ -84,10 +85,11 @@ fn size(vertices: &[Point3<f64>], stated: &StatedSize) -> Option<Warning> {
     let high = vertices.iter().fold(*first, |high, v| high.sup(v));
     let off = |found: Vector3<f64>, said: Vector3<f64>, what: &str, hint| {
         let by = (found - said).amax();
-        let [found, said] = [found, said]
-            .map(|v| format!("({:.1}, {:.1}, {:.1})", v.x * 1e3, v.y * 1e3, v.z * 1e3));
+        let [found, said] = [found, said].map(|v| {
+            format!("({:.1}, {:.1}, {:.1})", v.x * MM_PER_M, v.y * MM_PER_M, v.z * MM_PER_M)
+        });
         (by > SIZE_TOLERANCE * stated.diameter).then(|| {
-            Warning::new(Subject::Model, by * 1e3, "mm")
+            Warning::new(Subject::Model, by * MM_PER_M, "mm")
                 .found(format!("{what} {found} mm, but {said} mm in models_info.json"))
                 .hint(hint)
         })

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::{Fused, FusedSettings, Modality};
+use crate::MM_PER_M;
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::scene::Frame;
@@ -46,7 +47,7 @@ impl DiagnosisSummary {
             Self {
                 excluded: diagnosis.excluded.map(str::to_owned),
                 probability: posterior.map_or(0.0, |posterior| posterior.probability()),
-                distance_mm: 1e3 * (pose.translation.vector - all.translation.vector).norm(),
+                distance_mm: MM_PER_M * (pose.translation.vector - all.translation.vector).norm(),
                 angle_deg: pose.rotation.angle_to(&all.rotation).to_degrees(),
             }
         };

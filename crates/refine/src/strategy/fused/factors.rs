@@ -23,9 +23,6 @@ const SEEN: [Modality; 5] = [
     Modality::FreeSpace,
 ];
 
-/// Depth points that their noise is estimated from.
-const NOISE_POINTS: usize = 1200;
-
 /// Noise of depth points about the object at `state`; `None` without enough depth, or if it is not used.
 pub(super) fn depth_noise(
     frame: &Frame<'_>,
@@ -35,8 +32,7 @@ pub(super) fn depth_noise(
     if !settings.modalities.contains(&Modality::Depth) {
         return None;
     }
-    let depth = PointToPlaneSettings { points: NOISE_POINTS, ..settings.depth.clone() };
-    PointToPlaneFactor::new(frame, &depth).ok()?.noise_estimate(state)
+    PointToPlaneFactor::new(frame, &settings.depth).ok()?.noise_estimate(state)
 }
 
 /// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`, and turned as at `seen`.
@@ -129,7 +125,7 @@ fn picture_factor(
     }
     let mut rendering = settings.rendering.clone();
     rendering.downsample *= stage.downsample;
-    rendering.kernel_width *= stage.kernel_scale;
+    rendering.kernel_scale *= stage.kernel_scale;
     rendering.color = color;
     if !silhouette {
         rendering.mask_sigma = f64::INFINITY;
@@ -180,7 +176,7 @@ fn other_factors(
     // Where the surface may be elsewhere than the model has it, contact says as much less of the pose; a rig has the surface as it is.
     let is_uncertain = patches.is_some() && frame.rig().is_none();
     let surface = if is_uncertain { settings.model.gp_sigma } else { 0.0 };
-    let blurred = |noise: NoiseModel| NoiseModel { sigma: noise.sigma.hypot(surface), ..noise };
+    let blurred = |noise: NoiseModel| noise.with_sigma(noise.sigma.hypot(surface));
     let touch = wanted(Modality::Touch);
     let inactive = stage.contact && wanted(Modality::Quiet);
     if (touch || inactive) && !hand.forces.is_empty() {
@@ -189,11 +185,11 @@ fn other_factors(
             _ if !touch => tactile.touch = TouchModel::Nothing,
             TouchModel::Nothing => {}
             TouchModel::Taxels(noise) => *noise = blurred(*noise),
-            TouchModel::Contacts(contacts) => contacts.sigma = contacts.sigma.hypot(surface),
+            TouchModel::Contacts(contacts) => contacts.noise = blurred(contacts.noise),
         }
         tactile.no_contact = blurred(tactile.no_contact);
         if !inactive {
-            tactile.no_contact = NoiseModel { sigma: f64::INFINITY, ..tactile.no_contact };
+            tactile.no_contact = tactile.no_contact.with_sigma(f64::INFINITY);
         }
         factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
     }

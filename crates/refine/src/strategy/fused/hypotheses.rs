@@ -8,6 +8,7 @@ use prehend_autodiff::lie::so3_log;
 use super::posterior::principal_directions;
 use crate::factor::NoiseEstimate;
 use crate::problem::{Block, Linearization, Solution, State};
+use crate::scene::Object;
 use crate::symmetry::alternatives;
 
 /// The initial state, and those turned by `angle` \[rad\] about each axis of the camera frame, both ways; that alone if it is zero.
@@ -92,12 +93,13 @@ pub(super) fn settled(
 }
 
 /// Solutions of which no two are the same pose, the one of the lowest value first.
-pub(super) fn distinct(mut found: Vec<Solution>, radius: f64) -> Vec<Solution> {
+pub(super) fn distinct(mut found: Vec<Solution>, object: &Object) -> Vec<Solution> {
     found.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
     let mut kept: Vec<Solution> = Vec::new();
     for solution in found {
-        let state = &solution.at.state;
-        let same = |other: &Solution| state.surface_motion(&other.at.state, radius) < SAME;
+        let pose = &solution.at.state.t_cam_object;
+        let same =
+            |other: &Solution| object.surface_motion(pose, &other.at.state.t_cam_object) < SAME;
         if !kept.iter().any(same) {
             kept.push(solution);
         }

@@ -78,7 +78,8 @@ impl Fused {
         let mut settings = self.settings.prior.of_hand(frame.observation().hand.as_ref());
         let unknown = self.is_rotation_unknown(frame);
         if unknown {
-            settings.object_rotation = [UNKNOWN_ROTATION; 3];
+            // Half a turn costs half a nat.
+            settings.object_rotation = PI;
         }
         let turned = settings.object_turned;
         let with_others = |prior: GaussianPrior| match turned > 0.0 && !unknown {
@@ -104,7 +105,7 @@ impl Fused {
             let problem = "the covariance is not positive definite".into();
             RefineError::Setting { name: "rig", problem }
         })?;
-        Ok(with_others(prior.with_tails(settings.object_tails)))
+        Ok(with_others(prior.with_outliers()))
     }
 
     /// Whether nothing is known of the object's rotation.
@@ -202,19 +203,15 @@ impl Fused {
     }
 }
 
-/// Standard deviations of depth points that are believed when measured \[m\].
+/// The smallest standard deviation of depth points that is believed when measured \[m\].
 const FINEST: f64 = 2e-4;
-const COARSEST: f64 = 3e-3;
-
-/// Standard deviation about each axis of a rotation that nothing is known of \[rad\]: half a turn costs half a nat.
-const UNKNOWN_ROTATION: f64 = PI;
 
 /// Takes the noise of depth as it was measured. The model's part of what neighbors have in common is that of the patches, where there are any.
 fn take_noise(settings: &mut FusedSettings, measured: &NoiseEstimate, with_patches: bool) {
-    settings.depth.noise.sigma = measured.independent.clamp(FINEST, COARSEST);
+    settings.depth.noise.sigma = measured.independent.max(FINEST);
     let model = if with_patches { settings.model.gp_sigma } else { 0.0 };
     let correlated = (measured.correlated.powi(2) - model.powi(2)).max(0.0).sqrt();
-    settings.depth.gp_sigma = correlated.min(COARSEST);
+    settings.depth.gp_sigma = correlated;
     settings.depth.noise.effective_samples =
         measured.effective_samples.min(settings.max_effective_samples);
 }

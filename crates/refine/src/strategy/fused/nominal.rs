@@ -37,35 +37,35 @@ impl Quantity {
     fn units(self) -> &'static [(&'static str, f64)] {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         match self {
-            Self::Length => &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
-            Self::Angle => &[("deg", DEGREE), ("mrad", 1e-3), ("rad", 1.0)],
+            Self::Length => &[("mm", 1e-3), ("m", 1.0)],
+            Self::Angle => &[("deg", DEGREE), ("rad", 1.0)],
             Self::Ratio => &[("%", 1e-2), ("", 1.0)],
         }
     }
 }
 
-type Field = fn(&mut FusedSettings) -> Vec<&mut f64>;
+type Field = fn(&mut FusedSettings) -> Option<&mut f64>;
 
 /// All sizes: standard deviations of the errors, for most objects and rigs.
 const SIZES: [(&str, Quantity, Field); 15] = [
-    ("object.translation", Quantity::Length, |s| s.prior.object_translation.iter_mut().collect()),
-    ("object.rotation", Quantity::Angle, |s| s.prior.object_rotation.iter_mut().collect()),
-    ("hand.translation", Quantity::Length, |s| vec![&mut s.prior.hand_translation]),
-    ("hand.rotation", Quantity::Angle, |s| vec![&mut s.prior.hand_rotation]),
-    ("joints", Quantity::Angle, |s| vec![&mut s.prior.joints]),
-    ("depth.scale", Quantity::Ratio, |s| vec![&mut s.prior.depth_scale]),
-    ("depth.bias", Quantity::Length, |s| vec![&mut s.prior.depth_bias]),
-    ("depth.noise", Quantity::Length, |s| vec![&mut s.depth.noise.sigma]),
-    ("camera.principal-point", Quantity::Ratio, |s| vec![&mut s.prior.principal_point]),
-    ("camera.focal-length", Quantity::Ratio, |s| vec![&mut s.prior.focal_scale]),
-    ("camera.aspect", Quantity::Ratio, |s| vec![&mut s.prior.aspect]),
-    ("view.translation", Quantity::Length, |s| vec![&mut s.prior.view_translation]),
-    ("view.rotation", Quantity::Angle, |s| vec![&mut s.prior.view_rotation]),
-    ("model", Quantity::Length, |s| vec![&mut s.model.gp_sigma]),
+    ("object.translation", Quantity::Length, |s| Some(&mut s.prior.object_translation)),
+    ("object.rotation", Quantity::Angle, |s| Some(&mut s.prior.object_rotation)),
+    ("hand.translation", Quantity::Length, |s| Some(&mut s.prior.hand_translation)),
+    ("hand.rotation", Quantity::Angle, |s| Some(&mut s.prior.hand_rotation)),
+    ("joints", Quantity::Angle, |s| Some(&mut s.prior.joints)),
+    ("depth.scale", Quantity::Ratio, |s| Some(&mut s.prior.depth_scale)),
+    ("depth.bias", Quantity::Length, |s| Some(&mut s.prior.depth_bias)),
+    ("depth.noise", Quantity::Length, |s| Some(&mut s.depth.noise.sigma)),
+    ("camera.principal-point", Quantity::Ratio, |s| Some(&mut s.prior.principal_point)),
+    ("camera.focal-length", Quantity::Ratio, |s| Some(&mut s.prior.focal_scale)),
+    ("camera.aspect", Quantity::Ratio, |s| Some(&mut s.prior.aspect)),
+    ("view.translation", Quantity::Length, |s| Some(&mut s.prior.view_translation)),
+    ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
+    ("model", Quantity::Length, |s| Some(&mut s.model.gp_sigma)),
     ("touch", Quantity::Length, |s| match &mut s.tactile.touch {
-        crate::factor::TouchModel::Contacts(contacts) => vec![&mut contacts.sigma],
-        crate::factor::TouchModel::Taxels(noise) => vec![&mut noise.sigma],
-        crate::factor::TouchModel::Nothing => Vec::new(),
+        crate::factor::TouchModel::Contacts(contacts) => Some(&mut contacts.noise.sigma),
+        crate::factor::TouchModel::Taxels(noise) => Some(&mut noise.sigma),
+        crate::factor::TouchModel::Nothing => None,
     }),
 ];
 
@@ -110,7 +110,7 @@ impl FusedSettings {
             value: value.to_owned(),
             units: units.iter().map(|known| known.0).filter(|unit| !unit.is_empty()).collect(),
         })?;
-        for field in field(self) {
+        if let Some(field) = field(self) {
             *field = if size > 0.0 { size } else { EXACT * *field };
         }
         Ok(())
@@ -127,11 +127,10 @@ mod tests {
             let mut settings = FusedSettings::default();
             for &(unit, factor) in quantity.units() {
                 settings.set_nominal_size(name, &format!("2.5{unit}")).unwrap();
-                assert!(!field(&mut settings).is_empty());
-                assert!(field(&mut settings).iter().all(|size| **size == 2.5 * factor));
+                assert_eq!(field(&mut settings), Some(&mut (2.5 * factor)));
             }
             settings.set_nominal_size(name, "0").unwrap();
-            assert!(field(&mut settings).iter().all(|size| **size > 0.0 && **size < 1e-3));
+            assert!(field(&mut settings).is_some_and(|size| *size > 0.0 && *size < 1e-3));
         }
     }
 
@@ -140,7 +139,7 @@ mod tests {
         let mut settings = FusedSettings::default();
         for value in ["", "mm", "-1mm", "nanmm", "1", "1deg", "1e400mm"] {
             let error = settings.set_nominal_size("hand.translation", value).unwrap_err();
-            assert!(error.to_string().ends_with("one of the units mm, cm, m"), "{value} {error}");
+            assert!(error.to_string().ends_with("one of the units mm, m"), "{value} {error}");
         }
         let error = settings.set_nominal_size("hand.rotaton", "1deg").unwrap_err();
         assert!(error.to_string().contains("hand.rotation"));

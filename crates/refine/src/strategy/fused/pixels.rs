@@ -51,7 +51,7 @@ impl<'a> Pixels<'a> {
 
     /// Whether each pixel, row by row, is away from the hand.
     fn away_from_hand(&self) -> Vec<bool> {
-        eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN)
+        eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), MARGIN)
     }
 
     /// How far the outlines of mask and object are apart, away from the hand \[px\]: the area between them by the length of the object's.
@@ -82,7 +82,7 @@ impl<'a> Pixels<'a> {
         is_there: impl Fn(Pixel) -> bool,
     ) -> Vec<([usize; 2], f64)> {
         let width = self.view.size().0;
-        let inside = eroded(width, &self.marked(false, |_, p| is_there(p)), EDGE_MARGIN);
+        let inside = eroded(width, &self.marked(false, |_, p| is_there(p)), MARGIN);
         let CameraCalibrationError { depth_scale, depth_bias, .. } = self.camera_error;
         let residual = |(place, pixel): ([usize; 2], Pixel)| {
             let z = depth_scale * f64::from(pixel.sensor) + depth_bias;
@@ -93,11 +93,8 @@ impl<'a> Pixels<'a> {
     }
 }
 
-/// Pixels beside an edge that do not count \[px\].
-const EDGE_MARGIN: usize = 2;
-
-/// Pixels beside the hand where masks are not compared \[px\]: they leak onto it.
-const HAND_MARGIN: usize = 3;
+/// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
+const MARGIN: usize = 3;
 
 /// Of an image of `width` columns the pixels whose neighbors up to `reach` columns and rows away are all set.
 fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {

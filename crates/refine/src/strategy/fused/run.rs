@@ -20,14 +20,6 @@ use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination}
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Iteration, Observer, Recorder};
 
-/// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
-const KEPT: usize = 4;
-
-/// Where no rotation is known, the first stage, and the first that sees colors, take up so many hypotheses at most, …
-const MOST_ALTERNATIVES: usize = 64;
-/// … and later ones so many times as many as else.
-const WITH_ALTERNATIVES: usize = 2;
-
 /// Steps of geometry alone that a pose of another convention is given before it is compared, and from how many times the best one's cost on it is given up.
 const ALTERNATIVE_STEPS: usize = 4;
 const HOPELESS: f64 = 4.0;
@@ -83,7 +75,7 @@ impl<'a> Run<'a> {
             found = self.solve(index, &problem, &states);
             if let (1, Some(geometry)) = (index, &before) {
                 found.extend(self.other_conventions(geometry, &problem, &found[0]));
-                found = distinct(found, self.radius());
+                found = distinct(found, self.frame.object());
             }
             found = self.conclude(index, found)?;
             states = self.next_starts(index, self.initial, &found);
@@ -148,7 +140,7 @@ impl<'a> Run<'a> {
             at.cost += (self.settings.image_between_modes - 1.0) * of_image;
             Solution { at, ..solution }
         };
-        distinct(found.into_iter().map(with_own).collect(), self.radius())
+        distinct(found.into_iter().map(with_own).collect(), self.frame.object())
     }
 
     /// Learns scales at `solution`, and takes errors to be of these sizes from here on.
@@ -192,7 +184,7 @@ impl<'a> Run<'a> {
         if first < states.len() && !settled(&found[0].at, noise, self.radius()) {
             found.extend(problem.solve_all(&states[first..], solver));
         }
-        distinct(found, self.radius())
+        distinct(found, self.frame.object())
     }
 
     /// Modes among those `found` by stage `index` that are taken further, the best one first; sizes of errors are learnt there.
@@ -269,7 +261,8 @@ impl<'a> Run<'a> {
         if !self.is_rotation_unknown {
             return states[..states.len().min(usual)].to_vec();
         }
-        let limit = if index < 2 { MOST_ALTERNATIVES } else { WITH_ALTERNATIVES * usual };
+        // Near symmetries are many.
+        let limit = 4 * usual;
         if states.len() <= limit {
             return states.to_vec();
         }
@@ -289,7 +282,8 @@ impl<'a> Run<'a> {
         }
         let mut turned_back = states[0].clone();
         let moved = states[0].center() - initial.center();
-        states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
+        // Where solutions of geometry alone differ, starts spread about them say more than they do.
+        states.truncate((next.hypotheses / 3).max(1));
         turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
         states.extend([turned_back, initial.clone()]);
         let more = next.hypotheses.saturating_sub(states.len());

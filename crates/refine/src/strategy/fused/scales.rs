@@ -68,8 +68,6 @@ pub struct Scales {
     covariance: DMatrix<f64>,
 }
 
-/// Largest change of a logarithm in one step.
-const LARGEST_STEP: f64 = 1.0;
 /// Steps at most, and the change that ends them.
 const STEPS: usize = 12;
 const CONVERGED: f64 = 1e-2;
@@ -119,7 +117,7 @@ pub(super) fn noise_scale(chi_square: f64, degrees: f64, settings: &ScaleSetting
         let expected = chi_square * f64::exp(-2.0 * log);
         let gradient = expected - degrees - precision * log;
         let step: f64 = gradient / (2.0 * expected + precision);
-        log += step.clamp(-LARGEST_STEP, LARGEST_STEP);
+        log += step.clamp(-1.0, 1.0);
     }
     let log = log.max(0.0);
     NoiseScale { scale: log.exp(), cost: degrees * log + 0.5 * precision * log * log }
@@ -245,7 +243,7 @@ impl ScaleEvidence {
             let (gradient, told) = self.derivatives(&log)?;
             information = told;
             let step = information.clone().cholesky()?.solve(&gradient);
-            let step = &step * (LARGEST_STEP / step.amax()).min(1.0);
+            let step = &step * step.amax().recip().min(1.0);
             log += &step;
             if step.amax() < CONVERGED {
                 break;

@@ -5,12 +5,12 @@ use strum::IntoStaticStr;
 use super::fit::FitSettings;
 use super::scales::ScaleSettings;
 use crate::factor::{
-    BinaryTouchSettings, ContactPatchSettings, ContactSettings, FreeSpaceSettings,
-    HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings,
-    RenderingSettings, SupportSettings, TactileSettings, TouchModel,
+    BinaryTouchSettings, ContactPatchSettings, FreeSpaceSettings, HandDepthSettings,
+    PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RenderingSettings,
+    SupportSettings, TactileSettings,
 };
-use crate::problem::{Block, ModelErrorSettings, NoiseModel, Solver, State};
-use crate::scene::{Frame, Occluders};
+use crate::problem::{Block, ModelErrorSettings, Solver, State};
+use crate::scene::Frame;
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
@@ -113,6 +113,33 @@ pub struct Stage {
     pub contact: bool,
 }
 
+impl Stage {
+    /// Stage with kernels so many octaves wider than at the end: the wider, the fewer points, the more hypotheses and the sooner a solve ends.
+    pub(crate) fn octaves(octaves: u32) -> Self {
+        let kernel_scale = f64::from(1 << octaves);
+        Self {
+            downsample: if octaves == 0 { 2 } else { 4 },
+            points: 1200 >> octaves,
+            kernel_scale,
+            solver: Solver { iterations: 10, min_decrease: 0.02 * kernel_scale.powi(2) },
+            hypotheses: 3 << octaves,
+            color: true,
+            measured_noise: true,
+            model_error: octaves == 0,
+            contact: true,
+        }
+    }
+
+    /// Geometry alone, then colors, then measured noise; the last stage twice, because noise, scales and the modes that are left are found anew in
+    /// each.
+    fn coarse_to_fine() -> Vec<Self> {
+        let geometry =
+            Self { color: false, contact: false, measured_noise: false, ..Self::octaves(3) };
+        let colors = Self { measured_noise: false, ..Self::octaves(2) };
+        vec![geometry, colors, Self::octaves(1), Self::octaves(0), Self::octaves(0)]
+    }
+}
+
 /// Settings of [`Fused`](super::Fused).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FusedSettings {
@@ -197,61 +224,12 @@ impl FusedSettings {
 
 impl Default for FusedSettings {
     fn default() -> Self {
-        let depth = PointToPlaneSettings::default();
-        // Twice, because noise, scales and the modes that are left are found anew in each.
-        let last = Stage {
-            downsample: 2,
-            points: 1200,
-            kernel_scale: 1.0,
-            solver: Solver { iterations: 10, min_decrease: 0.02 },
-            hypotheses: 3,
-            color: true,
-            measured_noise: true,
-            model_error: true,
-            contact: true,
-        };
         Self {
             modalities: Modality::ALL.to_vec(),
             views: true,
             nuisances: Nuisance::ALL.to_vec(),
             prior: PriorSettings::default(),
-            stages: vec![
-                Stage {
-                    downsample: 4,
-                    points: 200,
-                    kernel_scale: 8.0,
-                    solver: Solver { iterations: 10, min_decrease: 1.0 },
-                    hypotheses: 7,
-                    color: false,
-                    measured_noise: false,
-                    model_error: false,
-                    contact: false,
-                },
-                Stage {
-                    downsample: 4,
-                    points: 250,
-                    kernel_scale: 4.0,
-                    solver: Solver { iterations: 5, min_decrease: 0.3 },
-                    hypotheses: 14,
-                    color: true,
-                    measured_noise: false,
-                    model_error: false,
-                    contact: true,
-                },
-                Stage {
-                    downsample: 4,
-                    points: 600,
-                    kernel_scale: 2.0,
-                    solver: Solver { iterations: 8, min_decrease: 0.1 },
-                    hypotheses: 5,
-                    color: true,
-                    measured_noise: true,
-                    model_error: false,
-                    contact: true,
-                },
-                last.clone(),
-                last,
-            ],
+            stages: Stage::coarse_to_fine(),
             restart_angle: 20f64.to_radians(),
             restart_spacing: 10e-3,
             max_effective_samples: 50.0,
@@ -262,23 +240,11 @@ impl Default for FusedSettings {
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),
             model: ModelErrorSettings::default(),
-            rendering: RenderingSettings {
-                downsample: 1,
-                occluders: Occluders::Measured,
-                effective_pixels: 80.0,
-                mask_sigma: 0.6,
-                ..RenderingSettings::default()
-            },
-            depth: PointToPlaneSettings {
-                noise: NoiseModel { effective_samples: 20.0, ..depth.noise },
-                ..depth
-            },
+            rendering: RenderingSettings::default(),
+            depth: PointToPlaneSettings::default(),
             hand_depth: HandDepthSettings::default(),
             free_space: FreeSpaceSettings::default(),
-            tactile: TactileSettings {
-                touch: TouchModel::Contacts(ContactSettings::default()),
-                ..TactileSettings::default()
-            },
+            tactile: TactileSettings::default(),
             binary_touch: BinaryTouchSettings::default(),
             proximity: ProximitySettings::default(),
             contact_patch: ContactPatchSettings::default(),

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::Posterior;
+use crate::MM_PER_M;
 
 /// What reports and files say of a [`Posterior`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,11 +51,11 @@ impl From<&Posterior> for PosteriorSummary {
             probability: posterior.probability(),
             fit: fit.map(|fit| fit.probability),
             misfits: misfits.map(|(what, p)| (what.to_owned(), p)).collect(),
-            deviation_mm: (deviation(0) * 1e3).into(),
+            deviation_mm: (deviation(0) * MM_PER_M).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             covariance: std::array::from_fn(|r| std::array::from_fn(|c| covariance[(r, c)])),
             center_m: posterior.center().into(),
-            unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),
+            unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * MM_PER_M).collect(),
             disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
             scales: posterior
                 .scales

@@ -1,8 +1,7 @@
 //! How often colors occur.
 
 /// Levels of a channel.
-const LEVELS: f32 = 16.0;
-const COLORS: usize = 16 * 16 * 16;
+const LEVELS: u16 = 16;
 /// What a color that was never seen counts for, as a share of all that were.
 const UNSEEN: f32 = 1e-4;
 
@@ -16,15 +15,16 @@ pub(super) struct ColorHistogram {
 
 impl Default for ColorHistogram {
     fn default() -> Self {
-        Self { shares: vec![0.0; COLORS], known: false }
+        Self { shares: vec![0.0; usize::from(LEVELS).pow(3)], known: false }
     }
 }
 
 /// The number of a color.
 pub(super) fn color_index(color: &[f32; 3]) -> u16 {
-    let level = |channel: f32| (channel * LEVELS).clamp(0.0, LEVELS - 1.0) as u16;
+    let level =
+        |channel: f32| (channel * f32::from(LEVELS)).clamp(0.0, f32::from(LEVELS - 1)) as u16;
     let [r, g, b] = color.map(level);
-    (r << 8) | (g << 4) | b
+    (r * LEVELS + g) * LEVELS + b
 }
 
 impl ColorHistogram {

@@ -12,6 +12,7 @@ use prehend_render::Mask;
 use self::colors::ColorHistogram;
 use self::parts::large_parts;
 use self::window::{Label, Pixel, Window};
+use super::GAIN;
 use super::sight::Sight;
 use crate::scene::Object;
 
@@ -19,28 +20,16 @@ use crate::scene::Object;
 const STRIDE: usize = 2;
 /// How far from where it should be the object is looked for \[m\].
 const REACH: f64 = 0.04;
-/// How much a frame that was believed counts for the colors beside those before.
-const COLOR_GAIN: f32 = 0.3;
-/// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
-const COLOR_WEIGHT: f32 = 0.6;
-const COLOR_LIMIT: f32 = 3.0;
+/// What a color tells at most \[nat\].
+const COLOR_LIMIT: f32 = 2.0;
 /// Evidence of a color \[nat\] below which it is another thing's, whatever depth says: what is found may lie flush with a wall.
-const OTHERS_COLOR: f32 = -0.5 * COLOR_WEIGHT * COLOR_LIMIT;
-/// Pixels that are needed to judge a mask, and what share of those that should show the object must be sure to.
+const OTHERS_COLOR: f32 = -0.5 * COLOR_LIMIT;
+/// Pixels that are needed to judge by.
 const ENOUGH: f32 = 30.0;
-const SURE_SHARE: f32 = 0.2;
-/// What is kept of how often masks have been right, in a frame in which that is not known.
-const FORGET: f32 = 0.9;
+/// Share of the pixels that should show the object below which nothing is judged by them, and of its largest part below which another is none.
+const LEAST_SHARE: f32 = 0.1;
 /// How often a mask errs at least.
 const MASK_ERROR: f32 = 0.02;
-/// How many of the pixels that should show the object must do so.
-const LEAST_SHARE: f32 = 0.05;
-
-/// How much of an object that was lost must be seen, beside what was seen of it, of which a frame counts so much.
-const LEAST_FOUND: f32 = 0.25;
-const AREA_GAIN: f32 = 0.1;
-/// What colors tell of an object in a hand before any are known \[nat\].
-const UNKNOWN_COLORS: f32 = 1.0;
 
 /// Tells the object from everything else by its colors and those around it, which are learnt from frames in which its pose was
 /// believed.
@@ -113,12 +102,11 @@ impl Segmenter {
             return None;
         }
         let may_show = |pixel: &Pixel| {
-            let color = match self.color_evidence.is_empty() {
-                true => UNKNOWN_COLORS,
-                false => self.color_evidence(pixel.color),
-            };
+            let color = self.color_evidence(pixel.color);
             let told = if pixel.masked { set } else { unset };
-            pixel.near_hand(center, &window.place(pixel)) + color + told > 0.0
+            let evidence = pixel.near_hand(center, &window.place(pixel)) + color + told;
+            // Before any color is known, all that is near the hand may be the object.
+            evidence > 0.0 || evidence == 0.0 && self.color_evidence.is_empty()
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
         let columns = sight.observation.camera.width.div_ceil(STRIDE);
@@ -129,7 +117,7 @@ impl Segmenter {
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mut mask = Mask::filled(width, height, false);
         shown().for_each(|pixel| fill(&mut mask, pixel.at));
-        let enough = shown().count() as f32 >= ENOUGH && area >= LEAST_FOUND * self.seen_area;
+        let enough = shown().count() as f32 >= ENOUGH && area >= LEAST_SHARE * self.seen_area;
         enough.then_some(mask)
     }
 
@@ -168,21 +156,20 @@ impl Segmenter {
 
     fn learn_within(&mut self, window: &Window) {
         let area: f32 = window.pixels().map(Pixel::expected_area).sum();
-        let gain = if self.seen_area > 0.0 { AREA_GAIN } else { 1.0 };
+        let gain = if self.seen_area > 0.0 { GAIN } else { 1.0 };
         self.seen_area += gain * (area - self.seen_area);
         for (label, colors) in [(Label::Object, &mut self.object), (Label::Other, &mut self.others)]
         {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
-            colors.learn(pixels.map(|pixel| pixel.color), COLOR_GAIN);
+            colors.learn(pixels.map(|pixel| pixel.color), GAIN);
         }
         self.color_evidence.clear();
         if !(self.object.is_known() && self.others.is_known()) {
             return;
         }
         let pairs = self.object.densities().zip(self.others.densities());
-        let evidence = |(own, other): (f32, f32)| {
-            COLOR_WEIGHT * (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)
-        };
+        let evidence =
+            |(own, other): (f32, f32)| (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT);
         self.color_evidence.extend(pairs.map(evidence));
     }
 
@@ -206,11 +193,11 @@ impl Segmenter {
             let [unset, set] = counts[label as usize];
             (unset + set >= ENOUGH.max(least)).then(|| set / (unset + set))
         };
-        let shares = (share(Label::Object, SURE_SHARE * expected), share(Label::Other, 0.0));
+        let shares = (share(Label::Object, LEAST_SHARE * expected), share(Label::Other, 0.0));
         (self.hits, self.false_alarms) = match shares {
             (Some(hits), Some(false_alarms)) => (hits, false_alarms),
             // What they were worth is forgotten while they cannot be judged.
-            _ => (FORGET * self.hits, FORGET * self.false_alarms),
+            _ => ((1.0 - GAIN) * self.hits, (1.0 - GAIN) * self.false_alarms),
         };
     }
 

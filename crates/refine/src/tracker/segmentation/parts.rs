@@ -1,9 +1,8 @@
 //! Connected parts of a mask.
 
-/// Parts are kept that have at least so much of the largest one: fingers part what they hold.
-const LEAST: f32 = 0.15;
+use super::LEAST_SHARE;
 
-/// The pixels of the largest connected part of what is `set`, and of others that are nearly as large, in rows of so many columns.
+/// The pixels of the largest connected part of what is `set`, and of others that are not far smaller, for fingers part what they hold, in rows of so many columns.
 pub(super) fn large_parts(set: &[bool], columns: usize) -> Vec<bool> {
     let mut part = vec![0_u32; set.len()];
     let mut sizes = vec![0_u32];
@@ -35,7 +34,8 @@ pub(super) fn large_parts(set: &[bool], columns: usize) -> Vec<bool> {
         sizes.push(size);
     }
     let largest = sizes.iter().copied().max().unwrap_or_default();
-    let kept = |part: &u32| *part > 0 && sizes[*part as usize] as f32 >= LEAST * largest as f32;
+    let kept =
+        |part: &u32| *part > 0 && sizes[*part as usize] as f32 >= LEAST_SHARE * largest as f32;
     part.iter().map(kept).collect()
 }
 

@@ -1,12 +1,13 @@
 //! The part of a picture in which the object may be, with what is expected there.
 
+use std::f32::consts::PI;
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
-use super::STRIDE;
 use super::colors::color_index;
+use super::{COLOR_LIMIT, STRIDE};
 use crate::scene::Object;
 use crate::tracker::sight::Sight;
 
@@ -17,15 +18,12 @@ const BEYOND: usize = 16;
 /// How sure it is that the object is where it should be.
 const SURE: f32 = 0.85;
 /// Standard deviation of depth about where the object should be, and at the hand \[m\].
-const OBJECT_SIGMA: f32 = 5e-3;
-const HAND_SIGMA: f32 = 5e-3;
-/// Density of depths of what is not known \[1/m\], and how often the object's depth is so, too: behind it, and in front of it.
+const DEPTH_SIGMA: f32 = 5e-3;
+/// Depth that is so far from the object's surface is not of it \[m\].
+const OFF_OBJECT: f32 = 15e-3;
+/// Density of depths of what is not known \[1/m\], and how often depth that is not in front of the object is so, too, where the object is seen.
 const ANYWHERE: f32 = 3.0;
 const OUTLIERS: f32 = 0.03;
-const OUTLIERS_IN_FRONT: f32 = 1e-3;
-/// Depth that is so near the object's surface is the object's, and so far from it not \[m\].
-const ON_OBJECT: f32 = 5e-3;
-const OFF_OBJECT: f32 = 15e-3;
 
 /// How far from the middle of a hand it holds something \[m\].
 const HELD: f32 = 0.2;
@@ -83,7 +81,7 @@ impl Window {
             return None;
         }
         // The whole picture, if it is as near as that.
-        let nearest = (center.z - object.radius).max(0.05 * center.z);
+        let nearest = (center.z - object.radius).max(f64::MIN_POSITIVE);
         let at = full.project(&center)?;
         let extent = (object.radius + reach) * full.fx.max(full.fy) / nearest;
         let range = |middle: f64, size: usize| {
@@ -243,7 +241,7 @@ impl Pixel {
     /// Whether no color and no mask could make this pixel the object's: beyond its outline, and far from it in depth.
     pub(super) fn is_elsewhere(&self) -> bool {
         let off = (self.sensor - self.object).abs();
-        self.share == 0.0 && self.sensor > 0.0 && off > 5.0 * OBJECT_SIGMA
+        self.share == 0.0 && self.sensor > 0.0 && off > OFF_OBJECT
     }
 
     /// The area of what is seen here, and of what should show the object, in squares of depth.
@@ -267,12 +265,14 @@ impl Pixel {
         if !(self.sensor > 0.0 && self.sensor.is_finite()) {
             return 0.0;
         }
-        let bell = |off: f32, sigma: f32| 0.399 / sigma * (-0.5 * (off / sigma).powi(2)).exp();
-        let own = bell(self.sensor - self.object, OBJECT_SIGMA);
-        let outliers = if self.sensor < self.object { OUTLIERS_IN_FRONT } else { OUTLIERS };
+        let bell = |off: f32| {
+            (-0.5 * (off / DEPTH_SIGMA).powi(2)).exp() / ((2.0 * PI).sqrt() * DEPTH_SIGMA)
+        };
+        let own = bell(self.sensor - self.object);
+        let outliers = if self.sensor < self.object { 0.0 } else { OUTLIERS };
         let own = (1.0 - outliers) * own + outliers * ANYWHERE;
         let other = match self.hand > 0.0 {
-            true => 0.5 * (bell(self.sensor - self.hand, HAND_SIGMA) + ANYWHERE),
+            true => 0.5 * (bell(self.sensor - self.hand) + ANYWHERE),
             false => ANYWHERE,
         };
         (own / other).ln()
@@ -280,7 +280,7 @@ impl Pixel {
 
     /// Whether depth is the hand's.
     fn is_on_hand(&self) -> bool {
-        self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < 2.0 * HAND_SIGMA
+        self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < 2.0 * DEPTH_SIGMA
     }
 
     /// Whether what is seen here, at `place`, may be held by a hand about that place \[nat\].
@@ -288,7 +288,7 @@ impl Pixel {
         let Some(center) = center else { return 0.0 };
         match self.sensor > 0.0 && !self.is_on_hand() && (place - center).norm() < HELD {
             true => 0.0,
-            false => -3.0,
+            false => -2.0 * COLOR_LIMIT,
         }
     }
 
@@ -296,7 +296,7 @@ impl Pixel {
     pub(super) fn label(&self) -> Option<Label> {
         let off = (self.sensor - self.object).abs();
         let measured = self.sensor > 0.0;
-        if self.share > 0.999 && measured && off < ON_OBJECT {
+        if self.share >= 1.0 && measured && off < DEPTH_SIGMA {
             return Some(Label::Object);
         }
         let elsewhere = self.share == 0.0 || measured && off > OFF_OBJECT;
