@@ -1,5 +1,7 @@
 //! Losses of one residual that forgive outliers.
 
+use serde::{Deserialize, Serialize};
+
 /// A loss ρ of a squared residual r² that is ½ r² near zero and grows more slowly, or no more, beyond `scale`.
 ///
 /// Forms as in Z. Zhang, "Parameter estimation techniques", 1997, table 1, and J. Barron, "A general and adaptive
@@ -13,7 +15,8 @@
 /// assert_eq!(cauchy.weight(0.0), 1.0);
 /// assert_eq!(cauchy.weight(4.0), 0.5);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum RobustKernel {
     /// ½ r²: every residual counts in full.
     #[default]

@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
+use serde::{Deserialize, Serialize};
 
 use super::facing::facing;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
 
 /// Settings of [`FreeSpaceFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct FreeSpaceSettings {
     /// Samples of the object's surface used at most.
     pub samples: usize,

@@ -6,13 +6,15 @@ use nalgebra::{Point3, Vector2};
 use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::RobotSample;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Hand};
 
 /// Settings of [`HandDepthFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct HandDepthSettings {
     /// Depth points used at most, spread evenly over the hand.
     pub points: usize,

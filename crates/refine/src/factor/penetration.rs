@@ -5,13 +5,15 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
 use crate::scene::{Frame, Hand, Object};
 
 /// Settings of [`PenetrationFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PenetrationSettings {
     /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of
     /// skin and pads, and the errors of the models.

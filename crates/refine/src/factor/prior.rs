@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 use prehend_geometry::RobustKernel;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, CAUCHY_WIDTH, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
@@ -11,7 +12,8 @@ use crate::strategy::{ErrorGroup, Scales};
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PriorSettings {
     /// The object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
     pub object_translation: f64,

@@ -9,6 +9,7 @@ use prehend_render::{
     PoseProblem, Session, Tile, light_samples,
 };
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::patch_sums::PatchSums;
 use crate::error::RefineError;
@@ -16,7 +17,8 @@ use crate::problem::{CAUCHY_WIDTH, Factor, NormalEquations, State, SurfacePatche
 use crate::scene::{Frame, Object, Occluders};
 
 /// Settings of [`RenderingFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RenderingSettings {
     /// The image is made smaller by this factor.
     pub downsample: usize,
@@ -285,7 +287,8 @@ mod tests {
     use crate::problem::Block;
 
     fn factor(frame: &Frame<'_>) -> RenderingFactor {
-        RenderingFactor::new(frame, &RenderingSettings::default()).unwrap()
+        let settings = RenderingSettings { downsample: 2, ..RenderingSettings::default() };
+        RenderingFactor::new(frame, &settings).unwrap()
     }
 
     #[test]

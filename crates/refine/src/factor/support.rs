@@ -6,13 +6,15 @@ use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3, Vector6};
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use prehend_sim::{CompliantBalance, CompliantSupport, Support};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{Frame, Hand, Object};
 
 /// Settings of [`SupportFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SupportSettings {
     /// Standard deviation of what is left unbalanced, as a share of all that acts on the object.
     pub sigma: f64,

@@ -8,6 +8,7 @@ use prehend_autodiff::optimize::{
     Criteria, LeastSquares, LevenbergMarquardt, OptimizeError, QuadraticModel, Solved, Stop,
 };
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::{
@@ -103,7 +104,8 @@ impl QuadraticModel for Linearization {
 }
 
 /// Levenberg–Marquardt over the blocks of a problem.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Solver {
     /// Steps tried at most.
     pub iterations: usize,

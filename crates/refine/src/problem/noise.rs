@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 
 use prehend_geometry::RobustKernel;
+use serde::{Deserialize, Serialize};
 
 /// How the residuals of a factor scatter: what makes costs in nats of residuals.
 ///
 /// n residuals r cost min(1, m/n) / σ² · Σ ρ(r²), where ρ is the kernel's loss (½ r² without one) and m the number of
 /// independent measurements that they amount to at most.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct NoiseModel {
     /// Standard deviation σ of a residual \[the residual's unit\]; infinite for one that says nothing.
     pub sigma: f64,
@@ -119,9 +121,10 @@ mod tests {
 
     #[test]
     fn a_wider_kernel_forgives_less() {
-        let noise = NoiseModel::cauchy(1.0, 0.5, f64::INFINITY);
+        let noise = NoiseModel::cauchy(1.0, f64::INFINITY);
         let wide = noise.widened(4.0).weighting(1);
-        assert_eq!(wide.weight(2.0), 0.5);
-        assert!(wide.cost(2.0) > noise.weighting(1).cost(2.0));
+        let far = 4.0 * CAUCHY_WIDTH;
+        assert_eq!(wide.weight(far), 0.5);
+        assert!(wide.cost(far) > noise.weighting(1).cost(far));
     }
 }

@@ -1,11 +1,13 @@
 //! Patches of the object's surface that may each be off by themselves.
 
 use nalgebra::{DMatrix, Point3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::scene::Observation;
 
 /// How far the surface of an object is from that of its model.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ModelErrorSettings {
     /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
     pub gp_sigma: f64,

@@ -11,7 +11,6 @@ use super::parameters::{Play, Rig};
 use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
-use super::skin::{SkinEvidence, SkinReading};
 use super::views::Views;
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
@@ -56,7 +55,6 @@ pub struct Calibrator {
     kept: Sums,
     kept_play: PlaySquares,
     kept_disagreements: Vec<f64>,
-    kept_skin: SkinEvidence,
     kept_views: Views,
     /// Passes that were solved for since then.
     solved: usize,
@@ -112,7 +110,6 @@ impl Calibrator {
             kept: Sums::default(),
             kept_play: PlaySquares::default(),
             kept_disagreements: Vec::new(),
-            kept_skin: SkinEvidence::default(),
             kept_views: Views::default(),
             solved: 0,
             averaged: 0,
@@ -152,12 +149,11 @@ impl Calibrator {
         let disagreement = information.disagreement(&self.prior, errors).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
-        let skin = SkinReading::new(&frame, &found.state, *obj_id);
         let obj_id = *obj_id;
-        Ok(Visit { obj_id, information, disagreement, skin, left_out, has_mask, t_cam_object })
+        Ok(Visit { obj_id, information, disagreement, left_out, has_mask, t_cam_object })
     }
 
-    /// How well a frame, as the rig corrects all but what its skin feels, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
+    /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
     /// found.
     ///
     /// # Errors
@@ -174,8 +170,7 @@ impl Calibrator {
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
         let CalibrationFrame { observation, obj_id, hand, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
-        // The skin is judged by the poses that visits find, which therefore do not depend on that judgment.
-        let mut observation = self.rig.corrected_geometry(observation)?;
+        let mut observation = self.rig.corrected(observation)?;
         if observation.mask.count() == 0 {
             observation.mask =
                 View::of_observation(&observation, object, hand.as_deref(), initial)?.likely_mask();
@@ -287,9 +282,6 @@ impl Calibrator {
         let change = change * share;
         self.rig = self.rig.changed(change.as_slice());
         self.rig.covariance = covariance;
-        let mut skin = self.kept_skin.clone();
-        skin.add(&pass.skin);
-        self.rig.skin = skin.solve();
         self.kept.shift(&change, &of_objects);
         pass.sums.shift(&change, &of_objects);
         Ok(change.component_div(&deviations).amax())
@@ -299,7 +291,6 @@ impl Calibrator {
     /// linear in the rig from then on, and its memory is free.
     pub fn keep(&mut self, pass: Pass) {
         self.kept.merge(pass.sums);
-        self.kept_skin.add(&pass.skin);
         self.kept_views.merge(&pass.views);
         self.kept_play.merge(&pass.squares);
         self.kept_disagreements.extend(pass.disagreements);

@@ -14,20 +14,8 @@ impl Rig {
     /// What a frame of this rig would have shown and said without its errors.
     ///
     /// # Errors
-    /// If images are of another size, or the hand has another number of joints or taxels.
+    /// If images are of another size, or the hand has another number of joints.
     pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
-        let mut corrected = self.corrected_geometry(observation)?;
-        if let Some(hand) = &mut corrected.hand {
-            self.skin.correct(hand)?;
-        }
-        Ok(corrected)
-    }
-
-    /// The same, but for what the skin feels.
-    pub(super) fn corrected_geometry(
-        &self,
-        observation: &Observation,
-    ) -> Result<Observation, RefineError> {
         let mut corrected = observation.clone();
         let (camera, error) = (&mut corrected.camera, &self.camera);
         let (size, expected) = ([camera.width, camera.height], self.warp.depth.size());

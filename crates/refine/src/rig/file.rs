@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use super::deviation::SurfaceDeviation;
 use super::parameters::{Play, Rig};
-use super::skin::{SkinCalibration, SkinLayout};
 use crate::data::bop::{DatasetError, read_json_in_range, write_atomically};
 use crate::problem::{DepthField, ImageWarp, ModelErrorSettings, RADIAL};
 use crate::scene::CameraCalibrationError;
@@ -24,7 +23,6 @@ struct Layout {
     /// A row each.
     covariance: Vec<Vec<f64>>,
     objects: BTreeMap<u32, ObjectLayout>,
-    skin: SkinLayout,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -84,7 +82,7 @@ impl Rig {
         let field = |name: &str, problem: &dyn std::fmt::Display| {
             Err(DatasetError::field(file, name, problem))
         };
-        let Layout { image_size: [width, height], camera, hand, play, covariance, objects, skin } =
+        let Layout { image_size: [width, height], camera, hand, play, covariance, objects } =
             layout;
         if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
             return field("image_size", &"no image is of that size");
@@ -124,7 +122,6 @@ impl Rig {
             },
             covariance: DMatrix::zeros(0, 0),
             objects: BTreeMap::new(),
-            skin: SkinCalibration::default(),
         };
         let n = rig.len();
         if covariance.len() != n || covariance.iter().any(|row| row.len() != n) {
@@ -166,10 +163,6 @@ impl Rig {
             };
             rig.objects.insert(id, deviation);
         }
-        match skin.read() {
-            Ok(skin) => rig.skin = skin,
-            Err((name, problem)) => return field(&name, &problem),
-        }
         Ok(rig)
     }
 
@@ -189,7 +182,7 @@ impl Rig {
             .chain(coefficients)
             .copied()
             .collect::<Vec<_>>();
-        if !numbers.into_iter().chain(self.skin.numbers()).all(f64::is_finite) {
+        if !numbers.into_iter().all(f64::is_finite) {
             return Err(DatasetError::unusable(file, "the rig is not finite, and was not written"));
         }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
@@ -231,7 +224,6 @@ impl Rig {
             },
             covariance: rows(&self.covariance),
             objects: self.objects.iter().map(object).collect(),
-            skin: (&self.skin).into(),
         };
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
         write_atomically(file, format!("{text}\n").as_bytes())

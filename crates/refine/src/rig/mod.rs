@@ -14,7 +14,6 @@ mod pass;
 mod passes;
 mod residuals;
 mod settings;
-mod skin;
 mod views;
 
 pub use self::calibrator::{CalibrationFrame, Calibrator};
@@ -25,4 +24,3 @@ pub use self::pass::{Pass, Visit};
 pub use self::passes::{Calibrated, Passes};
 pub use self::residuals::{FrameResiduals, Residuals, SensorResidual};
 pub use self::settings::CalibratorSettings;
-pub use self::skin::{SkinCalibration, TaxelCalibration};

@@ -8,7 +8,6 @@ use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_render::Camera;
 
 use super::deviation::SurfaceDeviation;
-use super::skin::SkinCalibration;
 use crate::data::bop::RemapCache;
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
@@ -51,8 +50,6 @@ pub struct Rig {
     pub covariance: DMatrix<f64>,
     /// By what the surface of each object differs from its model, by the object's number.
     pub objects: BTreeMap<u32, SurfaceDeviation>,
-    /// Calibration of the skin.
-    pub skin: SkinCalibration,
 }
 
 /// Displacements and rotations of the hand in its own axes and in those of the camera.
@@ -78,7 +75,6 @@ impl Rig {
             play,
             covariance: DMatrix::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
             objects: BTreeMap::new(),
-            skin: SkinCalibration::default(),
         }
     }
 

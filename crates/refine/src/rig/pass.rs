@@ -6,7 +6,6 @@ use std::collections::btree_map::Entry;
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::information::{Eliminated, FrameInformation, FramePlay};
-use super::skin::SkinReading;
 use super::views::Views;
 
 /// What a visit has found of a frame.
@@ -14,7 +13,6 @@ pub struct Visit {
     pub(super) obj_id: u32,
     pub(super) information: FrameInformation,
     pub(super) disagreement: f64,
-    pub(super) skin: Option<SkinReading>,
     /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
     /// rig was another then.
     pub left_out: Option<f64>,
@@ -33,7 +31,6 @@ pub struct Pass {
     /// By frame, those left out among them.
     pub(super) disagreements: Vec<f64>,
     pub(super) squares: PlaySquares,
-    pub(super) skin: Vec<SkinReading>,
     pub(super) views: Views,
 }
 
@@ -92,7 +89,7 @@ impl PlaySquares {
 impl Pass {
     /// Adds what a frame has said, unless it is left out.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information, disagreement, left_out, skin, t_cam_object, .. } = visit;
+        let Visit { obj_id, information, disagreement, left_out, t_cam_object, .. } = visit;
         self.disagreements.push(disagreement);
         if left_out.is_some() {
             return;
@@ -101,7 +98,6 @@ impl Pass {
         self.sums.add(obj_id, hessian, gradient);
         self.views.add(obj_id, &t_cam_object);
         self.play.push((obj_id, play));
-        self.skin.extend(skin);
     }
 
     /// Finds the squares of the frames' play if the parameters change so, and have that covariance then.

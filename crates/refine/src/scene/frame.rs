@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
+use serde::{Deserialize, Serialize};
 
 use super::{Hand, HandMeasurement, Object, Observation};
 use crate::error::RefineError;
@@ -45,7 +46,8 @@ pub struct CameraView<'a> {
 }
 
 /// What may hide the object in the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Occluders {
     /// The hand, where its pose and joints say that it is.
     Hand,

@@ -1,10 +1,13 @@
 //! Settings of the search.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::RefineError;
 use crate::strategy::FusedSettings;
 
 /// Settings of [`PoseSearch`](super::PoseSearch), chosen on made-up scenes and on kinematic grasps of nine objects.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SearchSettings {
     /// Rotations tried; 3000 leave no rotation more than some 17° from one of them.
     pub rotations: usize,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log, twist_row};
 use prehend_render::{DepthImage, draw_depth};
+use serde::{Deserialize, Serialize};
 
 use super::Tracker;
 use super::memory::{Prediction, TrackState};
@@ -13,7 +14,8 @@ use super::sight::Sight;
 use crate::scene::Object;
 
 /// Settings of the alignment of images to a keyframe.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct KeyframeSettings {
     /// Points at most; zero for no alignment.
     pub points: usize,

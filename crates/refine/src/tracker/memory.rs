@@ -161,12 +161,11 @@ impl TrackState {
         next
     }
 
-    /// What is expected at `time` of an object of this `radius` \[m\] where the hand is said to be as in `nominal`, and known if `in_hand`.
+    /// What is expected at `time` where the hand is said to be as in `nominal`, and known if `in_hand`.
     pub(super) fn predict(
         &self,
         time: Duration,
         nominal: &State,
-        radius: f64,
         in_hand: bool,
         prior: &PriorSettings,
         settings: &TrackerSettings,
@@ -215,8 +214,8 @@ impl TrackState {
         // does is not bounded.
         let mut growth = stated * (1.0 - kept * kept);
         for k in 0..3 {
-            growth[k] = motion.sigma.powi(2) * seconds;
-            growth[3 + k] = growth[k] / radius.powi(2);
+            growth[k] = motion.translation.powi(2) * seconds;
+            growth[3 + k] = motion.rotation.powi(2) * seconds;
         }
         let motion_covariance = Matrix6::from_diagonal(&growth.fixed_rows::<6>(0).into_owned());
         let covariance = covariance + DMatrix::from_diagonal(&growth);

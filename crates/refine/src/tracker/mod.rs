@@ -208,8 +208,7 @@ impl Tracker {
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
-        let mut prediction =
-            track.predict(time, &nominal, self.object.radius, in_hand, &self.prior, &self.settings);
+        let mut prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }

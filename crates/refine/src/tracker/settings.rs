@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
 use super::keyframe::KeyframeSettings;
@@ -10,17 +11,20 @@ use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
 /// What is known of how an object moves from frame to frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ProcessNoise {
-    /// Motion that was not foreseen, a random walk of the object's center in each direction, and of its surface by rotation about each axis: variances
-    /// grow by the square of this in a second \[m/√s\].
-    pub sigma: f64,
+    /// Motion that was not foreseen, a random walk in each direction: its variance grows by the square of this in a second \[m/√s\].
+    pub translation: f64,
+    /// Rotation that was not foreseen, about each axis alike \[rad/√s\].
+    pub rotation: f64,
     /// How much of the difference between measured and believed velocity is believed, between 0 and 1.
     pub gain: f64,
 }
 
 /// When a pose is not believed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GatingSettings {
     /// The cost may be so many times its running mean,
     pub cost_ratio: f64,
@@ -37,9 +41,21 @@ pub struct GatingSettings {
 /// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
 /// not hold for it.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantNames,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    EnumString,
+    IntoStaticStr,
+    VariantNames,
+    Serialize,
+    Deserialize,
 )]
 #[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
+#[serde(rename_all = "kebab-case")]
 pub enum Recovery {
     /// The frame is lost; the next is tried from the prediction.
     Off,
@@ -61,7 +77,8 @@ fn unknown(text: &str) -> String {
 }
 
 /// Settings of [`Tracker`](super::Tracker).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TrackerSettings {
     /// Evidence, nuisances and stated accuracies; its stages serve where a pose has to be found.
     pub fused: FusedSettings,
@@ -102,8 +119,8 @@ impl Default for TrackerSettings {
                 model_error: true,
                 ..Stage::octaves(1)
             },
-            in_hand: ProcessNoise { sigma: 3.7e-3, gain: 0.1 },
-            free: ProcessNoise { sigma: 0.05, gain: 0.5 },
+            in_hand: ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
+            free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
             time_constant: 0.2,
             keyframe: KeyframeSettings::default(),
             turn_sigma: 0.8f64.to_radians(),
@@ -129,8 +146,10 @@ impl TrackerSettings {
 
     pub(super) fn check(&self) -> Result<(), RefineError> {
         let positive = [
-            ("in_hand.sigma", self.in_hand.sigma),
-            ("free.sigma", self.free.sigma),
+            ("in_hand.translation", self.in_hand.translation),
+            ("in_hand.rotation", self.in_hand.rotation),
+            ("free.translation", self.free.translation),
+            ("free.rotation", self.free.rotation),
             ("time_constant", self.time_constant),
             ("turn_sigma", self.turn_sigma),
             ("gating.cost_ratio", self.gating.cost_ratio),

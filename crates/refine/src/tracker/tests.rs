@@ -39,7 +39,7 @@ fn a_jump_is_noticed_and_recovered_from() {
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
     };
-    let careful = ProcessNoise { sigma: 0.009, gain: 0.5 };
+    let careful = ProcessNoise { translation: 0.009, rotation: 0.09, gain: 0.5 };
     let settings = TrackerSettings { free: careful, ..Default::default() };
     let mut hopeless = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
     let lost = jump(&mut hopeless);
@@ -204,14 +204,7 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let SequenceFrame { observation, time, truth } = &SEQUENCE.frames[index];
     let remembered = tracker.track.clone().unwrap();
     let nominal = State::measured(observation, &object, truth).unwrap();
-    let prediction = remembered.predict(
-        *time,
-        &nominal,
-        SEQUENCE.object.radius,
-        true,
-        &tracker.prior,
-        &tracker.settings,
-    );
+    let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
     let mut sight = Sight::new(observation.clone(), Some(&hand), Images::default());
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
     let frame = tracker.frame(&sight, &object, Some(&hand), None).unwrap();

@@ -305,19 +305,23 @@ fn a_frame_file_is_as_good_as_a_dataset() {
     let said = place.prehend("check --frame ds/frame.json --report look");
     assert!(said.err.starts_with("warning: sensor depth is 10."), "{}", said.err);
     place.write("ds/frame.json", &frame.to_string());
-    let printed = place.succeed("refine --frame ds/frame.json --method combined --iterations 10");
+    // Few, because contacts that come and go amplify what texts are rounded by.
+    let printed = place.succeed("refine --frame ds/frame.json --method combined --iterations 3");
     let told: Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(told["terms"], json!(["physics", "rendering", "depth", "tactile"]));
-    place.succeed(&format!("{REFINE} --image 0 --out r.csv"));
+    place.succeed(
+        "refine --dataset ds --poses ds/init.csv --method combined --iterations 3 --image 0 --out r.csv",
+    );
     let expected = &place.poses("r.csv")[0].t_cam_model;
     for k in 0..3 {
         let found = told["translation_m"][k].as_f64().unwrap();
-        assert!((found - expected.translation.vector[k]).abs() < 1e-6);
+        let expected = expected.translation.vector[k];
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         assert_eq!(told["t_cam_object"][k][3].as_f64(), Some(found));
     }
     assert_eq!(
         place.succeed(
-            "refine --frame ds/frame.json --method combined --iterations 10 --out pose.json"
+            "refine --frame ds/frame.json --method combined --iterations 3 --out pose.json"
         ),
         ""
     );

@@ -99,7 +99,7 @@ fn a_problem_of_ones_own_is_solved() {
     let prior = GaussianPrior::independent(state.clone(), &PriorSettings::default()).unwrap();
     let problem = Problem::new(factors, blocks.clone()).with_prior(Arc::new(prior));
     let start = problem.linearize(&state);
-    let solver = Solver { iterations: 50, min_decrease: 1e-6 };
+    let solver = Solver { iterations: 200, min_decrease: 1e-6 };
     let solution = problem.solve(start.clone(), &solver, |_| ControlFlow::Continue(()));
     assert_ne!(solution.termination, Termination::Iterations);
     let (before, after) = (&start.state.t_cam_object, &solution.at.state.t_cam_object);

@@ -26,6 +26,7 @@ mod results;
 mod rig;
 mod search;
 mod sensors;
+mod settings;
 mod symmetry;
 mod synth_layout;
 mod tracker;

@@ -29,29 +29,12 @@ fn said(truth: &Observation) -> Observation {
     said
 }
 
-/// What a taxel reads far from the object \[N\].
-const RINGS: Vector3<f64> = Vector3::new(0.2, -0.1, 0.1);
-
-/// The taxel that is farthest from the object's center.
-fn farthest_taxel(sequence: &Sequence) -> usize {
-    let SequenceFrame { observation, truth, .. } = &sequence.frames[0];
-    let (hand, measured) = (&sequence.hand, observation.hand.as_ref().unwrap());
-    let posed = hand.posed(&measured.t_cam_hand, &measured.joints).unwrap();
-    let distance = |k: &usize| {
-        let taxel = &hand.taxels[*k];
-        let link = posed.t_world_links()[hand.tree.link_index(&taxel.link).unwrap()];
-        (link * taxel.position - truth * sequence.object.center).norm()
-    };
-    let all = 0..hand.taxels.len();
-    all.max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
-}
-
 /// Frames of `sequence` as a wrong rig says them, the object where it is.
 fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
     let chosen = sequence.frames.iter().step_by(6).enumerate();
     let frame = |(index, frame): (usize, &SequenceFrame)| CalibrationFrame {
         observation: said(&frame.observation),
-        // As if two objects were held: of one grasp alone a taxel may touch anything.
+        // As if two objects were held.
         obj_id: 7 + index as u32 % 2,
         hand: Some(Arc::clone(&sequence.hand)),
         initial: frame.truth,
@@ -86,11 +69,6 @@ fn learn(calibrator: &mut Calibrator, frames: &mut [CalibrationFrame], passes: u
 fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let sequence = default_sequence(1, 61).unwrap();
     let (mut frames, mut calibrator) = (frames(&sequence), calibrator(&sequence));
-    // A taxel rings false.
-    let ringing = farthest_taxel(&sequence);
-    for frame in &mut frames {
-        frame.observation.hand.as_mut().unwrap().forces[ringing] = RINGS;
-    }
     // The hand was elsewhere in one frame.
     let bumped = 4;
     let hand = frames[bumped].observation.hand.as_mut().unwrap();
@@ -134,15 +112,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let file = tempfile::tempdir().unwrap();
     let path = file.path().join("rig.json");
     rig.save(&path).unwrap();
-    let read = Rig::load(&path).unwrap();
-    assert_eq!(read.skin, rig.skin);
-    let rig = read;
-    let taxels = &rig.skin.taxels;
-    assert!((taxels[ringing].offset - RINGS).norm() < 1e-9, "{:?}", taxels[ringing]);
-    assert_eq!(taxels.iter().filter(|taxel| taxel.rings_false()).count(), 1);
-    assert!(
-        rig.corrected(&frames[0].observation).unwrap().hand.unwrap().forces[ringing].norm() < 1e-9
-    );
+    let rig = Rig::load(&path).unwrap();
     let new = &sequence.frames[39];
     let told = said(&new.observation);
     let error = |observation: &Observation, object, rig: Option<&Rig>| {

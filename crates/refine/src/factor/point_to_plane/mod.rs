@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::Mask;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 pub(crate) use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
@@ -20,7 +21,8 @@ use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches,
 use crate::scene::{Frame, Object};
 
 /// Settings of [`PointToPlaneFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PointToPlaneSettings {
     /// Depth points used at most, spread evenly over the mask.
     pub points: usize,

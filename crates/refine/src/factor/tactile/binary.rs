@@ -1,5 +1,7 @@
 //! Touch without forces: places of the skin that are touched, and others that are not.
 
+use serde::{Deserialize, Serialize};
+
 use std::sync::Arc;
 
 use super::probes::{Distance, Probe, Probes};
@@ -9,7 +11,8 @@ use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{BinaryContact, Frame, TouchReading};
 
 /// Settings of [`BinaryTouchFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct BinaryTouchSettings {
     /// Distances of touched places from the surface \[m\]: coarser than of forces, which tell where between taxels a contact is.
     pub contact: NoiseModel,

@@ -4,13 +4,15 @@ use nalgebra::{Point3, Vector3};
 use prehend_geometry::DistanceField;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
+use serde::{Deserialize, Serialize};
 
 use super::probes::{Distance, Probe};
 use crate::problem::NoiseModel;
 use crate::scene::Hand;
 
 /// How touched taxels become contacts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactSettings {
     /// Taxels of one link that feel force are of one contact if each is no farther from the next \[m\], and none is twice as far from the
     /// strongest, or faces away from it.

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use prehend_geometry::hand::Taxel;
+use serde::{Deserialize, Serialize};
 
 pub use self::binary::{BinaryTouchFactor, BinaryTouchSettings};
 pub use self::contacts::ContactSettings;
@@ -22,7 +23,8 @@ use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Hand};
 
 /// What taxels that feel force say.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum TouchModel {
     /// Nothing: they are as good as dead.
     Nothing,
@@ -40,7 +42,8 @@ const TOUCH_SAMPLES: f64 = 10.0;
 const NO_CONTACT_SIGMA: f64 = 1e-3;
 
 /// Settings of [`TactileFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TactileSettings {
     /// Force above which a taxel counts as touched, the paper's γ \[N\].
     pub contact_threshold: f64,

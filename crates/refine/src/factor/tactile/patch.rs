@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::ArticulatedRobot;
+use serde::{Deserialize, Serialize};
 
 use super::TOUCH_SAMPLES;
 use super::probes::{Distance, Probe, Probes};
@@ -13,7 +14,8 @@ use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
 use crate::scene::{Frame, TouchReading};
 
 /// Settings of [`ContactPatchFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactPatchSettings {
     /// Points used at most of a patch.
     pub points: usize,

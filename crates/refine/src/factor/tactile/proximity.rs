@@ -1,5 +1,7 @@
 //! Proximity: how far the object is from places of the skin.
 
+use serde::{Deserialize, Serialize};
+
 use std::sync::Arc;
 
 use super::TOUCH_SAMPLES;
@@ -9,7 +11,8 @@ use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, ProximityReading, TouchReading};
 
 /// Settings of [`ProximityFactor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ProximitySettings {
     /// Errors of short distances \[m\].
     pub noise: NoiseModel,

@@ -10,6 +10,7 @@ use crate::problem::{Contribution, Linearization};
 
 /// Settings of the test of fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct FitSettings {
     /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
     pub fault: f64,

@@ -44,6 +44,7 @@ impl ErrorGroup {
 
 /// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScaleSettings {
     /// Standard deviation of c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are known.
     pub common: f64,

@@ -1,5 +1,6 @@
 //! Settings of the fused estimator.
 
+use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::fit::FitSettings;
@@ -13,8 +14,9 @@ use crate::problem::{Block, ModelErrorSettings, Solver, State};
 use crate::scene::Frame;
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
 #[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
 pub enum Modality {
     /// Colors on the object.
     Color,
@@ -57,8 +59,9 @@ impl Modality {
 }
 
 /// A group of quantities that are estimated beside the pose because they are not known exactly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
 #[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
 pub enum Nuisance {
     /// The hand's pose in the camera frame.
     HandPose,
@@ -91,7 +94,8 @@ impl Nuisance {
 }
 
 /// One level of the way from coarse to fine.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Stage {
     /// Images are made smaller by this factor.
     pub downsample: usize,
@@ -141,7 +145,8 @@ impl Stage {
 }
 
 /// Settings of [`Fused`](super::Fused).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct FusedSettings {
     /// Modality to use, where the observation brings it.
     pub modalities: Vec<Modality>,

@@ -98,9 +98,6 @@ impl Calibrate {
             write_poses(out, rows(&jobs, &done.poses), &mut failures)?;
         }
         say(parameters(calibrator))?;
-        for [name, found] in report::skin_rows(calibrator) {
-            say(format!("{name:31} {found}"))?;
-        }
         save_models(calibrator, &objects, &models)?;
         let (used, out) = (count - done.left_out.len(), self.out.display());
         say(format!("\nrig of {used} frames written to {out}, models to {}", models.display()))?;

@@ -8,7 +8,7 @@ use prehend_refine::data::Workers;
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_refine::rig::{
     Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, Residuals,
-    SensorResidual, SkinCalibration, TaxelCalibration,
+    SensorResidual,
 };
 use prehend_render::RgbImage;
 
@@ -37,20 +37,6 @@ pub(super) fn parameter_rows(calibrator: &Calibrator) -> Vec<[String; 4]> {
         [name, number(value), number(*sigma), number(before)]
     })
     .collect()
-}
-
-/// What touch has told of the skin, name and finding each; nothing where there is none.
-pub(super) fn skin_rows(calibrator: &Calibrator) -> Vec<[String; 2]> {
-    let SkinCalibration { taxels } = &calibrator.rig().skin;
-    if taxels.is_empty() {
-        return Vec::new();
-    }
-    let count = |is: fn(&TaxelCalibration) -> bool| taxels.iter().filter(|t| is(t)).count();
-    let of = |count: usize| format!("{count} of {}", taxels.len());
-    vec![
-        ["taxels probably dead".to_owned(), of(count(TaxelCalibration::is_dead))],
-        ["taxels that ring false".to_owned(), of(count(TaxelCalibration::rings_false))],
-    ]
 }
 
 /// Writes the report of `done`, which began with the `nominal` rig, of images of this size, and returns its page; of frames that cannot be shown `failures` hears.
@@ -114,10 +100,6 @@ pub(super) fn write(
         ["parameter", "value", "standard deviation", "beforehand"],
         parameters,
     );
-    let skin: Vec<Vec<String>> = skin_rows(&done.calibrator).into_iter().map(Vec::from).collect();
-    if !skin.is_empty() {
-        report.add_table("Skin", ["what", "found"], skin);
-    }
     let left_out: Vec<Vec<String>> =
         done.left_out.values().map(|frame| vec![frame.clone()]).collect();
     if !left_out.is_empty() {
