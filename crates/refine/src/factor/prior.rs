@@ -28,6 +28,7 @@ pub struct PriorSettings {
     /// Each joint \[rad or m\].
     pub joints: f64,
     /// Joints of which that is known, in the order of the joints: beyond the end of the list and where there is none, as all others.
+    #[serde(skip)]
     pub known_joints: Vec<Option<f64>>,
     /// Depth, as a part of it.
     pub depth_scale: f64,

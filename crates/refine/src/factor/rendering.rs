@@ -31,7 +31,7 @@ pub struct RenderingSettings {
     pub sigma: f64,
     /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
     pub mask_sigma: f64,
-    /// Width of Cauchy's kernel of a color, beside [`CAUCHY_WIDTH`] standard deviations.
+    /// Width of Cauchy's kernel of a color in units of [`CAUCHY_WIDTH`] standard deviations.
     pub kernel_scale: f64,
     /// How many independent measurements the pixels amount to: the errors of shading, texture and
     /// segmentation reach over whole patches.

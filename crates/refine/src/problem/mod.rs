@@ -30,6 +30,5 @@ pub use rows::{Row, Rows};
 pub(crate) use scaled_cholesky::ScaledCholesky;
 pub use state::{Block, State};
 
-/// Part of the diagonal that is added to a Gauss–Newton matrix before it is inverted: what nothing is known of must not be
-/// infinite.
+/// Part of the diagonal that is added to a symmetric matrix before it is inverted: what nothing is known of must not be infinite.
 pub(crate) const RIDGE: f64 = 1e-9;

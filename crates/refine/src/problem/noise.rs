@@ -37,9 +37,9 @@ impl NoiseModel {
         Self { sigma, kernel, effective_samples }
     }
 
-    /// With this standard deviation, and a kernel as wide as before.
+    /// With this standard deviation, and a kernel of as many of them as before.
     pub(crate) fn with_sigma(self, sigma: f64) -> Self {
-        Self { sigma, ..self }
+        Self { sigma, ..self.widened(sigma / self.sigma) }
     }
 
     /// With a kernel `factor` times as wide: graduated non-convexity (Blake and Zisserman, 1987).

@@ -69,7 +69,7 @@ impl Evidence {
     }
 }
 
-/// `items` in a random order: every beginning is spread over all of them.
+/// `items` in a pseudorandom order that is always the same: beginnings are spread over all of them.
 fn shuffled<T>(items: Vec<T>) -> Vec<T> {
     let mut random = SplitMix64::new(0);
     let mut keyed: Vec<(f64, T)> = items.into_iter().map(|item| (random.uniform(), item)).collect();

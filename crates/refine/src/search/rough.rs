@@ -9,7 +9,7 @@ use super::distance_lattice::DistanceLattice;
 use super::evidence::Evidence;
 use crate::scene::Object;
 
-/// Damping of a step: what is left open by a few points must not lead far.
+/// Damping of a step, as a part of the mean curvature: what is left open by a few points must not lead far.
 const DAMPING: f64 = 0.03;
 
 /// An object and what is known of where it is.
@@ -113,9 +113,9 @@ impl CoarseScorer<'_> {
         evidence.points[..used].iter().for_each(|(p, _)| add(p, share(used), false));
         let touched = share(evidence.touched.len());
         evidence.touched.iter().for_each(|p| add(p, touched, false));
-        let outside =
-            evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points.max(1)).max(1));
-        let weight = share(points.min(evidence.outside.len()));
+        let stride = evidence.outside.len().div_ceil(points).max(1);
+        let outside = evidence.outside.iter().step_by(stride);
+        let weight = share(outside.len());
         outside.for_each(|p| add(p, weight, true));
         sum
     }

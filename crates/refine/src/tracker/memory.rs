@@ -16,7 +16,7 @@ use crate::scene::CameraCalibrationError;
 const GROWTH: f64 = 0.02;
 
 /// Frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than before.
-const LONG: u32 = 6;
+const PERIOD: u32 = 6;
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
@@ -118,12 +118,12 @@ impl TrackState {
 
     /// Whether colors are to be learnt from this frame: they change slowly.
     pub(super) fn is_time_to_learn(&self) -> bool {
-        self.followed.is_multiple_of(LONG)
+        self.followed.is_multiple_of(PERIOD)
     }
 
     /// Whether it was lost for so long that much may have happened to it.
     pub(super) fn is_long_lost(&self) -> bool {
-        self.misses >= LONG
+        self.misses >= PERIOD
     }
 
     /// Whether it is time to look for an object that is lost, and `seen` where it should be or not: often at first, where it comes into sight, and
@@ -132,7 +132,7 @@ impl TrackState {
         if seen && self.unseen {
             return true;
         }
-        self.misses.is_multiple_of(LONG) || self.misses.is_power_of_two() && self.misses < LONG
+        self.misses.is_multiple_of(PERIOD) || self.misses.is_power_of_two() && self.misses < PERIOD
     }
 
     /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.
@@ -186,7 +186,7 @@ impl TrackState {
         };
         let rest = with_hand * self.state.t_cam_object;
         let center = (rest * self.state.object_center).coords;
-        let coasting = settings.time_constant * (1.0 - kept);
+        let coasting = -settings.time_constant * (-seconds / settings.time_constant).exp_m1();
         let mut state = nominal.clone();
         state.t_cam_object = perturb_about(&rest, &center, &(velocity * coasting));
         if in_hand {

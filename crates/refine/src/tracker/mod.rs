@@ -109,7 +109,7 @@ impl Solved {
     }
 }
 
-/// Part of the way that running means go to the next value: they remember some ten frames.
+/// Part of the way that running means go to the next value.
 const GAIN: f32 = 0.1;
 
 impl Tracker {

@@ -10,7 +10,7 @@ use crate::error::RefineError;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
-/// What is known of how an object moves from frame to frame.
+/// What is known of how an object moves from frame to frame; in files, all of it or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessNoise {
@@ -24,7 +24,7 @@ pub struct ProcessNoise {
 
 /// When a pose is not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct GatingSettings {
     /// The cost may be so many times its running mean,
     pub cost_ratio: f64,
@@ -36,6 +36,18 @@ pub struct GatingSettings {
     pub max_sigma: f64,
     /// Share of the pixels that should show an object that was found again that must do so; half of it where it was expected.
     pub least_shown: f64,
+}
+
+impl Default for GatingSettings {
+    fn default() -> Self {
+        Self {
+            cost_ratio: 2.5,
+            cost_margin: 40.0,
+            innovation_gate: 8.0,
+            max_sigma: 12e-3,
+            least_shown: 0.5,
+        }
+    }
 }
 
 /// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
@@ -125,13 +137,7 @@ impl Default for TrackerSettings {
             keyframe: KeyframeSettings::default(),
             turn_sigma: 0.8f64.to_radians(),
             budget: None,
-            gating: GatingSettings {
-                cost_ratio: 2.5,
-                cost_margin: 40.0,
-                innovation_gate: 8.0,
-                max_sigma: 12e-3,
-                least_shown: 0.5,
-            },
+            gating: GatingSettings::default(),
             recovery: Recovery::Anywhere,
             search: SearchSettings::default(),
         }
@@ -162,6 +168,12 @@ impl TrackerSettings {
             if value.is_nan() || value <= 0.0 {
                 return Err(RefineError::Setting { name, problem: format!("is {value}") });
             }
+        }
+        if self.time_constant.is_infinite() {
+            return Err(RefineError::Setting {
+                name: "time_constant",
+                problem: "is infinite".into(),
+            });
         }
         for (name, gain) in [("in_hand.gain", self.in_hand.gain), ("free.gain", self.free.gain)] {
             if !(0.0..=1.0).contains(&gain) {

@@ -10,12 +10,12 @@ use prehend_refine::baselines::{
 };
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::factor::{
-    ContactSettings, FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor,
-    HandDepthSettings, PenetrationFactor, PenetrationSettings, PointToPlaneFactor,
-    PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings, SupportFactor,
-    SupportSettings, TactileFactor, TactileSettings, TouchModel,
+    FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor, HandDepthSettings,
+    PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
+    PriorSettings, RenderingFactor, RenderingSettings, SupportFactor, SupportSettings,
+    TactileFactor, TactileSettings, TouchModel,
 };
-use prehend_refine::problem::{Block, NormalEquations, Problem, Solver, Termination};
+use prehend_refine::problem::{Block, NoiseModel, NormalEquations, Problem, Solver, Termination};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::{Factor, Frame, RefineError, State};
 
@@ -29,8 +29,8 @@ fn frame() -> Frame<'static> {
 const UNITS: [f64; 6] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0];
 
 fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
-    let touch = TouchModel::Contacts(ContactSettings::default());
-    let contacts = TactileSettings { touch, ..TactileSettings::default() };
+    let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
+    let taxels = TactileSettings { touch, ..TactileSettings::default() };
     Ok(vec![
         Arc::new(ChamferDepthFactor::new(frame, &ChamferDepthSettings::default())?),
         Arc::new(FreeSpaceFactor::new(frame, &FreeSpaceSettings::default())),
@@ -41,7 +41,7 @@ fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineE
         Arc::new(StabilityFactor::new(frame, state, StabilitySettings::default())?),
         Arc::new(SupportFactor::new(frame, &SupportSettings::default())?),
         Arc::new(TactileFactor::new(frame, &TactileSettings::default())?),
-        Arc::new(TactileFactor::new(frame, &contacts)?),
+        Arc::new(TactileFactor::new(frame, &taxels)?),
         Arc::new(GaussianPrior::independent(state.clone(), &PriorSettings::default())?),
     ])
 }

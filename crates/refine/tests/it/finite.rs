@@ -11,12 +11,12 @@ use prehend_refine::evaluate::metrics::{
     PoseScore, ScoredModel, ScoredRow, oe_deg, oe_symmetric_deg, pe_cm, summarize,
 };
 use prehend_refine::factor::{
-    ContactSettings, FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor,
-    HandDepthSettings, PenetrationFactor, PenetrationSettings, PointToPlaneFactor,
-    PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings, SupportFactor,
-    SupportSettings, TactileFactor, TactileSettings, TouchModel,
+    FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor, HandDepthSettings,
+    PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
+    PriorSettings, RenderingFactor, RenderingSettings, SupportFactor, SupportSettings,
+    TactileFactor, TactileSettings, TouchModel,
 };
-use prehend_refine::problem::{Block, NormalEquations};
+use prehend_refine::problem::{Block, NoiseModel, NormalEquations};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_refine::strategy::Posterior;
@@ -165,8 +165,8 @@ fn factors(frame: &Frame<'_>, state: &State) -> Vec<Made> {
     fn made<F: Factor + 'static>(factor: Result<F, RefineError>) -> Made {
         factor.map(|factor| Arc::new(factor) as _)
     }
-    let touch = TouchModel::Contacts(ContactSettings::default());
-    let contacts = TactileSettings { touch, ..TactileSettings::default() };
+    let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
+    let taxels = TactileSettings { touch, ..TactileSettings::default() };
     vec![
         made(ChamferDepthFactor::new(frame, &ChamferDepthSettings::default())),
         made(Ok(FreeSpaceFactor::new(frame, &FreeSpaceSettings::default()))),
@@ -177,7 +177,7 @@ fn factors(frame: &Frame<'_>, state: &State) -> Vec<Made> {
         made(StabilityFactor::new(frame, state, StabilitySettings::default())),
         made(SupportFactor::new(frame, &SupportSettings::default())),
         made(TactileFactor::new(frame, &TactileSettings::default())),
-        made(TactileFactor::new(frame, &contacts)),
+        made(TactileFactor::new(frame, &taxels)),
         made(GaussianPrior::independent(state.clone(), &PriorSettings::default())),
     ]
 }

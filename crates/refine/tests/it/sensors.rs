@@ -80,7 +80,6 @@ fn touch_of_every_kind_ties_the_object_to_the_hand() {
     let [.., alone] = mean_errors(&[Extra::ColorAlone], 6);
     for extra in [Extra::Force, Extra::Binary, Extra::Proximity, Extra::Patch] {
         let [pe, oe, from_hand] = mean_errors(&[Extra::ColorAlone, extra], 6);
-        println!("{extra:?}: {pe} {oe} {from_hand} {alone}");
         assert!(
             pe < 0.3 && oe < 2.0 && from_hand < alone,
             "{extra:?}: {pe} {oe} {from_hand} {alone}"

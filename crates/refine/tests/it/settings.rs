@@ -19,6 +19,8 @@ fn what_a_file_leaves_out_is_usual() {
     (expected.scales.common, expected.scales.own, expected.scales.noise) = (0.0, 0.0, 0.0);
     expected.prior.joints = 0.02;
     assert_eq!(settings, expected);
+    let tracker: TrackerSettings = toml::from_str("[gating]\nmax_sigma = 0.02\n").unwrap();
+    assert_eq!((tracker.gating.max_sigma, tracker.gating.cost_ratio), (0.02, 2.5));
     let error = toml::from_str::<FusedSettings>("[prior]\njoint = 0.02\n").unwrap_err();
     assert!(error.to_string().contains("joint"), "{error}");
 }

@@ -153,7 +153,8 @@ impl PointToPlaneFactor {
             let smooth: Vector3<f64> =
                 corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
             let facing = facing(&(state.t_cam_object * smooth), &surface);
-            let away = if distance.abs() > f64::EPSILON { offset / distance } else { normal };
+            let away =
+                if distance.abs() > f64::EPSILON.sqrt() { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
         self.points.par_iter().with_min_len(TASK).map(residual).collect()

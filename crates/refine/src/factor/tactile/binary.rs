@@ -1,8 +1,8 @@
 //! Touch without forces: places of the skin that are touched, and others that are not.
 
-use serde::{Deserialize, Serialize};
-
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::probes::{Distance, Probe, Probes};
 use super::{NO_CONTACT_SIGMA, TOUCH_SAMPLES};

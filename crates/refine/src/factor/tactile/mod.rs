@@ -163,8 +163,8 @@ mod tests {
     #[test]
     fn gradients_match_differences() {
         let default = TactileSettings::default();
-        let contacts = TouchModel::Contacts(ContactSettings::default());
-        for touch in [default.touch.clone(), contacts] {
+        let taxels = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
+        for touch in [default.touch.clone(), taxels] {
             let settings = TactileSettings { touch, ..default.clone() };
             for seed in 0..3 {
                 let (frame, state) = fixture(seed);
@@ -180,9 +180,9 @@ mod tests {
     fn forces_of_which_nothing_is_known_say_nothing() {
         let scene = scene();
         let mut observation = scene.observation.clone();
-        let taxels = TactileSettings::default();
-        let touch = TouchModel::Contacts(ContactSettings::default());
-        let contacts = TactileSettings { touch, ..taxels.clone() };
+        let contacts = TactileSettings::default();
+        let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
+        let taxels = TactileSettings { touch, ..contacts.clone() };
         let probes = |observation: &Observation, settings: &TactileSettings| {
             let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
             TactileFactor::new(&frame, settings).unwrap().0.probes.len()

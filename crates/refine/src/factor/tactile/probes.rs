@@ -69,7 +69,7 @@ impl Probes {
         }
         let along = (local - closest.point) * distance.signum();
         let outward = along
-            .try_normalize(f64::EPSILON)
+            .try_normalize(f64::EPSILON.sqrt())
             .map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
         Some(Measured { distance, outward, point })
     }

@@ -1,8 +1,8 @@
 //! Proximity: how far the object is from places of the skin.
 
-use serde::{Deserialize, Serialize};
-
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::TOUCH_SAMPLES;
 use super::probes::{Distance, Probe, Probes};
@@ -50,8 +50,7 @@ impl ProximityFactor {
         let readings: Vec<ProximityReading> = readings.flatten().copied().collect();
         let probe = |&ProximityReading { link, position, distance }: &ProximityReading| {
             let sigma = settings.noise.sigma.hypot(settings.relative * distance);
-            let noise = NoiseModel { sigma, ..settings.noise };
-            let weighting = noise.weighting(readings.len());
+            let weighting = settings.noise.with_sigma(sigma).weighting(readings.len());
             Probe { link, position, distance: Distance::Is(distance), weighting }
         };
         let probes = readings.iter().map(probe).collect();

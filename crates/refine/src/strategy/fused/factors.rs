@@ -189,7 +189,7 @@ fn other_factors(
         }
         tactile.no_contact = blurred(tactile.no_contact);
         if !inactive {
-            tactile.no_contact = tactile.no_contact.with_sigma(f64::INFINITY);
+            tactile.no_contact.sigma = f64::INFINITY;
         }
         factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
     }

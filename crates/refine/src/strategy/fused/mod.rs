@@ -224,8 +224,12 @@ impl Strategy for Fused {
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
-        if self.settings.stages.is_empty() {
+        let FusedSettings { stages, rendering, .. } = &self.settings;
+        if stages.is_empty() {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
+        }
+        if rendering.downsample == 0 || stages.iter().any(|stage| stage.downsample == 0) {
+            return Err(RefineError::Setting { name: "downsample", problem: "is zero".into() });
         }
         Run::new(self, frame, initial)?.finish(observe)
     }

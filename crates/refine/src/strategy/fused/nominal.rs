@@ -3,6 +3,8 @@
 use thiserror::Error;
 
 use super::FusedSettings;
+use crate::factor::TouchModel;
+use crate::problem::NoiseModel;
 
 /// Why a nominal size is not taken.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -62,12 +64,16 @@ const SIZES: [(&str, Quantity, Field); 15] = [
     ("view.translation", Quantity::Length, |s| Some(&mut s.prior.view_translation)),
     ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
     ("model", Quantity::Length, |s| Some(&mut s.model.gp_sigma)),
-    ("touch", Quantity::Length, |s| match &mut s.tactile.touch {
-        crate::factor::TouchModel::Contacts(contacts) => Some(&mut contacts.noise.sigma),
-        crate::factor::TouchModel::Taxels(noise) => Some(&mut noise.sigma),
-        crate::factor::TouchModel::Nothing => None,
-    }),
+    ("touch", Quantity::Length, |s| touch_noise(s).map(|noise| &mut noise.sigma)),
 ];
+
+fn touch_noise(settings: &mut FusedSettings) -> Option<&mut NoiseModel> {
+    match &mut settings.tactile.touch {
+        TouchModel::Contacts(contacts) => Some(&mut contacts.noise),
+        TouchModel::Taxels(noise) => Some(noise),
+        TouchModel::Nothing => None,
+    }
+}
 
 /// Standard deviation of what is exact, as a share of the nominal one.
 const EXACT: f64 = 1e-4;
@@ -110,8 +116,16 @@ impl FusedSettings {
             value: value.to_owned(),
             units: units.iter().map(|known| known.0).filter(|unit| !unit.is_empty()).collect(),
         })?;
-        if let Some(field) = field(self) {
-            *field = if size > 0.0 { size } else { EXACT * *field };
+        let Some(field) = field(self) else { return Ok(()) };
+        let before = std::mem::replace(field, if size > 0.0 { size } else { EXACT * *field });
+        // What is forgiven beyond larger errors begins farther out; exact data may have the outliers that they had.
+        let noise = match name {
+            "depth.noise" => Some(&mut self.depth.noise),
+            "touch" => touch_noise(self),
+            _ => None,
+        };
+        if let Some(noise) = noise {
+            *noise = noise.widened((noise.sigma / before).max(1.0));
         }
         Ok(())
     }

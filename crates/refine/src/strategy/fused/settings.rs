@@ -182,8 +182,8 @@ pub struct FusedSettings {
     pub model: ModelErrorSettings,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
-    /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
-    /// [`Stage::measured_noise`] and where calibrations are exact.
+    /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured in stages with
+    /// [`Stage::measured_noise`], from this number of points; stages have a number of their own.
     pub depth: PointToPlaneSettings,
     /// Depth on the hand.
     pub hand_depth: HandDepthSettings,

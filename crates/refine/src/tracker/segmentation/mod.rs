@@ -26,7 +26,7 @@ const COLOR_LIMIT: f32 = 2.0;
 const OTHERS_COLOR: f32 = -0.5 * COLOR_LIMIT;
 /// Pixels that are needed to judge by.
 const ENOUGH: f32 = 30.0;
-/// Share of the pixels that should show the object below which nothing is judged by them, and of its largest part below which another is none.
+/// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
 const LEAST_SHARE: f32 = 0.1;
 /// How often a mask errs at least.
 const MASK_ERROR: f32 = 0.02;

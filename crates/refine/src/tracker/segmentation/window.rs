@@ -238,7 +238,7 @@ impl Pixel {
         }
     }
 
-    /// Whether no color and no mask could make this pixel the object's: beyond its outline, and far from it in depth.
+    /// Whether this pixel is left out whatever its color and masks: beyond the object's outline, and far from it in depth.
     pub(super) fn is_elsewhere(&self) -> bool {
         let off = (self.sensor - self.object).abs();
         self.share == 0.0 && self.sensor > 0.0 && off > OFF_OBJECT
