@@ -8,6 +8,7 @@ use prehend_geometry::KdTree;
 use prehend_render::{Camera, DepthImage};
 use rayon::prelude::*;
 
+use super::wide;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
@@ -23,7 +24,7 @@ pub struct ChamferDepthSettings {
 
 impl Default for ChamferDepthSettings {
     fn default() -> Self {
-        Self { points: 1500, noise: NoiseModel::cauchy(4e-3, 200.0) }
+        Self { points: 1500, noise: wide(1.5e-3, 10e-3, 200.0) }
     }
 }
 

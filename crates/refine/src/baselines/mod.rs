@@ -13,8 +13,13 @@ pub use self::icp::Icp;
 pub use self::robust_icp::RobustIcp;
 pub use self::stability::{StabilityFactor, StabilitySettings};
 use crate::factor::{RenderingSettings, TactileSettings, TouchModel};
-use crate::problem::NoiseModel;
+use crate::problem::{CAUCHY_WIDTH, NoiseModel};
 use crate::scene::Occluders;
+
+/// Residuals of standard deviation `sigma` with Cauchy's kernel of this `width`, wide enough for steps from far away: there is no way from coarse to fine.
+fn wide(sigma: f64, width: f64, effective_samples: f64) -> NoiseModel {
+    NoiseModel::cauchy(sigma, effective_samples).widened(width / (CAUCHY_WIDTH * sigma))
+}
 
 /// Color and silhouette as the paper has them: what hides the object is the hand, and nothing else.
 fn rendering_settings() -> RenderingSettings {
@@ -22,6 +27,7 @@ fn rendering_settings() -> RenderingSettings {
         downsample: 2,
         occluders: Occluders::Hand,
         mask_sigma: 0.3,
+        kernel_scale: 2.0 / CAUCHY_WIDTH,
         effective_pixels: 200.0,
         ..RenderingSettings::default()
     }
@@ -29,6 +35,7 @@ fn rendering_settings() -> RenderingSettings {
 
 /// Touch as the paper has it: every touched taxel is on the surface.
 fn tactile_settings() -> TactileSettings {
-    let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
-    TactileSettings { touch, ..TactileSettings::default() }
+    let touch = TouchModel::Taxels(wide(3e-3, 10e-3, 8.0));
+    let no_contact = wide(1e-3, 10e-3, f64::INFINITY);
+    TactileSettings { touch, no_contact, ..TactileSettings::default() }
 }
