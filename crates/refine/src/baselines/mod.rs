@@ -12,13 +12,16 @@ pub use self::heuristic::{GradientKind, Heuristic};
 pub use self::icp::Icp;
 pub use self::robust_icp::RobustIcp;
 pub use self::stability::{StabilityFactor, StabilitySettings};
+
+use prehend_geometry::RobustKernel;
+
 use crate::factor::{RenderingSettings, TactileSettings, TouchModel};
 use crate::problem::{CAUCHY_WIDTH, NoiseModel};
 use crate::scene::Occluders;
 
 /// Residuals of standard deviation `sigma` with Cauchy's kernel of this `width`, wide enough for steps from far away: there is no way from coarse to fine.
 fn wide(sigma: f64, width: f64, effective_samples: f64) -> NoiseModel {
-    NoiseModel::cauchy(sigma, effective_samples).widened(width / (CAUCHY_WIDTH * sigma))
+    NoiseModel { sigma, kernel: RobustKernel::Cauchy { scale: width }, effective_samples }
 }
 
 /// Color and silhouette as the paper has them: what hides the object is the hand, and nothing else.

@@ -175,14 +175,9 @@ impl Rig {
             .objects
             .values()
             .flat_map(|object| object.coefficients.iter().chain(&object.covariance));
-        let numbers = self
-            .values()
-            .iter()
-            .chain(&self.covariance)
-            .chain(coefficients)
-            .copied()
-            .collect::<Vec<_>>();
-        if !numbers.into_iter().all(f64::is_finite) {
+        let parameters = self.values();
+        let mut numbers = parameters.iter().chain(&self.covariance).chain(coefficients);
+        if !numbers.all(|number| number.is_finite()) {
             return Err(DatasetError::unusable(file, "the rig is not finite, and was not written"));
         }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
