@@ -67,7 +67,11 @@ fn main() -> anyhow::Result<()> {
     let trial = |&(row, turn): &(&ResultRow, &'static str)| -> anyhow::Result<Outcome> {
         let &ResultRow { scene_id, im_id, obj_id, .. } = row;
         let target = Target { scene_id, im_id, obj_id, instance: 0 };
-        let input = assets.lock().unwrap_or_else(PoisonError::into_inner).load(&target, &[])?;
+        let input = assets.lock().unwrap_or_else(PoisonError::into_inner).load_at(
+            &target,
+            &row.t_cam_model,
+            &[],
+        )?;
         let frame = Frame::new(&input.observation, &input.object, input.hand.as_ref())?;
         let initial = turned(&row.t_cam_model, &input.object, turn);
         let found = refine(&frame, &initial, &Fused::default())?;

@@ -347,7 +347,7 @@ mod tests {
                 Method::Fused(fused) => {
                     assert!(fused.settings.stages.iter().all(|s| s.solver.iterations == 7));
                     // What is counted are stages.
-                    assert_eq!(method.iterations(), 5);
+                    assert_eq!(method.iterations(), 4);
                 }
                 other => assert_eq!(other.iterations(), 7),
             }

@@ -22,6 +22,7 @@ pub mod light;
 mod look_at;
 mod mode;
 pub mod model;
+mod outline;
 pub mod overlay;
 mod pose_loss;
 mod posed;
@@ -52,6 +53,7 @@ pub use light::{Light, LightError, LightSample};
 pub use look_at::look_at;
 pub use mode::{ContourOptions, Mode, SoftRasOptions};
 pub use model::{ModelError, RenderModel};
+pub use outline::{OutlinePoint, outline_points};
 pub use overlay::draw_outline;
 pub use pose_loss::{
     Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss, Target,

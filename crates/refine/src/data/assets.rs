@@ -10,6 +10,7 @@ use prehend_geometry::{GridCache, TriMesh};
 use crate::baselines::GradientKind;
 use crate::data::bop::{BodyKind, Dataset, DatasetError, Frame, Models, SceneBodies};
 use crate::data::guard::Panicked;
+use crate::data::mask_choice::mask_at;
 use crate::data::robots::Robots;
 use crate::data::targets::Target;
 use crate::error::RefineError;
@@ -223,10 +224,39 @@ impl<'a> Assets<'a> {
     /// # Errors
     /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
     pub fn load(&mut self, target: &Target, required: &[Sensor]) -> Result<FrameInput, AssetError> {
+        self.load_with(target, required, |frame, _| {
+            frame.mask_number(target.obj_id, target.instance)
+        })
+    }
+
+    /// The same of an object that is about at `t_cam_object` \[m\]: another mask of the image than the one that is said to be its own is taken, with a warning, if
+    /// that overlaps it far better.
+    ///
+    /// # Errors
+    /// Those of [`Assets::load`].
+    pub fn load_at(
+        &mut self,
+        target: &Target,
+        t_cam_object: &Isometry3<f64>,
+        required: &[Sensor],
+    ) -> Result<FrameInput, AssetError> {
+        self.load_with(target, required, |frame, object| {
+            mask_at(frame, target, object, t_cam_object)
+        })
+    }
+
+    /// The same with the mask that `choose` says.
+    fn load_with(
+        &mut self,
+        target: &Target,
+        required: &[Sensor],
+        choose: impl FnOnce(&Frame<'_>, &Object) -> usize,
+    ) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
         let dataset = self.dataset.clone();
         let frame = dataset.frame(target.scene_id, target.im_id)?;
-        let (observation, hand) = self.observation(&frame, target.instance, required)?;
+        let mask = choose(&frame, &object);
+        let (observation, hand) = self.observation(&frame, mask, required)?;
         Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
     }
 

@@ -13,6 +13,7 @@ mod frame_file;
 mod guard;
 pub mod identity;
 mod journal;
+mod mask_choice;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 mod noise;

@@ -39,7 +39,7 @@ impl From<&PlainPose> for Isometry3<f64> {
     }
 }
 
-/// The pose \[m\] of a 4×4 matrix in row-major order. A rotation that is off by rounding only (1e-3) is replaced by the nearest one.
+/// The pose \[m\] of a 4×4 matrix in row-major order. A rotation that is up to 0.02 from orthonormal is replaced by the nearest one.
 ///
 /// # Errors
 /// What is wrong with a matrix that is no pose.

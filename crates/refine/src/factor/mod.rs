@@ -7,6 +7,7 @@ mod patch_sums;
 mod penetration;
 mod point_to_plane;
 mod prior;
+mod region;
 mod rendering;
 mod support;
 mod tactile;
@@ -19,6 +20,8 @@ pub(crate) use point_to_plane::NoiseEstimate;
 pub use point_to_plane::{PointToPlaneFactor, PointToPlaneSettings};
 pub(crate) use prior::Layout;
 pub use prior::{GaussianPrior, PriorSettings};
+pub(crate) use region::{ColorHistogram, color_index};
+pub use region::{RegionFactor, RegionSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
 pub use support::{SupportFactor, SupportSettings};
 pub use tactile::{

@@ -190,12 +190,7 @@ impl RenderingFactor {
 
     /// The cost at `state` and its derivatives, from those by the place at which the model's center is seen.
     fn add_tiles(&self, state: &State, tiles: &[Tile], equations: &mut NormalEquations) -> f64 {
-        // The object is seen shifted, and turned as it is.
-        let mut seen_by_state = SMatrix::<f64, 6, 12>::zeros();
-        let place = state.camera.reprojected_jacobian(&state.center());
-        seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
-        seen_by_state.fixed_view_mut::<3, 6>(0, 6).copy_from(&place.fixed_columns::<6>(3));
-        seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+        let mut seen_by_state = seen_by_state(state);
         // States turn about the object's center, which leaves out what does not belong to its surface.
         let arm = state.t_cam_object.rotation * (self.problem.model.center() - self.object.center);
         seen_by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
@@ -221,8 +216,18 @@ fn warn(error: BackendError) {
 }
 
 /// Where the object is to a camera without calibration errors that sees it as the true one does.
-fn reprojected(state: &State) -> Isometry3<f64> {
+pub(super) fn reprojected(state: &State) -> Isometry3<f64> {
     state.camera.reprojected(&state.t_cam_object, &state.center())
+}
+
+/// Derivatives of a twist of the [`reprojected`] object about its center by object pose and camera: it is seen shifted, and turned as it is.
+pub(super) fn seen_by_state(state: &State) -> SMatrix<f64, 6, 12> {
+    let mut seen = SMatrix::<f64, 6, 12>::zeros();
+    let place = state.camera.reprojected_jacobian(&state.center());
+    seen.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
+    seen.fixed_view_mut::<3, 6>(0, 6).copy_from(&place.fixed_columns::<6>(3));
+    seen.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+    seen
 }
 
 impl Factor for RenderingFactor {

@@ -53,6 +53,8 @@ pub enum Occluders {
     Hand,
     /// The hand, and what depth shows nearer beside the mask.
     Measured,
+    /// Anything wherever the mask is not set: nothing is compared there.
+    Unmasked,
 }
 
 /// The object in an image, with what may hide it.
@@ -61,6 +63,9 @@ pub(crate) struct Segmented {
     /// Root mean square of the colors under the mask.
     pub(crate) brightness: f64,
 }
+
+/// Within how many pixels of the border of a mask colors are those of object and others mixed, and masks are shrunk or grown.
+pub(crate) const MASK_MARGIN: usize = 4;
 
 /// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
 /// object itself, where the mask falls short.
@@ -260,6 +265,7 @@ impl<'a> Frame<'a> {
                     Occluders::Hand if factor == 1 => (**self.hand_depth()).clone(),
                     Occluders::Hand => self.hand_depth().downsampled(factor),
                     Occluders::Measured => self.measured_occluder(factor),
+                    Occluders::Unmasked => self.unmasked_occluder(factor),
                 };
                 let target = Target::reduced(*camera, color, mask, factor);
                 let target = target.and_then(|target| target.with_occluder(occluder));
@@ -268,6 +274,15 @@ impl<'a> Frame<'a> {
         };
         let brightness = *self.brightness.get_or_init(|| brightness(self.observation));
         Ok(Segmented { target, brightness })
+    }
+
+    /// Depth of the hand, and of something just before the camera where the mask is not set; `factor` times smaller.
+    fn unmasked_occluder(&self, factor: usize) -> DepthImage {
+        let mask = &self.observation.mask;
+        let (width, height) = (mask.width(), mask.height());
+        let (hand, inner) = (self.hand_depth().pixels(), eroded(width, mask.pixels(), MASK_MARGIN));
+        let nearest = |at: usize| if inner[at] { hand[at] } else { f32::MIN_POSITIVE };
+        DepthImage::downsampled_of(width, height, factor, [0..width, 0..height], nearest)
     }
 
     /// Depth of the hand and of what was measured beside the mask, whichever is nearer; `factor` times smaller.
@@ -285,6 +300,31 @@ impl<'a> Frame<'a> {
         };
         DepthImage::downsampled_of(width, height, factor, within, nearest)
     }
+}
+
+/// Of an image of `width` columns the pixels whose neighbors up to `reach` columns and rows away are all set.
+pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
+    let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
+    let height = set.len() / width.max(1);
+    for y in 0..height {
+        let mut run = 0;
+        for x in 0..width {
+            run = if set[y * width + x] { run + 1 } else { 0 };
+            if run > 2 * reach {
+                rows[y * width + x - reach] = true;
+            }
+        }
+    }
+    let mut runs = vec![0; width];
+    for y in 0..height {
+        for (x, run) in runs.iter_mut().enumerate() {
+            *run = if rows[y * width + x] { *run + 1 } else { 0 };
+            if *run > 2 * reach {
+                all[(y - reach) * width + x] = true;
+            }
+        }
+    }
+    all
 }
 
 /// Root mean square of the colors under the mask; never zero.

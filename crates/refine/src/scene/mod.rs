@@ -14,8 +14,8 @@ mod view;
 
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
 pub use example::{Scene, default_scene};
-pub(crate) use frame::draw_hand_depth;
 pub use frame::{CameraView, Frame, Occluders};
+pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded};
 pub use hand::Hand;
 pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose};

@@ -164,6 +164,11 @@ impl Observation {
         let first = colors.next();
         colors.any(|color| Some(color) != first)
     }
+
+    /// Whether any depth was measured.
+    pub(crate) fn has_depth(&self) -> bool {
+        self.depth.pixels().iter().any(|z| *z > 0.0)
+    }
 }
 
 /// Magnitudes of gravity on solid ground, from small moons up, with room to spare \[m/s²\].

@@ -12,8 +12,8 @@ use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::factor::{
     FreeSpaceFactor, FreeSpaceSettings, GaussianPrior, HandDepthFactor, HandDepthSettings,
     PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
-    PriorSettings, RenderingFactor, RenderingSettings, SupportFactor, SupportSettings,
-    TactileFactor, TactileSettings, TouchModel,
+    PriorSettings, RegionFactor, RegionSettings, RenderingFactor, RenderingSettings, SupportFactor,
+    SupportSettings, TactileFactor, TactileSettings, TouchModel,
 };
 use prehend_refine::problem::{Block, NoiseModel, NormalEquations, Problem, Solver, Termination};
 use prehend_refine::scene::{Scene, default_scene};
@@ -37,6 +37,7 @@ fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineE
         Arc::new(HandDepthFactor::new(frame, &HandDepthSettings::default())?),
         Arc::new(PenetrationFactor::new(frame, &PenetrationSettings::default())?),
         Arc::new(PointToPlaneFactor::new(frame, &PointToPlaneSettings::default())?),
+        Arc::new(RegionFactor::new(frame, &RegionSettings::default())?),
         Arc::new(RenderingFactor::new(frame, &RenderingSettings::default())?),
         Arc::new(StabilityFactor::new(frame, state, StabilitySettings::default())?),
         Arc::new(SupportFactor::new(frame, &SupportSettings::default())?),

@@ -34,6 +34,8 @@ pub struct Scene {
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
+    /// Read for which object each mask is of, and nothing else.
+    pub(super) objects: JsonFile,
     pub(super) remaps: Arc<RemapCache>,
     pub(super) depth_remaps: Arc<RemapCache>,
     /// Images by the name of the rig that took them together.
@@ -155,6 +157,7 @@ impl Scene {
             camera: JsonFile::new(dir.join("scene_camera.json")),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
+            objects: JsonFile::new(dir.join("scene_gt.json")),
             remaps: Arc::default(),
             depth_remaps: Arc::default(),
             rigs: OnceLock::new(),

@@ -61,6 +61,12 @@ struct PlaceEntry {
     translation: Option<Numbers<3>>,
 }
 
+/// What `scene_gt.json` says of a mask.
+#[derive(Deserialize)]
+struct ListedObject {
+    obj_id: u32,
+}
+
 /// What `cam_K` says of a camera of unknown size.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Numbers<9>")]
@@ -87,6 +93,7 @@ impl Dataset {
         if lens.is_none() && self.camera.exists() {
             lens = self.camera.field("cam_dist")?;
         }
+        scene.camera.check_rotations(entry.depth_rotation.iter());
         let depth_camera = DepthCamera::new(
             entry.depth_intrinsics.map(|k| k.0),
             entry.depth_lens.map(|lens| lens.0),
@@ -195,13 +202,38 @@ impl Frame<'_> {
         }
     }
 
-    /// Reads the mask of an object's visible part.
-    ///
-    /// Mask files are numbered by the order of the objects in the ground truth, which estimators must not
-    /// read. So the only mask of an image is taken for any `instance`; among several, the one whose number
-    /// is `instance`, the index of the object's row among that image's rows of the results file
-    /// ([`super::ReadResults::instances`]). Results for images with several masks must list the objects in
-    /// the order of the masks.
+    /// The number of the mask of the object `obj_id`. Masks are numbered as `scene_gt.json` lists the objects, of which nothing else is read. Of several
+    /// such objects it is that of `instance`, the index of the object's row among that image's rows of the results file
+    /// ([`super::ReadResults::instances`]), if it is one of them, and else the one after so many. Without such a list it is `instance`.
+    pub fn mask_number(&self, obj_id: u32, instance: usize) -> usize {
+        let Ok(listed) = self.scene.objects.entry::<Vec<ListedObject>>(self.im_id) else {
+            return instance;
+        };
+        let same = |(_, listed): &(usize, ListedObject)| listed.obj_id == obj_id;
+        let numbers: Vec<usize> =
+            listed.into_iter().enumerate().filter(same).map(|(k, _)| k).collect();
+        match numbers.contains(&instance) {
+            true => instance,
+            false => numbers.get(instance).or(numbers.first()).copied().unwrap_or(instance),
+        }
+    }
+
+    /// The numbers of the image's masks, in order.
+    pub(crate) fn mask_numbers(&self) -> Vec<usize> {
+        let files = fs::read_dir(self.scene.dir().join("mask_visib"));
+        let prefix = format!("{:06}_", self.im_id);
+        let number = |file: fs::DirEntry| {
+            let is_own = file.file_name().to_str()?.starts_with(&prefix);
+            mask_number(&file.path()).filter(|_| is_own)
+        };
+        let mut numbers: Vec<usize> =
+            files.into_iter().flatten().flatten().filter_map(number).collect();
+        numbers.sort_unstable();
+        numbers
+    }
+
+    /// Reads the mask of an object's visible part: the only one of an image whatever its number, among several the one of this number
+    /// ([`mask_number`](Self::mask_number)).
     ///
     /// # Errors
     /// When it is absent, does not decode, or no pixel is set.
@@ -357,6 +389,7 @@ impl Frame<'_> {
     /// World → camera \[m\].
     fn place(&self) -> Result<Isometry3<f64>, DatasetError> {
         let PlaceEntry { rotation, translation } = self.scene.camera.entry(self.im_id)?;
+        self.scene.camera.check_rotations(rotation.iter());
         let lacks = |name| self.scene.camera.fault(&self.im_id.to_string(), &missing(name));
         let rotation = rotation.ok_or_else(|| lacks("cam_R_w2c"))?;
         let translation = translation.ok_or_else(|| lacks("cam_t_w2c"))?;

@@ -74,7 +74,9 @@ impl<'a> GroundTruth<'a> {
     /// # Errors
     /// When `scene_gt.json` is absent or broken, or lacks the image or one of its fields.
     pub fn objects(&self, scene_id: u32, im_id: u32) -> Result<Vec<TrueObject>, DatasetError> {
-        let entries: Vec<ObjectEntry> = self.scene(scene_id)?.objects.entry(im_id)?;
+        let file = &self.scene(scene_id)?.objects;
+        let entries: Vec<ObjectEntry> = file.entry(im_id)?;
+        file.check_rotations(entries.iter().map(|entry| &entry.rotation));
         let object = |ObjectEntry { obj_id, rotation, translation }| {
             let translation = translation_from_mm(&translation.0);
             TrueObject { obj_id, t_cam_model: Isometry3::from_parts(translation, rotation.0) }

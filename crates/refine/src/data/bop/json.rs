@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::UnitQuaternion;
 use serde::Deserialize;
@@ -14,7 +15,9 @@ use serde_json::Value;
 use super::entries::Entries;
 use super::error::DatasetError;
 use super::files::read_bytes;
-use super::pose::{exactly, require_in_range, rotation_from_row_major};
+use super::pose::{
+    deviation_from_rotation, exactly, require_in_range, rotation_from_row_major, rotations_off,
+};
 use super::unique::parse_json;
 
 /// A JSON file whose top level is an object; it is read once, when something of it is first asked for.
@@ -22,11 +25,13 @@ use super::unique::parse_json;
 pub(super) struct JsonFile {
     path: PathBuf,
     root: OnceLock<Result<Entries, DatasetError>>,
+    /// Whether a user was told that rotations of the file are not quite orthonormal.
+    is_told: AtomicBool,
 }
 
 impl JsonFile {
     pub(super) fn new(path: PathBuf) -> Self {
-        Self { path, root: OnceLock::new() }
+        Self { path, root: OnceLock::new(), is_told: AtomicBool::new(false) }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -100,6 +105,14 @@ impl JsonFile {
                 named.map(|(k, value)| one(format!("{key}[{k}]"), value)).collect()
             }
             (key, value) => Ok(vec![one(key, value)?]),
+        }
+    }
+
+    /// Warns, once a file, of rotations that are not quite orthonormal.
+    pub(super) fn check_rotations<'r>(&self, rotations: impl Iterator<Item = &'r Rotation>) {
+        let largest = rotations.filter_map(|rotation| rotation.1).reduce(f64::max);
+        if let Some(deviation) = largest.filter(|_| !self.is_told.swap(true, Ordering::Relaxed)) {
+            log::warn!("{}", rotations_off(&self.path, deviation));
         }
     }
 
@@ -258,13 +271,18 @@ impl TryFrom<f64> for Positive {
 /// A rotation of nine row-major entries.
 #[derive(Deserialize)]
 #[serde(try_from = "Numbers<9>")]
-pub(crate) struct Rotation(pub(crate) UnitQuaternion<f64>);
+pub(crate) struct Rotation(
+    pub(crate) UnitQuaternion<f64>,
+    /// How far the matrix was from orthonormal, where that was more than rounding.
+    pub(crate) Option<f64>,
+);
 
 impl TryFrom<Numbers<9>> for Rotation {
     type Error = String;
 
     fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
-        rotation_from_row_major(&numbers.0).map(Self)
+        let rotation = rotation_from_row_major(&numbers.0)?;
+        Ok(Self(rotation, deviation_from_rotation(&numbers.0)))
     }
 }
 

@@ -10,7 +10,10 @@ use prehend_geometry::plain_target;
 
 use super::error::DatasetError;
 use super::files::{read_bytes, write_atomically};
-use super::pose::{parse_numbers, pose_from_bop, rotation_to_row_major, translation_to_mm};
+use super::pose::{
+    deviation_from_rotation, parse_numbers, pose_from_bop, rotation_to_row_major, rotations_off,
+    translation_to_mm,
+};
 
 const COLUMNS: [&str; 7] = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"];
 
@@ -47,7 +50,7 @@ pub struct ReadResults {
 }
 
 /// Reads a results file (`scene_id,im_id,obj_id,score,R,t,time`; R row-major, t in mm). The header may
-/// be absent. A rotation that is off by rounding only (1e-3) is replaced by the nearest rotation.
+/// be absent. Rotations that are up to 0.02 from orthonormal are replaced by the nearest ones, with one warning a file where that is more than rounding.
 ///
 /// # Errors
 /// When the file cannot be read at all or is empty; malformed rows are listed in [`ReadResults::errors`] and the
@@ -65,6 +68,7 @@ pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let mut results = ReadResults::default();
+    let mut off: Option<f64> = None;
     let mut rows_of_image: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     for (index, record) in reader.into_records().enumerate() {
         let record = record.map_err(|e| DatasetError::unusable(file, e))?;
@@ -79,7 +83,8 @@ pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
         });
         let line = record.position().map_or(0, csv::Position::line);
         match parse_row(&fields) {
-            Ok(row) => {
+            Ok((row, deviation)) => {
+                off = deviation.into_iter().chain(off).reduce(f64::max);
                 results.rows.push(row);
                 results.instances.push(instance);
                 results.lines.push(line);
@@ -89,6 +94,9 @@ pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
             }
         }
     }
+    if let Some(deviation) = off {
+        log::warn!("{}", rotations_off(file, deviation));
+    }
     Ok(results)
 }
 
@@ -96,8 +104,8 @@ fn image_of(fields: &[&str]) -> Option<(u32, u32)> {
     Some((fields.first()?.parse().ok()?, fields.get(1)?.parse().ok()?))
 }
 
-/// The row, or the column at fault and what is wrong with it.
-fn parse_row(fields: &[&str]) -> Result<ResultRow, (&'static str, String)> {
+/// The row, with how far its rotation is from orthonormal where that is more than rounding, or the column at fault and what is wrong with it.
+fn parse_row(fields: &[&str]) -> Result<(ResultRow, Option<f64>), (&'static str, String)> {
     let [scene_id, im_id, obj_id, score, r, t, time] = fields else {
         return Err(("row", format!("expected {} columns, found {}", COLUMNS.len(), fields.len())));
     };
@@ -106,14 +114,15 @@ fn parse_row(fields: &[&str]) -> Result<ResultRow, (&'static str, String)> {
     let number = |field, text: &str| parse_numbers(text).map(|[v]| v).map_err(|e| (field, e));
     let r = parse_numbers(r).map_err(|e| ("R", e))?;
     let t_mm = parse_numbers(t).map_err(|e| ("t", e))?;
-    Ok(ResultRow {
+    let row = ResultRow {
         scene_id: id("scene_id", scene_id)?,
         im_id: id("im_id", im_id)?,
         obj_id: id("obj_id", obj_id)?,
         score: number("score", score)?,
         t_cam_model: pose_from_bop(&r, &t_mm).map_err(|e| ("R", e))?,
         time: number("time", time)?,
-    })
+    };
+    Ok((row, deviation_from_rotation(&r)))
 }
 
 /// Gives all rows of an image the sum of their times, or −1 where one is unknown: BOP wants the time spent

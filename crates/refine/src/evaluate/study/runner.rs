@@ -144,7 +144,7 @@ impl<'a> Runner<'a> {
         let target = Target { scene_id, im_id, obj_id, instance: frame.instance };
         let mut input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(&target, &Sensor::required_by(method))?
+            assets.load_at(&target, &frame.row.t_cam_model, &Sensor::required_by(method))?
         };
         if let Some((sweep, amount)) = fault {
             sweep.perturb(&mut input.observation, amount, sweep.seed(row));

@@ -9,10 +9,11 @@ use crate::error::RefineError;
 use crate::factor::{
     BinaryTouchFactor, ContactPatchFactor, FreeSpaceFactor, HandDepthFactor, NoiseEstimate,
     PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
-    ProximityFactor, RenderingFactor, SupportFactor, TactileFactor, TouchModel, ViewFactor,
+    ProximityFactor, RegionFactor, RenderingFactor, SupportFactor, TactileFactor, TouchModel,
+    ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
-use crate::scene::{CameraView, Frame, TouchReading};
+use crate::scene::{CameraView, Frame, Occluders, TouchReading};
 
 /// What of a frame is seen.
 const SEEN: [Modality; 5] = [
@@ -119,7 +120,8 @@ fn picture_factor(
 ) -> Result<Option<Arc<dyn Factor>>, RefineError> {
     let wanted = |modality| settings.modalities.contains(&modality);
     let color = stage.color && wanted(Modality::Color) && frame.observation().has_colors();
-    let silhouette = wanted(Modality::Silhouette);
+    let region = has_region(frame, settings);
+    let silhouette = wanted(Modality::Silhouette) && !region;
     if !(color || silhouette) {
         return Ok(None);
     }
@@ -130,11 +132,20 @@ fn picture_factor(
     if !silhouette {
         rendering.mask_sigma = f64::INFINITY;
     }
+    if region {
+        rendering.occluders = Occluders::Unmasked;
+    }
     let mut factor = RenderingFactor::new(frame, &rendering)?;
     if let Some(patches) = patches {
         factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
     }
     Ok(Some(Arc::new(factor)))
+}
+
+/// Whether colors and the mask together tell the outline: where there is no depth, which tells it, too.
+fn has_region(frame: &Frame<'_>, settings: &FusedSettings) -> bool {
+    let seen = frame.observation();
+    settings.modalities.contains(&Modality::Silhouette) && seen.has_colors() && !seen.has_depth()
 }
 
 /// All others.
@@ -163,6 +174,12 @@ fn other_factors(
             Err(RefineError::NoDepth) => {}
             Err(other) => return Err(other),
         }
+    }
+    if has_region(frame, settings) {
+        let mut region = settings.region;
+        region.surface = region.surface.hypot(settings.model.gp_sigma);
+        region.downsample *= stage.downsample.div_ceil(2);
+        factors.push(Arc::new(RegionFactor::new(frame, &region)?));
     }
     if wanted(Modality::FreeSpace) {
         factors.push(Arc::new(FreeSpaceFactor::new(frame, &settings.free_space)));

@@ -3,7 +3,7 @@
 use prehend_render::depth_map;
 
 use crate::problem::State;
-use crate::scene::{CameraCalibrationError, Frame, Pixel, View};
+use crate::scene::{CameraCalibrationError, Frame, Pixel, View, eroded};
 
 /// The object and the hand of a state in the image of a frame, with what is wrong with the camera corrected.
 pub(crate) struct Pixels<'a> {
@@ -95,31 +95,6 @@ impl<'a> Pixels<'a> {
 
 /// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
 const MARGIN: usize = 3;
-
-/// Of an image of `width` columns the pixels whose neighbors up to `reach` columns and rows away are all set.
-fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
-    let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
-    let height = set.len() / width.max(1);
-    for y in 0..height {
-        let mut run = 0;
-        for x in 0..width {
-            run = if set[y * width + x] { run + 1 } else { 0 };
-            if run > 2 * reach {
-                rows[y * width + x - reach] = true;
-            }
-        }
-    }
-    let mut runs = vec![0; width];
-    for y in 0..height {
-        for (x, run) in runs.iter_mut().enumerate() {
-            *run = if rows[y * width + x] { *run + 1 } else { 0 };
-            if *run > 2 * reach {
-                all[(y - reach) * width + x] = true;
-            }
-        }
-    }
-    all
-}
 
 #[cfg(test)]
 mod tests {

@@ -7,8 +7,8 @@ use super::fit::FitSettings;
 use super::scales::ScaleSettings;
 use crate::factor::{
     BinaryTouchSettings, ContactPatchSettings, FreeSpaceSettings, HandDepthSettings,
-    PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RenderingSettings,
-    SupportSettings, TactileSettings,
+    PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RegionSettings,
+    RenderingSettings, SupportSettings, TactileSettings,
 };
 use crate::problem::{Block, ModelErrorSettings, Solver, State};
 use crate::scene::Frame;
@@ -134,13 +134,12 @@ impl Stage {
         }
     }
 
-    /// Geometry alone, then colors, then measured noise; the last stage twice, because noise, scales and the modes that are left are found anew in
-    /// each.
+    /// Geometry alone, then colors, then measured noise.
     fn coarse_to_fine() -> Vec<Self> {
         let geometry =
             Self { color: false, contact: false, measured_noise: false, ..Self::octaves(3) };
         let colors = Self { measured_noise: false, ..Self::octaves(2) };
-        vec![geometry, colors, Self::octaves(1), Self::octaves(0), Self::octaves(0)]
+        vec![geometry, colors, Self::octaves(1), Self::octaves(0)]
     }
 }
 
@@ -182,6 +181,8 @@ pub struct FusedSettings {
     pub model: ModelErrorSettings,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
+    /// Regions within and around the outline.
+    pub region: RegionSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured in stages with
     /// [`Stage::measured_noise`], from this number of points; stages have a number of their own.
     pub depth: PointToPlaneSettings,
@@ -246,6 +247,7 @@ impl Default for FusedSettings {
             fit: FitSettings::default(),
             model: ModelErrorSettings::default(),
             rendering: RenderingSettings::default(),
+            region: RegionSettings::default(),
             depth: PointToPlaneSettings::default(),
             hand_depth: HandDepthSettings::default(),
             free_space: FreeSpaceSettings::default(),

@@ -1,6 +1,5 @@
 //! What of a picture shows the object, told by where it should be, depth, colors, and a mask if there is one.
 
-mod colors;
 mod parts;
 mod window;
 
@@ -9,11 +8,11 @@ use std::mem;
 use nalgebra::Isometry3;
 use prehend_render::Mask;
 
-use self::colors::ColorHistogram;
 use self::parts::large_parts;
 use self::window::{Label, Pixel, Window};
 use super::GAIN;
 use super::sight::Sight;
+use crate::factor::ColorHistogram;
 use crate::scene::Object;
 
 /// Pixels of which each colors, depth and masks are asked: every so many of rows and columns.

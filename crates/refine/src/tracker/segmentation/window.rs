@@ -6,8 +6,8 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
-use super::colors::color_index;
 use super::{COLOR_LIMIT, STRIDE};
+use crate::factor::color_index;
 use crate::scene::Object;
 use crate::tracker::sight::Sight;
 

@@ -185,7 +185,7 @@ impl DatasetRun<'_> {
     fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(Refined, f64)> {
         let input = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(&job.target, &Sensor::required_by(&self.method))?
+            assets.load_at(&job.target, &job.row.t_cam_model, &Sensor::required_by(&self.method))?
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
@@ -247,7 +247,11 @@ impl DatasetRun<'_> {
             let t_cam_object = (&refined.pose).into();
             let mut draw = || -> Result<_, AssetError> {
                 report.draw(&FrameDrawing {
-                    input: &assets.load(&job.target, &Sensor::required_by(&self.method))?,
+                    input: &assets.load_at(
+                        &job.target,
+                        &job.row.t_cam_model,
+                        &Sensor::required_by(&self.method),
+                    )?,
                     initial: Some(&job.row.t_cam_model),
                     t_cam_object: &t_cam_object,
                     covariance: refined.confidence.as_ref().map(|c| &c.covariance),

@@ -1,13 +1,13 @@
 //! How often colors occur.
 
 /// Levels of a channel.
-const LEVELS: u16 = 16;
+pub(super) const LEVELS: u16 = 16;
 /// What a color that was never seen counts for, as a share of all that were.
 const UNSEEN: f32 = 1e-4;
 
 /// Shares of the colors of a part of pictures.
 #[derive(Clone, Debug)]
-pub(super) struct ColorHistogram {
+pub(crate) struct ColorHistogram {
     shares: Vec<f32>,
     /// Whether anything was learnt.
     known: bool,
@@ -20,7 +20,7 @@ impl Default for ColorHistogram {
 }
 
 /// The number of a color.
-pub(super) fn color_index(color: &[f32; 3]) -> u16 {
+pub(crate) fn color_index(color: &[f32; 3]) -> u16 {
     let level =
         |channel: f32| (channel * f32::from(LEVELS)).clamp(0.0, f32::from(LEVELS - 1)) as u16;
     let [r, g, b] = color.map(level);
@@ -29,7 +29,7 @@ pub(super) fn color_index(color: &[f32; 3]) -> u16 {
 
 impl ColorHistogram {
     /// Goes a part `gain` of the way to what `colors` show, and all of it at first.
-    pub(super) fn learn(&mut self, colors: impl Iterator<Item = u16> + Clone, gain: f32) {
+    pub(crate) fn learn(&mut self, colors: impl Iterator<Item = u16> + Clone, gain: f32) {
         let count = colors.clone().count();
         if count == 0 {
             return;
@@ -44,12 +44,12 @@ impl ColorHistogram {
     }
 
     /// Whether anything was learnt.
-    pub(super) fn is_known(&self) -> bool {
+    pub(crate) fn is_known(&self) -> bool {
         self.known
     }
 
     /// How often each color occurs.
-    pub(super) fn densities(&self) -> impl Iterator<Item = f32> {
+    pub(crate) fn densities(&self) -> impl Iterator<Item = f32> {
         self.shares.iter().map(|share| share + UNSEEN)
     }
 }

@@ -1,0 +1,231 @@
+//! Regions: colors within and around the object's outline, and the mask.
+
+mod border;
+mod colors;
+mod evidence;
+mod line;
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector2, Vector3, Vector6};
+use prehend_autodiff::lie::twist_row;
+use prehend_render::{Camera, DepthImage, OutlinePoint, outline_points};
+use serde::{Deserialize, Serialize};
+
+pub(crate) use self::colors::{ColorHistogram, color_index};
+use self::evidence::RegionEvidence;
+use self::line::{Border, Misfit, REACH, SAMPLES};
+use super::patch_sums::PatchSums;
+use super::rendering::{reprojected, seen_by_state};
+use crate::error::RefineError;
+use crate::problem::{Factor, NormalEquations, State};
+use crate::scene::{Frame, Object};
+
+/// Settings of [`RegionFactor`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegionSettings {
+    /// The image is made smaller by this factor.
+    pub downsample: usize,
+    /// Whether colors count, beside the mask.
+    pub color: bool,
+    /// Standard deviation of the outline beside what the pixels tell \[px\].
+    pub sigma: f64,
+    /// Standard deviation of the object's surface about its model \[m\].
+    pub surface: f64,
+    /// How many independent measurements the outline amounts to.
+    pub effective_samples: f64,
+    /// Cost of a part of the outline that nothing is seen of where it should be: something hides it \[nat\].
+    pub hidden: f64,
+    /// Cost of a part of the outline beyond which the object goes on \[nat\].
+    pub exceeded: f64,
+}
+
+impl Default for RegionSettings {
+    fn default() -> Self {
+        Self {
+            downsample: 1,
+            color: true,
+            sigma: 0.5,
+            surface: 0.0,
+            effective_samples: 40.0,
+            hidden: 2.0,
+            exceeded: 8.0,
+        }
+    }
+}
+
+/// Distance between the outline and where colors and the mask say that the object ends, along lines across the outline.
+///
+/// Each line has a distribution of the border's place from the log-likelihood ratios of object and others of its pixels (Prisacariu and Reid, 2012;
+/// Tjaden and others, 2018; Stoiber and others, 2022), whose mean and variance make a residual. Where nothing of a line is the object's, something hides it.
+pub struct RegionFactor {
+    object: Arc<Object>,
+    camera: Camera,
+    evidence: RegionEvidence,
+    hand: Arc<DepthImage>,
+    settings: RegionSettings,
+}
+
+/// A line across the outline.
+struct Line {
+    point: OutlinePoint,
+    border: Border,
+    /// Independent measurements that it amounts to.
+    weight: f64,
+}
+
+impl RegionFactor {
+    /// Of the image and the mask of `frame`.
+    ///
+    /// # Errors
+    /// [`RefineError::EmptyMask`].
+    pub fn new(frame: &Frame<'_>, settings: &RegionSettings) -> Result<Self, RefineError> {
+        let observation = frame.observation();
+        let color = Some(&observation.color).filter(|_| settings.color && observation.has_colors());
+        let factor = settings.downsample;
+        let evidence = RegionEvidence::new(color, &observation.mask, factor);
+        Ok(Self {
+            object: Arc::clone(frame.object()),
+            camera: observation.camera.scaled(1.0 / factor as f64),
+            evidence: evidence.ok_or(RefineError::EmptyMask)?,
+            hand: Arc::clone(frame.hand_depth()),
+            settings: *settings,
+        })
+    }
+
+    /// The lines at `seen` \[m\] that nothing known hides.
+    fn lines(&self, seen: &Isometry3<f64>) -> Vec<Line> {
+        let points = outline_points(&self.camera, &self.object.model, seen);
+        let length: f64 = points.iter().map(|point| point.length).sum();
+        let line = |point: OutlinePoint| {
+            let OutlinePoint { pixel, outward, .. } = point;
+            let evidence: [f64; SAMPLES] = std::array::from_fn(|k| {
+                let at = pixel + (k as f64 - f64::from(REACH)) * outward;
+                self.evidence.at(at.x, at.y)
+            });
+            let RegionSettings { sigma, surface, hidden, exceeded, .. } = self.settings;
+            let sigma = sigma.hypot(surface * self.camera.fx / point.point.z);
+            let border = Border::new(&evidence, sigma, [hidden, exceeded]);
+            let weight = self.settings.effective_samples * point.length / length;
+            Line { point, border, weight }
+        };
+        points.into_iter().filter(|point| !self.is_behind_hand(point)).map(line).collect()
+    }
+
+    fn is_behind_hand(&self, point: &OutlinePoint) -> bool {
+        let factor = self.settings.downsample as f64;
+        let [x, y] = [point.pixel.x, point.pixel.y].map(|v| ((v + 0.5) * factor).max(0.0) as usize);
+        let hand = self.hand.get(x, y).unwrap_or_default();
+        hand > 0.0 && f64::from(hand) < point.point.z
+    }
+
+    fn correspondences(&self, state: &State) -> Correspondences<'_> {
+        let seen = reprojected(state);
+        Correspondences { factor: self, lines: self.lines(&seen), to_object: seen.inverse() }
+    }
+}
+
+impl Factor for RegionFactor {
+    fn name(&self) -> &'static str {
+        "region"
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        self.correspondences(state).cost(state)
+    }
+
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        self.correspondences(state).linearize(state, equations)
+    }
+
+    fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {
+        Some(Box::new(self.correspondences(state)))
+    }
+}
+
+/// The factor with lines and borders as they are at one pose.
+struct Correspondences<'a> {
+    factor: &'a RegionFactor,
+    lines: Vec<Line>,
+    /// Camera frame where the lines were found → object coordinates \[m\].
+    to_object: Isometry3<f64>,
+}
+
+impl Correspondences<'_> {
+    /// Each line with its point as it is at `seen` \[m\], and how far outward that is from the middle of the line \[px\].
+    fn moved(&self, seen: &Isometry3<f64>) -> impl Iterator<Item = (&Line, Point3<f64>, f64)> {
+        let motion = seen * self.to_object;
+        let Camera { fx, fy, cx, cy, .. } = self.factor.camera;
+        self.lines.iter().map(move |line| {
+            let OutlinePoint { pixel, outward, point, .. } = line.point;
+            let point = motion * point;
+            let shown = Vector2::new(fx * point.x / point.z + cx, fy * point.y / point.z + cy);
+            (line, point, outward.dot(&(shown - pixel)))
+        })
+    }
+}
+
+impl Factor for Correspondences<'_> {
+    fn name(&self) -> &'static str {
+        self.factor.name()
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        let cost = |(line, _, place): (&Line, _, f64)| line.weight * line.border.misfit(place).cost;
+        self.moved(&reprojected(state)).map(cost).sum()
+    }
+
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        let seen = reprojected(state);
+        let center = seen * self.factor.object.center;
+        let Camera { fx, fy, .. } = self.factor.camera;
+        let (mut gradient, mut hessian) = (Vector6::zeros(), Matrix6::zeros());
+        let (mut cost, mut degrees) = (0.0, 0.0);
+        for (line, point, place) in self.moved(&seen) {
+            let Line { point: OutlinePoint { outward, .. }, border, weight } = line;
+            let Misfit { cost: own, slope, information } = border.misfit(place);
+            cost += weight * own;
+            degrees += weight;
+            let [x, y] = [outward.x * fx, outward.y * fy].map(|n| n / point.z);
+            let along = -(x * point.x + y * point.y) / point.z;
+            let row: Vector6<f64> = twist_row(&(point - center), &Vector3::new(x, y, along));
+            gradient += row * (weight * slope);
+            hessian += row * row.transpose() * (weight * information);
+        }
+        let chain = seen_by_state(state);
+        let mut sums = PatchSums::<12>::new(0);
+        sums.add(None, &chain.tr_mul(&gradient), &(chain.tr_mul(&hessian) * chain));
+        let center = state.center();
+        sums.add_to(&(center.xy() / center.z), equations);
+        equations.add_degrees(degrees);
+        cost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture, scene};
+    use super::*;
+    use crate::problem::Block;
+
+    #[test]
+    fn gradient_matches_differences() {
+        for seed in 0..3 {
+            let (frame, mut state) = fixture(seed);
+            let factor = RegionFactor::new(&frame, &RegionSettings::default()).unwrap();
+            let near = factor.correspondences(&state);
+            assert_gradient(&near, &state, Block::ObjectPose, 1e-6, 1e-4);
+            state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3, 1e-3]);
+            assert_gradient(&near, &state, Block::Camera, 1e-6, 1e-3);
+        }
+    }
+
+    #[test]
+    fn truth_fits_best() {
+        let (frame, state) = fixture(0);
+        let factor = RegionFactor::new(&frame, &RegionSettings::default()).unwrap();
+        let truth = State { t_cam_object: scene().truth, ..state.clone() };
+        assert!(factor.cost(&truth) < 0.3 * factor.cost(&state));
+    }
+}
