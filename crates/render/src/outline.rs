@@ -29,7 +29,8 @@ pub fn outline_points(
 ) -> Vec<OutlinePoint> {
     let posed = Posed::new(model, camera, t_cam_object, 0.0);
     let projected = &posed.projected;
-    let pieces = outline(projected, &projected.region, 0.0).outline;
+    // Edges lie between the centers of pixels that are covered and others.
+    let pieces = outline(projected, &projected.region, 1.0).outline;
     let point = |piece: &Piece| {
         let [from, to] = piece.range;
         let middle = 0.5 * (from + to);
