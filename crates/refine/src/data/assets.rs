@@ -229,8 +229,8 @@ impl<'a> Assets<'a> {
         })
     }
 
-    /// The same of an object that is about at `t_cam_object` \[m\]: another mask of the image than the one that is said to be its own is taken, with a warning, if
-    /// that overlaps it far better.
+    /// As [`load`](Self::load), of an object about at `t_cam_object` \[m\]: another mask of the image than its own is taken, with a warning, if that overlaps it
+    /// far better.
     ///
     /// # Errors
     /// Those of [`Assets::load`].
@@ -245,7 +245,7 @@ impl<'a> Assets<'a> {
         })
     }
 
-    /// The same with the mask that `choose` says.
+    /// Object and frame with the mask whose number `choose` gives.
     fn load_with(
         &mut self,
         target: &Target,

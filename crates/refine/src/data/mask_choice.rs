@@ -1,7 +1,7 @@
 //! Which of an image's masks is that of an object.
 
 use nalgebra::Isometry3;
-use prehend_render::{Mask, depth_map};
+use prehend_render::{DepthImage, Mask, depth_map};
 
 use super::bop::Frame;
 use super::targets::Target;
@@ -10,8 +10,8 @@ use crate::scene::Object;
 /// A mask whose overlap with the object is below this share of another mask's is not the object's.
 const LEAST_SHARE: f64 = 0.5;
 
-/// The number of the mask of `target` in `frame`, an `object` about at `t_cam_object` \[m\]: that of [`Frame::mask_number`], unless another mask of the image overlaps it far better (intersection over
-/// union), of which a user is warned.
+/// Number of the mask of `target` in `frame`, an `object` about at `t_cam_object` \[m\]: that of [`Frame::mask_number`], unless another mask of the image
+/// has more than twice its intersection over union with the object, which is warned of.
 pub(super) fn mask_at(
     frame: &Frame<'_>,
     target: &Target,
@@ -23,15 +23,23 @@ pub(super) fn mask_at(
     if numbers.len() < 2 {
         return number;
     }
-    let overlap = |number: usize| {
+    let mut drawn: Option<DepthImage> = None;
+    let mut overlap = |number: usize| {
         let mask = frame.mask(number).ok()?;
-        let camera = frame.camera(mask.width(), mask.height());
-        let drawn = depth_map(&camera, &[(&object.model, *t_cam_object)]);
-        Some(intersection_over_union(&mask, drawn.pixels()))
+        let depth = drawn.get_or_insert_with(|| {
+            let camera = frame.camera(mask.width(), mask.height());
+            depth_map(&camera, &[(&object.model, *t_cam_object)])
+        });
+        Some(intersection_over_union(&mask, depth.pixels()))
     };
     let of_number = overlap(number).unwrap_or_default();
-    let others = numbers.into_iter().filter_map(|other| Some((other, overlap(other)?)));
-    let Some((best, most)) = others.max_by(|a, b| a.1.total_cmp(&b.1)) else { return number };
+    // No overlap is more than one: the others need not be read then.
+    if of_number >= LEAST_SHARE {
+        return number;
+    }
+    let others = numbers.into_iter().filter(|other| *other != number);
+    let overlaps = others.filter_map(|other| Some((other, overlap(other)?)));
+    let Some((best, most)) = overlaps.max_by(|a, b| a.1.total_cmp(&b.1)) else { return number };
     if of_number >= LEAST_SHARE * most {
         return number;
     }

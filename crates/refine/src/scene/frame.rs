@@ -302,7 +302,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Of an image of `width` columns the pixels whose neighbors up to `reach` columns and rows away are all set.
+/// Pixels of an image of `width` columns whose neighbors up to `reach` columns and rows away are all set.
 pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
     let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
     let height = set.len() / width.max(1);
@@ -385,5 +385,14 @@ mod tests {
         assert!(mask.contains("the mask has 1x1 pixels"), "{mask}");
         let empty = refused(&|o| o.mask = Mask::filled(640, 480, false));
         assert_eq!(empty, RefineError::EmptyMask.to_string());
+    }
+
+    #[test]
+    fn erosion_leaves_what_is_surrounded() {
+        let square = |k: usize| (2..7).contains(&(k % 10)) && (1..6).contains(&(k / 10));
+        let set: Vec<bool> = (0..80).map(square).collect();
+        let left = eroded(10, &set, 2);
+        let kept: Vec<usize> = (0..80).filter(|k| left[*k]).collect();
+        assert_eq!(kept, [34]);
     }
 }

@@ -165,7 +165,7 @@ impl Observation {
         colors.any(|color| Some(color) != first)
     }
 
-    /// Whether any depth was measured.
+    /// Depth was measured at any pixel.
     pub(crate) fn has_depth(&self) -> bool {
         self.depth.pixels().iter().any(|z| *z > 0.0)
     }

@@ -76,12 +76,12 @@ fn a_second_camera_helps() {
 
 #[test]
 fn touch_of_every_kind_ties_the_object_to_the_hand() {
-    // Color alone leaves open how far away it is, though it tells most of it.
-    let [.., alone] = mean_errors(&[Extra::ColorAlone], 6);
+    // Where color alone leaves open how far away it is.
+    let [.., alone] = mean_errors(&[Extra::ColorAlone], 12);
     for extra in [Extra::Force, Extra::Binary, Extra::Proximity, Extra::Patch] {
-        let [pe, oe, from_hand] = mean_errors(&[Extra::ColorAlone, extra], 6);
+        let [pe, oe, from_hand] = mean_errors(&[Extra::ColorAlone, extra], 12);
         assert!(
-            pe < 0.3 && oe < 2.0 && from_hand < alone + 0.01,
+            pe < 0.3 && oe < 2.0 && from_hand < alone,
             "{extra:?}: {pe} {oe} {from_hand} {alone}"
         );
     }

@@ -34,7 +34,7 @@ pub struct Scene {
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
-    /// Read for which object each mask is of, and nothing else.
+    /// `scene_gt.json`; estimators may read the masks' objects alone.
     pub(super) objects: JsonFile,
     pub(super) remaps: Arc<RemapCache>,
     pub(super) depth_remaps: Arc<RemapCache>,

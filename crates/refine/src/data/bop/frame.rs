@@ -61,7 +61,7 @@ struct PlaceEntry {
     translation: Option<Numbers<3>>,
 }
 
-/// What `scene_gt.json` says of a mask.
+/// Entry of `scene_gt.json`, of which estimators may read the object alone.
 #[derive(Deserialize)]
 struct ListedObject {
     obj_id: u32,
@@ -137,22 +137,25 @@ impl Frame<'_> {
 
     /// The file of an object's mask; see [`Frame::mask`].
     fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
-        let dir = self.scene.dir().join("mask_visib");
-        let prefix = format!("{:06}_", self.im_id);
-        let expected = dir.join(format!("{prefix}{instance:06}.png"));
-        let Ok(listing) = fs::read_dir(&dir) else {
-            return Err(DatasetError::Missing { file: expected });
-        };
-        let mut masks = listing.flatten().map(|f| f.path()).filter(|p| {
-            p.file_name()
-                .and_then(|n| n.to_str())
-                .is_some_and(|n| n.starts_with(&prefix) && n.ends_with(".png"))
-        });
+        let name = format!("{:06}_{instance:06}.png", self.im_id);
+        let expected = self.scene.dir().join("mask_visib").join(name);
+        let mut masks = self.mask_files();
         match (masks.next(), masks.next()) {
             (Some(only), None) => Ok(only),
             _ if expected.is_file() => Ok(expected),
             _ => Err(DatasetError::Missing { file: expected }),
         }
+    }
+
+    /// The files of the image's masks, in any order.
+    fn mask_files(&self) -> impl Iterator<Item = PathBuf> + use<> {
+        let files = fs::read_dir(self.scene.dir().join("mask_visib"));
+        let prefix = format!("{:06}_", self.im_id);
+        files.into_iter().flatten().flatten().map(|file| file.path()).filter(move |path| {
+            path.file_name()
+                .and_then(|name| name.to_str())
+                .is_some_and(|name| name.starts_with(&prefix) && name.ends_with(".png"))
+        })
     }
 
     /// Reads the color image.
@@ -204,7 +207,7 @@ impl Frame<'_> {
 
     /// The number of the mask of the object `obj_id`. Masks are numbered as `scene_gt.json` lists the objects, of which nothing else is read. Of several
     /// such objects it is that of `instance`, the index of the object's row among that image's rows of the results file
-    /// ([`super::ReadResults::instances`]), if it is one of them, and else the one after so many. Without such a list it is `instance`.
+    /// ([`super::ReadResults::instances`]), if it is one of them, and else number `instance` among them. Without such a list it is `instance`.
     pub fn mask_number(&self, obj_id: u32, instance: usize) -> usize {
         let Ok(listed) = self.scene.objects.entry::<Vec<ListedObject>>(self.im_id) else {
             return instance;
@@ -220,14 +223,8 @@ impl Frame<'_> {
 
     /// The numbers of the image's masks, in order.
     pub(crate) fn mask_numbers(&self) -> Vec<usize> {
-        let files = fs::read_dir(self.scene.dir().join("mask_visib"));
-        let prefix = format!("{:06}_", self.im_id);
-        let number = |file: fs::DirEntry| {
-            let is_own = file.file_name().to_str()?.starts_with(&prefix);
-            mask_number(&file.path()).filter(|_| is_own)
-        };
         let mut numbers: Vec<usize> =
-            files.into_iter().flatten().flatten().filter_map(number).collect();
+            self.mask_files().filter_map(|file| number_of(&file)).collect();
         numbers.sort_unstable();
         numbers
     }
@@ -350,7 +347,7 @@ impl Frame<'_> {
     ) -> Result<Vec<(Observation, Isometry3<f64>)>, DatasetError> {
         let Some(together) = self.scene.taken_together(self.im_id)? else { return Ok(Vec::new()) };
         let t_cam_world = self.place()?;
-        let number = self.mask_path(instance).ok().and_then(|file| mask_number(&file));
+        let number = self.mask_path(instance).ok().and_then(|file| number_of(&file));
         let number = number.unwrap_or(instance);
         let mut seen = Vec::new();
         for image in together.into_iter().filter(|image| *image != self.im_id) {
@@ -444,6 +441,6 @@ impl Frame<'_> {
 }
 
 /// The number of the object that the mask in `file` is of.
-fn mask_number(file: &Path) -> Option<usize> {
+fn number_of(file: &Path) -> Option<usize> {
     file.file_stem()?.to_str()?.split_once('_')?.1.parse().ok()
 }

@@ -24,7 +24,6 @@ pub struct GroundTruth<'a> {
 /// The files of one scene.
 #[derive(Debug)]
 pub(super) struct TrueScene {
-    pub(super) objects: JsonFile,
     pub(super) visibility: JsonFile,
     bodies: JsonFile,
 }
@@ -51,7 +50,6 @@ impl<'a> GroundTruth<'a> {
     /// The truth about the split that `dataset` shows; nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
         let scene = |dir: &std::path::Path| TrueScene {
-            objects: JsonFile::new(dir.join("scene_gt.json")),
             visibility: JsonFile::new(dir.join("scene_gt_info.json")),
             bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
         };
@@ -74,7 +72,7 @@ impl<'a> GroundTruth<'a> {
     /// # Errors
     /// When `scene_gt.json` is absent or broken, or lacks the image or one of its fields.
     pub fn objects(&self, scene_id: u32, im_id: u32) -> Result<Vec<TrueObject>, DatasetError> {
-        let file = &self.scene(scene_id)?.objects;
+        let file = self.objects_file(scene_id)?;
         let entries: Vec<ObjectEntry> = file.entry(im_id)?;
         file.check_rotations(entries.iter().map(|entry| &entry.rotation));
         let object = |ObjectEntry { obj_id, rotation, translation }| {
@@ -99,13 +97,13 @@ impl<'a> GroundTruth<'a> {
         let distance = |o: &TrueObject| {
             (o.t_cam_model.translation.vector - estimate.translation.vector).norm()
         };
-        let objects = &self.scene(scene_id)?.objects;
+        let file = self.objects_file(scene_id)?;
         self.objects(scene_id, im_id)?
             .into_iter()
             .filter(|o| o.obj_id == obj_id)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .map(|o| o.t_cam_model)
-            .ok_or_else(|| DatasetError::UnknownObject { file: objects.path().into(), obj_id })
+            .ok_or_else(|| DatasetError::UnknownObject { file: file.path().into(), obj_id })
     }
 
     /// Whether a scene says where its robots are.
@@ -123,6 +121,11 @@ impl<'a> GroundTruth<'a> {
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn bodies(&self, scene_id: u32, im_id: u32) -> Result<SceneBodies, DatasetError> {
         SceneBodies::read(self.bodies_file(scene_id)?, im_id, self.dataset.root())
+    }
+
+    /// `scene_gt.json`.
+    pub(super) fn objects_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
+        self.dataset.scene(scene_id).map(|scene| &scene.objects)
     }
 
     fn bodies_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {

@@ -25,7 +25,7 @@ use super::unique::parse_json;
 pub(super) struct JsonFile {
     path: PathBuf,
     root: OnceLock<Result<Entries, DatasetError>>,
-    /// Whether a user was told that rotations of the file are not quite orthonormal.
+    /// A warning of rotations that are not quite orthonormal was given.
     is_told: AtomicBool,
 }
 

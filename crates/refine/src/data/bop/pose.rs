@@ -10,13 +10,17 @@ const ROTATION_TOLERANCE: f64 = 2e-2;
 /// Largest entry of RᵀR − I that is rounding, of which nobody needs to be told.
 const ROUNDING: f64 = 1e-3;
 
-/// Largest entry of RᵀR − I of nine row-major entries, where it is more than rounding.
-pub(crate) fn deviation_from_rotation(r: &[f64; 9]) -> Option<f64> {
-    let matrix = Matrix3::from_row_slice(r);
-    Some((matrix.transpose() * matrix - Matrix3::identity()).amax()).filter(|off| *off > ROUNDING)
+/// Largest entry of RᵀR − I.
+fn deviation(matrix: &Matrix3<f64>) -> f64 {
+    (matrix.transpose() * matrix - Matrix3::identity()).amax()
 }
 
-/// What to say of a file whose rotations are up to `deviation` off.
+/// Largest entry of RᵀR − I of nine row-major entries, where it is more than rounding.
+pub(crate) fn deviation_from_rotation(r: &[f64; 9]) -> Option<f64> {
+    Some(deviation(&Matrix3::from_row_slice(r))).filter(|deviation| *deviation > ROUNDING)
+}
+
+/// Warning about a file whose rotations are up to `deviation` from orthonormal.
 pub(crate) fn rotations_off(file: &Path, deviation: f64) -> String {
     let file = file.display();
     format!(
@@ -31,7 +35,7 @@ pub(crate) fn rotations_off(file: &Path, deviation: f64) -> String {
 pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, String> {
     require_all_in_range(r)?;
     let matrix = Matrix3::from_row_slice(r);
-    let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
+    let deviation = deviation(&matrix);
     if deviation > ROTATION_TOLERANCE {
         return Err(format!(
             "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"

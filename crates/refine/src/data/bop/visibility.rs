@@ -48,7 +48,7 @@ impl GroundTruth<'_> {
         let mut shown: Vec<usize> =
             (0..objects.len()).filter(|&k| objects[k].obj_id == obj_id).collect();
         if shown.len() < count {
-            let file = self.scene(scene_id)?.objects.path();
+            let file = self.objects_file(scene_id)?.path();
             let problem =
                 format!("instances of object {obj_id}: {} but targets {count}", shown.len());
             return Err(DatasetError::field(file, &im_id.to_string(), problem));

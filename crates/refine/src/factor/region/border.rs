@@ -28,7 +28,7 @@ impl MaskBorder {
     /// Standard deviation of a border that is drawn with care \[px\].
     pub(super) const SIGMA: f32 = 1.5;
 
-    /// Of `mask`, with as much of what is around the object as it is large; none of an empty mask. Chamfer distances (Borgefors, 1986) of pixel
+    /// Border of `mask`, with as much of what is around the object as it is large; none of an empty mask. Chamfer distances (Borgefors, 1986) of pixel
     /// centers to the border, which is between pixels.
     pub(super) fn new(mask: &Mask) -> Option<Self> {
         let (width, [left, top, columns, rows]) = (mask.width(), mask.bounds()?);
@@ -109,7 +109,7 @@ fn crossing(told: &[f32]) -> f32 {
     at as f32
 }
 
-/// The distance of each pixel of rows of so many columns to the nearest one that is `to` \[px\].
+/// Distance of each pixel of an image of `columns` columns to the nearest one that is `to` \[px\].
 fn chamfer(set: &[bool], columns: usize, to: bool) -> Vec<f32> {
     let rows = set.len() / columns;
     let mut distances: Vec<f32> =

@@ -48,8 +48,10 @@ impl ColorHistogram {
         self.known
     }
 
-    /// How often each color occurs.
-    pub(crate) fn densities(&self) -> impl Iterator<Item = f32> {
-        self.shares.iter().map(|share| share + UNSEEN)
+    /// Log-likelihood ratio of this histogram and another one for each color, within ± `limit` \[nat\].
+    pub(crate) fn log_ratios(&self, others: &Self, limit: f32) -> impl Iterator<Item = f32> {
+        let pairs = self.shares.iter().zip(&others.shares);
+        let ratio = |(own, other): (&f32, &f32)| ((own + UNSEEN) / (other + UNSEEN)).ln();
+        pairs.map(ratio).map(move |ratio| ratio.clamp(-limit, limit))
     }
 }

@@ -6,9 +6,9 @@ use super::border::MaskBorder;
 use super::colors::{ColorHistogram, LEVELS, color_index};
 use crate::scene::MASK_MARGIN;
 
-/// What a pixel's color tells at most \[nat\].
+/// Largest evidence of a pixel's color \[nat\].
 const COLOR_LIMIT: f32 = 1.0;
-/// What the mask tells at most \[nat\].
+/// Largest evidence of the mask \[nat\].
 const MASK_LIMIT: f32 = 3.0;
 
 /// Log-likelihood ratio of object and others at each pixel of an image \[nat\].
@@ -73,7 +73,7 @@ impl RegionEvidence {
     }
 }
 
-/// What each color tells \[nat\]; nothing without pixels to learn from. At the border colors are mixed, and are no more one's than the other's.
+/// Log-likelihood ratio of each color \[nat\]; zero without pixels to learn from. At the border colors are mixed, and are no more one's than the other's.
 fn color_ratios(color: &RgbImage, border: &MaskBorder) -> Vec<f32> {
     let learnt = |sign: f32| {
         let mut histogram = ColorHistogram::default();
@@ -85,6 +85,5 @@ fn color_ratios(color: &RgbImage, border: &MaskBorder) -> Vec<f32> {
     if !(own.is_known() && others.is_known()) {
         return vec![0.0; usize::from(LEVELS).pow(3)];
     }
-    let pairs = own.densities().zip(others.densities());
-    pairs.map(|(own, other)| (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)).collect()
+    own.log_ratios(&others, COLOR_LIMIT).collect()
 }

@@ -46,8 +46,13 @@ impl Border {
             highest: f64::NEG_INFINITY,
             limit: hidden,
         };
+        // exp(−½ (d − δ)²/σ²) by d − δ, of outlines at whole steps.
+        let normal: [f64; 2 * SAMPLES] =
+            std::array::from_fn(|k| border.normal(k as f64 - (SAMPLES as f64 - 0.5)));
         for step in -REACH..=REACH {
-            let likelihood = border.moments(f64::from(step))[0].ln();
+            let offsets = &normal[(REACH - step) as usize..];
+            let products = border.likelihoods.iter().zip(offsets).map(|(s, normal)| s * normal);
+            let likelihood = products.fold(f64::MIN_POSITIVE, |sum, product| sum + product).ln();
             if likelihood > border.highest {
                 border.highest = likelihood;
                 border.limit = if step > 0 { exceeded } else { hidden };
@@ -56,12 +61,17 @@ impl Border {
         border
     }
 
+    /// exp(−½ (d − δ)²/σ²) of a border at d that is `off` from the outline at δ \[steps\].
+    fn normal(&self, off: f64) -> f64 {
+        (-0.5 * self.precision * off * off).exp()
+    }
+
     /// Likelihood of an outline at `place`, and mean and variance of the border's place from there.
     fn moments(&self, place: f64) -> [f64; 3] {
         let [mut mass, mut first, mut second] = [f64::MIN_POSITIVE, 0.0, 0.0];
         for (k, likelihood) in self.likelihoods.iter().enumerate() {
             let off = k as f64 - f64::from(REACH) - 0.5 - place;
-            let joint = likelihood * (-0.5 * self.precision * off * off).exp();
+            let joint = likelihood * self.normal(off);
             mass += joint;
             first += joint * off;
             second += joint * off * off;
@@ -70,7 +80,7 @@ impl Border {
         [mass, mean, (second / mass - mean * mean).max(0.0)]
     }
 
-    /// Of an outline at `place` \[steps\].
+    /// Misfit of an outline at `place` \[steps\].
     pub(super) fn misfit(&self, place: f64) -> Misfit {
         let [likelihood, mean, variance] = self.moments(place);
         let relative = (likelihood.ln() - self.highest).exp();

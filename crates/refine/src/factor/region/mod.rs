@@ -7,7 +7,7 @@ mod line;
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector2, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::{Camera, DepthImage, OutlinePoint, outline_points};
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ use crate::scene::{Frame, Object};
 pub struct RegionSettings {
     /// The image is made smaller by this factor.
     pub downsample: usize,
-    /// Whether colors count, beside the mask.
+    /// Colors count beside the mask.
     pub color: bool,
     /// Standard deviation of the outline beside what the pixels tell \[px\].
     pub sigma: f64,
@@ -55,10 +55,8 @@ impl Default for RegionSettings {
     }
 }
 
-/// Distance between the outline and where colors and the mask say that the object ends, along lines across the outline.
-///
-/// Each line has a distribution of the border's place from the log-likelihood ratios of object and others of its pixels (Prisacariu and Reid, 2012;
-/// Tjaden and others, 2018; Stoiber and others, 2022), whose mean and variance make a residual. Where nothing of a line is the object's, something hides it.
+/// Likelihood of the outline along lines across it, given the log-likelihood ratios of object and others of their pixels (Prisacariu and Reid, 2012;
+/// Tjaden and others, 2018; Stoiber and others, 2022). Where nothing of a line is the object's, something hides it.
 pub struct RegionFactor {
     object: Arc<Object>,
     camera: Camera,
@@ -76,7 +74,7 @@ struct Line {
 }
 
 impl RegionFactor {
-    /// Of the image and the mask of `frame`.
+    /// Factor of the image and the mask of `frame`.
     ///
     /// # Errors
     /// [`RefineError::EmptyMask`].
@@ -156,12 +154,11 @@ impl Correspondences<'_> {
     /// Each line with its point as it is at `seen` \[m\], and how far outward that is from the middle of the line \[px\].
     fn moved(&self, seen: &Isometry3<f64>) -> impl Iterator<Item = (&Line, Point3<f64>, f64)> {
         let motion = seen * self.to_object;
-        let Camera { fx, fy, cx, cy, .. } = self.factor.camera;
-        self.lines.iter().map(move |line| {
+        self.lines.iter().filter_map(move |line| {
             let OutlinePoint { pixel, outward, point, .. } = line.point;
             let point = motion * point;
-            let shown = Vector2::new(fx * point.x / point.z + cx, fy * point.y / point.z + cy);
-            (line, point, outward.dot(&(shown - pixel)))
+            let shown = self.factor.camera.project(&point)?;
+            Some((line, point, outward.dot(&(shown - pixel))))
         })
     }
 }

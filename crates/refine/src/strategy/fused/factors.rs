@@ -81,9 +81,10 @@ fn factors_of(
     // Drawn by all threads, before two of them ask for it.
     frame.hand_depth();
     let views = view_factors(frame, stage, settings, patches.is_some())?;
+    let region = has_region(frame, settings);
     let (picture, others) = rayon::join(
-        || picture_factor(frame, stage, settings, patches),
-        || other_factors(frame, stage, settings, patches),
+        || picture_factor(frame, stage, settings, patches, region),
+        || other_factors(frame, stage, settings, patches, region),
     );
     Ok(picture?.into_iter().chain(others?).chain(views).collect())
 }
@@ -111,16 +112,16 @@ fn view_factors(
     frame.views().iter().map(view).collect()
 }
 
-/// What compares pictures, if anything does.
+/// What compares pictures, if anything does; of the outline nothing where a `region` factor tells it.
 fn picture_factor(
     frame: &Frame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,
+    region: bool,
 ) -> Result<Option<Arc<dyn Factor>>, RefineError> {
     let wanted = |modality| settings.modalities.contains(&modality);
     let color = stage.color && wanted(Modality::Color) && frame.observation().has_colors();
-    let region = has_region(frame, settings);
     let silhouette = wanted(Modality::Silhouette) && !region;
     if !(color || silhouette) {
         return Ok(None);
@@ -142,18 +143,19 @@ fn picture_factor(
     Ok(Some(Arc::new(factor)))
 }
 
-/// Whether colors and the mask together tell the outline: where there is no depth, which tells it, too.
+/// Regions tell the outline where no depth does.
 fn has_region(frame: &Frame<'_>, settings: &FusedSettings) -> bool {
     let seen = frame.observation();
     settings.modalities.contains(&Modality::Silhouette) && seen.has_colors() && !seen.has_depth()
 }
 
-/// All others.
+/// All others, with a `region` factor or without.
 fn other_factors(
     frame: &Frame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,
+    region: bool,
 ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
     let wanted = |modality| settings.modalities.contains(&modality);
     let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
@@ -175,7 +177,7 @@ fn other_factors(
             Err(other) => return Err(other),
         }
     }
-    if has_region(frame, settings) {
+    if region {
         let mut region = settings.region;
         region.surface = region.surface.hypot(settings.model.gp_sigma);
         region.downsample *= stage.downsample.div_ceil(2);

@@ -95,17 +95,3 @@ impl<'a> Pixels<'a> {
 
 /// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
 const MARGIN: usize = 3;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn erosion_leaves_what_is_surrounded() {
-        let square = |k: usize| (2..7).contains(&(k % 10)) && (1..6).contains(&(k / 10));
-        let set: Vec<bool> = (0..80).map(square).collect();
-        let left = eroded(10, &set, 2);
-        let kept: Vec<usize> = (0..80).filter(|k| left[*k]).collect();
-        assert_eq!(kept, [34]);
-    }
-}

@@ -166,10 +166,7 @@ impl Segmenter {
         if !(self.object.is_known() && self.others.is_known()) {
             return;
         }
-        let pairs = self.object.densities().zip(self.others.densities());
-        let evidence =
-            |(own, other): (f32, f32)| (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT);
-        self.color_evidence.extend(pairs.map(evidence));
+        self.color_evidence.extend(self.object.log_ratios(&self.others, COLOR_LIMIT));
     }
 
     /// Whether a color is rather the object's than another's \[nat\].
