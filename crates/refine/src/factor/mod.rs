@@ -20,7 +20,6 @@ pub(crate) use point_to_plane::NoiseEstimate;
 pub use point_to_plane::{PointToPlaneFactor, PointToPlaneSettings};
 pub(crate) use prior::Layout;
 pub use prior::{GaussianPrior, PriorSettings};
-pub(crate) use region::{ColorHistogram, color_index};
 pub use region::{RegionFactor, RegionSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
 pub use support::{SupportFactor, SupportSettings};

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 use serde::{Deserialize, Serialize};
 
-use super::{Hand, HandMeasurement, Object, Observation};
+use super::{Hand, HandMeasurement, Object, Observation, RegionEvidence};
 use crate::error::RefineError;
 use crate::rig::Rig;
 
@@ -25,6 +25,7 @@ pub struct Frame<'a> {
     segmented: Mutex<BTreeMap<(Occluders, usize), Arc<Target>>>,
     /// Root mean square of the colors under the mask.
     brightness: OnceLock<f64>,
+    regions: OnceLock<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<&'a Rig>,
@@ -106,6 +107,7 @@ impl<'a> Frame<'a> {
             depth: OnceLock::new(),
             segmented: Mutex::default(),
             brightness: OnceLock::new(),
+            regions: OnceLock::new(),
             backend: None,
             rig: None,
             rivals: None,
@@ -164,6 +166,11 @@ impl<'a> Frame<'a> {
         Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
     }
 
+    /// The same with what its pixels tell of where the object is, where that is not of its mask and colors alone.
+    pub(crate) fn with_regions(self, regions: &Arc<RegionEvidence>) -> Self {
+        Self { regions: OnceLock::from(Arc::clone(regions)), ..self }
+    }
+
     /// The same of an object that is nowhere but in these columns and rows.
     pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
         Self { focus: Some(focus), ..self }
@@ -212,6 +219,19 @@ impl<'a> Frame<'a> {
             let hand = self.hand.map(|(hand, measured)| (&**hand, measured));
             Arc::new(hand_depth(&self.observation.camera, hand))
         })
+    }
+
+    /// Log-likelihood ratio of object and others at each pixel, by colors and the mask \[nat\].
+    ///
+    /// # Errors
+    /// [`RefineError::EmptyMask`].
+    pub(crate) fn regions(&self) -> Result<Arc<RegionEvidence>, RefineError> {
+        if let Some(known) = self.regions.get() {
+            return Ok(Arc::clone(known));
+        }
+        let Observation { color, mask, .. } = self.observation;
+        let made = RegionEvidence::of_mask(Some(color), mask).ok_or(RefineError::EmptyMask)?;
+        Ok(Arc::clone(self.regions.get_or_init(|| Arc::new(made))))
     }
 
     /// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.

@@ -35,8 +35,8 @@ impl Tracker {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         if sight.given.count() > 0 {
             sight.observation.mask.copy_from(&sight.given);
-        } else if let Some(pose) = &self.initial {
-            if !self.segmenter.segment(sight, &object, pose) {
+        } else if let Some(pose) = self.initial {
+            if !self.segment(sight, &object, &pose) {
                 return Err(RefineError::EmptyMask);
             }
             // The pose may be far off.
@@ -138,7 +138,7 @@ impl Tracker {
             if !(if known {
                 seen
             } else {
-                self.segmenter.segment(sight, &self.object, &t_cam_object)
+                self.segment(sight, &Arc::clone(&self.object), &t_cam_object)
             }) {
                 continue;
             }
@@ -150,7 +150,7 @@ impl Tracker {
             }
             let (solved, posterior) = self.estimate(&frame, &start)?;
             let state = &solved.solution.at.state;
-            let shown = self.segmenter.shown(sight, &object, &state.t_cam_object);
+            let shown = self.shown(sight, &object, &state.t_cam_object);
             let moved = object.surface_motion(&predicted.t_cam_object, &state.t_cam_object);
             let is_expected = reach == Recovery::Near && moved <= 0.5 * object.radius;
             // Fingers that hide most of it are known to some millimeters only.

@@ -1,5 +1,6 @@
 //! An object followed from frame to frame.
 
+mod appearance;
 mod clock;
 mod find;
 mod keyframe;
@@ -23,6 +24,7 @@ use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
 
+use self::appearance::Appearance;
 use self::clock::Clock;
 pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
@@ -91,6 +93,7 @@ pub struct Tracker {
     /// Made when it is first needed.
     search: Option<PoseSearch>,
     segmenter: Segmenter,
+    appearance: Appearance,
     /// Of the frame before.
     images: Images,
 }
@@ -135,6 +138,7 @@ impl Tracker {
             track: None,
             search: None,
             segmenter: Segmenter::default(),
+            appearance: Appearance::default(),
             images: Images::default(),
         })
     }
@@ -160,6 +164,7 @@ impl Tracker {
         self.initial = Some(*t_cam_object);
         self.track = None;
         self.segmenter = Segmenter::default();
+        self.appearance = Appearance::default();
     }
 
     /// [`push`](Self::push) of a copy.
@@ -249,7 +254,7 @@ impl Tracker {
     ) -> Result<Tracked, RefineError> {
         let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
         let object = Arc::clone(&self.object);
-        let seen = self.segmenter.segment(sight, &object, &prediction.state.t_cam_object);
+        let seen = self.segment(sight, &object, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
         let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
@@ -360,6 +365,9 @@ impl Tracker {
         if let Some(focus) = &sight.focus {
             frame = frame.with_focus(focus.clone());
         }
+        if let Some(regions) = &sight.regions {
+            frame = frame.with_regions(regions);
+        }
         if let Some(backend) = &self.backend {
             frame = frame.with_backend(Arc::clone(backend));
         }
@@ -372,7 +380,31 @@ impl Tracker {
     /// Learns colors where a pose was believed.
     fn learn(&mut self, sight: &Sight, solved: &Solved) {
         let pose = &solved.solution.at.state.t_cam_object;
-        self.segmenter.learn(sight, &self.object, pose);
+        match sight.measured {
+            true => self.segmenter.learn(sight, &self.object, pose),
+            false => self.appearance.learn(sight, &self.object, pose),
+        }
+    }
+
+    /// Finds what of a frame shows the object, and whether anything does.
+    fn segment(
+        &mut self,
+        sight: &mut Sight,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> bool {
+        match sight.measured {
+            true => self.segmenter.segment(sight, object, t_cam_object),
+            false => self.appearance.look(sight, object, t_cam_object),
+        }
+    }
+
+    /// The share of the pixels which should show an object at `t_cam_object` that do.
+    fn shown(&self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> f64 {
+        match sight.measured {
+            true => self.segmenter.shown(sight, object, t_cam_object),
+            false => self.appearance.shown(sight, object, t_cam_object),
+        }
     }
 
     /// The problem of a frame, and its prior, which is the prediction.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use prehend_render::{DepthImage, Mask};
 
-use crate::scene::{Hand, Observation, draw_hand_depth};
+use crate::scene::{Hand, Observation, RegionEvidence, draw_hand_depth};
 
 /// A frame with its hand, and what shows the object in it as far as that is known.
 pub(super) struct Sight {
@@ -20,6 +20,10 @@ pub(super) struct Sight {
     pub(super) hand_depth: Arc<DepthImage>,
     /// The measured depth, as terms share it \[m\].
     pub(super) depth: Arc<DepthImage>,
+    /// Whether any depth is measured.
+    pub(super) measured: bool,
+    /// What pixels tell of where the object is, where no depth does.
+    pub(super) regions: Option<Arc<RegionEvidence>>,
     /// Columns and rows in which the object is, where that is known.
     pub(super) focus: Option<[Range<usize>; 2]>,
 }
@@ -45,7 +49,8 @@ impl Sight {
         own(&mut depth).copy_from(&observation.depth);
         let given = mem::replace(&mut observation.mask, mask);
         let tells = (1..given.pixels().len()).contains(&given.count());
-        Self { given, tells, observation, hand_depth, depth, focus: None }
+        let measured = observation.has_depth();
+        Self { given, tells, observation, hand_depth, depth, measured, regions: None, focus: None }
     }
 
     /// What is left of it for the next one.

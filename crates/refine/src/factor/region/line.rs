@@ -8,7 +8,8 @@ pub(super) const SAMPLES: usize = 2 * REACH as usize + 1;
 /// Likelihood of the border's place along a line of pixels.
 ///
 /// The model's outline is off from the border by a normal deviation σ: a border at d and an outline at δ, both outward from the middle of the line
-/// \[steps\], have the likelihood exp(S(d) − ½ (d − δ)²/σ²), where S(d) is the sum of the log-likelihood ratios of object and others over the pixels within d.
+/// \[steps\], have the likelihood exp(S(d) − ½ (d − δ)²/σ²), where S(d) is the sum of the log-likelihood ratios of object and others
+/// over the pixels within d, and that of a border at d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Border {
     /// exp(S) before the first pixel and after each, the largest one.
@@ -29,15 +30,22 @@ pub(super) struct Misfit {
 }
 
 impl Border {
-    /// From the log-likelihood ratios of the pixels on a line, from within outward \[nat\], and the deviation σ \[steps\]. Where the border is farther in,
+    /// From the log-likelihood ratios of the pixels on a line, from within outward, and of a border before the first of them and after each \[nat\], and the
+    /// deviation σ \[steps\]. Where the border is farther in,
     /// the outline may be hidden, which costs `hidden`; where it is farther out the object goes on, which costs `exceeded` at most \[nat\].
-    pub(super) fn new(evidence: &[f64; SAMPLES], sigma: f64, [hidden, exceeded]: [f64; 2]) -> Self {
+    pub(super) fn new(
+        evidence: &[f64; SAMPLES],
+        edges: &[f64; SAMPLES + 1],
+        sigma: f64,
+        [hidden, exceeded]: [f64; 2],
+    ) -> Self {
         let mut likelihoods = [0.0; SAMPLES + 1];
         let mut sum = 0.0;
         for (after, evidence) in likelihoods[1..].iter_mut().zip(evidence) {
             sum += evidence;
             *after = sum;
         }
+        likelihoods.iter_mut().zip(edges).for_each(|(sum, edge)| *sum += edge);
         let largest = likelihoods.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
         likelihoods.iter_mut().for_each(|sum| *sum = (*sum - largest).exp());
         let mut border = Self {
@@ -107,7 +115,7 @@ mod tests {
     #[test]
     fn the_border_is_where_evidence_changes() {
         for last in -4..4 {
-            let border = Border::new(&line(last), 0.8, [2.0, 8.0]);
+            let border = Border::new(&line(last), &[0.0; SAMPLES + 1], 0.8, [2.0, 8.0]);
             let at = f64::from(last) + 0.5;
             assert!(border.misfit(at).slope.abs() < 1e-3);
             let off = border.misfit(at + 1.0);
@@ -117,11 +125,14 @@ mod tests {
 
     #[test]
     fn what_is_hidden_pulls_nowhere() {
-        let nothing = Border::new(&[0.0; SAMPLES], 0.8, [2.0, 8.0]).misfit(0.0);
+        let nothing =
+            Border::new(&[0.0; SAMPLES], &[0.0; SAMPLES + 1], 0.8, [2.0, 8.0]).misfit(0.0);
         assert!(nothing.cost < 0.01 && nothing.slope.abs() < 1e-9 && nothing.information < 0.1);
-        let hidden = Border::new(&[-2.0; SAMPLES], 0.8, [2.0, 8.0]).misfit(0.0);
+        let hidden =
+            Border::new(&[-2.0; SAMPLES], &[0.0; SAMPLES + 1], 0.8, [2.0, 8.0]).misfit(0.0);
         assert!((hidden.cost - 2.0).abs() < 0.01 && hidden.slope < 0.1);
-        let exceeded = Border::new(&[2.0; SAMPLES], 0.8, [2.0, 8.0]).misfit(0.0);
+        let exceeded =
+            Border::new(&[2.0; SAMPLES], &[0.0; SAMPLES + 1], 0.8, [2.0, 8.0]).misfit(0.0);
         assert!((exceeded.cost - 8.0).abs() < 0.1);
     }
 
@@ -129,7 +140,7 @@ mod tests {
     fn slope_matches_differences() {
         let mixed = std::array::from_fn(|k| (1.3 * k as f64).sin() - 0.2 * (k as f64 - 8.0));
         for place in [-2.3, -0.4, 0.0, 0.7, 3.1] {
-            let border = Border::new(&mixed, 0.9, [2.0, 8.0]);
+            let border = Border::new(&mixed, &[0.0; SAMPLES + 1], 0.9, [2.0, 8.0]);
             let numeric =
                 (border.misfit(place + 1e-6).cost - border.misfit(place - 1e-6).cost) / 2e-6;
             let slope = border.misfit(place).slope;

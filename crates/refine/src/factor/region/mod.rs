@@ -1,8 +1,5 @@
 //! Regions: colors within and around the object's outline, and the mask.
 
-mod border;
-mod colors;
-mod evidence;
 mod line;
 
 use std::sync::Arc;
@@ -12,14 +9,12 @@ use prehend_autodiff::lie::twist_row;
 use prehend_render::{Camera, DepthImage, OutlinePoint, outline_points};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use self::colors::{ColorHistogram, color_index};
-use self::evidence::RegionEvidence;
-use self::line::{Border, Misfit, REACH, SAMPLES};
+use self::line::{Border, Misfit, REACH};
 use super::patch_sums::PatchSums;
 use super::rendering::{reprojected, seen_by_state};
 use crate::error::RefineError;
 use crate::problem::{Factor, NormalEquations, State};
-use crate::scene::{Frame, Object};
+use crate::scene::{Frame, Object, RegionEvidence};
 
 /// Settings of [`RegionFactor`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,10 +24,13 @@ pub struct RegionSettings {
     pub downsample: usize,
     /// Colors count beside the mask.
     pub color: bool,
-    /// Standard deviation of the outline beside what the pixels tell \[px\].
+    /// Standard deviation of the outline beside what the pixels tell \[px of the reduced image\].
     pub sigma: f64,
     /// Standard deviation of the object's surface about its model \[m\].
     pub surface: f64,
+    /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn away are
+    /// darker, masks are drawn too small or too large \[px of the reduced image\].
+    pub offset: f64,
     /// How many independent measurements the outline amounts to.
     pub effective_samples: f64,
     /// Cost of a part of the outline that nothing is seen of where it should be: something hides it \[nat\].
@@ -48,6 +46,7 @@ impl Default for RegionSettings {
             color: true,
             sigma: 0.5,
             surface: 0.0,
+            offset: 0.7,
             effective_samples: 40.0,
             hidden: 2.0,
             exceeded: 8.0,
@@ -65,6 +64,10 @@ pub struct RegionFactor {
     settings: RegionSettings,
 }
 
+/// Newton's steps to the common offset of the outline at most, and the last of them \[px\].
+const OFFSET_STEPS: usize = 20;
+const OFFSET_RESOLUTION: f64 = 1e-6;
+
 /// A line across the outline.
 struct Line {
     point: OutlinePoint,
@@ -80,16 +83,28 @@ impl RegionFactor {
     /// [`RefineError::EmptyMask`].
     pub fn new(frame: &Frame<'_>, settings: &RegionSettings) -> Result<Self, RefineError> {
         let observation = frame.observation();
-        let color = Some(&observation.color).filter(|_| settings.color && observation.has_colors());
         let factor = settings.downsample;
-        let evidence = RegionEvidence::new(color, &observation.mask, factor);
+        let evidence = match settings.color && observation.has_colors() {
+            true => frame.regions()?.reduced(factor),
+            false => RegionEvidence::of_mask(None, &observation.mask)
+                .ok_or(RefineError::EmptyMask)?
+                .reduced(factor),
+        };
         Ok(Self {
             object: Arc::clone(frame.object()),
             camera: observation.camera.scaled(1.0 / factor as f64),
-            evidence: evidence.ok_or(RefineError::EmptyMask)?,
+            evidence,
             hand: Arc::clone(frame.hand_depth()),
             settings: *settings,
         })
+    }
+
+    /// Misfit of a common offset of the outline \[px\], which has a Cauchy distribution.
+    fn offset_prior(&self, offset: f64) -> Misfit {
+        let variance = self.settings.offset.powi(2);
+        let information = 2.0 / (variance + offset * offset);
+        let cost = (offset * offset / variance).ln_1p();
+        Misfit { cost, slope: information * offset, information }
     }
 
     /// The lines at `seen` \[m\] that nothing known hides.
@@ -98,13 +113,12 @@ impl RegionFactor {
         let length: f64 = points.iter().map(|point| point.length).sum();
         let line = |point: OutlinePoint| {
             let OutlinePoint { pixel, outward, .. } = point;
-            let evidence: [f64; SAMPLES] = std::array::from_fn(|k| {
-                let at = pixel + (k as f64 - f64::from(REACH)) * outward;
-                self.evidence.at(at.x, at.y)
-            });
+            let place = |k: usize| pixel + (k as f64 - f64::from(REACH)) * outward;
+            let evidence = std::array::from_fn(|k| self.evidence.at(&place(k)));
+            let edges = std::array::from_fn(|k| self.evidence.edge_at(&(place(k) - 0.5 * outward)));
             let RegionSettings { sigma, surface, hidden, exceeded, .. } = self.settings;
             let sigma = sigma.hypot(surface * self.camera.fx / point.point.z);
-            let border = Border::new(&evidence, sigma, [hidden, exceeded]);
+            let border = Border::new(&evidence, &edges, sigma, [hidden, exceeded]);
             let weight = self.settings.effective_samples * point.length / length;
             Line { point, border, weight }
         };
@@ -161,6 +175,37 @@ impl Correspondences<'_> {
             Some((line, point, outward.dot(&(shown - pixel))))
         })
     }
+
+    /// The common offset of the outline that fits best with the object at `seen` \[px\], and the information about it \[nat/px²\].
+    fn offset(&self, seen: &Isometry3<f64>) -> (f64, f64) {
+        let places: Vec<(&Line, f64)> =
+            self.moved(seen).map(|(line, _, place)| (line, place)).collect();
+        let misfit = |offset: f64| {
+            let mut sum = self.factor.offset_prior(offset);
+            for (Line { border, weight, .. }, place) in &places {
+                let line = border.misfit(place - offset);
+                sum.cost += weight * line.cost;
+                sum.slope -= weight * line.slope;
+                sum.information += weight * line.information;
+            }
+            sum
+        };
+        let (mut offset, mut at) = (0.0, misfit(0.0));
+        let mut step = -at.slope / at.information;
+        for _ in 0..OFFSET_STEPS {
+            if step.abs() < OFFSET_RESOLUTION {
+                break;
+            }
+            let next = misfit(offset + step);
+            if next.cost <= at.cost {
+                (offset, at) = (offset + step, next);
+                step = -at.slope / at.information;
+            } else {
+                step *= 0.5;
+            }
+        }
+        (offset, at.information)
+    }
 }
 
 impl Factor for Correspondences<'_> {
@@ -169,8 +214,12 @@ impl Factor for Correspondences<'_> {
     }
 
     fn cost(&self, state: &State) -> f64 {
-        let cost = |(line, _, place): (&Line, _, f64)| line.weight * line.border.misfit(place).cost;
-        self.moved(&reprojected(state)).map(cost).sum()
+        let seen = reprojected(state);
+        let (offset, _) = self.offset(&seen);
+        let cost = |(line, _, place): (&Line, _, f64)| {
+            line.weight * line.border.misfit(place - offset).cost
+        };
+        self.factor.offset_prior(offset).cost + self.moved(&seen).map(cost).sum::<f64>()
     }
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
@@ -178,10 +227,14 @@ impl Factor for Correspondences<'_> {
         let center = seen * self.factor.object.center;
         let Camera { fx, fy, .. } = self.factor.camera;
         let (mut gradient, mut hessian) = (Vector6::zeros(), Matrix6::zeros());
-        let (mut cost, mut degrees) = (0.0, 0.0);
+        let (offset, of_offset) = self.offset(&seen);
+        let mut cost = self.factor.offset_prior(offset).cost;
+        // Mixed derivative by pose and offset, which is eliminated (Schur's complement).
+        let mut mixed = Vector6::zeros();
+        let mut degrees = 0.0;
         for (line, point, place) in self.moved(&seen) {
             let Line { point: OutlinePoint { outward, .. }, border, weight } = line;
-            let Misfit { cost: own, slope, information } = border.misfit(place);
+            let Misfit { cost: own, slope, information } = border.misfit(place - offset);
             cost += weight * own;
             degrees += weight;
             let [x, y] = [outward.x * fx, outward.y * fy].map(|n| n / point.z);
@@ -189,7 +242,9 @@ impl Factor for Correspondences<'_> {
             let row: Vector6<f64> = twist_row(&(point - center), &Vector3::new(x, y, along));
             gradient += row * (weight * slope);
             hessian += row * row.transpose() * (weight * information);
+            mixed += row * (weight * information);
         }
+        hessian -= mixed * mixed.transpose() / of_offset;
         let chain = seen_by_state(state);
         let mut sums = PatchSums::<12>::new(0);
         sums.add(None, &chain.tr_mul(&gradient), &(chain.tr_mul(&hessian) * chain));

@@ -181,6 +181,7 @@ fn other_factors(
         let mut region = settings.region;
         region.surface = region.surface.hypot(settings.model.gp_sigma);
         region.downsample *= stage.downsample.div_ceil(2);
+        region.color &= wanted(Modality::Color);
         factors.push(Arc::new(RegionFactor::new(frame, &region)?));
     }
     if wanted(Modality::FreeSpace) {

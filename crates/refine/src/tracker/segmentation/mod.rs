@@ -12,17 +12,14 @@ use self::parts::large_parts;
 use self::window::{Label, Pixel, Window};
 use super::GAIN;
 use super::sight::Sight;
-use crate::factor::ColorHistogram;
-use crate::scene::Object;
+use crate::scene::{ColorRatios, Object, RegionColors};
 
 /// Pixels of which each colors, depth and masks are asked: every so many of rows and columns.
 const STRIDE: usize = 2;
 /// How far from where it should be the object is looked for \[m\].
 const REACH: f64 = 0.04;
-/// What a color tells at most \[nat\].
-const COLOR_LIMIT: f32 = 2.0;
 /// Evidence of a color \[nat\] below which it is another thing's, whatever depth says: what is found may lie flush with a wall.
-const OTHERS_COLOR: f32 = -0.5 * COLOR_LIMIT;
+const OTHERS_COLOR: f32 = -0.5 * ColorRatios::LIMIT;
 /// Pixels that are needed to judge by.
 const ENOUGH: f32 = 30.0;
 /// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
@@ -34,13 +31,11 @@ const MASK_ERROR: f32 = 0.02;
 /// believed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Segmenter {
-    object: ColorHistogram,
-    others: ColorHistogram,
+    colors: RegionColors,
+    ratios: ColorRatios,
     /// How often masks say so of pixels that show the object, and of others.
     hits: f32,
     false_alarms: f32,
-    /// What each color tells \[nat\]; empty before any is known.
-    color_evidence: Vec<f32>,
     /// How much of the object is seen, in squares of depth by pixels.
     seen_area: f32,
     /// Where the last frame was looked at; its memory serves the next one.
@@ -78,7 +73,7 @@ impl Segmenter {
             if pixel.is_elsewhere() {
                 continue;
             }
-            let color = self.color_evidence(pixel.color);
+            let color = self.ratios.of_index(pixel.color);
             let told = if pixel.masked { set } else { unset };
             if pixel.prior() + pixel.depth_evidence() + color + told <= 0.0 {
                 continue;
@@ -97,15 +92,15 @@ impl Segmenter {
         let [set, unset] = self.mask_evidence(sight);
         let center = window.hand_center();
         // Nothing is known at all.
-        if center.is_none() && self.color_evidence.is_empty() && set == 0.0 {
+        if center.is_none() && !self.ratios.are_known() && set == 0.0 {
             return None;
         }
         let may_show = |pixel: &Pixel| {
-            let color = self.color_evidence(pixel.color);
+            let color = self.ratios.of_index(pixel.color);
             let told = if pixel.masked { set } else { unset };
             let evidence = pixel.near_hand(center, &window.place(pixel)) + color + told;
             // Before any color is known, all that is near the hand may be the object.
-            evidence > 0.0 || evidence == 0.0 && self.color_evidence.is_empty()
+            evidence > 0.0 || evidence == 0.0 && !self.ratios.are_known()
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
         let columns = sight.observation.camera.width.div_ceil(STRIDE);
@@ -133,7 +128,7 @@ impl Segmenter {
         }
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
-            let color = self.color_evidence(pixel.color);
+            let color = self.ratios.of_index(pixel.color);
             let told = pixel.depth_evidence() + color;
             if told != 0.0 {
                 expected += pixel.share;
@@ -157,21 +152,13 @@ impl Segmenter {
         let area: f32 = window.pixels().map(Pixel::expected_area).sum();
         let gain = if self.seen_area > 0.0 { GAIN } else { 1.0 };
         self.seen_area += gain * (area - self.seen_area);
-        for (label, colors) in [(Label::Object, &mut self.object), (Label::Other, &mut self.others)]
+        for (label, colors) in
+            [(Label::Object, &mut self.colors.object), (Label::Other, &mut self.colors.others)]
         {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
             colors.learn(pixels.map(|pixel| pixel.color), GAIN);
         }
-        self.color_evidence.clear();
-        if !(self.object.is_known() && self.others.is_known()) {
-            return;
-        }
-        self.color_evidence.extend(self.object.log_ratios(&self.others, COLOR_LIMIT));
-    }
-
-    /// Whether a color is rather the object's than another's \[nat\].
-    fn color_evidence(&self, color: u16) -> f32 {
-        self.color_evidence.get(usize::from(color)).copied().unwrap_or_default()
+        self.ratios = self.colors.ratios();
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.

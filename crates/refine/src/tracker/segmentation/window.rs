@@ -6,9 +6,8 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
-use super::{COLOR_LIMIT, STRIDE};
-use crate::factor::color_index;
-use crate::scene::Object;
+use super::STRIDE;
+use crate::scene::{ColorRatios, Object, color_index};
 use crate::tracker::sight::Sight;
 
 /// Outlines are expected within so many pixels of the window to either side.
@@ -16,7 +15,7 @@ const BAND: usize = 4;
 /// Depth of the surface is carried on over so many pixels of the window beyond its outline.
 const BEYOND: usize = 16;
 /// How sure it is that the object is where it should be.
-const SURE: f32 = 0.85;
+const SURE: f32 = 0.7;
 /// Standard deviation of depth about where the object should be, and at the hand \[m\].
 const DEPTH_SIGMA: f32 = 5e-3;
 /// Depth that is so far from the object's surface is not of it \[m\].
@@ -288,7 +287,7 @@ impl Pixel {
         let Some(center) = center else { return 0.0 };
         match self.sensor > 0.0 && !self.is_on_hand() && (place - center).norm() < HELD {
             true => 0.0,
-            false => -2.0 * COLOR_LIMIT,
+            false => -2.0 * ColorRatios::LIMIT,
         }
     }
 

@@ -1,20 +1,18 @@
 //! The border of a mask.
 
 use std::f32::consts::SQRT_2;
+use std::ops::Range;
 
-use prehend_render::{Mask, RgbImage};
+use prehend_render::Mask;
 
-use super::colors::color_index;
-
-/// By how much a mask is shrunk or grown everywhere at most \[px\].
-const MOST_GROWTH: usize = 5;
-/// How far from where colors change on the whole the image's edges are looked for \[px\].
-const EDGE_REACH: f32 = 2.0;
-/// How many times as strong as those along the mask's border edges must be for the border to be elsewhere.
-const EDGE_RATIO: f32 = 1.25;
+/// By how much a mask is shrunk or grown everywhere at most, and half the width of the distribution of that \[px\].
+pub(super) const MOST_GROWTH: usize = 4;
+const TYPICAL_GROWTH: f32 = 0.5;
+/// Independent measurements of growth that all pixels about a border amount to: shadows and shades err alike along it.
+const EFFECTIVE_SAMPLES: f32 = 5.0;
 
 /// Distances to the border of a mask, of the pixels about it.
-pub(super) struct MaskBorder {
+pub(crate) struct MaskBorder {
     /// Columns of the image.
     width: usize,
     left: usize,
@@ -41,72 +39,58 @@ impl MaskBorder {
             &mask.pixels()[from..from + columns]
         };
         let set: Vec<bool> = (0..rows).flat_map(line).copied().collect();
-        let outside = chamfer(&set, columns, true);
-        let inside = chamfer(&set, columns, false);
+        Some(Self::within(width, [left..left + columns, top..top + rows], &set))
+    }
+
+    /// Border of what is `set` of a window of an image that is `width` columns wide.
+    pub(crate) fn within(width: usize, window: [Range<usize>; 2], set: &[bool]) -> Self {
+        let [Range { start: left, end: right }, Range { start: top, .. }] = window;
+        let columns = right - left;
+        let outside = chamfer(set, columns, true);
+        let inside = chamfer(set, columns, false);
         let signed = |(out, into): (&f32, &f32)| if *into > 0.0 { into - 0.5 } else { 0.5 - out };
         let distances = outside.iter().zip(&inside).map(signed).collect();
-        Some(Self { width, left, top, columns, distances })
+        Self { width, left, top, columns, distances }
+    }
+
+    /// Its columns and rows of the image.
+    pub(super) fn window(&self) -> [Range<usize>; 2] {
+        let rows = self.distances.len() / self.columns;
+        [self.left..self.left + self.columns, self.top..self.top + rows]
     }
 
     /// The index of each pixel in the image, and its distance to the border \[px\].
-    pub(super) fn pixels(&self) -> impl Iterator<Item = (usize, f32)> + Clone {
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = (usize, f32)> + Clone {
         let index =
             |k: usize| (self.top + k / self.columns) * self.width + self.left + k % self.columns;
         self.distances.iter().enumerate().map(move |(k, distance)| (index(k), *distance))
     }
 
-    /// How far outside the image's own edges the border is everywhere \[px\]; `ratios` are what each color tells of object and others.
-    ///
-    /// Nothing unless edges are clearly stronger elsewhere, and farther away than a border may be: where an edge is to a pixel, light and shadow decide, too.
-    pub(super) fn growth(&self, color: &RgbImage, ratios: &[f32]) -> f32 {
-        // Of the pixels at about one distance: number, sum of changes of color across the border, sum of what colors tell.
-        let mut levels = [[0.0_f32; 3]; 2 * MOST_GROWTH];
-        let (pixels, rows) = (color.pixels(), self.distances.len() / self.columns);
-        for (k, (at, distance)) in self.pixels().enumerate() {
-            let (x, y) = (k % self.columns, k / self.columns);
-            let inner = x > 0 && y > 0 && x + 1 < self.columns && y + 1 < rows;
-            let level = distance.floor() as i32 + MOST_GROWTH as i32;
+    /// Probability of each whole number of pixels from −[`MOST_GROWTH`] on that the mask is grown by everywhere; of its pixels, `colors` are the log-likelihood
+    /// ratios of object and others, and `edges` those of a border \[nat\]. Growth has a Cauchy distribution beforehand.
+    pub(super) fn growth(&self, colors: &[f32], edges: &[f32]) -> [f32; 2 * MOST_GROWTH + 1] {
+        // Sums of the pixels at about one distance: number, evidence of edges, of colors.
+        let mut levels = [[0.0_f32; 3]; 2 * MOST_GROWTH + 2];
+        for (distance, (color, edge)) in self.distances.iter().zip(colors.iter().zip(edges)) {
+            let level = distance.floor() as i32 + MOST_GROWTH as i32 + 1;
             let level = usize::try_from(level).ok().and_then(|level| levels.get_mut(level));
-            let Some([count, change, told]) = level.filter(|_| inner) else { continue };
-            let slope = |step: usize| 0.5 * (self.distances[k + step] - self.distances[k - step]);
-            let (right, down) = (slope(1), slope(self.columns));
-            let across = |channel: usize| {
-                let change = |step: usize| pixels[at + step][channel] - pixels[at - step][channel];
-                0.5 * (right * change(1) + down * change(self.width))
-            };
-            *count += 1.0;
-            *change += [0, 1, 2].map(|channel| across(channel).powi(2)).iter().sum::<f32>().sqrt();
-            *told += ratios[usize::from(color_index(&pixels[at]))];
+            let Some(level) = level else { continue };
+            level.iter_mut().zip([1.0, *edge, *color]).for_each(|(sum, value)| *sum += value);
         }
         let mean = |sum: usize| levels.map(|level| level[sum] / level[0].max(1.0));
-        let (changes, told) = (mean(1), mean(2));
-        let strength = |k: usize| changes[k - 1] + 2.0 * changes[k] + changes[k + 1];
-        let crossing = crossing(&told);
-        let is_near = |k: &usize| (*k as f32 + 0.5 - crossing).abs() <= EDGE_REACH;
-        let inner = (1..levels.len() - 1).filter(is_near);
-        let Some(strongest) = inner.max_by(|a, b| strength(*a).total_cmp(&strength(*b))) else {
-            return 0.0;
+        let (edges, colors) = (mean(1), mean(2));
+        let log_likelihood = |k: usize| {
+            let growth = k as f32 - MOST_GROWTH as f32;
+            let inside: f32 = colors[k + 1..].iter().sum();
+            let edge = 0.5 * (edges[k] + edges[k + 1]);
+            EFFECTIVE_SAMPLES * (inside + edge) - (growth / TYPICAL_GROWTH).powi(2).ln_1p()
         };
-        let around = strongest - 1..=strongest + 1;
-        let weight: f32 = around.clone().map(|k| changes[k]).sum();
-        let place: f32 = around.map(|k| changes[k] * (k as f32 + 0.5)).sum();
-        let growth = place / weight.max(f32::MIN_POSITIVE) - MOST_GROWTH as f32;
-        let of_border = strength(MOST_GROWTH).max(strength(MOST_GROWTH - 1));
-        let is_elsewhere = strength(strongest) > EDGE_RATIO * of_border;
-        if is_elsewhere && growth.abs() > Self::SIGMA { growth } else { 0.0 }
+        let logs: [f32; 2 * MOST_GROWTH + 1] = std::array::from_fn(log_likelihood);
+        let largest = logs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let likelihoods = logs.map(|log| (log - largest).exp());
+        let sum: f32 = likelihoods.iter().sum();
+        likelihoods.map(|likelihood| likelihood / sum)
     }
-}
-
-/// The level, counted from the farthest outside, from which on inward colors are the object's on the whole.
-fn crossing(told: &[f32]) -> f32 {
-    let (mut most, mut at, mut sum) = (0.0, told.len(), 0.0);
-    for (k, told) in told.iter().enumerate().rev() {
-        sum += told;
-        if sum > most {
-            (most, at) = (sum, k);
-        }
-    }
-    at as f32
 }
 
 /// Distance of each pixel of an image of `columns` columns to the nearest one that is `to` \[px\].
@@ -135,6 +119,9 @@ fn chamfer(set: &[bool], columns: usize, to: bool) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
+    use prehend_render::RgbImage;
+
+    use super::super::{RegionColors, edges};
     use super::*;
 
     /// A disk of `radius` \[px\], and its picture: red before green.
@@ -166,15 +153,23 @@ mod tests {
     #[test]
     fn masks_that_are_shrunk_or_grown_are_told() {
         let picture = disk(15.0).1;
-        let mut ratios = vec![0.0; 4096];
-        ratios[usize::from(color_index(&[0.8, 0.1, 0.1]))] = 1.0;
-        ratios[usize::from(color_index(&[0.1, 0.6, 0.1]))] = -1.0;
         for growth in [-3.0, -2.0, 0.0, 2.0, 3.0] {
             let border = MaskBorder::new(&disk(15.0 + growth).0).unwrap();
-            let found = f64::from(border.growth(&picture, &ratios));
-            assert!((found - growth).abs() <= 0.6, "{growth}: {found}");
+            let mut colors = RegionColors::default();
+            colors.learn(&picture, &border, 4.0, |_| true, 1.0);
+            let ratios = colors.ratios();
+            let told: Vec<f32> =
+                border.pixels().map(|(at, _)| ratios.of(&picture.pixels()[at])).collect();
+            let found = border.growth(&told, &edges(&picture, &border.window()));
+            let steps = -(MOST_GROWTH as i32)..;
+            let mean: f64 =
+                found.iter().zip(steps).map(|(p, g)| f64::from(*p) * f64::from(g)).sum();
+            assert!((mean - growth).abs() <= 0.6, "{growth}: {mean}");
         }
-        let gray = RgbImage::filled(80, 60, [0.5; 3]);
-        assert_eq!(MaskBorder::new(&disk(15.0).0).unwrap().growth(&gray, &ratios), 0.0);
+        // Without any evidence it is as it is beforehand.
+        let border = MaskBorder::new(&disk(15.0).0).unwrap();
+        let nothing = vec![0.0; border.distances.len()];
+        let found = border.growth(&nothing, &nothing);
+        assert!(found[MOST_GROWTH] > 0.4 && found[0] > 1e-3, "{found:?}");
     }
 }

@@ -1,0 +1,116 @@
+//! How often colors occur.
+
+use prehend_render::RgbImage;
+
+use super::border::MaskBorder;
+
+/// Levels of a channel.
+const LEVELS: u16 = 16;
+/// What a color that was never seen counts for, as a share of all that were.
+const UNSEEN: f32 = 1e-4;
+
+/// Shares of the colors of a part of pictures.
+#[derive(Clone, Debug)]
+pub(crate) struct ColorHistogram {
+    shares: Vec<f32>,
+    /// Whether anything was learnt.
+    known: bool,
+}
+
+impl Default for ColorHistogram {
+    fn default() -> Self {
+        Self { shares: vec![0.0; usize::from(LEVELS).pow(3)], known: false }
+    }
+}
+
+/// The number of a color.
+pub(crate) fn color_index(color: &[f32; 3]) -> u16 {
+    let level =
+        |channel: f32| (channel * f32::from(LEVELS)).clamp(0.0, f32::from(LEVELS - 1)) as u16;
+    let [r, g, b] = color.map(level);
+    (r * LEVELS + g) * LEVELS + b
+}
+
+impl ColorHistogram {
+    /// Goes a part `gain` of the way to what `colors` show, and all of it at first.
+    pub(crate) fn learn(&mut self, colors: impl Iterator<Item = u16> + Clone, gain: f32) {
+        let count = colors.clone().count();
+        if count == 0 {
+            return;
+        }
+        let gain = if self.known { gain } else { 1.0 };
+        self.known = true;
+        self.shares.iter_mut().for_each(|share| *share *= 1.0 - gain);
+        let each = gain / count as f32;
+        for color in colors {
+            self.shares[usize::from(color)] += each;
+        }
+    }
+}
+
+/// Colors of an object, and of what is around it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RegionColors {
+    pub(crate) object: ColorHistogram,
+    pub(crate) others: ColorHistogram,
+}
+
+impl RegionColors {
+    /// Goes a part `gain` of the way to what the pixels of `image` show on both sides of `border`, beyond `margin` \[px\] from it. Those within it that do
+    /// not show the object by `shows`, which is asked with an index of the image, are others.
+    pub(crate) fn learn(
+        &mut self,
+        image: &RgbImage,
+        border: &MaskBorder,
+        margin: f32,
+        shows: impl Fn(usize) -> bool,
+        gain: f32,
+    ) {
+        let (mut object, mut others) = (Vec::new(), Vec::new());
+        for (at, inside) in border.pixels().filter(|(_, inside)| inside.abs() > margin) {
+            let colors = if inside > 0.0 && shows(at) { &mut object } else { &mut others };
+            colors.push(color_index(&image.pixels()[at]));
+        }
+        self.object.learn(object.into_iter(), gain);
+        self.others.learn(others.into_iter(), gain);
+    }
+
+    /// What each color tells; nothing before both are known.
+    pub(crate) fn ratios(&self) -> ColorRatios {
+        let Self { object, others } = self;
+        if !(object.known && others.known) {
+            return ColorRatios::default();
+        }
+        let limit = ColorRatios::LIMIT;
+        let ratio = |(own, other): (&f32, &f32)| ((own + UNSEEN) / (other + UNSEEN)).ln();
+        let pairs = object.shares.iter().zip(&others.shares).map(ratio);
+        ColorRatios { values: pairs.map(|ratio| ratio.clamp(-limit, limit)).collect() }
+    }
+}
+
+/// Log-likelihood ratio of each color between object and others \[nat\].
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ColorRatios {
+    /// By number of the color; empty where nothing is known.
+    values: Vec<f32>,
+}
+
+impl ColorRatios {
+    /// The largest \[nat\].
+    pub(crate) const LIMIT: f32 = 1.0;
+
+    /// Whether any is known.
+    pub(crate) fn are_known(&self) -> bool {
+        !self.values.is_empty()
+    }
+
+    /// The one of the color with a number; 0 where nothing is known.
+    pub(crate) fn of_index(&self, index: u16) -> f32 {
+        self.values.get(usize::from(index)).copied().unwrap_or_default()
+    }
+
+    /// The one of a color.
+    pub(crate) fn of(&self, color: &[f32; 3]) -> f32 {
+        self.of_index(color_index(color))
+    }
+}

@@ -1,0 +1,180 @@
+//! Regions of an image: how far its pixels are the object's, by colors and masks.
+
+mod border;
+mod colors;
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
+use prehend_render::{Mask, RgbImage};
+
+use self::border::MOST_GROWTH;
+pub(crate) use self::border::MaskBorder;
+pub(crate) use self::colors::{ColorRatios, RegionColors, color_index};
+use super::MASK_MARGIN;
+
+/// Largest evidence of the mask \[nat\].
+const MASK_LIMIT: f32 = 3.0;
+/// Contrast beside the mean that a border has at least: some are seen of which nothing is.
+const LEAST_CONTRAST: f32 = 0.2;
+
+/// Log-likelihood ratios of object and others at each pixel of an image, and of a border of the object \[nat\], within a window of it.
+#[derive(Clone, Debug)]
+pub(crate) struct RegionEvidence {
+    /// Columns and rows of the image, and of the window.
+    size: [usize; 2],
+    window: [Range<usize>; 2],
+    values: Vec<f32>,
+    edges: Vec<f32>,
+    /// The value outside of the window.
+    outside: f32,
+}
+
+impl RegionEvidence {
+    /// From `mask`, and from how often colors of `color`, if there is any, occur within and around it. None of an empty mask.
+    pub(crate) fn of_mask(color: Option<&RgbImage>, mask: &Mask) -> Option<Self> {
+        let border = MaskBorder::new(mask)?;
+        let window = border.window();
+        let (told, edges) = match color {
+            Some(color) => {
+                let mut colors = RegionColors::default();
+                // At the border colors are mixed, and are no more one's than the other's.
+                colors.learn(color, &border, MASK_MARGIN as f32, |_| true, 1.0);
+                let ratios = colors.ratios();
+                let told = border.pixels().map(|(at, _)| ratios.of(&color.pixels()[at]));
+                (told.collect(), edges(color, &window))
+            }
+            None => {
+                let nothing = vec![0.0_f32; border.pixels().count()];
+                (nothing.clone(), nothing)
+            }
+        };
+        let growth = border.growth(&told, &edges);
+        let within = |distance: f32| {
+            let growths = growth.iter().zip(-(MOST_GROWTH as i32)..);
+            let inside = |growth: i32| (distance - growth as f32) / MaskBorder::SIGMA;
+            growths.map(|(p, growth)| p * inside(growth).clamp(-1.0, 1.0)).sum::<f32>()
+        };
+        let pixels = border.pixels().zip(&told);
+        let values = pixels.map(|((_, distance), told)| told + MASK_LIMIT * within(distance));
+        let values = values.collect();
+        // What is far away is not the object.
+        let outside = -MASK_LIMIT - ColorRatios::LIMIT;
+        Some(Self { size: [mask.width(), mask.height()], window, values, edges, outside })
+    }
+
+    /// From `color` alone, within a window of the image.
+    pub(crate) fn of_colors(
+        color: &RgbImage,
+        window: [Range<usize>; 2],
+        ratios: &ColorRatios,
+    ) -> Self {
+        let [columns, rows] = &window;
+        let line = |y: usize| &color.pixels()[y * color.width()..][columns.clone()];
+        let values = rows.clone().flat_map(line).map(|pixel| ratios.of(pixel)).collect();
+        let size = [color.width(), color.height()];
+        let edges = edges(color, &window);
+        Self { size, window, values, edges, outside: -ColorRatios::LIMIT }
+    }
+
+    /// Means of blocks of `factor` pixels across.
+    pub(crate) fn reduced(&self, factor: usize) -> Self {
+        if factor <= 1 {
+            return self.clone();
+        }
+        let size = self.size.map(|size| (size / factor).max(1));
+        let window: [Range<usize>; 2] = std::array::from_fn(|k| {
+            let Range { start, end } = &self.window[k];
+            start / factor..end.div_ceil(factor).min(size[k])
+        });
+        let mean = |x: usize, y: usize, of: &[f32], outside: f32| {
+            let rows = y * factor..((y + 1) * factor).min(self.size[1]);
+            let columns = x * factor..((x + 1) * factor).min(self.size[0]);
+            let count = rows.len() * columns.len();
+            let sum: f32 = rows
+                .flat_map(|y| columns.clone().map(move |x| (x, y)))
+                .map(|(x, y)| self.get(x, y, of, outside))
+                .sum();
+            sum / count as f32
+        };
+        let [columns, rows] = window.clone();
+        let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+        let values = places.clone().map(|(x, y)| mean(x, y, &self.values, self.outside)).collect();
+        let edges = places.map(|(x, y)| mean(x, y, &self.edges, 0.0)).collect();
+        Self { size, window, values, edges, outside: self.outside }
+    }
+
+    /// The one `of` a column and row.
+    fn get(&self, x: usize, y: usize, of: &[f32], outside: f32) -> f32 {
+        let [columns, rows] = &self.window;
+        if columns.contains(&x) && rows.contains(&y) {
+            of[(y - rows.start) * columns.len() + x - columns.start]
+        } else {
+            outside
+        }
+    }
+
+    /// The log-likelihood ratio of object and others at a place of the image \[nat\].
+    pub(crate) fn at(&self, place: &Vector2<f64>) -> f64 {
+        self.sample(place, &self.values, self.outside)
+    }
+
+    /// The log-likelihood ratio of a border of the object at a place of the image \[nat\].
+    pub(crate) fn edge_at(&self, place: &Vector2<f64>) -> f64 {
+        self.sample(place, &self.edges, 0.0)
+    }
+
+    /// The one `of` a place, linear between pixels; of the image's border beyond it.
+    fn sample(&self, place: &Vector2<f64>, of: &[f32], outside: f32) -> f64 {
+        let [width, height] = self.size;
+        let inside = |v: f64, size: usize| v.clamp(0.0, (size - 1) as f64);
+        let (x, y) = (inside(place.x, width), inside(place.y, height));
+        let (column, row) = (x as usize, y as usize);
+        let (right, below) = ((column + 1).min(width - 1), (row + 1).min(height - 1));
+        let (s, t) = (x - column as f64, y - row as f64);
+        let value = |x: usize, y: usize| f64::from(self.get(x, y, of, outside));
+        (1.0 - t) * ((1.0 - s) * value(column, row) + s * value(right, row))
+            + t * ((1.0 - s) * value(column, below) + s * value(right, below))
+    }
+}
+
+/// Log-likelihood ratio of a border at the pixels of a window: borders are where colors change, in proportion to how much \[nat\].
+fn edges(color: &RgbImage, window: &[Range<usize>; 2]) -> Vec<f32> {
+    let (width, height, pixels) = (color.width(), color.height(), color.pixels());
+    let [columns, rows] = window.clone();
+    let change = |(x, y): (usize, usize)| {
+        let squared = |from: usize, to: usize| -> f32 {
+            pixels[from].iter().zip(&pixels[to]).map(|(a, b)| (a - b).powi(2)).sum()
+        };
+        let (line, left, right) = (y * width, x.saturating_sub(1), (x + 1).min(width - 1));
+        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+        (squared(line + left, line + right) + squared(above * width + x, below * width + x)).sqrt()
+    };
+    let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let mut changes: Vec<f32> = places.map(change).collect();
+    let mean = changes.iter().sum::<f32>() / changes.len().max(1) as f32;
+    let mean = mean.max(f32::MIN_POSITIVE);
+    changes.iter_mut().for_each(|change| *change = (LEAST_CONTRAST + *change / mean).ln());
+    changes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_are_part_of_an_image() {
+        let color = RgbImage::filled(40, 30, [0.5; 3]);
+        let mut colors = RegionColors::default();
+        colors.object.learn([color_index(&[0.5; 3])].into_iter(), 1.0);
+        colors.others.learn([0].into_iter(), 1.0);
+        let ratios = colors.ratios();
+        let evidence = RegionEvidence::of_colors(&color, [10..30, 5..25], &ratios);
+        for (factor, evidence) in [(1.0, evidence.clone()), (2.0, evidence.reduced(2))] {
+            let at = |x: f64, y: f64| evidence.at(&Vector2::new(x / factor, y / factor));
+            assert!((at(20.0, 15.0) - 1.0).abs() < 1e-6);
+            assert!((at(3.0, 15.0) + 1.0).abs() < 1e-6);
+            assert!((at(-3.0, 400.0) + 1.0).abs() < 1e-6);
+        }
+    }
+}
