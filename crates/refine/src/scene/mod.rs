@@ -22,7 +22,9 @@ pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose};
 pub use object::{Inertial, Object, StatedSize};
 pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
-pub(crate) use region::{ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index};
+pub(crate) use region::{
+    COLOR_LIMIT, ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index,
+};
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
 pub use touch::{BinaryContact, ContactPatch, ProximityReading, TouchReading};
 pub(crate) use view::{Pixel, View, median};

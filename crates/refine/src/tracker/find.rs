@@ -8,6 +8,7 @@ use log::debug;
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 
+use super::appearance::Appearance;
 use super::clock::{Clock, Timing};
 use super::memory::TrackState;
 use super::settings::Recovery;
@@ -24,6 +25,9 @@ use crate::strategy::{Fused, Posterior, Strategy};
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
+/// How often colors are learnt anew where no mask tells the object.
+const COLOR_ROUNDS: usize = 3;
+
 impl Tracker {
     /// The first frame.
     pub(super) fn begin(
@@ -33,7 +37,9 @@ impl Tracker {
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        if sight.given.count() > 0 {
+        if let Some(pose) = self.initial.filter(|_| !sight.measured && !sight.tells) {
+            self.initial = Some(self.learn_colors(sight, &pose)?);
+        } else if sight.given.count() > 0 {
             sight.observation.mask.copy_from(&sight.given);
         } else if let Some(pose) = self.initial {
             if !self.segment(sight, &object, &pose) {
@@ -70,6 +76,31 @@ impl Tracker {
         self.learn(sight, &solved);
         let timing = Timing { recovery: clock.lap(), ..Timing::default() };
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
+    }
+
+    /// Learns colors in a frame with neither depth nor a mask, in which the object is about `initial`, and says where it is then \[m\]: colors and pose in turns.
+    fn learn_colors(
+        &mut self,
+        sight: &mut Sight,
+        initial: &Isometry3<f64>,
+    ) -> Result<Isometry3<f64>, RefineError> {
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let mut pose = *initial;
+        for _ in 0..COLOR_ROUNDS {
+            self.appearance = Appearance::default();
+            if !self.appearance.look(sight, &object, &pose) {
+                return Err(RefineError::EmptyMask);
+            }
+            self.appearance.learn(sight, &object, &pose);
+            self.appearance.look(sight, &object, &pose);
+            // The pose may be far off.
+            sight.focus = None;
+            let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+            let start = State::new(&frame, initial)?;
+            pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
+        }
+        self.appearance.look(sight, &object, &pose);
+        Ok(pose)
     }
 
     /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; linearized as frames that are
@@ -125,7 +156,7 @@ impl Tracker {
         let recovery = self.settings.recovery;
         for (reach, level) in ways.into_iter().filter(|(reach, _)| *reach <= recovery) {
             let found = match reach {
-                Recovery::Anywhere => self.search_anywhere(sight)?,
+                Recovery::Anywhere => self.search_anywhere(sight, &predicted.t_cam_object)?,
                 _ => Some((predicted.t_cam_object, None)),
             };
             let Some((t_cam_object, rivals)) = found else { continue };
@@ -165,8 +196,17 @@ impl Tracker {
         Ok(None)
     }
 
-    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; none if nothing fits.
-    fn search_anywhere(&mut self, sight: &mut Sight) -> Result<Option<Candidates>, RefineError> {
+    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; where no depth is measured, the `expected` one moved to
+    /// where its colors are seen. None if nothing fits.
+    fn search_anywhere(
+        &mut self,
+        sight: &mut Sight,
+        expected: &Isometry3<f64>,
+    ) -> Result<Option<Candidates>, RefineError> {
+        if !sight.measured {
+            let found = self.appearance.find(sight, &self.object, expected);
+            return Ok(found.map(|pose| (pose, None)));
+        }
         let Some(mask) = self.segmenter.anywhere(sight) else {
             debug!("nothing like the object is seen anywhere");
             return Ok(None);

@@ -10,6 +10,7 @@ mod pyramid;
 mod segmentation;
 mod settings;
 mod sight;
+mod sums;
 #[cfg(test)]
 mod tests;
 mod tracked;
@@ -320,6 +321,13 @@ impl Tracker {
             timing.validation = clock.lap();
             return Ok(Err(rejection));
         }
+        if !sight.measured {
+            let shown = self.shown(sight, &object, &solved.solution.at.state.t_cam_object);
+            if shown < self.settings.gating.least_shown {
+                timing.validation = clock.lap();
+                return Ok(Err(Rejection::OtherColors(shown)));
+            }
+        }
         timing.validation = clock.lap();
         let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(in_hand));
         let rotation = solved.solution.at.state.t_cam_object.rotation;
@@ -399,7 +407,7 @@ impl Tracker {
         }
     }
 
-    /// The share of the pixels which should show an object at `t_cam_object` that do.
+    /// The share of the pixels which should show an object at `t_cam_object` that do; of the usual share, where colors alone tell.
     fn shown(&self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> f64 {
         match sight.measured {
             true => self.segmenter.shown(sight, object, t_cam_object),

@@ -242,3 +242,24 @@ fn a_turned_pose_that_fits_better_is_taken() {
         left.t_cam_object.rotation.angle_to(&wrong.solution.at.state.t_cam_object.rotation) < 0.02
     );
 }
+
+#[test]
+fn color_alone_follows_an_object_without_any_mask() {
+    let hidden = |index: usize| {
+        let mut observation = SEQUENCE.frames[index].observation.clone();
+        observation.depth.pixels_mut().fill(0.0);
+        observation.mask.pixels_mut().fill(false);
+        observation
+    };
+    let mut tracker = tracker(TrackerSettings::default());
+    for index in 0..12 {
+        let tracked = tracker.track(&hidden(index), SEQUENCE.frames[index].time).unwrap();
+        let (pe, oe) = errors(&tracked, index);
+        assert!(pe < 0.5 && oe < 5.0, "{index}: {pe} cm, {oe}°");
+    }
+    // Where its colors are nowhere it is not followed.
+    let mut blank = hidden(12);
+    blank.color.pixels_mut().fill([0.5; 3]);
+    let lost = tracker.track(&blank, SEQUENCE.frames[12].time).unwrap();
+    assert_eq!(lost.status, TrackStatus::Lost);
+}

@@ -157,7 +157,7 @@ mod tests {
             let border = MaskBorder::new(&disk(15.0 + growth).0).unwrap();
             let mut colors = RegionColors::default();
             colors.learn(&picture, &border, 4.0, |_| true, 1.0);
-            let ratios = colors.ratios();
+            let ratios = colors.ratios(1.0);
             let told: Vec<f32> =
                 border.pixels().map(|(at, _)| ratios.of(&picture.pixels()[at])).collect();
             let found = border.growth(&told, &edges(&picture, &border.window()));

@@ -6,6 +6,8 @@ use super::border::MaskBorder;
 
 /// Levels of a channel.
 const LEVELS: u16 = 16;
+/// Levels of a channel of histograms that are compared.
+const COARSE: usize = 4;
 /// What a color that was never seen counts for, as a share of all that were.
 const UNSEEN: f32 = 1e-4;
 
@@ -46,6 +48,21 @@ impl ColorHistogram {
             self.shares[usize::from(color)] += each;
         }
     }
+
+    /// Intersection with the histogram of `colors` (Swain and Ballard, 1991), of fewer levels: from 0 to 1, which is the same distribution.
+    pub(crate) fn overlap(&self, colors: &[u16]) -> f64 {
+        let coarse = |index: usize| {
+            let level = |k: usize| index / usize::from(LEVELS).pow(k as u32) % usize::from(LEVELS);
+            (0..3).fold(0, |sum, k| sum * COARSE + level(k) * COARSE / usize::from(LEVELS))
+        };
+        let [mut own, mut others] = [[0.0_f64; COARSE.pow(3)]; 2];
+        for (index, share) in self.shares.iter().enumerate() {
+            own[coarse(index)] += f64::from(*share);
+        }
+        let each = 1.0 / colors.len().max(1) as f64;
+        colors.iter().for_each(|index| others[coarse(usize::from(*index))] += each);
+        own.iter().zip(&others).map(|(a, b)| a.min(*b)).sum()
+    }
 }
 
 /// Colors of an object, and of what is around it.
@@ -75,16 +92,15 @@ impl RegionColors {
         self.others.learn(others.into_iter(), gain);
     }
 
-    /// What each color tells; nothing before both are known.
-    pub(crate) fn ratios(&self) -> ColorRatios {
+    /// What each color tells, `limit` at most \[nat\]; nothing before both are known.
+    pub(crate) fn ratios(&self, limit: f32) -> ColorRatios {
         let Self { object, others } = self;
         if !(object.known && others.known) {
             return ColorRatios::default();
         }
-        let limit = ColorRatios::LIMIT;
         let ratio = |(own, other): (&f32, &f32)| ((own + UNSEEN) / (other + UNSEEN)).ln();
         let pairs = object.shares.iter().zip(&others.shares).map(ratio);
-        ColorRatios { values: pairs.map(|ratio| ratio.clamp(-limit, limit)).collect() }
+        ColorRatios { values: pairs.map(|ratio| ratio.clamp(-limit, limit)).collect(), limit }
     }
 }
 
@@ -93,11 +109,15 @@ impl RegionColors {
 pub(crate) struct ColorRatios {
     /// By number of the color; empty where nothing is known.
     values: Vec<f32>,
+    /// The largest \[nat\].
+    limit: f32,
 }
 
 impl ColorRatios {
     /// The largest \[nat\].
-    pub(crate) const LIMIT: f32 = 1.0;
+    pub(crate) fn limit(&self) -> f32 {
+        self.limit
+    }
 
     /// Whether any is known.
     pub(crate) fn are_known(&self) -> bool {

@@ -13,8 +13,9 @@ pub(crate) use self::border::MaskBorder;
 pub(crate) use self::colors::{ColorRatios, RegionColors, color_index};
 use super::MASK_MARGIN;
 
-/// Largest evidence of the mask \[nat\].
+/// Largest evidence of the mask, and of a color beside it \[nat\].
 const MASK_LIMIT: f32 = 3.0;
+pub(crate) const COLOR_LIMIT: f32 = 1.0;
 /// Contrast beside the mean that a border has at least: some are seen of which nothing is.
 const LEAST_CONTRAST: f32 = 0.2;
 
@@ -40,7 +41,7 @@ impl RegionEvidence {
                 let mut colors = RegionColors::default();
                 // At the border colors are mixed, and are no more one's than the other's.
                 colors.learn(color, &border, MASK_MARGIN as f32, |_| true, 1.0);
-                let ratios = colors.ratios();
+                let ratios = colors.ratios(COLOR_LIMIT);
                 let told = border.pixels().map(|(at, _)| ratios.of(&color.pixels()[at]));
                 (told.collect(), edges(color, &window))
             }
@@ -59,7 +60,7 @@ impl RegionEvidence {
         let values = pixels.map(|((_, distance), told)| told + MASK_LIMIT * within(distance));
         let values = values.collect();
         // What is far away is not the object.
-        let outside = -MASK_LIMIT - ColorRatios::LIMIT;
+        let outside = -MASK_LIMIT - COLOR_LIMIT;
         Some(Self { size: [mask.width(), mask.height()], window, values, edges, outside })
     }
 
@@ -74,7 +75,7 @@ impl RegionEvidence {
         let values = rows.clone().flat_map(line).map(|pixel| ratios.of(pixel)).collect();
         let size = [color.width(), color.height()];
         let edges = edges(color, &window);
-        Self { size, window, values, edges, outside: -ColorRatios::LIMIT }
+        Self { size, window, values, edges, outside: -ratios.limit() }
     }
 
     /// Means of blocks of `factor` pixels across.
@@ -168,7 +169,7 @@ mod tests {
         let mut colors = RegionColors::default();
         colors.object.learn([color_index(&[0.5; 3])].into_iter(), 1.0);
         colors.others.learn([0].into_iter(), 1.0);
-        let ratios = colors.ratios();
+        let ratios = colors.ratios(1.0);
         let evidence = RegionEvidence::of_colors(&color, [10..30, 5..25], &ratios);
         for (factor, evidence) in [(1.0, evidence.clone()), (2.0, evidence.reduced(2))] {
             let at = |x: f64, y: f64| evidence.at(&Vector2::new(x / factor, y / factor));

@@ -18,8 +18,10 @@ use crate::scene::{ColorRatios, Object, RegionColors};
 const STRIDE: usize = 2;
 /// How far from where it should be the object is looked for \[m\].
 const REACH: f64 = 0.04;
+/// What a color tells at most \[nat\].
+const COLOR_LIMIT: f32 = 2.0;
 /// Evidence of a color \[nat\] below which it is another thing's, whatever depth says: what is found may lie flush with a wall.
-const OTHERS_COLOR: f32 = -0.5 * ColorRatios::LIMIT;
+const OTHERS_COLOR: f32 = -0.5 * COLOR_LIMIT;
 /// Pixels that are needed to judge by.
 const ENOUGH: f32 = 30.0;
 /// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
@@ -158,7 +160,7 @@ impl Segmenter {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
             colors.learn(pixels.map(|pixel| pixel.color), GAIN);
         }
-        self.ratios = self.colors.ratios();
+        self.ratios = self.colors.ratios(COLOR_LIMIT);
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.
