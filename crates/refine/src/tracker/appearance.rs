@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3};
 use prehend_render::{DepthImage, draw_depth};
 
 use super::GAIN;
@@ -22,8 +22,8 @@ const MIXED: f32 = 2.0;
 const AGREEMENT: f32 = 0.5;
 /// Every so many columns and rows a lost object is looked for.
 const STRIDE: usize = 4;
-/// Share of a square as large as an object that has its colors at least where it may be.
-const LEAST_FOUND: f32 = 0.2;
+/// Share of what was seen of its colors that must be seen again where it is found.
+const LEAST_FOUND: f64 = 0.2;
 
 /// Colors of the object and of what is around it, learnt from frames in which its pose was believed.
 #[derive(Clone, Debug, Default)]
@@ -32,6 +32,8 @@ pub(super) struct Appearance {
     ratios: ColorRatios,
     /// See [`shares`](Self::shares).
     usual: [f64; 2],
+    /// Area that rather has its colors, were it flat \[m²\].
+    area: f64,
 }
 
 /// The object in an image, were nothing before it but the hand.
@@ -85,6 +87,12 @@ impl Silhouette {
         };
         self.pixels(sight).filter_map(shown)
     }
+}
+
+/// Pixels that an area of 1 m² at `place` has, were it seen from the front.
+fn pixels_per_area(sight: &Sight, place: &Point3<f64>) -> f64 {
+    let camera = &sight.observation.camera;
+    camera.fx * camera.fy / (place.z * place.z)
 }
 
 impl Appearance {
@@ -162,6 +170,8 @@ impl Appearance {
         self.colors.learn(&sight.observation.color, &border, MIXED, shows, GAIN);
         self.ratios = self.colors.ratios(COLOR_LIMIT);
         let shares = self.shares(sight, object, t_cam_object);
+        let drawn = set.iter().filter(|set| **set).count() as f64;
+        self.area = drawn * shares[0] / pixels_per_area(sight, &(t_cam_object * object.center));
         let gain = if self.usual == [0.0; 2] { 1.0 } else { f64::from(GAIN) };
         for (usual, share) in self.usual.iter_mut().zip(shares) {
             *usual += gain * (share - *usual);
@@ -194,8 +204,8 @@ impl Appearance {
         around.find(&seen, (columns, rows), 2 * reach);
         let score = |k: &usize| 2.0 * within.all[*k] - around.all[*k];
         let best = (0..seen.len()).max_by(|a, b| score(a).total_cmp(&score(b)))?;
-        let least = LEAST_FOUND * (2 * reach + 1).pow(2) as f32;
-        if within.all[best] < least {
+        let usual = self.area * pixels_per_area(sight, &center) / STRIDE.pow(2) as f64;
+        if f64::from(within.all[best]) < LEAST_FOUND * usual {
             return None;
         }
         let [x, y] = [best % columns, best / columns].map(|at| (at * STRIDE) as f64);
