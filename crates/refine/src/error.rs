@@ -67,6 +67,9 @@ pub enum RefineError {
     /// No factor was asked for.
     #[error("no factor to refine by")]
     NoFactors,
+    /// Nothing of the object is in the image at its initial pose.
+    #[error("nothing of the object is in the image at its initial pose")]
+    OutOfView,
     /// A search has come to nothing.
     #[error("no pose of the object fits what is seen")]
     NothingFits,

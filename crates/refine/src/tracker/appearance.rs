@@ -14,29 +14,33 @@ use crate::scene::{
     color_index,
 };
 
-/// How far around the object colors are learnt, as a share of its radius.
+/// Distance around the object in which colors are learnt and compared, in radii of it.
 const AROUND: f64 = 0.5;
 /// Distance from the outline within which colors are mixed \[px\].
 const MIXED: f32 = 2.0;
-/// Share of the pixels that should show the object of which a mask must have as many as of others to be of it.
+/// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
 const AGREEMENT: f32 = 0.5;
-/// Every so many columns and rows a lost object is looked for.
+/// Distance of the columns and rows of which a lost object is looked for \[px\].
 const STRIDE: usize = 4;
-/// Share of what was seen of its colors that must be seen again where it is found.
+/// Area with its colors where an object is found, as a share of that seen before.
 const LEAST_FOUND: f64 = 0.2;
+/// Places that are compared where an object is looked for.
+const PLACES: usize = 4;
+/// Share of pixels that is none.
+const LEAST_SHARE: f64 = 1e-3;
 
 /// Colors of the object and of what is around it, learnt from frames in which its pose was believed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Appearance {
     colors: RegionColors,
     ratios: ColorRatios,
-    /// See [`shares`](Self::shares).
-    usual: [f64; 2],
+    /// See [`shares`](Self::shares); none before any was learnt from a pose.
+    usual: Option<[f64; 2]>,
     /// Area that rather has its colors, were it flat \[m²\].
     area: f64,
 }
 
-/// The object in an image, were nothing before it but the hand.
+/// Depth of the object in a part of an image, as if nothing else were there.
 struct Silhouette {
     /// Columns and rows of the image.
     window: [Range<usize>; 2],
@@ -45,7 +49,7 @@ struct Silhouette {
 }
 
 impl Silhouette {
-    /// Of `object` at a pose, with what is around it; none if that is not in the image.
+    /// Silhouette of `object` at a pose, with what is around it; none if that is not in the image.
     fn new(sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> Option<Self> {
         let camera = &sight.observation.camera;
         let center = t_cam_object * object.center;
@@ -96,6 +100,16 @@ fn pixels_per_area(sight: &Sight, place: &Point3<f64>) -> f64 {
 }
 
 impl Appearance {
+    /// Colors that were learnt otherwise.
+    pub(super) fn of(colors: &RegionColors) -> Self {
+        Self { colors: colors.clone(), ratios: colors.ratios(COLOR_LIMIT), ..Self::default() }
+    }
+
+    /// Whether any colors are known.
+    pub(super) fn is_known(&self) -> bool {
+        self.ratios.are_known()
+    }
+
     /// Finds what of `sight` shows `object`, which should be at `t_cam_object`, and how far its pixels are the object's; false if nothing is seen of it.
     pub(super) fn look(
         &self,
@@ -135,17 +149,19 @@ impl Appearance {
         !seen.is_empty()
     }
 
-    /// How much of what is usually seen of the object is seen of one at `t_cam_object`: by pixels that rather have its colors, and by how often it has
-    /// each color, whichever is less.
+    /// Share of what is usually seen of the object that is seen of one at `t_cam_object`, one at most: by pixels that rather have its colors, and by how often
+    /// it has each color, whichever is less. One where nothing is known of it.
     pub(super) fn shown(
         &self,
         sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
+        let Some(usual) = self.usual else { return 1.0 };
         let shares = self.shares(sight, object, t_cam_object);
-        let relative = shares.iter().zip(&self.usual).map(|(share, usual)| share / usual);
-        relative.fold(f64::INFINITY, f64::min)
+        let relative =
+            shares.iter().zip(usual).map(|(share, usual)| share / usual.max(LEAST_SHARE));
+        relative.fold(1.0, f64::min)
     }
 
     /// The share of the pixels which should show an object at `t_cam_object` that rather have its colors, and how far their histogram is its own.
@@ -165,21 +181,26 @@ impl Appearance {
         let set: Vec<bool> = silhouette.depth.pixels().iter().map(|z| *z > 0.0).collect();
         let width = sight.observation.camera.width;
         let border = MaskBorder::within(width, silhouette.window.clone(), &set);
-        let (mask, hand) = (sight.observation.mask.pixels(), sight.hand_depth.pixels());
-        let shows = |at: usize| mask[at] && hand[at] == 0.0;
-        self.colors.learn(&sight.observation.color, &border, MIXED, shows, GAIN);
+        let (mask, color) = (sight.observation.mask.pixels(), &sight.observation.color);
+        let mut shown = vec![false; color.pixels().len()];
+        silhouette.shown(sight).for_each(|at| shown[at] = true);
+        let known = self.ratios.are_known();
+        let shows = |at: usize| match known {
+            true => shown[at] && self.ratios.of(&color.pixels()[at]) >= 0.0,
+            false => shown[at] && mask[at],
+        };
+        self.colors.learn(color, &border, MIXED, shows, GAIN);
         self.ratios = self.colors.ratios(COLOR_LIMIT);
         let shares = self.shares(sight, object, t_cam_object);
         let drawn = set.iter().filter(|set| **set).count() as f64;
         self.area = drawn * shares[0] / pixels_per_area(sight, &(t_cam_object * object.center));
-        let gain = if self.usual == [0.0; 2] { 1.0 } else { f64::from(GAIN) };
-        for (usual, share) in self.usual.iter_mut().zip(shares) {
-            *usual += gain * (share - *usual);
-        }
+        let usual = self.usual.unwrap_or(shares);
+        let next = |k: usize| usual[k] + f64::from(GAIN) * (shares[k] - usual[k]);
+        self.usual = Some([next(0), next(1)]);
     }
 
-    /// `expected`, moved across the line of sight to where most of its colors are seen within a square as large as it and fewest around that; none if these are
-    /// too few.
+    /// `expected`, moved across the line of sight to where its colors are: of the places with most of them within a square as large as it, and fewest around
+    /// that, the one at which most of it is seen. None if these are too few.
     pub(super) fn find(
         &self,
         sight: &Sight,
@@ -192,9 +213,13 @@ impl Appearance {
         }
         let Observation { camera, color, .. } = &sight.observation;
         let (columns, rows) = (camera.width / STRIDE, camera.height / STRIDE);
+        if columns == 0 {
+            return None;
+        }
         let has_color = |k: usize| {
             let at = (k / columns * camera.width + k % columns) * STRIDE;
-            let hidden = sight.hand_depth.pixels()[at] > 0.0;
+            let hand = f64::from(sight.hand_depth.pixels()[at]);
+            let hidden = hand > 0.0 && hand < center.z;
             f32::from(u8::from(!hidden && self.ratios.of(&color.pixels()[at]) > 0.0))
         };
         let seen: Vec<f32> = (0..columns * rows).map(has_color).collect();
@@ -203,14 +228,27 @@ impl Appearance {
         within.find(&seen, (columns, rows), reach);
         around.find(&seen, (columns, rows), 2 * reach);
         let score = |k: &usize| 2.0 * within.all[*k] - around.all[*k];
-        let best = (0..seen.len()).max_by(|a, b| score(a).total_cmp(&score(b)))?;
         let usual = self.area * pixels_per_area(sight, &center) / STRIDE.pow(2) as f64;
-        if f64::from(within.all[best]) < LEAST_FOUND * usual {
-            return None;
+        let is_enough = |k: &usize| f64::from(within.all[*k]) >= LEAST_FOUND * usual;
+        let mut places: Vec<usize> = (0..seen.len()).filter(is_enough).collect();
+        let mut best: Option<(f64, Isometry3<f64>)> = None;
+        for _ in 0..PLACES {
+            let Some(place) = places.iter().copied().max_by(|a, b| score(a).total_cmp(&score(b)))
+            else {
+                break;
+            };
+            let [column, row] = [place % columns, place / columns];
+            places.retain(|k| {
+                (k % columns).abs_diff(column).max((k / columns).abs_diff(row)) > reach
+            });
+            let [x, y] = [column, row].map(|at| (at * STRIDE) as f64);
+            let moved = Translation3::from(camera.unproject(x, y, center.z) - center) * expected;
+            let shown = self.shown(sight, object, &moved);
+            if best.as_ref().is_none_or(|(most, _)| shown > *most) {
+                best = Some((shown, moved));
+            }
         }
-        let [x, y] = [best % columns, best / columns].map(|at| (at * STRIDE) as f64);
-        let place = camera.unproject(x, y, center.z);
-        Some(Translation3::from(place - center) * expected)
+        best.map(|(_, pose)| pose)
     }
 }
 

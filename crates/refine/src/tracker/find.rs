@@ -38,7 +38,7 @@ impl Tracker {
     ) -> Result<Tracked, RefineError> {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         if let Some(pose) = self.initial.filter(|_| !sight.measured && !sight.tells) {
-            self.initial = Some(self.learn_colors(sight, &pose)?);
+            self.learn_colors(sight, &pose)?;
         } else if sight.given.count() > 0 {
             sight.observation.mask.copy_from(&sight.given);
         } else if let Some(pose) = self.initial {
@@ -78,18 +78,18 @@ impl Tracker {
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
 
-    /// Learns colors in a frame with neither depth nor a mask, in which the object is about `initial`, and says where it is then \[m\]: colors and pose in turns.
+    /// Learns colors in a frame with neither depth nor a mask, in which the object is about `initial` \[m\]: colors and pose in turns.
     fn learn_colors(
         &mut self,
         sight: &mut Sight,
         initial: &Isometry3<f64>,
-    ) -> Result<Isometry3<f64>, RefineError> {
+    ) -> Result<(), RefineError> {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         let mut pose = *initial;
         for _ in 0..COLOR_ROUNDS {
             self.appearance = Appearance::default();
             if !self.appearance.look(sight, &object, &pose) {
-                return Err(RefineError::EmptyMask);
+                return Err(RefineError::OutOfView);
             }
             self.appearance.learn(sight, &object, &pose);
             self.appearance.look(sight, &object, &pose);
@@ -100,7 +100,8 @@ impl Tracker {
             pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
         }
         self.appearance.look(sight, &object, &pose);
-        Ok(pose)
+        sight.focus = None;
+        Ok(())
     }
 
     /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; linearized as frames that are

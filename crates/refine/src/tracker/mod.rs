@@ -401,10 +401,13 @@ impl Tracker {
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> bool {
-        match sight.measured {
-            true => self.segmenter.segment(sight, object, t_cam_object),
-            false => self.appearance.look(sight, object, t_cam_object),
+        if sight.measured {
+            return self.segmenter.segment(sight, object, t_cam_object);
         }
+        if !self.appearance.is_known() {
+            self.appearance = Appearance::of(self.segmenter.colors());
+        }
+        self.appearance.look(sight, object, t_cam_object)
     }
 
     /// The share of the pixels which should show an object at `t_cam_object` that do; of the usual share, where colors alone tell.

@@ -34,7 +34,8 @@ pub struct GatingSettings {
     pub innovation_gate: f64,
     /// Standard deviation of the pose in the direction in which it is largest \[m of surface motion\].
     pub max_sigma: f64,
-    /// Share of the pixels that should show an object that was found again that must do so; half of it where it was expected.
+    /// Share of the pixels that should show an object found again, which do so, at least; half of it where it was expected. Without depth, also of an object
+    /// that is followed, as a share of what is usually seen of its colors.
     pub least_shown: f64,
 }
 

@@ -1,16 +1,16 @@
 //! Sums over squares of pixels.
 
-/// Sums over squares of pixels.
+/// Sums over the square about each pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sums {
     pub(super) all: Vec<f32>,
     across: Vec<f32>,
-    /// Of each column, of the rows at hand.
+    /// Sum of each column over the rows at hand.
     column: Vec<f32>,
 }
 
 impl Sums {
-    /// Of `values` over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
+    /// Finds those of `values` over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
     pub(super) fn find(&mut self, values: &[f32], (columns, rows): (usize, usize), reach: usize) {
         let Self { all, across, column } = self;
         for sums in [&mut *all, &mut *across] {

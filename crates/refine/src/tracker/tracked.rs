@@ -44,7 +44,7 @@ pub enum Rejection {
     Cost(f64, f64),
     /// The object would be so many standard deviations of the prediction away from it.
     Innovation(f64),
-    /// This share only of the pixels that usually show its colors does so.
+    /// Share of what is usually seen of its colors that is seen.
     OtherColors(f64),
     /// The pose is so uncertain \[m of surface motion\].
     Uncertain(f64),
@@ -62,11 +62,7 @@ impl fmt::Display for Rejection {
                 write!(f, "{sigmas:.0} standard deviations from where it should be")
             }
             Self::OtherColors(share) => {
-                write!(
-                    f,
-                    "its colors are seen on {:.0} % of what usually shows them",
-                    100.0 * share
-                )
+                write!(f, "only {:.0} % of what is usually seen of its colors", 100.0 * share)
             }
             Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * MM_PER_M),
         }

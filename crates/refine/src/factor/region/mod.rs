@@ -54,6 +54,25 @@ impl Default for RegionSettings {
     }
 }
 
+impl RegionSettings {
+    fn check(&self) -> Result<(), RefineError> {
+        let named = [
+            ("sigma", self.sigma),
+            ("offset", self.offset),
+            ("effective_samples", self.effective_samples),
+            ("hidden", self.hidden),
+            ("exceeded", self.exceeded),
+            ("downsample", self.downsample as f64),
+        ];
+        let Some((name, value)) =
+            named.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0)
+        else {
+            return Ok(());
+        };
+        Err(RefineError::Setting { name: "region", problem: format!("has {name} = {value}") })
+    }
+}
+
 /// Likelihood of the outline along lines across it, given the log-likelihood ratios of object and others of their pixels (Prisacariu and Reid, 2012;
 /// Tjaden and others, 2018; Stoiber and others, 2022). Where nothing of a line is the object's, something hides it.
 pub struct RegionFactor {
@@ -80,8 +99,9 @@ impl RegionFactor {
     /// Factor of the image and the mask of `frame`.
     ///
     /// # Errors
-    /// [`RefineError::EmptyMask`].
+    /// [`RefineError::EmptyMask`], [`RefineError::Setting`] for a setting that is not positive.
     pub fn new(frame: &Frame<'_>, settings: &RegionSettings) -> Result<Self, RefineError> {
+        settings.check()?;
         let observation = frame.observation();
         let factor = settings.downsample;
         let evidence = match settings.color && observation.has_colors() {
@@ -271,6 +291,14 @@ mod tests {
             state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3, 1e-3]);
             assert_gradient(&near, &state, Block::Camera, 1e-6, 1e-3);
         }
+    }
+
+    #[test]
+    fn settings_that_are_not_positive_are_named() {
+        let (frame, _) = fixture(0);
+        let settings = RegionSettings { offset: 0.0, ..RegionSettings::default() };
+        let refused = RegionFactor::new(&frame, &settings).err().unwrap();
+        assert!(refused.to_string().contains("offset = 0"), "{refused}");
     }
 
     #[test]

@@ -8,6 +8,8 @@ use prehend_render::Mask;
 /// By how much a mask is shrunk or grown everywhere at most, and half the width of the distribution of that \[px\].
 pub(super) const MOST_GROWTH: usize = 4;
 const TYPICAL_GROWTH: f32 = 0.5;
+/// Distance at which nothing is of a border \[px\].
+const FAR: f32 = 1e6;
 /// Independent measurements of growth that all pixels about a border amount to: shadows and shades err alike along it.
 const EFFECTIVE_SAMPLES: f32 = 5.0;
 
@@ -72,7 +74,8 @@ impl MaskBorder {
         // Sums of the pixels at about one distance: number, evidence of edges, of colors.
         let mut levels = [[0.0_f32; 3]; 2 * MOST_GROWTH + 2];
         for (distance, (color, edge)) in self.distances.iter().zip(colors.iter().zip(edges)) {
-            let level = distance.floor() as i32 + MOST_GROWTH as i32 + 1;
+            let nearest = distance.floor().clamp(-FAR, FAR);
+            let level = nearest as i32 + MOST_GROWTH as i32 + 1;
             let level = usize::try_from(level).ok().and_then(|level| levels.get_mut(level));
             let Some(level) = level else { continue };
             level.iter_mut().zip([1.0, *edge, *color]).for_each(|(sum, value)| *sum += value);

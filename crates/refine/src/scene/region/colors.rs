@@ -25,7 +25,7 @@ impl Default for ColorHistogram {
     }
 }
 
-/// The number of a color.
+/// Index of a color in histograms.
 pub(crate) fn color_index(color: &[f32; 3]) -> u16 {
     let level =
         |channel: f32| (channel * f32::from(LEVELS)).clamp(0.0, f32::from(LEVELS - 1)) as u16;
@@ -92,7 +92,7 @@ impl RegionColors {
         self.others.learn(others.into_iter(), gain);
     }
 
-    /// What each color tells, `limit` at most \[nat\]; nothing before both are known.
+    /// Log-likelihood ratio of each color, `limit` at most \[nat\]; nothing before both are known.
     pub(crate) fn ratios(&self, limit: f32) -> ColorRatios {
         let Self { object, others } = self;
         if !(object.known && others.known) {
@@ -109,12 +109,12 @@ impl RegionColors {
 pub(crate) struct ColorRatios {
     /// By number of the color; empty where nothing is known.
     values: Vec<f32>,
-    /// The largest \[nat\].
+    /// Largest ratio \[nat\].
     limit: f32,
 }
 
 impl ColorRatios {
-    /// The largest \[nat\].
+    /// Largest ratio \[nat\].
     pub(crate) fn limit(&self) -> f32 {
         self.limit
     }
@@ -124,12 +124,12 @@ impl ColorRatios {
         !self.values.is_empty()
     }
 
-    /// The one of the color with a number; 0 where nothing is known.
+    /// Log-likelihood ratio of the color with an index; 0 where nothing is known \[nat\].
     pub(crate) fn of_index(&self, index: u16) -> f32 {
         self.values.get(usize::from(index)).copied().unwrap_or_default()
     }
 
-    /// The one of a color.
+    /// Log-likelihood ratio of a color \[nat\].
     pub(crate) fn of(&self, color: &[f32; 3]) -> f32 {
         self.of_index(color_index(color))
     }

@@ -101,11 +101,11 @@ impl RegionEvidence {
         let [columns, rows] = window.clone();
         let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
         let values = places.clone().map(|(x, y)| mean(x, y, &self.values, self.outside)).collect();
-        let edges = places.map(|(x, y)| mean(x, y, &self.edges, 0.0)).collect();
+        let edges = places.map(|(x, y)| mean(x, y, &self.edges, LEAST_CONTRAST.ln())).collect();
         Self { size, window, values, edges, outside: self.outside }
     }
 
-    /// The one `of` a column and row.
+    /// Value of an image of the window at a column and row, and `outside` elsewhere.
     fn get(&self, x: usize, y: usize, of: &[f32], outside: f32) -> f32 {
         let [columns, rows] = &self.window;
         if columns.contains(&x) && rows.contains(&y) {
@@ -115,17 +115,17 @@ impl RegionEvidence {
         }
     }
 
-    /// The log-likelihood ratio of object and others at a place of the image \[nat\].
+    /// Log-likelihood ratio of object and others at a place of the image \[nat\].
     pub(crate) fn at(&self, place: &Vector2<f64>) -> f64 {
         self.sample(place, &self.values, self.outside)
     }
 
-    /// The log-likelihood ratio of a border of the object at a place of the image \[nat\].
+    /// Log-likelihood ratio of a border of the object at a place of the image \[nat\].
     pub(crate) fn edge_at(&self, place: &Vector2<f64>) -> f64 {
-        self.sample(place, &self.edges, 0.0)
+        self.sample(place, &self.edges, LEAST_CONTRAST.ln())
     }
 
-    /// The one `of` a place, linear between pixels; of the image's border beyond it.
+    /// Value of an image of the window at a place, linear between pixels; that of the image's border beyond it.
     fn sample(&self, place: &Vector2<f64>, of: &[f32], outside: f32) -> f64 {
         let [width, height] = self.size;
         let inside = |v: f64, size: usize| v.clamp(0.0, (size - 1) as f64);

@@ -141,6 +141,11 @@ impl Segmenter {
         if expected > 0.0 { f64::from(seen / expected) } else { 0.0 }
     }
 
+    /// Colors as far as they are known.
+    pub(super) fn colors(&self) -> &RegionColors {
+        &self.colors
+    }
+
     /// Learns colors from a frame with the object at `t_cam_object`.
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let mut window = mem::take(&mut self.window);
