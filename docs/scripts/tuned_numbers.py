@@ -2,7 +2,7 @@
 
     python3 docs/scripts/tuned_numbers.py [--list]
 
-A tuned number is, in the sources of problem, factor, strategy, tracker and search (without tests and comments),
+A tuned number is, in the sources of problem, factor, strategy, tracker, search and scene/region (without tests and comments),
 - a numeric constant,
 - a number in an `impl Default` other than 0, 1, 2 and 1/2,
 - any other float literal other than 0, 1, 2 and 1/2.
@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 BEFORE = 334
-FOLDERS = ("problem", "factor", "strategy", "tracker", "search")
+FOLDERS = ("problem", "factor", "strategy", "tracker", "search", "scene/region")
 PLAIN = {0.0, 1.0, 2.0, 0.5}
 NUMBER = re.compile(
     r"(?<![\w.])(\d[\d_]*(?:\.\d[\d_]*)?(?:[eE][+-]?\d+)?)(_?(?:f64|f32|usize|u\d+|i\d+))?(?![\w])"

@@ -18,7 +18,7 @@ use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
-use crate::scene::Frame;
+use crate::scene::{Frame, Object};
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
 
@@ -219,6 +219,44 @@ impl Tracker {
             Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
             Err(error) => Err(error),
+        }
+    }
+
+    /// Learns colors where a pose was believed.
+    pub(super) fn learn(&mut self, sight: &Sight, solved: &Solved) {
+        let pose = &solved.solution.at.state.t_cam_object;
+        match sight.measured {
+            true => self.segmenter.learn(sight, &self.object, pose),
+            false => self.appearance.learn(sight, &self.object, pose),
+        }
+    }
+
+    /// Finds what of a frame shows the object, and whether anything does.
+    pub(super) fn segment(
+        &mut self,
+        sight: &mut Sight,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> bool {
+        if sight.measured {
+            return self.segmenter.segment(sight, object, t_cam_object);
+        }
+        if !self.appearance.is_known() {
+            self.appearance = Appearance::of(self.segmenter.colors());
+        }
+        self.appearance.look(sight, object, t_cam_object)
+    }
+
+    /// The share of the pixels which should show an object at `t_cam_object` that do; of the usual share, where colors alone tell.
+    pub(super) fn shown(
+        &self,
+        sight: &Sight,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> f64 {
+        match sight.measured {
+            true => self.segmenter.shown(sight, object, t_cam_object),
+            false => self.appearance.shown(sight, object, t_cam_object),
         }
     }
 }

@@ -385,39 +385,6 @@ impl Tracker {
         })
     }
 
-    /// Learns colors where a pose was believed.
-    fn learn(&mut self, sight: &Sight, solved: &Solved) {
-        let pose = &solved.solution.at.state.t_cam_object;
-        match sight.measured {
-            true => self.segmenter.learn(sight, &self.object, pose),
-            false => self.appearance.learn(sight, &self.object, pose),
-        }
-    }
-
-    /// Finds what of a frame shows the object, and whether anything does.
-    fn segment(
-        &mut self,
-        sight: &mut Sight,
-        object: &Object,
-        t_cam_object: &Isometry3<f64>,
-    ) -> bool {
-        if sight.measured {
-            return self.segmenter.segment(sight, object, t_cam_object);
-        }
-        if !self.appearance.is_known() {
-            self.appearance = Appearance::of(self.segmenter.colors());
-        }
-        self.appearance.look(sight, object, t_cam_object)
-    }
-
-    /// The share of the pixels which should show an object at `t_cam_object` that do; of the usual share, where colors alone tell.
-    fn shown(&self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> f64 {
-        match sight.measured {
-            true => self.segmenter.shown(sight, object, t_cam_object),
-            false => self.appearance.shown(sight, object, t_cam_object),
-        }
-    }
-
     /// The problem of a frame, and its prior, which is the prediction.
     fn prepare(
         &self,

@@ -1,4 +1,4 @@
-//! A cube that stands still before a camera with depth: ten frames of a real camera, with the mask of the first.
+//! A cube that stands still before a camera: ten frames of a real one, with the mask of the first, or with neither mask nor depth.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
 use prehend_refine::scene::{Frame, Object, Observation};
 use prehend_refine::strategy::Fused;
-use prehend_refine::tracker::{Tracker, TrackerSettings};
+use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 
 use crate::data;
 
@@ -81,5 +81,30 @@ fn what_stands_still_is_refined_and_tracked_to_one_pose() {
             let probability = tracked.posterior.as_ref().unwrap().probability();
             assert!((probability - refined.1).abs() < 0.1, "{probability} {}", refined.1);
         }
+    }
+}
+
+#[test]
+#[ignore = "reads PREHEND_DATA"]
+fn what_stands_still_is_tracked_on_color_alone_without_a_mask() {
+    let (mut frames, object, found) = load();
+    for frame in &mut frames {
+        frame.depth.pixels_mut().fill(0.0);
+        frame.mask.pixels_mut().fill(false);
+    }
+    for (by, turn) in [([0.0; 3], [0.0; 3]), ([5e-3, -4e-3, 6e-3], [0.05, -0.05, 0.06])] {
+        let mut tracker =
+            Tracker::new(Arc::clone(&object), None, TrackerSettings::default()).unwrap();
+        tracker.start_from(&off(&found, by, turn));
+        let track = |(k, frame): (usize, &Observation)| {
+            tracker.track(frame, Duration::from_millis(33 * k as u64)).unwrap()
+        };
+        let tracked: Vec<_> = frames.iter().enumerate().map(track).collect();
+        assert!(tracked.iter().skip(1).all(|frame| frame.status == TrackStatus::Tracked));
+        let poses: Vec<_> = tracked.iter().map(|tracked| tracked.t_cam_object).collect();
+        let (pe, oe) = extent(&poses);
+        let from_search = (10.0 * pe_cm(&poses[9], &found), oe_deg(&poses[9], &found));
+        println!("within {pe:.2} mm, {oe:.2}°; {from_search:.2?} from the search with depth");
+        assert!(pe < 1.5 && oe < 1.5 && from_search.0 < 10.0);
     }
 }
