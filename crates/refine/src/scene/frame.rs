@@ -25,7 +25,10 @@ pub struct Frame<'a> {
     segmented: Mutex<BTreeMap<(Occluders, usize), Arc<Target>>>,
     /// Root mean square of the colors under the mask.
     brightness: OnceLock<f64>,
+    /// Regions by mask and colors.
     regions: OnceLock<Arc<RegionEvidence>>,
+    /// Regions that were found otherwise.
+    given_regions: Option<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<&'a Rig>,
@@ -108,6 +111,7 @@ impl<'a> Frame<'a> {
             segmented: Mutex::default(),
             brightness: OnceLock::new(),
             regions: OnceLock::new(),
+            given_regions: None,
             backend: None,
             rig: None,
             rivals: None,
@@ -166,9 +170,9 @@ impl<'a> Frame<'a> {
         Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
     }
 
-    /// The same with what its pixels tell of where the object is, where that is not of its mask and colors alone.
+    /// Frame whose regions are not those of its mask and its own colors.
     pub(crate) fn with_regions(self, regions: &Arc<RegionEvidence>) -> Self {
-        Self { regions: OnceLock::from(Arc::clone(regions)), ..self }
+        Self { given_regions: Some(Arc::clone(regions)), ..self }
     }
 
     /// The same of an object that is nowhere but in these columns and rows.
@@ -221,17 +225,19 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// Log-likelihood ratio of object and others at each pixel, by colors and the mask \[nat\].
+    /// Log-likelihood ratio of object and others at each pixel \[nat\]: those given, or else by the mask, and by colors if these `count`.
     ///
     /// # Errors
     /// [`RefineError::EmptyMask`].
-    pub(crate) fn regions(&self) -> Result<Arc<RegionEvidence>, RefineError> {
-        if let Some(known) = self.regions.get() {
+    pub(crate) fn regions(&self, count: bool) -> Result<Arc<RegionEvidence>, RefineError> {
+        let known = self.regions.get().filter(|_| count);
+        if let Some(known) = self.given_regions.as_ref().or(known) {
             return Ok(Arc::clone(known));
         }
         let Observation { color, mask, .. } = self.observation;
-        let made = RegionEvidence::of_mask(Some(color), mask).ok_or(RefineError::EmptyMask)?;
-        Ok(Arc::clone(self.regions.get_or_init(|| Arc::new(made))))
+        let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask);
+        let made = Arc::new(made.ok_or(RefineError::EmptyMask)?);
+        Ok(if count { Arc::clone(self.regions.get_or_init(|| made)) } else { made })
     }
 
     /// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.

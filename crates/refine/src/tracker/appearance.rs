@@ -164,7 +164,7 @@ impl Appearance {
         relative.fold(1.0, f64::min)
     }
 
-    /// The share of the pixels which should show an object at `t_cam_object` that rather have its colors, and how far their histogram is its own.
+    /// Share of the pixels which should show an object at `t_cam_object` that rather have its colors, and intersection of their histogram and its own.
     fn shares(&self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> [f64; 2] {
         let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else {
             return [0.0; 2];

@@ -247,7 +247,7 @@ impl Tracker {
         self.appearance.look(sight, object, t_cam_object)
     }
 
-    /// The share of the pixels which should show an object at `t_cam_object` that do; of the usual share, where colors alone tell.
+    /// Share of the pixels which should show an object at `t_cam_object` that do; over the usual share, where colors alone tell.
     pub(super) fn shown(
         &self,
         sight: &Sight,

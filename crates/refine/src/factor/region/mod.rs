@@ -104,12 +104,7 @@ impl RegionFactor {
         settings.check()?;
         let observation = frame.observation();
         let factor = settings.downsample;
-        let evidence = match settings.color && observation.has_colors() {
-            true => frame.regions()?.reduced(factor),
-            false => RegionEvidence::of_mask(None, &observation.mask)
-                .ok_or(RefineError::EmptyMask)?
-                .reduced(factor),
-        };
+        let evidence = frame.regions(settings.color && observation.has_colors())?.reduced(factor);
         Ok(Self {
             object: Arc::clone(frame.object()),
             camera: observation.camera.scaled(1.0 / factor as f64),
@@ -196,7 +191,7 @@ impl Correspondences<'_> {
         })
     }
 
-    /// The common offset of the outline that fits best with the object at `seen` \[px\], and the information about it \[nat/px²\].
+    /// Offset of the outline that fits best with the object at `seen` \[px\], and the information about it \[nat/px²\].
     fn offset(&self, seen: &Isometry3<f64>) -> (f64, f64) {
         let places: Vec<(&Line, f64)> =
             self.moved(seen).map(|(line, _, place)| (line, place)).collect();
