@@ -44,7 +44,7 @@ pub(super) struct Appearance {
 struct Silhouette {
     /// Columns and rows of the image.
     window: [Range<usize>; 2],
-    /// Of the window \[m\]; 0 where it is not.
+    /// Depth in the window \[m\]; 0 where the object is not.
     depth: DepthImage,
 }
 
@@ -59,11 +59,7 @@ impl Silhouette {
         let at = camera.project(&center)?;
         let extent =
             (1.0 + AROUND) * object.radius * camera.fx.max(camera.fy) / (center.z - object.radius);
-        let range = |middle: f64, size: usize| {
-            let [from, to] = [middle - extent, middle + extent];
-            from.max(0.0) as usize..to.clamp(0.0, size as f64) as usize
-        };
-        let window = [range(at.x, camera.width), range(at.y, camera.height)];
+        let window = sight.part(&at, extent, 1);
         let [columns, rows] = &window;
         if columns.is_empty() || rows.is_empty() {
             return None;
@@ -74,22 +70,17 @@ impl Silhouette {
         depth.pixels().iter().any(|z| *z > 0.0).then_some(Self { window, depth })
     }
 
-    /// Index in the image of each of its pixels, and depth of the object there.
-    fn pixels<'a>(&'a self, sight: &'a Sight) -> impl Iterator<Item = (usize, f32)> + 'a {
+    /// Indices in the image of the pixels that should show the object.
+    fn shown<'a>(&'a self, sight: &'a Sight) -> impl Iterator<Item = usize> + 'a {
         let [columns, rows] = self.window.clone();
         let width = sight.observation.camera.width;
         let index = rows.flat_map(move |y| columns.clone().map(move |x| y * width + x));
-        index.zip(self.depth.pixels().iter().copied())
-    }
-
-    /// Indices of those that should show the object.
-    fn shown<'a>(&'a self, sight: &'a Sight) -> impl Iterator<Item = usize> + 'a {
         let hand = sight.hand_depth.pixels();
         let shown = move |(at, z): (usize, f32)| {
             let hidden = hand[at] > 0.0 && hand[at] < z;
             (z > 0.0 && !hidden).then_some(at)
         };
-        self.pixels(sight).filter_map(shown)
+        index.zip(self.depth.pixels().iter().copied()).filter_map(shown)
     }
 }
 
@@ -105,7 +96,7 @@ impl Appearance {
         Self { colors: colors.clone(), ratios: colors.ratios(COLOR_LIMIT), ..Self::default() }
     }
 
-    /// Whether any colors are known.
+    /// True once both kinds of colors are known.
     pub(super) fn is_known(&self) -> bool {
         self.ratios.are_known()
     }
@@ -119,13 +110,10 @@ impl Appearance {
     ) -> bool {
         let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return false };
         let color = &sight.observation.color;
-        let shown: Vec<usize> = silhouette.shown(sight).collect();
-        let seen: Vec<usize> = shown
-            .iter()
-            .copied()
+        let seen: Vec<usize> = silhouette
+            .shown(sight)
             .filter(|at| self.ratios.of(&color.pixels()[*at]) >= 0.0)
             .collect();
-        let [columns, rows] = silhouette.window.clone();
         let given = sight.given.pixels();
         let both = seen.iter().filter(|at| given[**at]).count() as f32;
         let agrees = sight.tells
@@ -136,7 +124,7 @@ impl Appearance {
             false => None,
         };
         let regions = regions.unwrap_or_else(|| {
-            RegionEvidence::of_colors(color, [columns.clone(), rows.clone()], &self.ratios)
+            RegionEvidence::of_colors(color, silhouette.window.clone(), &self.ratios)
         });
         sight.regions = Some(Arc::new(regions));
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
@@ -145,7 +133,7 @@ impl Appearance {
         seen.iter()
             .filter(|at| !agrees || given[**at])
             .for_each(|at| mask.pixels_mut()[*at] = true);
-        sight.focus = Some([columns, rows]);
+        sight.focus = Some(silhouette.window);
         !seen.is_empty()
     }
 
@@ -158,17 +146,15 @@ impl Appearance {
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
         let Some(usual) = self.usual else { return 1.0 };
-        let shares = self.shares(sight, object, t_cam_object);
+        let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return 0.0 };
+        let shares = self.shares(sight, &silhouette);
         let relative =
             shares.iter().zip(usual).map(|(share, usual)| share / usual.max(LEAST_SHARE));
         relative.fold(1.0, f64::min)
     }
 
-    /// Share of the pixels which should show an object at `t_cam_object` that rather have its colors, and intersection of their histogram and its own.
-    fn shares(&self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> [f64; 2] {
-        let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else {
-            return [0.0; 2];
-        };
+    /// Share of the pixels which should show the object that rather have its colors, and intersection of their histogram and its own.
+    fn shares(&self, sight: &Sight, silhouette: &Silhouette) -> [f64; 2] {
         let color = sight.observation.color.pixels();
         let shown: Vec<u16> = silhouette.shown(sight).map(|at| color_index(&color[at])).collect();
         let own = shown.iter().filter(|color| self.ratios.of_index(**color) > 0.0).count();
@@ -191,7 +177,7 @@ impl Appearance {
         };
         self.colors.learn(color, &border, MIXED, shows, GAIN);
         self.ratios = self.colors.ratios(COLOR_LIMIT);
-        let shares = self.shares(sight, object, t_cam_object);
+        let shares = self.shares(sight, &silhouette);
         let drawn = set.iter().filter(|set| **set).count() as f64;
         self.area = drawn * shares[0] / pixels_per_area(sight, &(t_cam_object * object.center));
         let usual = self.usual.unwrap_or(shares);

@@ -18,7 +18,7 @@ use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
-use crate::scene::{Frame, Object};
+use crate::scene::Frame;
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
 
@@ -42,7 +42,7 @@ impl Tracker {
         } else if sight.given.count() > 0 {
             sight.observation.mask.copy_from(&sight.given);
         } else if let Some(pose) = self.initial {
-            if !self.segment(sight, &object, &pose) {
+            if !self.segment(sight, &pose) {
                 return Err(RefineError::EmptyMask);
             }
             // The pose may be far off.
@@ -167,11 +167,7 @@ impl Tracker {
             }
             // Unless it was looked for elsewhere before, what shows the object there is known.
             let known = reach == Recovery::Near && !long_lost;
-            if !(if known {
-                seen
-            } else {
-                self.segment(sight, &Arc::clone(&self.object), &t_cam_object)
-            }) {
+            if !(if known { seen } else { self.segment(sight, &t_cam_object) }) {
                 continue;
             }
             let (object, hand, rig) =
@@ -182,7 +178,7 @@ impl Tracker {
             }
             let (solved, posterior) = self.estimate(&frame, &start)?;
             let state = &solved.solution.at.state;
-            let shown = self.shown(sight, &object, &state.t_cam_object);
+            let shown = self.shown(sight, &state.t_cam_object);
             let moved = object.surface_motion(&predicted.t_cam_object, &state.t_cam_object);
             let is_expected = reach == Recovery::Near && moved <= 0.5 * object.radius;
             // Fingers that hide most of it are known to some millimeters only.
@@ -232,31 +228,21 @@ impl Tracker {
     }
 
     /// Finds what of a frame shows the object, and whether anything does.
-    pub(super) fn segment(
-        &mut self,
-        sight: &mut Sight,
-        object: &Object,
-        t_cam_object: &Isometry3<f64>,
-    ) -> bool {
+    pub(super) fn segment(&mut self, sight: &mut Sight, t_cam_object: &Isometry3<f64>) -> bool {
         if sight.measured {
-            return self.segmenter.segment(sight, object, t_cam_object);
+            return self.segmenter.segment(sight, &self.object, t_cam_object);
         }
         if !self.appearance.is_known() {
             self.appearance = Appearance::of(self.segmenter.colors());
         }
-        self.appearance.look(sight, object, t_cam_object)
+        self.appearance.look(sight, &self.object, t_cam_object)
     }
 
     /// Share of the pixels which should show an object at `t_cam_object` that do; over the usual share, where colors alone tell.
-    pub(super) fn shown(
-        &self,
-        sight: &Sight,
-        object: &Object,
-        t_cam_object: &Isometry3<f64>,
-    ) -> f64 {
+    pub(super) fn shown(&self, sight: &Sight, t_cam_object: &Isometry3<f64>) -> f64 {
         match sight.measured {
-            true => self.segmenter.shown(sight, object, t_cam_object),
-            false => self.appearance.shown(sight, object, t_cam_object),
+            true => self.segmenter.shown(sight, &self.object, t_cam_object),
+            false => self.appearance.shown(sight, &self.object, t_cam_object),
         }
     }
 }

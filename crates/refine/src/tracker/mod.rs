@@ -254,8 +254,7 @@ impl Tracker {
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
-        let object = Arc::clone(&self.object);
-        let seen = self.segment(sight, &object, &prediction.state.t_cam_object);
+        let seen = self.segment(sight, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
         let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
@@ -317,18 +316,12 @@ impl Tracker {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
         let mut posterior = self.posterior(&solved, nominal)?;
-        if let Some(rejection) = self.gate(&solved, &posterior, Some(&prior), track.allowance()) {
-            timing.validation = clock.lap();
+        let doubt = self.gate(&solved, &posterior, Some(&prior), track.allowance());
+        let doubt = doubt.or_else(|| self.other_colors(sight, &solved));
+        timing.validation = clock.lap();
+        if let Some(rejection) = doubt {
             return Ok(Err(rejection));
         }
-        if !sight.measured {
-            let shown = self.shown(sight, &object, &solved.solution.at.state.t_cam_object);
-            if shown < self.settings.gating.least_shown {
-                timing.validation = clock.lap();
-                return Ok(Err(Rejection::OtherColors(shown)));
-            }
-        }
-        timing.validation = clock.lap();
         let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(in_hand));
         let rotation = solved.solution.at.state.t_cam_object.rotation;
         let mut is_turned = false;
@@ -453,6 +446,15 @@ impl Tracker {
         }
         let widest = posterior.widest(self.object.radius);
         (widest > gating.max_sigma).then_some(Rejection::Uncertain(widest))
+    }
+
+    /// Why the colors at `solved` say that something else is there, if they do; depth says so by its cost.
+    fn other_colors(&self, sight: &Sight, solved: &Solved) -> Option<Rejection> {
+        if sight.measured {
+            return None;
+        }
+        let shown = self.shown(sight, &solved.solution.at.state.t_cam_object);
+        (shown < self.settings.gating.least_shown).then_some(Rejection::OtherColors(shown))
     }
 
     /// The posterior of `solved`. Calibrations far from `nominal` are inconsistent, also where the frames before have led them there.

@@ -52,12 +52,9 @@ pub(super) fn pyramid(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option
     let extent = reach * camera.fx.max(camera.fy) / (center.z - reach).max(reach);
     // Sizes are multiples of the coarsest level's pixels.
     let unit = 1 << (LEVELS - 1);
-    let range = |middle: f64, size: usize| {
-        let from = (middle - extent).clamp(0.0, size as f64) as usize / unit;
-        let to = (middle + extent).clamp(0.0, size as f64) as usize / unit;
-        (from * unit, to.saturating_sub(from) * unit)
-    };
-    let ((left, width), (top, height)) = (range(at.x, camera.width), range(at.y, camera.height));
+    let [columns, rows] = sight.part(&at, extent, unit);
+    let [left, top, width, height] =
+        [columns.start, rows.start, columns.len(), rows.len()].map(|count| count * unit);
     if width < 4 * unit || height < 4 * unit {
         return None;
     }

@@ -4,6 +4,7 @@ use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::Vector2;
 use prehend_render::{DepthImage, Mask};
 
 use crate::scene::{Hand, Observation, RegionEvidence, draw_hand_depth};
@@ -20,9 +21,9 @@ pub(super) struct Sight {
     pub(super) hand_depth: Arc<DepthImage>,
     /// The measured depth, as terms share it \[m\].
     pub(super) depth: Arc<DepthImage>,
-    /// Whether any depth is measured.
+    /// True where any depth is measured.
     pub(super) measured: bool,
-    /// What pixels tell of where the object is, where no depth does.
+    /// Regions of the image, where no depth is measured.
     pub(super) regions: Option<Arc<RegionEvidence>>,
     /// Columns and rows in which the object is, where that is known.
     pub(super) focus: Option<[Range<usize>; 2]>,
@@ -51,6 +52,16 @@ impl Sight {
         let tells = (1..given.pixels().len()).contains(&given.count());
         let measured = observation.has_depth();
         Self { given, tells, observation, hand_depth, depth, measured, regions: None, focus: None }
+    }
+
+    /// Columns and rows within `extent` \[px\] of a place, in squares of `unit` pixels, as far as they are in the image.
+    pub(super) fn part(&self, place: &Vector2<f64>, extent: f64, unit: usize) -> [Range<usize>; 2] {
+        let range = |middle: f64, size: usize| {
+            let end = |at: f64| at.clamp(0.0, size as f64) as usize / unit;
+            end(middle - extent)..end(middle + extent)
+        };
+        let camera = &self.observation.camera;
+        [range(place.x, camera.width), range(place.y, camera.height)]
     }
 
     /// What is left of it for the next one.

@@ -69,7 +69,7 @@ impl MaskBorder {
     }
 
     /// Probability of each whole number of pixels from −[`MOST_GROWTH`] on that the mask is grown by everywhere; of its pixels, `colors` are the log-likelihood
-    /// ratios of object and others, and `edges` those of a border \[nat\]. Growth has a Cauchy distribution beforehand.
+    /// ratios of object and others, and `edges` those of a border \[nat\]. The prior of growth is a Cauchy distribution.
     pub(super) fn growth(&self, colors: &[f32], edges: &[f32]) -> [f32; 2 * MOST_GROWTH + 1] {
         // Sums of the pixels at about one distance: number, evidence of edges, of colors.
         let mut levels = [[0.0_f32; 3]; 2 * MOST_GROWTH + 2];
@@ -169,7 +169,7 @@ mod tests {
                 found.iter().zip(steps).map(|(p, g)| f64::from(*p) * f64::from(g)).sum();
             assert!((mean - growth).abs() <= 0.6, "{growth}: {mean}");
         }
-        // Without any evidence it is as it is beforehand.
+        // Without any evidence it is the prior.
         let border = MaskBorder::new(&disk(15.0).0).unwrap();
         let nothing = vec![0.0; border.distances.len()];
         let found = border.growth(&nothing, &nothing);

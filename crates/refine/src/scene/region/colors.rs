@@ -8,14 +8,14 @@ use super::border::MaskBorder;
 const LEVELS: u16 = 16;
 /// Levels of a channel of histograms that are compared.
 const COARSE: usize = 4;
-/// What a color that was never seen counts for, as a share of all that were.
+/// Share of a color that was never seen.
 const UNSEEN: f32 = 1e-4;
 
 /// Shares of the colors of a part of pictures.
 #[derive(Clone, Debug)]
 pub(crate) struct ColorHistogram {
     shares: Vec<f32>,
-    /// Whether anything was learnt.
+    /// True once anything was learnt.
     known: bool,
 }
 
@@ -119,7 +119,7 @@ impl ColorRatios {
         self.limit
     }
 
-    /// Whether any is known.
+    /// True where any is known.
     pub(crate) fn are_known(&self) -> bool {
         !self.values.is_empty()
     }

@@ -85,12 +85,8 @@ impl Window {
         let nearest = (center.z - object.radius).max(f64::MIN_POSITIVE);
         let at = full.project(&center)?;
         let extent = (object.radius + reach) * full.fx.max(full.fy) / nearest;
-        let range = |middle: f64, size: usize| {
-            let from = ((middle - extent).max(0.0) as usize) / STRIDE;
-            let to = ((middle + extent).clamp(0.0, size as f64) as usize) / STRIDE;
-            (from, to.saturating_sub(from))
-        };
-        let ((left, columns), (top, rows)) = (range(at.x, full.width), range(at.y, full.height));
+        let [across, down] = sight.part(&at, extent, STRIDE);
+        let (left, columns, top, rows) = (across.start, across.len(), down.start, down.len());
         if columns == 0 || rows == 0 {
             return None;
         }
