@@ -39,7 +39,8 @@ impl RefineJob<'_> {
         if let Method::Heuristic(heuristic) = &mut method {
             heuristic.gradients.retain(|&gradient| self.input.offers(gradient));
         }
-        let mut frame = self.input.frame()?;
+        let segmented = self.input.segmented(&self.initial, &method)?;
+        let mut frame = segmented.as_ref().unwrap_or(self.input).frame()?;
         if let Some(rivals) = &self.rivals {
             frame = frame.with_rivals(rivals.clone());
         }
@@ -93,7 +94,7 @@ mod tests {
             let mut observation = observation.clone();
             observation.mask.pixels_mut().iter_mut().for_each(|set| *set &= mask);
             let (object, hand) = (Arc::clone(&object), Some(Arc::clone(&hand)));
-            FrameInput { observation, object, hand, rig: None }
+            FrameInput::new(observation, object, hand, None)
         };
         let inputs = [input(true), input(false), input(true)];
         let job = |input| RefineJob { input, initial, rivals: None };
@@ -131,7 +132,7 @@ mod tests {
             let mut observation = observation.clone();
             observation.hand = observation.hand.filter(|_| has_hand);
             let hand = has_hand.then(|| Arc::clone(&hand));
-            FrameInput { observation, object: Arc::clone(&object), hand, rig: None }
+            FrameInput::new(observation, Arc::clone(&object), hand, None)
         };
         let inputs = [input(true), input(false), input(true)];
         let job = |input| RefineJob { input, initial, rivals: None };

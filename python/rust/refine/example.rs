@@ -25,7 +25,7 @@ pub(crate) fn example_frame<'py>(
     let scene = py.detach(|| default_scene(seed)).raise()?;
     let (initial, truth) = (matrix(py, &scene.initial)?, matrix(py, &scene.truth)?);
     let (observation, object, hand) = (scene.observation, scene.object, Some(scene.hand));
-    let input = FrameInput { observation, object, hand, rig: None };
+    let input = FrameInput::new(observation, object, hand, None);
     Ok((Frame { input, target: None }, initial, truth))
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn example_sequence<'py>(
     let initial = matrix(py, &sequence.initial)?;
     let frame = |SequenceFrame { time, observation, truth }| {
         let (object, hand) = (Arc::clone(&sequence.object), Arc::clone(&sequence.hand));
-        let input = FrameInput { observation, object, hand: Some(hand), rig: None };
+        let input = FrameInput::new(observation, object, Some(hand), None);
         Ok((Frame { input, target: None }, time.as_secs_f64(), matrix(py, &truth)?))
     };
     let frames = sequence.frames.into_iter().map(frame).collect::<PyResult<_>>()?;

@@ -108,7 +108,7 @@ impl Frame {
         if let Some(rig) = &rig {
             observation = rig.corrected(&observation).raise()?;
         }
-        Ok(Self { input: FrameInput { observation, object, hand, rig }, target: None })
+        Ok(Self { input: FrameInput::new(observation, object, hand, rig), target: None })
     }
 
     /// Refines a pose of the object (4 × 4, camera ← object [m]): an `Estimate`. Python's other threads run on meanwhile.

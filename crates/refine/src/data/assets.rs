@@ -6,18 +6,27 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use prehend_geometry::{GridCache, TriMesh};
+use prehend_render::Mask;
 
 use crate::baselines::GradientKind;
-use crate::data::bop::{BodyKind, Dataset, DatasetError, Frame, Models, SceneBodies};
+use crate::data::bop::{
+    Body, BodyKind, Dataset, DatasetError, Frame, Models, ResultRow, SceneBodies,
+};
 use crate::data::guard::Panicked;
-use crate::data::mask_choice::mask_at;
+use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::Robots;
 use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{self, Hand, Inertial, Object, Observation, StatedSize, Warning, check_gravity};
+use crate::scene::{
+    self, Hand, Inertial, Object, Observation, RegionEvidence, StatedSize, Subject, Warning, check_gravity,
+};
+use crate::strategy::FusedSettings;
+use crate::tracker::{Tracker, TrackerSettings};
 
+/// Standard deviations of the poses of neighbors, in each direction and about each axis \[m, rad\].
+const NEIGHBOR_SIGMAS: [f64; 2] = [2e-3, 0.02];
 /// BOP models are in millimeters \[m\].
 const MILLIMETER: f64 = 1e-3;
 
@@ -90,15 +99,60 @@ pub struct FrameInput {
     pub hand: Option<Arc<Hand>>,
     /// The rig, by which all this is corrected, where it is known.
     pub rig: Option<Arc<Rig>>,
+    /// True if pixels of the mask were told by the pose.
+    is_segmented: bool,
+    /// Regions, where no mask tells them.
+    regions: Option<Arc<RegionEvidence>>,
 }
 
 impl FrameInput {
+    /// Frame of an object, in a hand if that is known, corrected by `rig` already.
+    pub fn new(
+        observation: Observation,
+        object: Arc<Object>,
+        hand: Option<Arc<Hand>>,
+        rig: Option<Arc<Rig>>,
+    ) -> Self {
+        Self { observation, object, hand, rig, is_segmented: false, regions: None }
+    }
+
+    /// The frame with pixels that show the object told by its pose, which is about `t_cam_object` \[m\], by depth and by colors, if its mask is empty or a box;
+    /// `None` if its mask tells.
+    ///
+    /// # Errors
+    /// If nothing of the object is seen there.
+    pub fn segmented(
+        &self,
+        t_cam_object: &Isometry3<f64>,
+        method: &Method,
+    ) -> Result<Option<Self>, RefineError> {
+        if tells_pixels(&self.observation.mask) {
+            return Ok(None);
+        }
+        let fused = match method {
+            Method::Fused(fused) => fused.settings.clone(),
+            _ => FusedSettings::default(),
+        };
+        let Self { object, hand, rig, .. } = self;
+        let settings = TrackerSettings { fused, ..TrackerSettings::default() };
+        let mut tracker = Tracker::new(Arc::clone(object), hand.clone(), settings)?;
+        if let Some(rig) = rig {
+            tracker = tracker.with_rig(Arc::clone(rig));
+        }
+        let (observation, regions) = tracker.segmented(self.observation.clone(), t_cam_object)?;
+        let (object, hand, rig) = (Arc::clone(object), hand.clone(), rig.clone());
+        Ok(Some(Self { observation, object, hand, rig, is_segmented: true, regions }))
+    }
+
     /// The frame.
     ///
     /// # Errors
     /// Those of [`scene::Frame::new`].
     pub fn frame(&self) -> Result<scene::Frame<'_>, RefineError> {
-        let frame = scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())?;
+        let mut frame = scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())?;
+        if let Some(regions) = &self.regions {
+            frame = frame.with_regions(regions);
+        }
         Ok(match &self.rig {
             Some(rig) => frame.with_rig(rig),
             None => frame,
@@ -109,10 +163,10 @@ impl FrameInput {
     /// sensors, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
-        [
-            scene::inspect_object(object),
-            scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object),
-        ]
+        let mut of_frame =
+            scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
+        of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
+        [scene::inspect_object(object), of_frame]
     }
 
     /// Whether the frame brings the evidence that a gradient needs.
@@ -152,7 +206,10 @@ pub struct Assets<'a> {
     objects: HashMap<u32, Arc<Object>>,
     robots: Robots,
     rig: Option<Arc<Rig>>,
+    masks: MaskSource,
     masks_optional: bool,
+    /// Objects of images (scene and image) beside those that are stated.
+    neighbors: HashMap<(u32, u32), Vec<Body>>,
 }
 
 impl<'a> Assets<'a> {
@@ -173,13 +230,35 @@ impl<'a> Assets<'a> {
             objects: HashMap::new(),
             robots: Robots::default(),
             rig: None,
+            masks: MaskSource::default(),
             masks_optional: false,
+            neighbors: HashMap::new(),
         }
     }
 
     /// With an empty mask where there is no file of one, or one in which nothing is set, which otherwise are errors.
     pub fn with_optional_masks(self) -> Self {
         Self { masks_optional: true, ..self }
+    }
+
+    /// With masks of `source`.
+    pub fn with_masks(self, source: MaskSource) -> Self {
+        Self { masks: source, ..self }
+    }
+
+    /// With objects at the poses of a results file as bodies of their images, known as well as poses are that were refined: they hide the object that is
+    /// sought, and are not where it is.
+    pub fn with_neighbors(mut self, rows: &[ResultRow]) -> Self {
+        for ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } in rows {
+            let bodies = self.neighbors.entry((*scene_id, *im_id)).or_default();
+            bodies.push(Body {
+                name: format!("object {obj_id}, {}", bodies.len()),
+                kind: BodyKind::Object { obj_id: *obj_id },
+                t_cam_base: *t_cam_model,
+                sigmas: NEIGHBOR_SIGMAS.map(Some),
+            });
+        }
+        self
     }
 
     /// With the distance grids of hands kept between runs in `cache`, if there is one.
@@ -224,13 +303,10 @@ impl<'a> Assets<'a> {
     /// # Errors
     /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
     pub fn load(&mut self, target: &Target, required: &[Sensor]) -> Result<FrameInput, AssetError> {
-        self.load_with(target, required, |frame, _| {
-            frame.mask_number(target.obj_id, target.instance)
-        })
+        self.load_about(target, None, required)
     }
 
-    /// As [`load`](Self::load), of an object about at `t_cam_object` \[m\]: another mask of the image than its own is taken, with a warning, if that overlaps it
-    /// far better.
+    /// As [`load`](Self::load), of an object about at `t_cam_object` \[m\], which tells masks that are of something else ([`MaskSource`]).
     ///
     /// # Errors
     /// Those of [`Assets::load`].
@@ -240,24 +316,21 @@ impl<'a> Assets<'a> {
         t_cam_object: &Isometry3<f64>,
         required: &[Sensor],
     ) -> Result<FrameInput, AssetError> {
-        self.load_with(target, required, |frame, object| {
-            mask_at(frame, target, object, t_cam_object)
-        })
+        self.load_about(target, Some(t_cam_object), required)
     }
 
-    /// Object and frame with the mask whose number `choose` gives.
-    fn load_with(
+    fn load_about(
         &mut self,
         target: &Target,
+        t_cam_object: Option<&Isometry3<f64>>,
         required: &[Sensor],
-        choose: impl FnOnce(&Frame<'_>, &Object) -> usize,
     ) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
         let dataset = self.dataset.clone();
         let frame = dataset.frame(target.scene_id, target.im_id)?;
-        let mask = choose(&frame, &object);
-        let (observation, hand) = self.observation(&frame, mask, required)?;
-        Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
+        let sought = Sought { target, object: &object, t_cam_object };
+        let (observation, hand) = self.sensed(&frame, MaskOf::Object(&sought), required)?;
+        Ok(FrameInput::new(observation, object, hand, self.rig.clone()))
     }
 
     /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or
@@ -271,31 +344,60 @@ impl<'a> Assets<'a> {
         instance: usize,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        let (observation, hand) = self.said(frame, instance, required)?;
+        self.sensed(frame, MaskOf::Number(instance), required)
+    }
+
+    /// The frame with a mask, corrected by the rig.
+    fn sensed(
+        &mut self,
+        frame: &Frame<'_>,
+        mask: MaskOf<'_>,
+        required: &[Sensor],
+    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
+        let (observation, hand) = self.stated(frame, mask, required)?;
         let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
         Ok((corrected.unwrap_or(observation), hand))
     }
 
-    /// The same as it is said to be.
-    fn said(
+    /// The frame as its files state it.
+    fn stated(
         &mut self,
         frame: &Frame<'_>,
-        instance: usize,
+        mask: MaskOf<'_>,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let mut observation = frame.unsegmented()?;
-        match frame.segment(&mut observation, instance) {
-            Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. })
-                if self.masks_optional => {}
-            read => read?,
-        }
-        for (view, t_cam_view) in frame.taken_together(&self.dataset, instance)? {
-            observation = observation.with_view(view, t_cam_view);
-        }
-        let Some(SceneBodies { gravity, bodies }) = present(frame.bodies(), !required.is_empty())?
-        else {
-            return Ok((observation, None));
+        let segmented = match mask {
+            MaskOf::Object(sought) => self.masks.segment(&mut observation, frame, sought),
+            MaskOf::Number(number) => {
+                frame.segment(&mut observation, number).map(|()| Some(number))
+            }
         };
+        let number = match segmented {
+            Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. })
+                if self.masks_optional =>
+            {
+                Some(0)
+            }
+            number => number?,
+        };
+        // Masks of other cameras have the same number.
+        if let Some(number) = number {
+            for (view, t_cam_view) in frame.taken_together(&self.dataset, number)? {
+                observation = observation.with_view(view, t_cam_view);
+            }
+        }
+        let stated = present(frame.bodies(), !required.is_empty())?;
+        let SceneBodies { gravity, mut bodies } = stated.unwrap_or_default();
+        if let MaskOf::Object(sought) = mask {
+            bodies.retain(|body| !sought.is_it(body));
+            let image = (sought.target.scene_id, sought.target.im_id);
+            let neighbors = self.neighbors.get(&image).into_iter().flatten();
+            bodies.extend(neighbors.filter(|body| !sought.is_it(body)).cloned());
+        }
+        if bodies.is_empty() && gravity.is_none() {
+            return Ok((observation, None));
+        }
         let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
         gravity.iter().try_for_each(check_gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
         if gravity.is_none() && required.contains(&Sensor::Hand) {
@@ -319,6 +421,18 @@ impl<'a> Assets<'a> {
         observation.place_views();
         Ok((observation, Some(hand)))
     }
+}
+
+/// An object whose mask a frame has, or the mask's number.
+#[derive(Clone, Copy)]
+enum MaskOf<'a> {
+    Object(&'a Sought<'a>),
+    Number(usize),
+}
+
+/// Whether a mask tells which pixels show the object, and not only about where it is.
+fn tells_pixels(mask: &Mask) -> bool {
+    mask.count() > 0 && !mask.is_box()
 }
 
 /// What was read; `None` where the file or its entry is absent and need not be there.

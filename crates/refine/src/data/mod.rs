@@ -13,7 +13,7 @@ mod frame_file;
 mod guard;
 pub mod identity;
 mod journal;
-mod mask_choice;
+mod mask_source;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 mod noise;
@@ -33,6 +33,7 @@ pub use frame_file::load_frame_file;
 pub use guard::{Panicked, guard};
 pub use identity::Identity;
 pub use journal::Journal;
+pub use mask_source::MaskSource;
 pub use noise::NoiseLevel;
 pub use pose::{PlainPose, pose_from_matrix};
 pub(crate) use smooth_field::smooth_field;

@@ -26,6 +26,9 @@ const STRIDE: usize = 4;
 const LEAST_FOUND: f64 = 0.2;
 /// Places that are compared where an object is looked for.
 const PLACES: usize = 4;
+/// Standard deviation of the outline of a stated pose \[m\], and of the sides of a box \[px\].
+const STATED: f64 = 5e-3;
+const BOX_SIGMA: f32 = 5.0;
 /// Share of pixels that is none.
 const LEAST_SHARE: f64 = 1e-3;
 
@@ -101,12 +104,14 @@ impl Appearance {
         self.ratios.are_known()
     }
 
-    /// Finds what of `sight` shows `object`, which should be at `t_cam_object`, and how far its pixels are the object's; false if nothing is seen of it.
+    /// Finds what of `sight` shows `object`, which should be at `t_cam_object`, and how far its pixels are the object's; false if nothing is seen of it. In a first
+    /// frame without a mask the object is stated to be `about` somewhere.
     pub(super) fn look(
         &self,
         sight: &mut Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
+        about: Option<&Isometry3<f64>>,
     ) -> bool {
         let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return false };
         let color = &sight.observation.color;
@@ -123,9 +128,12 @@ impl Appearance {
             true => RegionEvidence::of_mask(Some(color), &sight.given),
             false => None,
         };
-        let regions = regions.unwrap_or_else(|| {
+        let mut regions = regions.unwrap_or_else(|| {
             RegionEvidence::of_colors(color, silhouette.window.clone(), &self.ratios)
         });
+        if let Some(about) = about {
+            Self::place(&mut regions, sight, object, about);
+        }
         sight.regions = Some(Arc::new(regions));
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mask = &mut sight.observation.mask;
@@ -135,6 +143,24 @@ impl Appearance {
             .for_each(|at| mask.pixels_mut()[*at] = true);
         sight.focus = Some(silhouette.window);
         !seen.is_empty()
+    }
+
+    /// Adds to `regions` that the object was stated to be `about` somewhere, and in the given box, if there is one.
+    fn place(regions: &mut RegionEvidence, sight: &Sight, object: &Object, about: &Isometry3<f64>) {
+        let (camera, given) = (&sight.observation.camera, sight.given.pixels());
+        let Some(Silhouette { window, depth }) = Silhouette::new(sight, object, about) else {
+            return;
+        };
+        let set: Vec<bool> = depth.pixels().iter().map(|z| *z > 0.0).collect();
+        let border = MaskBorder::within(camera.width, window.clone(), &set);
+        let sigma = STATED * camera.fx / (about * object.center).z;
+        regions.add_border(&border, sigma as f32, f32::INFINITY);
+        if sight.given.count() > 0 {
+            let [columns, rows] = window.clone();
+            let set = rows.flat_map(|y| columns.clone().map(move |x| given[y * camera.width + x]));
+            let border = MaskBorder::within(camera.width, window, &set.collect::<Vec<_>>());
+            regions.add_border(&border, BOX_SIGMA, 0.0);
+        }
     }
 
     /// Share of what is usually seen of the object that is seen of one at `t_cam_object`, one at most: by pixels that rather have its colors, and by how often
@@ -264,7 +290,7 @@ mod tests {
         // The pixels around its middle are its own, and those beside it are not.
         let mut looked = sight();
         looked.tells = false;
-        assert!(appearance.look(&mut looked, &scene.object, &scene.truth));
+        assert!(appearance.look(&mut looked, &scene.object, &scene.truth, None));
         let regions = looked.regions.unwrap();
         let mean = |set: bool| {
             let width = scene.observation.camera.width;

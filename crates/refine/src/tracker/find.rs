@@ -12,13 +12,13 @@ use super::appearance::Appearance;
 use super::clock::{Clock, Timing};
 use super::memory::TrackState;
 use super::settings::Recovery;
-use super::sight::Sight;
+use super::sight::{Images, Sight};
 use super::tracked::{TrackStatus, Tracked};
 use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
-use crate::scene::Frame;
+use crate::scene::{Frame, Observation, RegionEvidence};
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
 
@@ -36,21 +36,8 @@ impl Tracker {
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
+        self.segment_first(sight)?;
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        if let Some(pose) = self.initial.filter(|_| !sight.measured && !sight.tells) {
-            self.learn_colors(sight, &pose)?;
-        } else if sight.given.count() > 0 {
-            sight.observation.mask.copy_from(&sight.given);
-        } else if let Some(pose) = self.initial {
-            if !self.segment(sight, &pose) {
-                return Err(RefineError::EmptyMask);
-            }
-            // The pose may be far off.
-            sight.focus = None;
-        } else {
-            sight.observation.mask =
-                self.segmenter.anywhere(sight).ok_or(RefineError::EmptyMask)?;
-        }
         let sight = &*sight;
         let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
         let initial = match self.initial {
@@ -78,6 +65,39 @@ impl Tracker {
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
 
+    /// Finds the pixels of a first frame that show the object, which is about where it begins if that is known.
+    fn segment_first(&mut self, sight: &mut Sight) -> Result<(), RefineError> {
+        match self.initial.filter(|_| !sight.tells) {
+            Some(pose) if !sight.measured => self.learn_colors(sight, &pose)?,
+            Some(pose) => {
+                if !self.segment(sight, &pose) {
+                    return Err(RefineError::OutOfView);
+                }
+                // The pose may be far off.
+                sight.focus = None;
+            }
+            None if sight.given.count() > 0 => sight.observation.mask.copy_from(&sight.given),
+            None => {
+                sight.observation.mask =
+                    self.segmenter.anywhere(sight).ok_or(RefineError::EmptyMask)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A frame with the pixels that show the object told by its pose, about `t_cam_object` \[m\], depth and colors; and its regions, where no depth is measured.
+    pub(crate) fn segmented(
+        mut self,
+        observation: Observation,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Result<(Observation, Option<Arc<RegionEvidence>>), RefineError> {
+        observation.require_sizes()?;
+        self.start_from(t_cam_object);
+        let mut sight = Sight::new(observation, self.hand.as_ref(), Images::default());
+        self.segment_first(&mut sight)?;
+        Ok((sight.observation, sight.regions))
+    }
+
     /// Learns colors in a frame with neither depth nor a mask, in which the object is about `initial` \[m\]: colors and pose in turns.
     fn learn_colors(
         &mut self,
@@ -88,18 +108,18 @@ impl Tracker {
         let mut pose = *initial;
         for _ in 0..COLOR_ROUNDS {
             self.appearance = Appearance::default();
-            if !self.appearance.look(sight, &object, &pose) {
+            if !self.appearance.look(sight, &object, &pose, Some(initial)) {
                 return Err(RefineError::OutOfView);
             }
             self.appearance.learn(sight, &object, &pose);
-            self.appearance.look(sight, &object, &pose);
+            self.appearance.look(sight, &object, &pose, Some(initial));
             // The pose may be far off.
             sight.focus = None;
             let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
             let start = State::new(&frame, initial)?;
             pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
         }
-        self.appearance.look(sight, &object, &pose);
+        self.appearance.look(sight, &object, &pose, Some(initial));
         sight.focus = None;
         Ok(())
     }
@@ -235,7 +255,7 @@ impl Tracker {
         if !self.appearance.is_known() {
             self.appearance = Appearance::of(self.segmenter.colors());
         }
-        self.appearance.look(sight, &self.object, t_cam_object)
+        self.appearance.look(sight, &self.object, t_cam_object, None)
     }
 
     /// Share of the pixels which should show an object at `t_cam_object` that do; over the usual share, where colors alone tell.

@@ -15,7 +15,7 @@ pub(super) struct Sight {
     pub(super) observation: Observation,
     /// The mask that came with it.
     pub(super) given: Mask,
-    /// Whether that is of something, and not of everything.
+    /// True if that tells which pixels show the object: it is neither empty nor a box.
     pub(super) tells: bool,
     /// Depth image of the hand \[m\], 0 where it is not.
     pub(super) hand_depth: Arc<DepthImage>,
@@ -49,7 +49,7 @@ impl Sight {
         draw_hand_depth(own(&mut hand_depth), &observation.camera, hand);
         own(&mut depth).copy_from(&observation.depth);
         let given = mem::replace(&mut observation.mask, mask);
-        let tells = (1..given.pixels().len()).contains(&given.count());
+        let tells = given.count() > 0 && !given.is_box();
         let measured = observation.has_depth();
         Self { given, tells, observation, hand_depth, depth, measured, regions: None, focus: None }
     }

@@ -14,6 +14,7 @@ mod fused;
 mod info;
 mod initial;
 mod log;
+mod masks;
 mod messages;
 mod pages;
 mod resume;

@@ -22,7 +22,9 @@ use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::options::{RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses};
+use crate::options::{
+    Masks, RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses,
+};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -43,7 +45,7 @@ pub(crate) struct Initial {
         long,
         value_name = "LEVEL",
         required_unless_present = "search",
-        conflicts_with_all = ["search", "device"]
+        conflicts_with_all = ["search", "device", "Masks"]
     )]
     noise: Option<NoiseLevel>,
     /// Seed of the errors
@@ -59,6 +61,8 @@ pub(crate) struct Initial {
     /// [default: that file of the dataset, or the only object in every image]
     #[arg(long, value_name = "FILE", requires = "search")]
     targets: Option<PathBuf>,
+    #[command(flatten)]
+    masks: Masks,
     /// Write the poses here, as a BOP results file; an existing one is replaced
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
@@ -157,7 +161,8 @@ impl Initial {
     /// The poses that the search finds, and the journal that holds them until they are written.
     fn found(&self, dataset: &Dataset) -> anyhow::Result<(Found, Journal)> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
-        let mut assets = Assets::new(dataset, 0).with_cache(cache());
+        let mut assets =
+            Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
         let backend = self.rendering.open()?;
         let identity = self.identity(dataset, &targets, backend.name())?;
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<Candidate>>) =
@@ -200,6 +205,7 @@ impl Initial {
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "targets": targets.iter().map(Target::to_string).collect::<Vec<_>>(),
             "filters": self.selection.filters(),
+            "masks": self.masks.identity()?,
             "backend": backend,
         })))
     }

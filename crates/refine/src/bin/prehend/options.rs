@@ -10,11 +10,12 @@ use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, ReadResults, ResultRow, check_writable, read_results, read_rivals,
-    share_image_times, write_results,
+    Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_results,
+    read_rivals, share_image_times, write_results,
 };
 use prehend_refine::data::details::DetailsFormat;
-use prehend_refine::data::{Target, find_targets};
+use prehend_refine::data::identity::file_fingerprint;
+use prehend_refine::data::{MaskSource, Target, find_targets};
 use prehend_refine::rig::Rig;
 use prehend_render::{Backend, Device};
 use strum::VariantNames;
@@ -47,6 +48,61 @@ pub(crate) struct Input {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
+}
+
+/// Where masks come from.
+#[derive(Args)]
+pub(crate) struct Masks {
+    /// Where the masks of the objects come from
+    #[arg(long, value_name = "SOURCE", default_value = "files", help_heading = "Input")]
+    mask_source: MaskKind,
+    /// Masks or boxes that a detector found, as BOP has them (JSON; bbox, segmentation as COCO's run lengths, plain or compressed)
+    ///
+    /// Of several of an object in an image the one is taken that overlaps the object most at its pose; without poses the most confident one.
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    detections: Option<PathBuf>,
+}
+
+/// Kind of masks.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MaskKind {
+    /// mask_visib/, or --detections where they are given
+    Files,
+    /// Boxes of --detections: within them, pixels are told by the initial pose, depth and colors; without detections as none
+    Box,
+    /// The object at its initial pose
+    Silhouette,
+    /// None: pixels are told by the initial pose, depth and colors
+    None,
+}
+
+impl Masks {
+    /// The source of masks.
+    ///
+    /// # Errors
+    /// If the file of detections is missing or broken, or not used.
+    pub(crate) fn source(&self) -> anyhow::Result<MaskSource> {
+        let detections = self.detections.as_deref().map(Detections::load).transpose()?;
+        Ok(match (self.mask_source, detections.map(Arc::new)) {
+            (MaskKind::Files, None) => MaskSource::Files,
+            (MaskKind::Files, Some(detections)) => MaskSource::Detections(detections),
+            (MaskKind::Box, detections) => MaskSource::Boxes(detections),
+            (MaskKind::Silhouette, None) => MaskSource::Silhouettes,
+            (MaskKind::None, None) => MaskSource::None,
+            (kind, Some(_)) => {
+                bail!(
+                    "--mask-source {}: does not use --detections",
+                    format!("{kind:?}").to_lowercase()
+                )
+            }
+        })
+    }
+
+    /// The options in words, to be compared with those of an interrupted run.
+    pub(crate) fn identity(&self) -> Result<String, DatasetError> {
+        let detections = self.detections.as_deref().map(file_fingerprint).transpose()?;
+        Ok(format!("{:?} {detections:?}", self.mask_source))
+    }
 }
 
 /// Where pictures are rendered.

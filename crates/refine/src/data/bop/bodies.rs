@@ -54,7 +54,7 @@ impl Body {
 }
 
 /// One image's entry of `scene_bodies.json`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneBodies {
     /// Gravity in the camera frame \[m/s²\], where it is said.
     pub gravity: Option<Vector3<f64>>,

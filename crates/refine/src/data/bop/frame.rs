@@ -123,11 +123,7 @@ impl Frame<'_> {
     /// # Errors
     /// [`DatasetError::Missing`] naming the PNG file when there is none.
     pub fn rgb_path(&self) -> Result<PathBuf, DatasetError> {
-        let stem = self.scene.dir().join("rgb").join(format!("{:06}", self.im_id));
-        let mut candidates = ["png", "jpg", "jpeg"].into_iter().map(|e| stem.with_extension(e));
-        candidates
-            .find(|p| p.is_file())
-            .ok_or_else(|| DatasetError::Missing { file: stem.with_extension("png") })
+        first_image(&self.scene.dir().join("rgb").join(format!("{:06}", self.im_id)))
     }
 
     /// The depth image, whether or not it exists.
@@ -137,14 +133,12 @@ impl Frame<'_> {
 
     /// The file of an object's mask; see [`Frame::mask`].
     fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
-        let name = format!("{:06}_{instance:06}.png", self.im_id);
-        let expected = self.scene.dir().join("mask_visib").join(name);
         let mut masks = self.mask_files();
-        match (masks.next(), masks.next()) {
-            (Some(only), None) => Ok(only),
-            _ if expected.is_file() => Ok(expected),
-            _ => Err(DatasetError::Missing { file: expected }),
+        if let (Some(only), None) = (masks.next(), masks.next()) {
+            return Ok(only);
         }
+        let name = format!("{:06}_{instance:06}", self.im_id);
+        first_image(&self.scene.dir().join("mask_visib").join(name))
     }
 
     /// The files of the image's masks, in any order.
@@ -154,7 +148,8 @@ impl Frame<'_> {
         files.into_iter().flatten().flatten().map(|file| file.path()).filter(move |path| {
             path.file_name()
                 .and_then(|name| name.to_str())
-                .is_some_and(|name| name.starts_with(&prefix) && name.ends_with(".png"))
+                .and_then(|name| name.strip_prefix(&prefix)?.split_once('.'))
+                .is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
         })
     }
 
@@ -293,6 +288,15 @@ impl Frame<'_> {
         Ok(())
     }
 
+    /// A mask of the image as it was taken, as a pinhole camera sees it.
+    ///
+    /// # Errors
+    /// If it has another size than the image.
+    pub(crate) fn undistorted_mask(&self, stored: Mask) -> Result<Mask, DatasetError> {
+        let size = (stored.width(), stored.height());
+        self.undistorted(self.scene.dir(), stored, size, Remap::mask)
+    }
+
     /// Whether the scene has a folder of color images.
     pub(super) fn has_color(&self) -> bool {
         self.scene.dir().join("rgb").is_dir()
@@ -358,10 +362,9 @@ impl Frame<'_> {
                 return Err(self.scene.camera.fault(&format!("{image}.cam_t_w2c"), &problem));
             }
             let file = self.scene.dir().join("mask_visib");
-            let file = file.join(format!("{image:06}_{number:06}.png"));
-            if !file.is_file() {
+            let Ok(file) = first_image(&file.join(format!("{image:06}_{number:06}"))) else {
                 continue;
-            }
+            };
             let mut view = other.unsegmented()?;
             match other.segment_by(&mut view, &file) {
                 Err(DatasetError::EmptyMask { .. }) => continue,
@@ -438,6 +441,19 @@ impl Frame<'_> {
         let dot = if field.is_empty() || field.starts_with('[') { "" } else { "." };
         DatasetError::field(file.path(), &format!("{}{dot}{field}", self.im_id), problem)
     }
+}
+
+/// Extensions of images' names, in the order in which they are looked for.
+const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// The image that is called `stem` without its extension.
+///
+/// # Errors
+/// [`DatasetError::Missing`] naming the PNG file when there is none.
+fn first_image(stem: &Path) -> Result<PathBuf, DatasetError> {
+    let mut candidates = IMAGE_EXTENSIONS.into_iter().map(|e| stem.with_extension(e));
+    let found = candidates.find(|path| path.is_file());
+    found.ok_or_else(|| DatasetError::Missing { file: stem.with_extension("png") })
 }
 
 /// The number of the object that the mask in `file` is of.

@@ -9,6 +9,7 @@
 mod arrival;
 mod bodies;
 mod dataset;
+mod detections;
 mod entries;
 mod error;
 mod files;
@@ -29,6 +30,7 @@ pub use arrival::Stamp;
 pub use bodies::{Body, BodyKind, SceneBodies};
 pub(crate) use bodies::{KindName, body_sigmas, positions};
 pub use dataset::{Dataset, Scene};
+pub use detections::Detections;
 pub use error::DatasetError;
 pub use files::{check_writable, create_folder, write_atomically};
 pub(crate) use files::{lock, read_bytes, read_text};

@@ -34,8 +34,8 @@ impl ImagesLayout<'_> {
             return Err(field(lacks, "is missing".to_owned()));
         }
         let of = if self.rgb.is_some() { "rgb" } else { "depth" };
-        let others =
-            [("depth", depth_size.filter(|_| own.is_none())), ("mask", Some(size(self.mask)?))];
+        let mask_size = self.mask.map(size).transpose()?;
+        let others = [("depth", depth_size.filter(|_| own.is_none())), ("mask", mask_size)];
         for (name, size) in others {
             if let Some((width, height)) = size.filter(|size| *size != (w, h)) {
                 let problem = format!("the image is {width}x{height} pixels, {of} is {w}x{h}");
@@ -51,8 +51,11 @@ impl ImagesLayout<'_> {
                 Some(DepthImage::load(&folder.join(path), unit.0).map_err(broken)?)
             }
         };
-        let mut mask = Mask::load(&folder.join(self.mask)).map_err(broken)?;
-        if prefix.is_empty() && mask.count() == 0 {
+        let mut mask = match self.mask {
+            Some(path) => Mask::load(&folder.join(path)).map_err(broken)?,
+            None => Mask::filled(w, h, false),
+        };
+        if prefix.is_empty() && self.mask.is_some() && mask.count() == 0 {
             // Of other cameras those are left out that do not see the object.
             return Err(field("mask", "the mask is empty".to_owned()));
         }

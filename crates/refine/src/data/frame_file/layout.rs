@@ -23,7 +23,7 @@ pub(super) struct Layout {
     depth: Option<PathBuf>,
     /// Meters of one unit of the depth image.
     depth_unit_m: Option<Positive>,
-    mask: PathBuf,
+    mask: Option<PathBuf>,
     #[serde(rename = "depth_K")]
     depth_k: Option<Numbers<9>>,
     #[serde(rename = "depth_dist")]
@@ -59,7 +59,7 @@ pub(super) struct CameraLayout {
     rgb: Option<PathBuf>,
     depth: Option<PathBuf>,
     depth_unit_m: Option<Positive>,
-    mask: PathBuf,
+    mask: Option<PathBuf>,
     #[serde(rename = "depth_K")]
     depth_k: Option<Numbers<9>>,
     #[serde(rename = "depth_dist")]
@@ -79,7 +79,7 @@ pub(super) struct ImagesLayout<'a> {
     pub(super) rgb: Option<&'a PathBuf>,
     pub(super) depth: Option<&'a PathBuf>,
     pub(super) depth_unit_m: Option<Positive>,
-    pub(super) mask: &'a PathBuf,
+    pub(super) mask: Option<&'a PathBuf>,
     pub(super) depth_k: Option<[f64; 9]>,
     pub(super) depth_lens: Option<Lens>,
     pub(super) depth_rotation: Option<UnitQuaternion<f64>>,
@@ -98,7 +98,7 @@ macro_rules! images {
                     rgb: self.rgb.as_ref(),
                     depth: self.depth.as_ref(),
                     depth_unit_m: self.depth_unit_m,
-                    mask: &self.mask,
+                    mask: self.mask.as_ref(),
                     depth_k: self.depth_k.as_ref().map(|k| k.0),
                     depth_lens: self.depth_lens,
                     depth_rotation: self.depth_rotation.as_ref().map(|rotation| rotation.0),

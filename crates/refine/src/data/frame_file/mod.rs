@@ -51,7 +51,7 @@ pub fn load_frame_file(
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
-    Ok((FrameInput { observation, object: Arc::new(object), hand, rig }, layout.pose.0))
+    Ok((FrameInput::new(observation, Arc::new(object), hand, rig), layout.pose.0))
 }
 
 /// What a frame file names, as it is there: nothing is derived from it yet.

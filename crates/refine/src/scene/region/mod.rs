@@ -78,6 +78,19 @@ impl RegionEvidence {
         Self { size, window, values, edges, outside: -ratios.limit() }
     }
 
+    /// Adds that pixels within `border`, which is known within `sigma` \[px\], are the object's and others are not, by `most` at most where they are \[nat\].
+    pub(crate) fn add_border(&mut self, border: &MaskBorder, sigma: f32, most: f32) {
+        let width = self.size[0];
+        let [columns, rows] = self.window.clone();
+        for (at, distance) in border.pixels() {
+            let (x, y) = (at % width, at / width);
+            if columns.contains(&x) && rows.contains(&y) {
+                let told = MASK_LIMIT * (distance / sigma).clamp(-1.0, 1.0);
+                self.values[(y - rows.start) * columns.len() + x - columns.start] += told.min(most);
+            }
+        }
+    }
+
     /// Means of blocks of `factor` pixels across.
     pub(crate) fn reduced(&self, factor: usize) -> Self {
         if factor <= 1 {

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use anyhow::bail;
 use nalgebra::Isometry3;
-use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
+use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{
@@ -24,16 +24,26 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
-use crate::options::{Job, Selection, beside, open_rig, write_poses};
+use crate::options::{Job, Masks, Selection, beside, open_rig, write_poses};
 use crate::report;
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
-/// A refinement of a dataset's frames.
-pub(super) struct DatasetRun<'a> {
+/// Frames of a dataset, and where their objects are about.
+pub(super) struct DatasetInputs<'a> {
     pub(super) selection: &'a Selection,
     pub(super) poses: &'a Path,
     /// Rivals of the poses, where these come from a search.
     pub(super) rivals: Option<&'a Path>,
+    pub(super) masks: &'a Masks,
+    /// Poses of other objects of the images.
+    pub(super) neighbors: Option<&'a Path>,
+    /// The rig's file.
+    pub(super) rig: Option<&'a Path>,
+}
+
+/// A refinement of a dataset's frames.
+pub(super) struct DatasetRun<'a> {
+    pub(super) inputs: DatasetInputs<'a>,
     pub(super) out: &'a Path,
     pub(super) output: &'a OutputOptions,
     pub(super) options: &'a MethodOptions,
@@ -41,8 +51,6 @@ pub(super) struct DatasetRun<'a> {
     pub(super) method: Method,
     /// What renders.
     pub(super) backend: Arc<dyn Backend>,
-    /// The rig's file.
-    pub(super) rig: Option<&'a Path>,
 }
 
 /// A refined frame as the journal has it.
@@ -66,10 +74,16 @@ impl DatasetRun<'_> {
     pub(super) fn run(&self) -> anyhow::Result<ExitCode> {
         let name = self.options.method().name;
         let json = self.output.json;
-        let dataset = self.selection.open()?;
-        let (jobs, mut failures) = self.selection.jobs_with_rivals(self.poses, self.rivals)?;
-        let rig = open_rig(self.rig)?;
-        let assets = Assets::new(&dataset, self.options.seed).with_cache(cache()).with_rig(rig);
+        let DatasetInputs { selection, poses, rivals, masks, neighbors, rig } = &self.inputs;
+        let dataset = selection.open()?;
+        let (jobs, mut failures) = selection.jobs_with_rivals(poses, *rivals)?;
+        let assets = Assets::new(&dataset, self.options.seed).with_cache(cache());
+        let mut assets = assets.with_rig(open_rig(*rig)?).with_masks(masks.source()?);
+        if let Some(file) = neighbors {
+            let ReadResults { rows, errors, .. } = read_results(file)?;
+            failures.extend(errors.iter().map(|error| format!("{}: {error}", file.display())));
+            assets = assets.with_neighbors(&rows);
+        }
         let assets = Mutex::new(assets);
         let create = |folder| Report::create(folder, "Refined poses");
         let report = self.output.report.as_deref().map(create).transpose()?;
@@ -164,14 +178,17 @@ impl DatasetRun<'_> {
     }
 
     fn identity(&self, dataset: &Dataset) -> anyhow::Result<Identity> {
+        let DatasetInputs { selection, poses, rivals, masks, neighbors, rig } = &self.inputs;
         Ok(Identity::of(&json!({
             "command": "refine",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
-            "poses": file_fingerprint(self.poses)?,
-            "rivals": self.rivals.map(file_fingerprint).transpose()?,
-            "rig": self.rig.map(file_fingerprint).transpose()?,
-            "filters": self.selection.filters(),
+            "poses": file_fingerprint(poses)?,
+            "rivals": rivals.map(file_fingerprint).transpose()?,
+            "masks": masks.identity()?,
+            "neighbors": neighbors.map(file_fingerprint).transpose()?,
+            "rig": rig.map(file_fingerprint).transpose()?,
+            "filters": selection.filters(),
             "method": self.options.method().name,
             "settings": format!("{:?}", self.method),
             "seed": self.options.seed,
@@ -189,6 +206,7 @@ impl DatasetRun<'_> {
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
+        let input = input.segmented(initial, &self.method)?.unwrap_or(input);
         let mut frame = input.frame()?.with_backend(Arc::clone(&self.backend));
         if let Some(rivals) = &job.rivals {
             frame = frame.with_rivals(rivals.clone());

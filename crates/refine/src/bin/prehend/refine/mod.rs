@@ -11,10 +11,10 @@ use anyhow::bail;
 use clap::Args;
 use prehend_refine::data::bop::check_writable;
 
-use self::dataset::DatasetRun;
+use self::dataset::{DatasetInputs, DatasetRun};
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{RIVALS, Rendering, Selection, beside, check_details, limit_threads};
+use crate::options::{Masks, RIVALS, Rendering, Selection, beside, check_details, limit_threads};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -33,8 +33,14 @@ pub(crate) struct Refine {
     /// rotation, and starts from all of them and from what looks alike by shape [default: the poses' file with .rivals.csv added, if there is one]
     #[arg(long, value_name = "FILE", requires = "poses")]
     rivals: Option<PathBuf>,
+    #[command(flatten)]
+    masks: Masks,
+    /// Poses of objects that are there besides, as a BOP results file: such as the refined poses of all objects of the images. They hide the object that is
+    /// refined and are not where it is; itself does not count
+    #[arg(long, value_name = "FILE", requires = "poses")]
+    neighbors: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "rivals", "report"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "Masks", "poses", "rivals", "report"])]
     frame: Option<PathBuf>,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
     #[arg(long, value_name = "FILE")]
@@ -49,7 +55,8 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, rivals, frame, rig, output, method, rendering } = &self;
+        let Self { selection, poses, rivals, masks, neighbors, .. } = &self;
+        let Self { frame, rig, output, method, rendering, .. } = &self;
         // What cannot be written must be known before the work, not after it.
         if let Some(out) = &output.out {
             check_writable(out)?;
@@ -65,9 +72,9 @@ impl Refine {
                 let (method, rig) = (configured, rig.as_deref());
                 let beside = Some(beside(poses, RIVALS)).filter(|file| file.exists());
                 let rivals = rivals.clone().or(beside);
-                let rivals = rivals.as_deref();
-                DatasetRun { selection, poses, rivals, out, output, options, method, backend, rig }
-                    .run()
+                let (rivals, neighbors) = (rivals.as_deref(), neighbors.as_deref());
+                let inputs = DatasetInputs { selection, poses, rivals, masks, neighbors, rig };
+                DatasetRun { inputs, out, output, options, method, backend }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }

@@ -109,7 +109,7 @@ impl Film for LogFilm<'_> {
                 observation = rig.corrected(&observation)?;
             }
             let (object, hand) = (Arc::clone(&self.log.object), self.log.hand.clone());
-            Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
+            Ok(FrameInput::new(observation, object, hand, self.rig.clone()))
         };
         let stamp = Some(frame.nanoseconds);
         let input = input();

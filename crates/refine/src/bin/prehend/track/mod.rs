@@ -43,7 +43,7 @@ use self::log::{Log, LogWriter};
 use self::log_options::LogOptions;
 use self::report::FilmReport;
 use crate::options::{
-    Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
+    Masks, Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
 };
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
@@ -76,6 +76,8 @@ pub(crate) struct Track {
     /// [default: that file of the dataset, or the only object in every image]
     #[arg(long, value_name = "FILE", requires = "search")]
     targets: Option<PathBuf>,
+    #[command(flatten)]
+    masks: Masks,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and the model are corrected by it
     #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
@@ -276,7 +278,8 @@ impl Track {
             report.share(starts.len());
         }
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
-        assets = assets.with_rig(following.rig.clone()).with_optional_masks();
+        assets = assets.with_rig(following.rig.clone()).with_masks(self.masks.source()?);
+        assets = assets.with_optional_masks();
         for &(start, initial) in &starts {
             let watch = watched.map(|scene_id| Watch::new(scene_id, start.im_id, idle));
             let followed = || {

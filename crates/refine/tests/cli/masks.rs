@@ -1,0 +1,95 @@
+//! Masks from files, detections, boxes, silhouettes, or none; and objects that are not their own neighbors.
+
+use prehend_refine::data::bop::ResultRow;
+use prehend_render::Mask;
+use serde_json::{Value, json};
+
+use crate::fixture::Workplace;
+
+const MASK: &str = "ds/test/000001/mask_visib/000000_000000.png";
+const REFINE: &str = "refine --dataset ds --poses ds/init.csv --image 0";
+
+/// Distance of the first pose of a file from another one \[m\].
+fn distance(place: &Workplace, file: &str, to: &ResultRow) -> f64 {
+    let [found, to] = [&place.poses(file)[0], to].map(|row| row.t_cam_model.translation.vector);
+    (found - to).norm()
+}
+
+/// Run lengths of a mask, by columns.
+fn run_lengths(mask: &Mask) -> Vec<usize> {
+    let (width, height) = (mask.width(), mask.height());
+    let mut counts = vec![0];
+    let mut set = false;
+    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
+        if mask.get(x, y) != Some(set) {
+            set = !set;
+            counts.push(0);
+        }
+        *counts.last_mut().unwrap() += 1;
+    }
+    counts
+}
+
+#[test]
+fn masks_come_from_files_detections_boxes_or_the_pose() {
+    let place = Workplace::new();
+    place.succeed(&format!("{REFINE} --out files.csv"));
+    let by_files = place.poses("files.csv")[0].clone();
+    let mask = Mask::load(&place.path(MASK)).unwrap();
+    let [left, top, width, height] = mask.bounds().unwrap();
+    let obj_id = by_files.obj_id;
+    let of = |score: f64, bbox: [usize; 4]| json!({"scene_id": 1, "image_id": 0, "category_id": obj_id, "score": score, "bbox": bbox, "time": -1});
+    let mut segmented = of(0.4, [left, top, width, height]);
+    segmented["segmentation"] =
+        json!({"counts": run_lengths(&mask), "size": [mask.height(), mask.width()]});
+    // A more confident one elsewhere overlaps less.
+    let found = Value::from(vec![of(0.9, [0, 0, 30, 30]), segmented]);
+    place.write("found.json", &found.to_string());
+    place.remove(MASK);
+    place.succeed(&format!("{REFINE} --detections found.json --out detected.csv"));
+    assert_eq!(place.poses("detected.csv")[0].t_cam_model, by_files.t_cam_model);
+    for source in ["box --detections found.json", "box", "none", "silhouette"] {
+        place.succeed(&format!("{REFINE} --mask-source {source} --out other.csv --restart"));
+        let off = distance(&place, "other.csv", &by_files);
+        assert!(off < 2e-3, "{source}: {off}");
+    }
+    let said =
+        place.prehend(&format!("{REFINE} --mask-source none --detections found.json --out x.csv"));
+    assert!(
+        said.code == 2 && said.err.contains("--mask-source none: does not use --detections"),
+        "{}",
+        said.err
+    );
+    let other =
+        found.to_string().replace(&format!(r#""category_id":{obj_id}"#), r#""category_id":77"#);
+    place.write("found.json", &other);
+    let said = place.prehend(&format!("{REFINE} --detections found.json --out x.csv --restart"));
+    assert!(said.err.contains("found.json: scene 1 image 0 object"), "{}", said.err);
+    assert!(
+        said.err.contains("no detection of this object (category_id) in this image"),
+        "{}",
+        said.err
+    );
+}
+
+#[test]
+fn an_object_is_not_its_own_neighbor() {
+    let place = Workplace::new();
+    place.succeed(&format!("{REFINE} --out alone.csv"));
+    let alone = place.poses("alone.csv")[0].clone();
+    // The poses of all objects of the image, itself among them.
+    place.succeed(&format!("{REFINE} --neighbors alone.csv --out again.csv"));
+    assert_eq!(place.poses("again.csv")[0].t_cam_model, alone.t_cam_model);
+    // Scenes list all their objects as bodies.
+    let translation: Vec<f64> =
+        alone.t_cam_model.translation.vector.iter().map(|m| m * 1e3).collect();
+    let rotation = alone.t_cam_model.rotation.to_rotation_matrix();
+    let rotation: Vec<f64> = rotation.matrix().transpose().iter().copied().collect();
+    place.edit_json("ds/test/000001/scene_bodies.json", |bodies| {
+        let itself = json!({"name": "object", "kind": "object", "obj_id": alone.obj_id,
+            "cam_R_b2c": rotation, "cam_t_b2c": translation});
+        bodies["0"]["bodies"].as_array_mut().unwrap().push(itself);
+    });
+    place.succeed(&format!("{REFINE} --out listed.csv"));
+    assert_eq!(place.poses("listed.csv")[0].t_cam_model, alone.t_cam_model);
+}
