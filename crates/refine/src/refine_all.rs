@@ -39,12 +39,16 @@ impl RefineJob<'_> {
         if let Method::Heuristic(heuristic) = &mut method {
             heuristic.gradients.retain(|&gradient| self.input.offers(gradient));
         }
-        let segmented = self.input.segmented(&self.initial, &method)?;
-        let mut frame = segmented.as_ref().unwrap_or(self.input).frame()?;
+        let prepared = self.input.prepared(&self.initial, &method)?;
+        let input = prepared.as_ref().unwrap_or(self.input);
+        let mut frame = input.frame()?;
         if let Some(rivals) = &self.rivals {
             frame = frame.with_rivals(rivals.clone());
         }
-        let estimate = refine(&frame, &self.initial, &method)?;
+        let mut estimate = refine(&frame, &self.initial, &method)?;
+        if let Some(posterior) = &mut estimate.posterior {
+            posterior.model_scale = input.model_scale;
+        }
         let pose = estimate.t_cam_object();
         let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
         if !numbers.all(|v| v.is_finite()) {

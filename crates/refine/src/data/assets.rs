@@ -20,9 +20,10 @@ use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{
-    self, Hand, Inertial, Object, Observation, RegionEvidence, StatedSize, Subject, Warning, check_gravity,
+    self, Hand, Inertial, Object, Observation, RegionEvidence, StatedSize, Subject, Warning,
+    check_gravity,
 };
-use crate::strategy::FusedSettings;
+use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
 
 /// Standard deviations of the poses of neighbors, in each direction and about each axis \[m, rad\].
@@ -90,6 +91,7 @@ impl Sensor {
 }
 
 /// A frame ready to be refined.
+#[derive(Clone)]
 pub struct FrameInput {
     /// What was sensed.
     pub observation: Observation,
@@ -99,6 +101,8 @@ pub struct FrameInput {
     pub hand: Option<Arc<Hand>>,
     /// The rig, by which all this is corrected, where it is known.
     pub rig: Option<Arc<Rig>>,
+    /// Size of the object by that of its model, if the model was scaled by that.
+    pub model_scale: Option<ModelScale>,
     /// True if pixels of the mask were told by the pose.
     is_segmented: bool,
     /// Regions, where no mask tells them.
@@ -113,26 +117,42 @@ impl FrameInput {
         hand: Option<Arc<Hand>>,
         rig: Option<Arc<Rig>>,
     ) -> Self {
-        Self { observation, object, hand, rig, is_segmented: false, regions: None }
+        let (model_scale, is_segmented, regions) = (None, false, None);
+        Self { observation, object, hand, rig, model_scale, is_segmented, regions }
     }
 
-    /// The frame with pixels that show the object told by its pose, which is about `t_cam_object` \[m\], by depth and by colors, if its mask is empty or a box;
-    /// `None` if its mask tells.
+    /// The frame as `method` needs it, where it is not so yet, of an object about at `t_cam_object` \[m\]: if its mask is empty or a box, with the pixels that show
+    /// the object told by its pose, by depth and by colors; if the size of the model is to be estimated, with a model of that size.
     ///
     /// # Errors
     /// If nothing of the object is seen there.
-    pub fn segmented(
+    pub fn prepared(
         &self,
         t_cam_object: &Isometry3<f64>,
         method: &Method,
     ) -> Result<Option<Self>, RefineError> {
-        if tells_pixels(&self.observation.mask) {
-            return Ok(None);
-        }
         let fused = match method {
-            Method::Fused(fused) => fused.settings.clone(),
-            _ => FusedSettings::default(),
+            Method::Fused(fused) => (**fused).clone(),
+            _ => Fused::default(),
         };
+        let segmented = match tells_pixels(&self.observation.mask) {
+            true => None,
+            false => Some(self.segmented(t_cam_object, fused.settings.clone())?),
+        };
+        if fused.settings.model_scale <= 0.0 {
+            return Ok(segmented);
+        }
+        let input = segmented.unwrap_or_else(|| self.clone());
+        let found = fused.model_scale(&input.frame()?, t_cam_object)?;
+        let object = Arc::new(input.object.scaled(found.scale)?);
+        Ok(Some(Self { object, model_scale: Some(found), ..input }))
+    }
+
+    fn segmented(
+        &self,
+        t_cam_object: &Isometry3<f64>,
+        fused: FusedSettings,
+    ) -> Result<Self, RefineError> {
         let Self { object, hand, rig, .. } = self;
         let settings = TrackerSettings { fused, ..TrackerSettings::default() };
         let mut tracker = Tracker::new(Arc::clone(object), hand.clone(), settings)?;
@@ -140,8 +160,7 @@ impl FrameInput {
             tracker = tracker.with_rig(Arc::clone(rig));
         }
         let (observation, regions) = tracker.segmented(self.observation.clone(), t_cam_object)?;
-        let (object, hand, rig) = (Arc::clone(object), hand.clone(), rig.clone());
-        Ok(Some(Self { observation, object, hand, rig, is_segmented: true, regions }))
+        Ok(Self { observation, is_segmented: true, regions, ..self.clone() })
     }
 
     /// The frame.
@@ -163,8 +182,7 @@ impl FrameInput {
     /// sensors, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
-        let mut of_frame =
-            scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
+        let mut of_frame = scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
         of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
         [scene::inspect_object(object), of_frame]
     }

@@ -14,7 +14,7 @@ use crate::scene::{Object, Observation};
 const LEAST_SHARE: f64 = 0.5;
 
 /// Source of the masks of a dataset's frames. Where there is no mask, or one that is a box, pixels are told by pose, depth and colors
-/// ([`FrameInput::segmented`](super::FrameInput::segmented)).
+/// ([`FrameInput::prepared`](super::FrameInput::prepared)).
 #[derive(Clone, Debug, Default)]
 pub enum MaskSource {
     /// `mask_visib/`; where another mask of the image overlaps the object at its pose far better, that one, with a warning.

@@ -63,16 +63,17 @@ impl EvaluationModel {
         vsd(camera, sensed, &draw(estimate), &draw(truth), self.diameter)
     }
 
-    /// The errors that BOP thresholds, `sensed` as for [`EvaluationModel::vsd`].
+    /// The errors that BOP thresholds, `sensed` as for [`EvaluationModel::vsd`]; without it no visible surface is right.
     pub(super) fn errors(
         &self,
         estimate: &Isometry3<f64>,
         truth: &Isometry3<f64>,
         camera: &Camera,
-        sensed: &DepthImage,
+        sensed: Option<&DepthImage>,
     ) -> NormalizedErrors {
+        let vsd = sensed.map(|sensed| self.vsd(estimate, truth, camera, sensed));
         NormalizedErrors::new(
-            &self.vsd(estimate, truth, camera, sensed),
+            &vsd.unwrap_or([f64::INFINITY; VSD_TOLERANCES.len()]),
             self.points.mssd(estimate, truth),
             self.diameter,
             self.points.mspd(estimate, truth, camera),

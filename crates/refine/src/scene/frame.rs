@@ -119,6 +119,21 @@ impl<'a> Frame<'a> {
         })
     }
 
+    /// The frame with another model of the object.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub(crate) fn of_object<'b>(
+        &'b self,
+        object: &'b Arc<Object>,
+    ) -> Result<Frame<'b>, RefineError> {
+        let mut frame = Frame::new(self.observation, object, self.hand.map(|(hand, _)| hand))?;
+        frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
+        frame.given_regions.clone_from(&self.given_regions);
+        frame.backend.clone_from(&self.backend);
+        Ok(Frame { rig: self.rig, ..frame })
+    }
+
     /// The same of a rig that is known as well as `rig` says: what was observed, and the object, are corrected by it already. The fused
     /// estimator takes that for what is known beforehand; others do not ask.
     pub fn with_rig(self, rig: &'a Rig) -> Self {

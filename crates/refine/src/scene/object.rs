@@ -124,6 +124,24 @@ impl Object {
         })
     }
 
+    /// The object with a model that is larger by a factor about its center, of the same density.
+    ///
+    /// # Errors
+    /// If the mesh cannot be used.
+    pub(crate) fn scaled(&self, factor: f64) -> Result<Self, RefineError> {
+        let mut mesh = self.mesh.clone();
+        let about = |p: &Point3<f64>| self.center + (p - self.center) * factor;
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex = about(vertex));
+        let Inertial { mass, center_of_mass, inertia } = &self.inertial;
+        let inertial = Inertial {
+            mass: mass * factor.powi(3),
+            center_of_mass: about(center_of_mass),
+            inertia: inertia * factor.powi(5),
+        };
+        let scaled = Self { inertial, ..self.with_surface(mesh, self.deviation.clone())? };
+        Ok(Self { stated_size: None, ..scaled })
+    }
+
     /// Distance between the object's surfaces at two poses, at most \[m\]: that of its centers and, times its radius, the angle.
     pub(crate) fn surface_motion(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         (from * self.center - to * self.center).norm()

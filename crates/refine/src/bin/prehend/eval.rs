@@ -23,7 +23,7 @@ pub(crate) struct Eval {
     /// Print BOP's average recall over all targets instead: AR_VSD, AR_MSSD, AR_MSPD and AR, by object too
     ///
     /// Of each object in an image, as many poses count as there are instances to be found, those of the highest scores; what has no
-    /// pose counts as missed. Needs depth/ and models_info.json. The time is the mean of the file's last column over images.
+    /// pose counts as missed. Needs models_info.json, and depth/ for AR_VSD and AR; without it AR_MSSD and AR_MSPD are printed. The time is the mean of the file's last column over images.
     #[arg(long)]
     bop: bool,
     /// What is to be found, as BOP's test_targets_bop19.json has it

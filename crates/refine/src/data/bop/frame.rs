@@ -27,6 +27,8 @@ use crate::scene::Observation;
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     scene: &'a Scene,
+    /// `camera.json`.
+    dataset_camera: &'a JsonFile,
     im_id: u32,
     intrinsics: Intrinsics,
     lens: Option<Distortion>,
@@ -103,6 +105,7 @@ impl Dataset {
             depth_camera.map_err(|name| scene.camera.fault(&im_id.to_string(), &missing(name)))?;
         Ok(Frame {
             scene,
+            dataset_camera: &self.camera,
             im_id,
             intrinsics,
             depth_camera,
@@ -302,8 +305,24 @@ impl Frame<'_> {
         self.scene.dir().join("rgb").is_dir()
     }
 
+    /// Width and height of the color image, or without color images of the camera that `camera.json` describes \[px\].
+    ///
+    /// # Errors
+    /// If neither is known.
+    pub(crate) fn image_size(&self) -> Result<(usize, usize), DatasetError> {
+        if self.has_color() {
+            return Ok(image_size(&self.rgb_path()?)?);
+        }
+        let of_camera = |name: &str| {
+            let size = self.dataset_camera.field::<u32>(name)?;
+            let missing = || self.dataset_camera.fault(name, "is missing, and there are no images");
+            size.map(|size| size as usize).ok_or_else(missing)
+        };
+        Ok((of_camera("width")?, of_camera("height")?))
+    }
+
     /// Whether the scene has a folder of depth images.
-    pub(super) fn has_depth(&self) -> bool {
+    pub(crate) fn has_depth(&self) -> bool {
         self.scene.dir().join("depth").is_dir()
     }
 

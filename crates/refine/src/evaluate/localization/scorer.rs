@@ -25,8 +25,8 @@ pub struct LocalizationScorer<'a> {
 struct Image {
     scene_and_image: (u32, u32),
     camera: Camera,
-    /// What was measured.
-    depth: DepthImage,
+    /// What was measured, in scenes with depth.
+    depth: Option<DepthImage>,
 }
 
 impl<'a> LocalizationScorer<'a> {
@@ -48,7 +48,7 @@ impl<'a> LocalizationScorer<'a> {
     /// How well those of `rows` that are of `target` localize it. Of rows of equal score, the first counts.
     ///
     /// # Errors
-    /// If a file that scoring needs is missing or broken (depth, ground truth, `models_info.json`), or the image shows
+    /// If a file that scoring needs is missing or broken (depth in a scene that has some, ground truth, `models_info.json`), or the image shows
     /// fewer instances than the target has.
     pub fn score(
         &mut self,
@@ -72,12 +72,15 @@ impl<'a> LocalizationScorer<'a> {
             let Image { camera, depth, .. } = self.image.insert(image);
             let model = &self.models[&obj_id];
             let against_all = |estimate: &&ResultRow| {
-                let error = |truth| model.errors(&estimate.t_cam_model, truth, camera, depth);
+                let error =
+                    |truth| model.errors(&estimate.t_cam_model, truth, camera, depth.as_ref());
                 truths.iter().map(error).collect()
             };
             errors = estimates.iter().map(against_all).collect();
         }
-        Ok(TargetScore { target: *target, estimates: estimates.len(), found: Found::new(&errors) })
+        let found = Found::new(&errors);
+        let has_depth = self.has_depth(target);
+        Ok(TargetScore { target: *target, estimates: estimates.len(), found, has_depth })
     }
 
     fn prepare_model(&mut self, obj_id: u32) -> Result<(), AssetError> {
@@ -94,8 +97,18 @@ impl<'a> LocalizationScorer<'a> {
 
     fn read_image(&self, scene_id: u32, im_id: u32) -> Result<Image, DatasetError> {
         let frame = self.dataset.frame(scene_id, im_id)?;
-        let depth = frame.depth()?;
-        let camera = frame.camera(depth.width(), depth.height());
+        let depth = frame.has_depth().then(|| frame.depth()).transpose()?;
+        let (width, height) = match &depth {
+            Some(depth) => (depth.width(), depth.height()),
+            None => frame.image_size()?,
+        };
+        let camera = frame.camera(width, height);
         Ok(Image { scene_and_image: (scene_id, im_id), camera, depth })
+    }
+
+    /// True of a target in a scene whose depth was measured, which VSD compares with.
+    fn has_depth(&self, target: &LocalizationTarget) -> bool {
+        let frame = self.dataset.frame(target.scene_id, target.im_id);
+        frame.is_ok_and(|frame| frame.has_depth())
     }
 }

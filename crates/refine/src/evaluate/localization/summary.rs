@@ -14,14 +14,14 @@ pub struct AverageRecall {
     pub targets: usize,
     /// Number of estimates that count, at most one an instance.
     pub estimates: usize,
-    /// Of the visible surface discrepancy, over tolerances and thresholds.
-    pub ar_vsd: f64,
+    /// Of the visible surface discrepancy, over tolerances and thresholds; none unless depth was measured of all targets.
+    pub ar_vsd: Option<f64>,
     /// Of the maximum symmetry-aware surface distance, over thresholds.
     pub ar_mssd: f64,
     /// Of the maximum symmetry-aware projection distance, over thresholds.
     pub ar_mspd: f64,
-    /// The mean of the three.
-    pub ar: f64,
+    /// The mean of the three, if there are three.
+    pub ar: Option<f64>,
 }
 
 /// Average recalls over all targets and over those of each object.
@@ -37,7 +37,9 @@ impl AverageRecall {
     /// Zero without targets.
     fn of<'a>(scores: impl Iterator<Item = &'a TargetScore>) -> Self {
         let (mut targets, mut estimates, mut found) = (0, 0, [0; 3]);
+        let mut has_depth = true;
         for score in scores {
+            has_depth &= score.has_depth;
             targets += score.target.instances;
             estimates += score.estimates;
             let of_target = [score.found.vsd, score.found.mssd, score.found.mspd];
@@ -52,8 +54,8 @@ impl AverageRecall {
             mssd: recall(found[1], THRESHOLDS.len()),
             mspd: recall(found[2], THRESHOLDS.len()),
         };
-        let (ar_vsd, ar_mssd, ar_mspd) = (recall.vsd, recall.mssd, recall.mspd);
-        Self { targets, estimates, ar_vsd, ar_mssd, ar_mspd, ar: recall.average() }
+        let [ar_vsd, ar] = [recall.vsd, recall.average()].map(|r| has_depth.then_some(r));
+        Self { targets, estimates, ar_vsd, ar_mssd: recall.mssd, ar_mspd: recall.mspd, ar }
     }
 }
 
@@ -80,7 +82,9 @@ impl LocalizationSummary {
         let objects = self.per_object.iter().map(|(&id, average)| (name(id), average));
         for (label, average) in objects.chain([("all".into(), &self.overall)]) {
             let AverageRecall { targets, estimates, ar_vsd, ar_mssd, ar_mspd, ar } = average;
-            let recalls = [ar_vsd, ar_mssd, ar_mspd, ar].map(|recall| format!("{recall:.4}"));
+            let recalls = [*ar_vsd, Some(*ar_mssd), Some(*ar_mspd), *ar];
+            let recalls =
+                recalls.map(|r| r.map_or_else(|| "–".to_owned(), |recall| format!("{recall:.4}")));
             let counts = [targets, estimates].map(usize::to_string);
             table.push([label].into_iter().chain(counts).chain(recalls).collect());
         }
@@ -97,7 +101,7 @@ mod tests {
     fn score(obj_id: u32, instances: usize, estimates: usize, found: [usize; 3]) -> TargetScore {
         let target = LocalizationTarget { scene_id: 1, im_id: 0, obj_id, instances };
         let [vsd, mssd, mspd] = found;
-        TargetScore { target, estimates, found: Found { vsd, mssd, mspd } }
+        TargetScore { target, estimates, found: Found { vsd, mssd, mspd }, has_depth: true }
     }
 
     #[test]
@@ -107,11 +111,17 @@ mod tests {
         let summary = summarize_localization(&scores);
         let all = summary.overall;
         assert_eq!((all.targets, all.estimates), (4, 2));
-        assert_eq!((all.ar_vsd, all.ar_mssd, all.ar_mspd), (150.0 / 400.0, 14.0 / 40.0, 0.3));
-        assert!((all.ar - (0.375 + 0.35 + 0.3) / 3.0).abs() < 1e-15);
+        assert_eq!((all.ar_vsd, all.ar_mssd, all.ar_mspd), (Some(150.0 / 400.0), 14.0 / 40.0, 0.3));
+        assert!((all.ar.unwrap() - (0.375 + 0.35 + 0.3) / 3.0).abs() < 1e-15);
         assert_eq!(summary.per_object[&7].ar_mssd, 14.0 / 30.0);
-        assert_eq!(summary.per_object[&3].ar, 0.0);
-        assert_eq!(summarize_localization(&[]).overall.ar, 0.0);
+        assert_eq!(summary.per_object[&3].ar, Some(0.0));
+        assert_eq!(summarize_localization(&[]).overall.ar, Some(0.0));
+        let unmeasured = TargetScore { has_depth: false, ..score(7, 1, 1, [0, 10, 5]) };
+        let of_color = summarize_localization(&[unmeasured]);
+        let AverageRecall { ar_vsd, ar_mssd, ar_mspd, ar, .. } = of_color.overall;
+        assert_eq!((ar_vsd, ar_mssd, ar_mspd, ar), (None, 1.0, 0.5, None));
+        let line = of_color.table(|id| id.to_string()).to_string();
+        assert!(line.lines().last().unwrap().contains('–'), "{line}");
 
         let text = summary.table(|id| format!("object {id}")).to_string();
         let last: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();

@@ -31,6 +31,8 @@ pub struct TargetScore {
     /// Number of estimates that count, at most one an instance.
     pub estimates: usize,
     pub(super) found: Found,
+    /// True where depth was measured.
+    pub(super) has_depth: bool,
 }
 
 /// The targets that `file` lists; without `file` those that the dataset lists, and without such a list all objects of which

@@ -49,7 +49,7 @@ impl Quantity {
 type Field = fn(&mut FusedSettings) -> Option<&mut f64>;
 
 /// All sizes: standard deviations of the errors, for most objects and rigs.
-const SIZES: [(&str, Quantity, Field); 15] = [
+const SIZES: [(&str, Quantity, Field); 16] = [
     ("object.translation", Quantity::Length, |s| Some(&mut s.prior.object_translation)),
     ("object.rotation", Quantity::Angle, |s| Some(&mut s.prior.object_rotation)),
     ("hand.translation", Quantity::Length, |s| Some(&mut s.prior.hand_translation)),
@@ -64,6 +64,7 @@ const SIZES: [(&str, Quantity, Field); 15] = [
     ("view.translation", Quantity::Length, |s| Some(&mut s.prior.view_translation)),
     ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
     ("model", Quantity::Length, |s| Some(&mut s.model.gp_sigma)),
+    ("model.scale", Quantity::Ratio, |s| Some(&mut s.model_scale)),
     ("touch", Quantity::Length, |s| touch_noise(s).map(|noise| &mut noise.sigma)),
 ];
 

@@ -6,6 +6,7 @@ use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 
 use super::fit::Fit;
+use super::model_scale::ModelScale;
 use super::scales::Scales;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
@@ -64,6 +65,8 @@ pub struct Posterior {
     pub fit: Option<Fit>,
     /// Scales of errors that the frame tells of.
     pub scales: Scales,
+    /// Size of the object by that of its model, where that was estimated.
+    pub model_scale: Option<ModelScale>,
     /// Why the search ended.
     pub termination: Termination,
     /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
@@ -125,6 +128,7 @@ impl Posterior {
             inconsistencies: inconsistencies(&best.at),
             fit: None,
             scales: Scales::default(),
+            model_scale: None,
             hypotheses,
             termination: best.termination,
             cramer_rao_bound: bounds[0].0,

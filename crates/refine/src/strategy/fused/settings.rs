@@ -179,6 +179,8 @@ pub struct FusedSettings {
     pub fit: FitSettings,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
     pub model: ModelErrorSettings,
+    /// Standard deviation of the model's size as a share of it; zero of a model whose size is known.
+    pub model_scale: f64,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
     /// Regions within and around the outline.
@@ -246,6 +248,7 @@ impl Default for FusedSettings {
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),
             model: ModelErrorSettings::default(),
+            model_scale: 0.0,
             rendering: RenderingSettings::default(),
             region: RegionSettings::default(),
             depth: PointToPlaneSettings::default(),

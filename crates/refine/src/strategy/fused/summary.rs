@@ -30,6 +30,9 @@ pub struct PosteriorSummary {
     /// Scales of errors: factors by which they are larger than their nominal sizes.
     #[serde(default)]
     pub scales: Vec<(String, f64)>,
+    /// Size of the object by that of its model, and its standard deviation, where that is estimated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_scale: Option<[f64; 2]>,
     /// Shares of the posterior that the poses found have, the best first.
     pub weights: Vec<f64>,
     /// The poses that have them: object → camera, homogeneous, row by row \[m\].
@@ -62,6 +65,7 @@ impl From<&Posterior> for PosteriorSummary {
                 .iter()
                 .map(|(g, ln, _)| (g.name().to_owned(), ln.exp()))
                 .collect(),
+            model_scale: posterior.model_scale.map(|found| [found.scale, found.sigma]),
             weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
             modes: posterior
                 .hypotheses

@@ -206,12 +206,15 @@ impl DatasetRun<'_> {
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
-        let input = input.segmented(initial, &self.method)?.unwrap_or(input);
+        let input = input.prepared(initial, &self.method)?.unwrap_or(input);
         let mut frame = input.frame()?.with_backend(Arc::clone(&self.backend));
         if let Some(rivals) = &job.rivals {
             frame = frame.with_rivals(rivals.clone());
         }
-        let found = refine(&frame, initial, &self.method)?;
+        let mut found = refine(&frame, initial, &self.method)?;
+        if let Some(posterior) = &mut found.posterior {
+            posterior.model_scale = input.model_scale;
+        }
         let seconds = start.elapsed().as_secs_f64();
         let diagnosis = match &self.method {
             Method::Fused(fused) if self.output.diagnose => {

@@ -39,15 +39,18 @@ pub(super) fn refine_frame(
     let warnings = input.warnings(&t_cam_object).concat();
     let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
     warnings.iter().for_each(|warning| log::warn!("{warning}"));
-    let input = input.segmented(&t_cam_object, &configured)?.unwrap_or(input);
+    let input = input.prepared(&t_cam_object, &configured)?.unwrap_or(input);
     let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
-    let refined = configured.run(&frame, &initial, &mut |p| {
+    let mut refined = configured.run(&frame, &initial, &mut |p| {
         bar.set_position(p.iteration as u64);
         ControlFlow::Continue(())
     })?;
     bar.finish_and_clear();
+    if let Some(posterior) = &mut refined.posterior {
+        posterior.model_scale = input.model_scale;
+    }
     let pose = refined.t_cam_object();
     let PlainPose { translation_m, quaternion_wxyz } = pose.into();
     let matrix = pose.to_homogeneous();

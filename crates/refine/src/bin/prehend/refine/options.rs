@@ -48,6 +48,9 @@ pub(super) struct OutputOptions {
     pub(super) restart: bool,
 }
 
+/// Standard deviation of a model's size with `--fit-scale`, as a share of it.
+const MODEL_SCALE: f64 = 0.05;
+
 /// How to refine: a named method, changed by options.
 #[derive(Args)]
 #[command(next_help_heading = "Method")]
@@ -63,6 +66,10 @@ pub(super) struct MethodOptions {
     /// model=0 for an exact one; may be repeated. By what factor they are larger or smaller in a frame is learnt from it
     #[arg(long, value_name = "NAME=SIZE", value_parser = name_and_size)]
     noise: Vec<(String, String)>,
+    /// Estimate the size of the object with its pose, for models that are off by some percent such as reconstructions from images: --noise model.scale=5%.
+    /// Needs depth
+    #[arg(long)]
+    fit_scale: bool,
     /// Trust no initial rotation: the fused method then tries all that look alike by shape
     #[arg(long)]
     rotation_unknown: bool,
@@ -135,11 +142,18 @@ impl MethodOptions {
         if self.exhaustive {
             method.set_exhaustive();
         }
-        if self.rotation_unknown || !self.noise.is_empty() {
+        let fused_only = [
+            ("--rotation-unknown", self.rotation_unknown),
+            ("--fit-scale", self.fit_scale),
+            ("--noise", !self.noise.is_empty()),
+        ];
+        if let Some((option, _)) = fused_only.iter().find(|(_, given)| *given) {
             let Method::Fused(fused) = &mut method else {
-                let option = if self.rotation_unknown { "--rotation-unknown" } else { "--noise" };
                 bail!("{option}: is of the fused method, not of {}", named.name);
             };
+            if self.fit_scale {
+                fused.settings.model_scale = MODEL_SCALE;
+            }
             fused.settings.rotation_unknown = self.rotation_unknown;
             for (name, size) in &self.noise {
                 let set = fused.settings.set_nominal_size(name, size);
