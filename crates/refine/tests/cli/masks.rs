@@ -1,5 +1,9 @@
 //! Masks from files, detections, boxes, silhouettes, or none; and objects that are not their own neighbors.
 
+use std::fs;
+
+use nalgebra::Translation3;
+use prehend_geometry::TriMesh;
 use prehend_refine::data::bop::ResultRow;
 use prehend_render::Mask;
 use serde_json::{Value, json};
@@ -49,14 +53,15 @@ fn masks_come_from_files_detections_boxes_or_the_pose() {
     place.succeed(&format!("{REFINE} --detections found.json --out detected.csv"));
     assert_eq!(place.poses("detected.csv")[0].t_cam_model, by_files.t_cam_model);
     for source in ["box --detections found.json", "box", "none", "silhouette"] {
-        place.succeed(&format!("{REFINE} --mask-source {source} --out other.csv --restart"));
+        let said = format!("{REFINE} --mask-source {source} --out other.csv --restart");
+        assert_eq!(place.prehend(&said).code, 0, "{source}");
         let off = distance(&place, "other.csv", &by_files);
         assert!(off < 2e-3, "{source}: {off}");
     }
     let said =
         place.prehend(&format!("{REFINE} --mask-source none --detections found.json --out x.csv"));
     assert!(
-        said.code == 2 && said.err.contains("--mask-source none: does not use --detections"),
+        said.code != 0 && said.err.contains("--mask-source none: does not use --detections"),
         "{}",
         said.err
     );
@@ -92,4 +97,43 @@ fn an_object_is_not_its_own_neighbor() {
     });
     place.succeed(&format!("{REFINE} --out listed.csv"));
     assert_eq!(place.poses("listed.csv")[0].t_cam_model, alone.t_cam_model);
+}
+
+#[test]
+fn the_size_of_a_model_is_estimated_if_asked() {
+    let place = Workplace::new();
+    place.succeed(&format!("{REFINE} --out right.csv"));
+    let right = place.poses("right.csv")[0].clone();
+    // The model is 6 % larger than the object.
+    let file = place.path("ds/models").join(format!("obj_{:06}.ply", right.obj_id));
+    let mesh = TriMesh::load(&file).unwrap();
+    let (low, high) = mesh.bounds().unwrap();
+    let center = nalgebra::center(&low, &high).coords;
+    let larger = mesh.transformed(&Translation3::from(-center).into()).scaled(1.06);
+    larger.transformed(&Translation3::from(center).into()).save(&file).unwrap();
+    let _ = fs::remove_file(place.path("ds/models/models_info.json"));
+    let errors = ["", "--fit-scale"].map(|option| {
+        let told = place.prehend(&format!("{REFINE} {option} --json --out scaled.csv --restart"));
+        assert_eq!(told.code, 0, "{}", told.err);
+        let told: Value = serde_json::from_str(&told.out).unwrap();
+        let scale = told["frames"][0]["confidence"]["model_scale"][0].as_f64();
+        assert_eq!(scale.is_some(), !option.is_empty());
+        assert!(scale.is_none_or(|scale| (scale * 1.06 - 1.0).abs() < 0.02), "{scale:?}");
+        distance(&place, "scaled.csv", &right)
+    });
+    assert!(errors[1] < 2e-3 && errors[1] < errors[0], "{errors:?}");
+    let said = place.prehend(&format!("{REFINE} --fit-scale --method icp --out x.csv"));
+    assert!(said.err.contains("--fit-scale: is of the fused method, not of icp"), "{}", said.err);
+}
+
+#[test]
+fn a_missing_mask_says_what_does_without() {
+    let place = Workplace::new();
+    place.remove(MASK);
+    let said = place.prehend(&format!("{REFINE} --out x.csv"));
+    assert!(
+        said.err.contains("000000_000000.png: no such file or folder (--detections or"),
+        "{}",
+        said.err
+    );
 }

@@ -128,7 +128,7 @@ impl DatasetRun<'_> {
             },
         )?;
         bar.finish_and_clear();
-        failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}", jobs[i].target)));
+        failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}{}", jobs[i].target, hint(e))));
         let seconds = |index: usize| times.of(index, name);
         // Files have no times unless asked: a resumed run would not end with the same ones.
         let timed = |index| seconds(index).filter(|_| self.output.time);
@@ -288,6 +288,18 @@ impl DatasetRun<'_> {
         }
         report.finish()
     }
+}
+
+/// What to do where there is no mask.
+fn hint(error: &anyhow::Error) -> &'static str {
+    let lacks_mask = match error.downcast_ref::<AssetError>() {
+        Some(AssetError::Dataset(DatasetError::EmptyMask { .. })) => true,
+        Some(AssetError::Dataset(DatasetError::Missing { file })) => {
+            file.components().any(|part| part.as_os_str() == "mask_visib")
+        }
+        _ => false,
+    };
+    if lacks_mask { " (--detections or --mask-source none do without)" } else { "" }
 }
 
 /// Frames that are drawn at most: pages stay small enough to be opened.
