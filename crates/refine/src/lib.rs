@@ -34,6 +34,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod baselines;
+pub mod calibration;
 pub mod data;
 mod error;
 pub mod evaluate;
@@ -55,7 +56,7 @@ pub mod tracker;
 /// Millimeters in a meter, for what is told to people and written to BOP files.
 pub(crate) const MM_PER_M: f64 = 1e3;
 
-pub use error::RefineError;
+pub use error::{Panicked, RefineError, guard};
 pub use method::{Method, NamedMethod};
 pub use problem::{Factor, State};
 pub use refine::refine;

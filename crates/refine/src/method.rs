@@ -1,8 +1,11 @@
 //! Ways to refine a pose, and their names: what `--method` picks and what studies compare.
 
+use std::sync::Arc;
+
 use crate::baselines::{GradientKind, Heuristic, Icp, RobustIcp};
 use crate::error::RefineError;
 use crate::problem::State;
+use crate::rig::Rig;
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Fused, FusedSettings, Modality, Nuisance, Observer, Strategy};
 
@@ -59,6 +62,14 @@ impl Method {
             Self::Heuristic(heuristic) => heuristic.exhaustive = true,
             Self::Icp(icp) => icp.step_tolerance = f64::NEG_INFINITY,
             Self::RobustIcp(_) => {}
+        }
+    }
+
+    /// The method for frames and objects that are corrected by `rig`, if there is one: the fused estimator takes that for known, others do not ask.
+    pub fn with_rig(&self, rig: Option<&Arc<Rig>>) -> Self {
+        match (self, rig) {
+            (Self::Fused(fused), Some(rig)) => Fused::clone(fused).with_rig(Arc::clone(rig)).into(),
+            _ => self.clone(),
         }
     }
 

@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 
 use nalgebra::Isometry3;
 
-use crate::data::{FrameInput, Workers, guard};
-use crate::error::RefineError;
+use crate::data::{FrameInput, Workers};
+use crate::error::{RefineError, guard};
 use crate::method::Method;
 use crate::refine::refine;
 use crate::scene::Warning;
@@ -35,7 +35,7 @@ impl RefineJob<'_> {
     /// # Errors
     /// Those of [`refine`], and if the pose that is found is not finite.
     pub fn run(&self, method: &Method) -> Result<Refined, RefineError> {
-        let mut method = method.clone();
+        let mut method = method.with_rig(self.input.rig.as_ref());
         if let Method::Heuristic(heuristic) = &mut method {
             heuristic.gradients.retain(|&gradient| self.input.offers(gradient));
         }

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use prehend_refine::calibration::{Calibrator, CalibratorSettings};
 use prehend_refine::data::{AssetError, Assets, Target, user_cache};
-use prehend_refine::rig::{Calibrated, CalibrationFrames, Calibrator, CalibratorSettings, Passes};
+use prehend_refine::data::{Calibrated, CalibrationFrames, Passes};
 use pyo3::prelude::*;
 
 use super::dataset::Dataset;

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 use prehend_geometry::write_atomic;
-use prehend_refine::data::guard;
+use prehend_refine::guard;
 
 use crate::table::Row;
 use crate::tools::root;

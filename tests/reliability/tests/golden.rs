@@ -13,7 +13,7 @@ use prehend_autodiff::lie::lift;
 use prehend_autodiff::{Scalar, Var, gradient};
 use prehend_geometry::shapes;
 use prehend_refine::baselines::Heuristic;
-use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass};
+use prehend_refine::calibration::{CalibrationFrame, Calibrator, CalibratorSettings, Pass};
 use prehend_refine::scene::{default_scene, default_sequence};
 use prehend_refine::strategy::Fused;
 use prehend_refine::{Frame, Strategy, refine};

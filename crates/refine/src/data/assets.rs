@@ -12,11 +12,10 @@ use crate::baselines::GradientKind;
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, Frame, Models, ResultRow, SceneBodies,
 };
-use crate::data::guard::Panicked;
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::Robots;
 use crate::data::targets::Target;
-use crate::error::RefineError;
+use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{
@@ -135,6 +134,7 @@ impl FrameInput {
             Method::Fused(fused) => (**fused).clone(),
             _ => Fused::default(),
         };
+        let fused = Fused { rig: self.rig.clone(), ..fused };
         let segmented = match tells_pixels(&self.observation.mask) {
             true => None,
             false => Some(self.segmented(t_cam_object, fused.settings.clone())?),
@@ -172,10 +172,7 @@ impl FrameInput {
         if let Some(regions) = &self.regions {
             frame = frame.with_regions(regions);
         }
-        Ok(match &self.rig {
-            Some(rig) => frame.with_rig(rig),
-            None => frame,
-        })
+        Ok(frame)
     }
 
     /// What looks wrong with the object's model, then with the frame and the object's pose in it, `t_cam_object`: units, frames,

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, UnitQuaternion};
 use prehend_render::{Camera, DepthImage, Distortion, DistortionError, register_depth};
 
-use crate::data::bop::{RemapCache, translation_from_mm};
+use crate::data::bop::translation_from_mm;
+use crate::scene::RemapCache;
 
 /// A camera of its own, that measured depth.
 #[derive(Clone, Copy, Debug)]

@@ -9,6 +9,7 @@ mod point_to_plane;
 mod prior;
 mod region;
 mod rendering;
+mod scales;
 mod support;
 mod tactile;
 mod view;
@@ -22,6 +23,7 @@ pub(crate) use prior::Layout;
 pub use prior::{GaussianPrior, PriorSettings};
 pub use region::{RegionFactor, RegionSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
+pub use scales::{ErrorGroup, ScaleSettings, Scales};
 pub use support::{SupportFactor, SupportSettings};
 pub use tactile::{
     BinaryTouchFactor, BinaryTouchSettings, ContactPatchFactor, ContactPatchSettings,
@@ -37,10 +39,8 @@ pub(crate) mod gradient_check {
     use nalgebra::{Isometry3, Vector6};
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
-    use crate::problem::{
-        Block, Factor, ModelErrorSettings, NormalEquations, State, SurfacePatches,
-    };
-    use crate::scene::{Frame, Scene, default_scene};
+    use crate::problem::{Block, Factor, NormalEquations, State, SurfacePatches};
+    use crate::scene::{Frame, ModelErrorSettings, Scene, default_scene};
 
     static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 

@@ -5,10 +5,10 @@ use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 use prehend_geometry::RobustKernel;
 use serde::{Deserialize, Serialize};
 
+use super::{ErrorGroup, Scales};
 use crate::error::RefineError;
 use crate::problem::{Block, CAUCHY_WIDTH, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
 use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError};
-use crate::strategy::{ErrorGroup, Scales};
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.

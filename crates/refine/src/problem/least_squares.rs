@@ -385,7 +385,7 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::problem::ModelErrorSettings;
+    use crate::scene::ModelErrorSettings;
     use crate::scene::{Frame, default_scene};
 
     /// Measurements that are linear in the object's twist and the displacements of patches.

@@ -1,26 +1,8 @@
 //! Patches of the object's surface that may each be off by themselves.
 
 use nalgebra::{DMatrix, Point3, Vector3};
-use serde::{Deserialize, Serialize};
 
-use crate::scene::Observation;
-
-/// How far the surface of an object is from that of its model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ModelErrorSettings {
-    /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
-    pub gp_sigma: f64,
-    /// Length scale of its Gaussian process over the surface \[m\].
-    pub length_scale: f64,
-}
-
-impl Default for ModelErrorSettings {
-    /// A scan, or a careful model, of a thing that fits into a hand.
-    fn default() -> Self {
-        Self { gp_sigma: 7e-4, length_scale: 20e-3 }
-    }
-}
+use crate::scene::{ModelErrorSettings, Observation};
 
 /// Patches that would cover the mask if all were full, and at most.
 const FULL_PATCHES: f64 = 30.0;

@@ -87,7 +87,7 @@ mod tests {
     use prehend_render::{Mask, Remap};
 
     use super::*;
-    use crate::rig::{Calibrator, CalibratorSettings};
+    use crate::calibration::{Calibrator, CalibratorSettings};
     use crate::scene::{Scene, default_scene};
 
     fn nominal() -> Rig {

@@ -7,12 +7,10 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_render::Camera;
 
-use super::deviation::SurfaceDeviation;
-use crate::data::bop::RemapCache;
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
-use crate::scene::CameraCalibrationError;
+use crate::scene::{CameraCalibrationError, RemapCache, SurfaceDeviation};
 
 /// Standard deviations of what changes from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,11 +30,11 @@ pub struct Rig {
     pub camera: CameraCalibrationError,
     /// k1 and k2 of the radial distortion (Brown and Conrady) that the corrected camera has beside that which is said of its lens.
     pub distortion: [f64; RADIAL],
-    pub(super) warp: Arc<ImageWarp>,
+    pub(crate) warp: Arc<ImageWarp>,
     /// What undistorts images, kept for the last camera.
-    pub(super) remaps: Arc<RemapCache>,
+    pub(crate) remaps: Arc<RemapCache>,
     /// By what depth is off beside scale and bias: coefficients of a smooth field over the image, to be added \[m\].
-    pub(super) depth_offsets: Vec<f64>,
+    pub(crate) depth_offsets: Vec<f64>,
     /// The hand's pose in the frame of where it is said to be, as if it were mounted so.
     pub in_hand: Isometry3<f64>,
     /// Its displacement and its rotation about its own origin in the axes of the camera, as if that were mounted so.
@@ -57,7 +55,7 @@ const POSES: usize = 12;
 
 impl Rig {
     /// With everything as it is said to be, of a hand of so many joints and a field of depth; `sigmas` are the parameters' standard deviations.
-    pub(super) fn nominal(
+    pub(crate) fn nominal(
         joints: usize,
         warp: ImageWarp,
         sigmas: &DVector<f64>,
@@ -79,7 +77,7 @@ impl Rig {
     }
 
     /// Whether frames have said anything of it, the inverse variances of its parameters being `prior` beforehand.
-    pub(super) fn is_known(&self, prior: &DVector<f64>) -> bool {
+    pub(crate) fn is_known(&self, prior: &DVector<f64>) -> bool {
         self.covariance.diagonal().iter().zip(prior).any(|(now, prior)| now * prior < 0.999)
     }
 
@@ -89,22 +87,22 @@ impl Rig {
     }
 
     /// Number of its parameters, but for the objects'.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.first_warp() + self.warp.len()
     }
 
     /// Where what the image is off by begins among them: distortion, then coefficients of depth's field.
-    pub(super) fn first_warp(&self) -> usize {
+    pub(crate) fn first_warp(&self) -> usize {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
     }
 
     /// Where the coefficients of depth's field begin.
-    pub(super) fn first_offset(&self) -> usize {
+    pub(crate) fn first_offset(&self) -> usize {
         self.first_warp() + RADIAL
     }
 
     /// The parameters, zero where nothing is corrected.
-    pub(super) fn values(&self) -> DVector<f64> {
+    pub(crate) fn values(&self) -> DVector<f64> {
         let poses = [&self.in_hand, &self.in_camera];
         let poses = poses.map(|pose| (pose.translation.vector, so3_log(&pose.rotation)));
         let poses = poses.iter().flat_map(|(place, turn)| place.iter().chain(turn)).copied();
@@ -133,7 +131,7 @@ impl Rig {
     }
 
     /// With `change` on top of what it corrects.
-    pub(super) fn changed(&self, change: &[f64]) -> Self {
+    pub(crate) fn changed(&self, change: &[f64]) -> Self {
         let vector = |from: usize| Vector3::from_column_slice(&change[from..from + 3]);
         let rotation = |from: usize| UnitQuaternion::from_scaled_axis(vector(from));
         let (joints, rest) = change[POSES..].split_at(self.joints.len());
@@ -158,7 +156,7 @@ impl Rig {
 
     /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints
     /// and camera, by the rig's parameters; `said` is what the frame says when corrected, of all joints or, where no hand is known, of none.
-    pub(super) fn jacobian(&self, said: &State) -> DMatrix<f64> {
+    pub(crate) fn jacobian(&self, said: &State) -> DMatrix<f64> {
         let rest = said.joints.len() + CameraCalibrationError::DIMENSION;
         let mut jacobian = DMatrix::zeros(6 + rest, self.len());
         let turn = said.t_cam_hand.rotation.to_rotation_matrix().into_inner();
@@ -246,14 +244,14 @@ impl Rig {
 
 impl Play {
     /// Variances of a hand's pose and of so many joints.
-    pub(super) fn variances(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
+    pub(crate) fn variances(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
         let Self { hand_translation, hand_rotation, joints } = *self;
         let hand = [hand_translation; 3].into_iter().chain([hand_rotation; 3]);
         hand.chain(std::iter::repeat_n(joints, count)).map(|sigma| sigma * sigma)
     }
 }
 
-pub(super) fn of_other_joints(given: usize, expected: usize) -> RefineError {
+pub(crate) fn of_other_joints(given: usize, expected: usize) -> RefineError {
     let problem = format!("is of a hand of {expected} joints, not of {given}");
     RefineError::Setting { name: "rig", problem }
 }

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Hand, HandMeasurement, Object, Observation, RegionEvidence};
 use crate::error::RefineError;
-use crate::rig::Rig;
 
 /// An observation of an object in a hand, checked, with what factors derive from it: each thing is made when it is first asked
 /// for, and once.
@@ -31,7 +30,6 @@ pub struct Frame<'a> {
     given_regions: Option<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
-    rig: Option<&'a Rig>,
     rivals: Option<Vec<Isometry3<f64>>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     focus: Option<[Range<usize>; 2]>,
@@ -113,7 +111,6 @@ impl<'a> Frame<'a> {
             regions: OnceLock::new(),
             given_regions: None,
             backend: None,
-            rig: None,
             rivals: None,
             focus: None,
         })
@@ -131,13 +128,7 @@ impl<'a> Frame<'a> {
         frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
         frame.given_regions.clone_from(&self.given_regions);
         frame.backend.clone_from(&self.backend);
-        Ok(Frame { rig: self.rig, ..frame })
-    }
-
-    /// The same of a rig that is known as well as `rig` says: what was observed, and the object, are corrected by it already. The fused
-    /// estimator takes that for what is known beforehand; others do not ask.
-    pub fn with_rig(self, rig: &'a Rig) -> Self {
-        Self { rig: Some(rig), ..self }
+        Ok(frame)
     }
 
     /// The same where initial poses come from a search, which ended at `rivals` (object → camera \[m\]), too, or at that pose alone. The fused
@@ -149,11 +140,6 @@ impl<'a> Frame<'a> {
     /// The rivals of initial poses, where these come from a search.
     pub(crate) fn rivals(&self) -> Option<&[Isometry3<f64>]> {
         self.rivals.as_deref()
-    }
-
-    /// The rig, where it is known.
-    pub(crate) fn rig(&self) -> Option<&'a Rig> {
-        self.rig
     }
 
     /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures

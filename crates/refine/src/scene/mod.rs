@@ -4,12 +4,15 @@ mod calibration;
 mod example;
 mod frame;
 mod hand;
+mod inducing_points;
 mod inspect;
 mod object;
 mod observation;
 mod region;
+mod remap_cache;
 mod sensing;
 mod sequence;
+mod surface_deviation;
 mod touch;
 mod view;
 
@@ -18,6 +21,7 @@ pub use example::{Scene, default_scene};
 pub use frame::{CameraView, Frame, Occluders};
 pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded};
 pub use hand::Hand;
+pub(crate) use inducing_points::far_apart;
 pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose};
 pub use object::{Inertial, Object, StatedSize};
@@ -25,6 +29,8 @@ pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravit
 pub(crate) use region::{
     COLOR_LIMIT, ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index,
 };
+pub(crate) use remap_cache::RemapCache;
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
+pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
 pub use touch::{BinaryContact, ContactPatch, ProximityReading, TouchReading};
 pub(crate) use view::{Pixel, View, median};

@@ -9,8 +9,8 @@ use prehend_geometry::sample::{SurfaceSample, surface_samples};
 use prehend_geometry::{MeshReport, TriMesh};
 use prehend_render::RenderModel;
 
+use super::SurfaceDeviation;
 use crate::error::RefineError;
-use crate::rig::SurfaceDeviation;
 use crate::symmetry::near_symmetries;
 
 /// Assumed where an object's mass is unknown \[kg/m³\].

@@ -133,7 +133,7 @@ impl PoseSearch {
 
     /// Stage 3.
     fn descend(&self, frame: &Frame<'_>, turned: &[Scored]) -> Result<Vec<Scored>, RefineError> {
-        let mut settings = self.settings.estimator.for_frame(frame);
+        let mut settings = self.settings.estimator.for_frame(frame, false);
         settings.nuisances.clear();
         let states = |poses: &[Scored]| -> Vec<State> {
             poses.iter().filter_map(|(pose, _)| State::new(frame, pose).ok()).collect()

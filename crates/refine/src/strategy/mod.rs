@@ -8,9 +8,9 @@ pub(crate) use estimate::Recorder;
 pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
-    Consistency, Diagnosis, DiagnosisSummary, ErrorGroup, Fit, FitSettings, Fused, FusedSettings,
-    Hypothesis, Inconsistency, Modality, ModelScale, NominalSizeError, Nuisance, Posterior,
-    PosteriorSummary, ScaleSettings, Scales, Stage, UnobservableDirection,
+    Consistency, Diagnosis, DiagnosisSummary, Fit, FitSettings, Fused, FusedSettings, Hypothesis,
+    Inconsistency, Modality, ModelScale, NominalSizeError, Nuisance, Posterior, PosteriorSummary,
+    Stage, UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
 pub use trace::{Iteration, Trace};

@@ -37,9 +37,9 @@ impl Tracker {
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         self.segment_first(sight)?;
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
         let sight = &*sight;
-        let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        let mut frame = self.frame(sight, &object, hand.as_ref())?;
         let initial = match self.initial {
             Some(pose) => pose,
             None => {
@@ -51,7 +51,7 @@ impl Tracker {
         let frame = &frame;
         let nominal = State::new(frame, &initial)?;
         let stated = self.settings.fused.prior.of_hand(frame.observation().hand.as_ref());
-        self.prior = match frame.rig() {
+        self.prior = match &self.rig {
             Some(rig) => rig.marginal_prior(&nominal, &frame.observation().camera, &stated)?,
             None => stated,
         };
@@ -104,7 +104,7 @@ impl Tracker {
         sight: &mut Sight,
         initial: &Isometry3<f64>,
     ) -> Result<(), RefineError> {
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
         let mut pose = *initial;
         for _ in 0..COLOR_ROUNDS {
             self.appearance = Appearance::default();
@@ -115,7 +115,7 @@ impl Tracker {
             self.appearance.look(sight, &object, &pose, Some(initial));
             // The pose may be far off.
             sight.focus = None;
-            let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+            let frame = self.frame(sight, &object, hand.as_ref())?;
             let start = State::new(&frame, initial)?;
             pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
         }
@@ -132,7 +132,8 @@ impl Tracker {
         initial: &State,
     ) -> Result<(Solved, Posterior), RefineError> {
         let fused = Fused::new(self.settings.fused.clone());
-        let fused = self.factors.iter().cloned().fold(fused, Fused::with);
+        let mut fused = self.factors.iter().cloned().fold(fused, Fused::with);
+        fused.rig.clone_from(&self.rig);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
@@ -190,9 +191,8 @@ impl Tracker {
             if !(if known { seen } else { self.segment(sight, &t_cam_object) }) {
                 continue;
             }
-            let (object, hand, rig) =
-                (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-            let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+            let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+            let mut frame = self.frame(sight, &object, hand.as_ref())?;
             if let Some(rivals) = rivals {
                 frame = frame.with_rivals(rivals);
             }
@@ -229,8 +229,8 @@ impl Tracker {
             return Ok(None);
         };
         (sight.observation.mask, sight.focus) = (mask, None);
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let frame = self.frame(sight, &object, hand.as_ref())?;
         match self.search(&frame) {
             Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),

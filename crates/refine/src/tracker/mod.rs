@@ -35,8 +35,7 @@ use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
-use crate::data::guard;
-use crate::error::RefineError;
+use crate::error::{RefineError, guard};
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
@@ -301,8 +300,8 @@ impl Tracker {
         clock: &mut Clock,
         timing: &mut Timing,
     ) -> Result<Result<Tracked, Rejection>, RefineError> {
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let frame = self.frame(sight, &object, hand.as_ref())?;
         let in_hand = frame.hand().is_some();
         let predicted = &prediction.state;
         let (problem, prior) = self.prepare(&frame, prediction)?;
@@ -358,7 +357,6 @@ impl Tracker {
         sight: &'a Sight,
         object: &'a Arc<Object>,
         hand: Option<&'a Arc<Hand>>,
-        rig: Option<&'a Rig>,
     ) -> Result<Frame<'a>, RefineError> {
         let mut frame =
             Frame::new(&sight.observation, object, hand)?.with_hand_depth(&sight.hand_depth);
@@ -372,10 +370,7 @@ impl Tracker {
         if let Some(backend) = &self.backend {
             frame = frame.with_backend(Arc::clone(backend));
         }
-        Ok(match rig {
-            Some(rig) => frame.with_rig(rig),
-            None => frame,
-        })
+        Ok(frame)
     }
 
     /// The problem of a frame, and its prior, which is the prediction.
@@ -400,7 +395,8 @@ impl Tracker {
         initial: &State,
         prior: Arc<GaussianPrior>,
     ) -> Result<Problem, RefineError> {
-        let (stage, settings) = (&self.settings.stage, self.settings.fused.for_frame(frame));
+        let (stage, settings) =
+            (&self.settings.stage, self.settings.fused.for_frame(frame, self.rig.is_some()));
         let patches = surface_patches(frame, initial, initial, stage, &settings);
         let problem = problem_of(frame, initial, stage, &settings, patches, &self.factors)?;
         Ok(problem.with_prior(prior))

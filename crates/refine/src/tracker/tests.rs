@@ -207,7 +207,7 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
     let mut sight = Sight::new(observation.clone(), Some(&hand), Images::default());
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
-    let frame = tracker.frame(&sight, &object, Some(&hand), None).unwrap();
+    let frame = tracker.frame(&sight, &object, Some(&hand)).unwrap();
     let (problem, _) = tracker.prepare(&frame, &prediction).unwrap();
     let level = remembered.allowance();
     let followed =

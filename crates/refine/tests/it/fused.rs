@@ -5,9 +5,10 @@ use std::sync::{Arc, LazyLock};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::factor::ErrorGroup;
 use prehend_refine::problem::{Block, NoiseModel, Rows};
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::strategy::{ErrorGroup, Fused, FusedSettings, Modality, Nuisance, Posterior};
+use prehend_refine::strategy::{Fused, FusedSettings, Modality, Nuisance, Posterior};
 use prehend_refine::{Factor, Frame, Hand, Observation, State, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());

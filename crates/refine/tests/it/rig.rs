@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use prehend_refine::calibration::{
+    CalibrationFrame, Calibrator, CalibratorSettings, Pass, Residuals,
+};
 use prehend_refine::refine;
-use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Residuals, Rig};
+use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Frame, Observation, Sequence, SequenceFrame, default_sequence};
 use prehend_refine::strategy::Fused;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
@@ -117,11 +120,8 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let told = said(&new.observation);
     let error = |observation: &Observation, object, rig: Option<&Rig>| {
         let frame = Frame::new(observation, object, Some(&sequence.hand)).unwrap();
-        let frame = match rig {
-            Some(rig) => frame.with_rig(rig),
-            None => frame,
-        };
-        let found = refine(&frame, &sequence.frames[36].truth, &Fused::default()).unwrap();
+        let fused = Fused { rig: rig.map(|rig| Arc::new(rig.clone())), ..Fused::default() };
+        let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
         let center = sequence.object.center;
         let off = (found.t_cam_object() * center - new.truth * center).norm();
         (off, found.posterior.unwrap().covariance().trace())
@@ -139,8 +139,9 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     };
     // Without a hand, what is known of the camera still counts.
     let corrected = rig.corrected(&told).unwrap();
-    let frame = Frame::new(&corrected, &object, None).unwrap().with_rig(&rig);
-    let found = refine(&frame, &sequence.frames[36].truth, &Fused::default()).unwrap();
+    let frame = Frame::new(&corrected, &object, None).unwrap();
+    let fused = Fused::default().with_rig(Arc::new(rig.clone()));
+    let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
     assert!(found.posterior.is_some());
     let (before, after) = (wrong(&told), wrong(&rig.corrected(&told).unwrap()));
     println!("joints {before} → {after} rad");
@@ -297,7 +298,8 @@ fn a_camera_is_calibrated_without_a_hand() {
     let mut observation = said(observation);
     observation.hand = None;
     let corrected = rig.corrected(&observation).unwrap();
-    let frame = Frame::new(&corrected, &sequence.object, None).unwrap().with_rig(&rig);
-    let found = refine(&frame, truth, &Fused::default()).unwrap();
+    let frame = Frame::new(&corrected, &sequence.object, None).unwrap();
+    let fused = Fused::default().with_rig(Arc::new(rig));
+    let found = refine(&frame, truth, &fused).unwrap();
     assert!(found.posterior.unwrap().probability() > 0.5);
 }

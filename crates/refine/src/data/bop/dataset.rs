@@ -9,8 +9,8 @@ use serde::Deserialize;
 
 use super::error::DatasetError;
 use super::json::JsonFile;
-use super::lens::RemapCache;
 use super::models::Models;
+use crate::scene::RemapCache;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
 /// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.

@@ -39,7 +39,7 @@ pub use ground_truth::{GroundTruth, TrueObject};
 pub(crate) use json::{
     Numbers, Positive, Real, Rotation, field_fault, read_json, read_json_in_range,
 };
-pub(crate) use lens::{Lens, RemapCache};
+pub(crate) use lens::Lens;
 pub use models::{ModelInfo, Models};
 pub(crate) use models_info::extent_to_bop;
 pub use models_info::write_symmetries;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage, image_size};
 
 use super::layout::ImagesLayout;
-use crate::data::bop::{DatasetError, Lens, RemapCache};
+use crate::data::bop::{DatasetError, Lens};
 use crate::data::depth_camera::DepthCamera;
-use crate::scene::Observation;
+use crate::scene::{Observation, RemapCache};
 
 impl ImagesLayout<'_> {
     /// What they show to a pinhole camera of the same matrix. Fields of `file` are called as they are there, after `prefix`.

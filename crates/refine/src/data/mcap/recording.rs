@@ -22,7 +22,7 @@ use super::reader::MessageReader;
 use super::series::Series;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
 use super::transforms::{Transforms, plain};
-use crate::data::bop::RemapCache;
+use crate::scene::RemapCache;
 use crate::scene::{Hand, HandMeasurement, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::document::{Chart, Figure, LabeledPicture, Series};
 use super::scene::EncodedScene;
+use crate::calibration::{FrameResiduals, SensorResidual};
 use crate::data::FrameInput;
 use crate::error::RefineError;
-use crate::rig::{FrameResiduals, SensorResidual};
 use crate::strategy::{PosteriorSummary, Trace};
 
 /// A frame: a row of the table, and words.

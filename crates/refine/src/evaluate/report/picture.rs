@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector2};
 use prehend_render::{Camera, RgbImage, draw_outline};
 
-use crate::rig::Residuals;
+use crate::calibration::Residuals;
 use crate::scene::{Hand, Object, Observation};
 
 /// Outline of the initial pose.

@@ -13,7 +13,8 @@ use super::posterior::PredictedPosterior;
 use super::record::{FrameRecord, RowOutcome};
 use super::sweep::Sweep;
 use crate::data::bop::{Dataset, ResultRow};
-use crate::data::{AssetError, Assets, PlainPose, Sensor, Target, guard};
+use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
+use crate::error::guard;
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
 use crate::problem::State;
@@ -154,7 +155,7 @@ impl<'a> Runner<'a> {
         let start = Instant::now();
         let frame = input.frame()?;
         let initial = State::new(&frame, &row.t_cam_model)?;
-        let refined = method.run(&frame, &initial, &mut |p| {
+        let refined = method.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {
             // A run of fewer iterations would have come just as far: nothing in it looks ahead.
             if steps.contains(&p.iteration) {
                 poses.push((p.t_cam_object, p.iteration));

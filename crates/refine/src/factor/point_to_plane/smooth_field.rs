@@ -2,7 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
-use crate::problem::{RIDGE, far_apart};
+use crate::problem::RIDGE;
+use crate::scene::far_apart;
 
 /// Coefficients that the field is described by, at most.
 const MOST_COEFFICIENTS: usize = 24;

@@ -193,8 +193,7 @@ fn other_factors(
         depth.points = stage.points / 3;
         factors.push(Arc::new(HandDepthFactor::new(frame, &depth)?));
     }
-    // Where the surface may be elsewhere than the model has it, contact says as much less of the pose; a rig has the surface as it is.
-    let is_uncertain = patches.is_some() && frame.rig().is_none();
+    let is_uncertain = patches.is_some() && settings.blurred_contact;
     let surface = if is_uncertain { settings.model.gp_sigma } else { 0.0 };
     let blurred = |noise: NoiseModel| noise.with_sigma(noise.sigma.hypot(surface));
     let touch = wanted(Modality::Touch);

@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::scales::{ScaleSettings, Scales};
-use crate::factor::NoiseEstimate;
+use crate::factor::{NoiseEstimate, ScaleSettings, Scales};
 use crate::problem::{Contribution, Linearization};
 
 /// Settings of the test of fit.

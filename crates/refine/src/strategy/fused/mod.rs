@@ -29,16 +29,16 @@ pub(crate) use self::pixels::Pixels;
 pub use self::posterior::{Hypothesis, Inconsistency, Posterior, UnobservableDirection};
 pub(crate) use self::posterior::{ScaleMixture, chi_square_z};
 use self::run::Run;
-pub use self::scales::{ErrorGroup, ScaleSettings, Scales};
 pub use self::settings::{FusedSettings, Modality, Nuisance, Stage};
 pub use self::summary::PosteriorSummary;
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::{GaussianPrior, Layout, NoiseEstimate, PriorSettings};
+use crate::factor::{GaussianPrior, Layout, NoiseEstimate, PriorSettings, Scales};
 use crate::problem::{
     Block, Factor, ImageWarp, NormalEquations, Problem, Solution, State, SurfacePatches,
     Termination,
 };
+use crate::rig::Rig;
 use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
@@ -62,12 +62,14 @@ pub struct Fused {
     pub settings: FusedSettings,
     /// Factors of one's own.
     pub factors: Vec<Arc<dyn Factor>>,
+    /// Rig by which frames and the object are corrected, where it is known.
+    pub rig: Option<Arc<Rig>>,
 }
 
 impl Fused {
     /// With these settings.
     pub fn new(settings: FusedSettings) -> Self {
-        Self { settings, factors: Vec::new() }
+        Self { settings, ..Self::default() }
     }
 
     /// The prior about `initial` with errors of these sizes; calibrations have the covariance of the frame's rig, if it is known.
@@ -88,7 +90,7 @@ impl Fused {
             true => prior.with_others(conventions(&initial.t_cam_object.rotation), turned),
             false => prior,
         };
-        let Some(rig) = frame.rig() else {
+        let Some(rig) = &self.rig else {
             return GaussianPrior::scaled(initial.clone(), &settings, scales).map(with_others);
         };
         let object = settings.sigmas(Block::ObjectPose);
@@ -108,6 +110,16 @@ impl Fused {
             RefineError::Setting { name: "rig", problem }
         })?;
         Ok(with_others(prior.with_outliers()))
+    }
+
+    /// With frames and an object that are corrected by `rig` already: calibrations are as accurate as the rig is known.
+    pub fn with_rig(self, rig: Arc<Rig>) -> Self {
+        Self { rig: Some(rig), ..self }
+    }
+
+    /// Settings with the accuracy of the rig, and of the model of `frame`.
+    fn settings_for(&self, frame: &Frame<'_>) -> FusedSettings {
+        self.settings.for_frame(frame, self.rig.is_some())
     }
 
     /// Whether nothing is known of the object's rotation.
@@ -181,7 +193,7 @@ impl Fused {
         state: &State,
     ) -> Result<Option<StageProblem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
-        let mut settings = self.settings.for_frame(frame);
+        let mut settings = self.settings_for(frame);
         self.stage_problem(frame, state, state, stage, &mut settings).map(Some)
     }
 

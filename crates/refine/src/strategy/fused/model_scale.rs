@@ -7,10 +7,10 @@ use nalgebra::Isometry3;
 
 use super::{Fused, Stage, StageProblem};
 use crate::error::RefineError;
-use crate::factor::GaussianPrior;
+use crate::factor::{GaussianPrior, Scales};
 use crate::problem::State;
 use crate::scene::Frame;
-use crate::strategy::{Scales, Strategy};
+use crate::strategy::Strategy;
 
 /// Scale of an object's model about its center.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +79,7 @@ impl Fused {
             ..Stage::octaves(1)
         };
         let state = State { t_cam_object: *t_cam_object, ..initial.clone() };
-        let mut settings = self.settings.for_frame(&frame);
+        let mut settings = self.settings_for(&frame);
         let StageProblem { problem, .. } =
             self.stage_problem(&frame, &state, &state, &geometry, &mut settings)?;
         let prior: GaussianPrior = self.prior(&frame, initial, &Scales::default())?;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::fit::Fit;
 use super::model_scale::ModelScale;
-use super::scales::Scales;
+use crate::factor::Scales;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
     Termination,

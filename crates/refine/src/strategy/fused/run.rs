@@ -12,10 +12,10 @@ use super::hypotheses::{
     conventions, distinct, hypotheses, lowest, restarts, settled, spread, turned, with_rotations,
 };
 use super::posterior::{Posterior, log_mass};
-use super::scales::{ErrorGroup, ScaleEvidence, Scales, noise_scale};
+use super::scales::{ScaleEvidence, noise_scale};
 use super::settings::{FusedSettings, Stage};
 use crate::error::RefineError;
-use crate::factor::GaussianPrior;
+use crate::factor::{ErrorGroup, GaussianPrior, Scales};
 use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Iteration, Observer, Recorder};
@@ -49,7 +49,7 @@ impl<'a> Run<'a> {
         Ok(Self {
             prior: Arc::new(fused.prior(frame, initial, &scales)?),
             is_rotation_unknown: fused.is_rotation_unknown(frame),
-            settings: fused.settings.for_frame(frame),
+            settings: fused.settings_for(frame),
             fused,
             frame,
             initial,
@@ -86,7 +86,7 @@ impl<'a> Run<'a> {
             before = Some(problem);
         }
         let radius = self.radius();
-        let evidence = match self.frame.rig() {
+        let evidence = match &self.fused.rig {
             Some(_) => None,
             None => self.scale_evidence(&found[0]),
         };
@@ -146,7 +146,7 @@ impl<'a> Run<'a> {
     /// Learns scales at `solution`, and takes errors to be of these sizes from here on.
     fn learn(&mut self, solution: &Solution) -> Result<(), RefineError> {
         // A rig's errors were learnt from many frames.
-        if self.frame.rig().is_some() {
+        if self.fused.rig.is_some() {
             return Ok(());
         }
         let Some(learnt) =
@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
         };
         self.scales = learnt;
         self.prior = Arc::new(self.fused.prior(self.frame, self.initial, &self.scales)?);
-        let nominal = self.fused.settings.for_frame(self.frame).model.gp_sigma;
+        let nominal = self.fused.settings_for(self.frame).model.gp_sigma;
         self.settings.model.gp_sigma = nominal * self.scales.get(ErrorGroup::Surface);
         Ok(())
     }

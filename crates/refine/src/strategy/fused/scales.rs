@@ -1,110 +1,13 @@
-//! Scales of errors: by which factors they are larger or smaller than their nominal sizes, learnt from each frame (empirical Bayes).
+//! Scales of errors, learnt from each frame (empirical Bayes).
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
-use serde::{Deserialize, Serialize};
-use strum::IntoStaticStr;
 
+use crate::factor::{ErrorGroup, ScaleSettings, Scales};
 use crate::problem::{Block, Linearization, NoiseScale, RIDGE, ScaledCholesky};
-
-/// A group of errors that share a scale.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, Serialize, Deserialize,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum ErrorGroup {
-    /// The hand's pose in the camera frame.
-    Hand,
-    /// The hand's joint positions.
-    Joints,
-    /// Intrinsics and depth calibration of the camera.
-    Camera,
-    /// Other cameras: where they are, and their calibration.
-    Views,
-    /// The object's surface, and what neighboring depth points have in common.
-    Surface,
-}
-
-impl ErrorGroup {
-    /// The name used in reports.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    pub(crate) fn of(block: Block) -> Option<Self> {
-        match block {
-            Block::ObjectPose => None,
-            Block::HandPose => Some(Self::Hand),
-            Block::Joints(_) => Some(Self::Joints),
-            Block::Camera => Some(Self::Camera),
-            Block::View(_) => Some(Self::Views),
-        }
-    }
-}
-
-/// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ScaleSettings {
-    /// Standard deviation of c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are known.
-    pub common: f64,
-    /// Standard deviation of each d.
-    pub own: f64,
-    /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
-    pub noise: f64,
-}
-
-impl Default for ScaleSettings {
-    /// Errors within a factor of 2.5 of what is usual, groups alike within a factor of 1.6.
-    fn default() -> Self {
-        Self { common: 0.9, own: 0.3, noise: 0.35 }
-    }
-}
-
-/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Scales {
-    groups: Vec<ErrorGroup>,
-    log: DVector<f64>,
-    covariance: DMatrix<f64>,
-}
 
 /// Steps at most, and the change that ends them.
 const STEPS: usize = 12;
 const CONVERGED: f64 = 1e-2;
-
-impl Default for Scales {
-    /// Nominal.
-    fn default() -> Self {
-        Self { groups: Vec::new(), log: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }
-    }
-}
-
-impl Scales {
-    /// The scale of `group`: 1 if nothing tells of it.
-    pub fn get(&self, group: ErrorGroup) -> f64 {
-        let at = self.groups.iter().position(|known| *known == group);
-        at.map_or(1.0, |k| self.log[k].exp())
-    }
-
-    /// The common part c of the logarithms: its posterior mean given them.
-    pub(super) fn common(&self, settings: &ScaleSettings) -> f64 {
-        let (common, own) = (settings.common.powi(2), settings.own.powi(2));
-        let count = self.log.len() as f64;
-        if count == 0.0 || common == 0.0 {
-            return 0.0;
-        }
-        self.log.sum() / (count + own / common)
-    }
-
-    /// Each group's logarithm of the scale with its standard deviation.
-    pub fn iter(&self) -> impl Iterator<Item = (ErrorGroup, f64, f64)> {
-        let of = |(k, group): (usize, &ErrorGroup)| {
-            (*group, self.log[k], self.covariance[(k, k)].max(0.0).sqrt())
-        };
-        self.groups.iter().enumerate().map(of)
-    }
-}
 
 /// The scale exp(u) of a factor's noise whose posterior density is the largest: its residuals have this `chi_square` by so many `degrees` of freedom at a
 /// scale of one, and −ln p(u | χ²) = n u + ½ χ² exp(−2u) + ½ u²/τ². Not below one: residuals that are smaller than usual are no more independent.

@@ -4,14 +4,13 @@ use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::fit::FitSettings;
-use super::scales::ScaleSettings;
 use crate::factor::{
     BinaryTouchSettings, ContactPatchSettings, FreeSpaceSettings, HandDepthSettings,
     PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RegionSettings,
-    RenderingSettings, SupportSettings, TactileSettings,
+    RenderingSettings, ScaleSettings, SupportSettings, TactileSettings,
 };
-use crate::problem::{Block, ModelErrorSettings, Solver, State};
-use crate::scene::Frame;
+use crate::problem::{Block, Solver, State};
+use crate::scene::{Frame, ModelErrorSettings};
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
@@ -171,6 +170,8 @@ pub struct FusedSettings {
     pub image_between_modes: f64,
     /// Independent measurements that the hand's depth amounts to at most in frames of a known rig: what depth is off by in all frames is in the rig.
     pub samples_with_rig: f64,
+    /// Where the surface may be elsewhere than the model has it, contact says as much less of the pose; a rig has the surface as it is.
+    pub blurred_contact: bool,
     /// Whether nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
     pub rotation_unknown: bool,
     /// By which factors errors may be larger or smaller than their nominal sizes.
@@ -207,14 +208,15 @@ pub struct FusedSettings {
 }
 
 impl FusedSettings {
-    /// These settings with the accuracy of the model and the rig of `frame`.
-    pub(crate) fn for_frame(&self, frame: &Frame<'_>) -> Self {
+    /// These settings with the accuracy of the model of `frame`, and of a rig if that `is_rig_known`.
+    pub(crate) fn for_frame(&self, frame: &Frame<'_>, is_rig_known: bool) -> Self {
         let mut settings = self.clone();
         if let Some(deviation) = &frame.object().deviation {
             settings.model.gp_sigma = settings.model.gp_sigma.min(deviation.left());
         }
-        if frame.rig().is_some() {
+        if is_rig_known {
             settings.hand_depth.noise.effective_samples = settings.samples_with_rig;
+            settings.blurred_contact = false;
         }
         settings.prior = settings.prior.of_hand(frame.observation().hand.as_ref());
         settings
@@ -244,6 +246,7 @@ impl Default for FusedSettings {
             prune_margin: 15.0,
             image_between_modes: 2.0,
             samples_with_rig: 200.0,
+            blurred_contact: true,
             rotation_unknown: false,
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),

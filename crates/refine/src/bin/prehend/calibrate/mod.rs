@@ -11,11 +11,12 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Isometry3;
+use prehend_refine::calibration::{Calibrator, CalibratorSettings};
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{ResultRow, check_writable};
 use prehend_refine::data::identity::canonical;
+use prehend_refine::data::{CalibrationFrames, Passes};
 use prehend_refine::evaluate::report::Report;
-use prehend_refine::rig::{CalibrationFrames, Calibrator, CalibratorSettings, Passes};
 use prehend_refine::scene::Object;
 
 use crate::options::{Input, Job, limit_threads, write_poses};

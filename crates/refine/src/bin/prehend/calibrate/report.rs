@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Isometry3;
-use prehend_refine::data::Workers;
-use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
-use prehend_refine::rig::{
-    Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, Residuals,
-    SensorResidual,
+use prehend_refine::calibration::{
+    CalibrationFrame, Calibrator, FrameResiduals, Residuals, SensorResidual,
 };
+use prehend_refine::data::Workers;
+use prehend_refine::data::{Calibrated, CalibrationFrames};
+use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_render::RgbImage;
 
 use crate::terminal::progress;

@@ -12,13 +12,13 @@ use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, r
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{
-    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers, guard,
+    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers,
 };
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
-use prehend_refine::{Method, State, refine};
+use prehend_refine::{Method, State, guard, refine};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -211,12 +211,13 @@ impl DatasetRun<'_> {
         if let Some(rivals) = &job.rivals {
             frame = frame.with_rivals(rivals.clone());
         }
-        let mut found = refine(&frame, initial, &self.method)?;
+        let method = self.method.with_rig(input.rig.as_ref());
+        let mut found = refine(&frame, initial, &method)?;
         if let Some(posterior) = &mut found.posterior {
             posterior.model_scale = input.model_scale;
         }
         let seconds = start.elapsed().as_secs_f64();
-        let diagnosis = match &self.method {
+        let diagnosis = match &method {
             Method::Fused(fused) if self.output.diagnose => {
                 let initial = State::new(&frame, initial)?;
                 DiagnosisSummary::of(&fused.diagnose_estimate(&frame, &initial, found.clone())?)

@@ -43,7 +43,7 @@ pub(super) fn refine_frame(
     let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
-    let mut refined = configured.run(&frame, &initial, &mut |p| {
+    let mut refined = configured.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {
         bar.set_position(p.iteration as u64);
         ControlFlow::Continue(())
     })?;

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Isometry3;
 
-use super::calibrator::CalibrationFrame;
+use crate::calibration::CalibrationFrame;
 use crate::data::{AssetError, Assets, FrameInput, Target};
 use crate::error::RefineError;
 use crate::scene::Observation;

@@ -2,9 +2,9 @@
 
 use nalgebra::DVector;
 
-use super::parameters::Play;
 use crate::factor::PriorSettings;
 use crate::problem::{Block, ImageWarp, RADIAL};
+use crate::rig::Play;
 use crate::strategy::Fused;
 
 /// Settings of a [`Calibrator`](super::Calibrator): how frames are refined, and standard deviations of what is wrong with a rig.

@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
-use super::deviation::SurfaceDeviation;
 use super::information::{Eliminated, Elimination, FrameInformation};
-use super::parameters::{Play, Rig};
 use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
@@ -15,7 +13,8 @@ use super::views::Views;
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
-use crate::scene::{Frame, Hand, Object, Observation, View, median};
+use crate::rig::{Play, Rig};
+use crate::scene::{Frame, Hand, Object, Observation, SurfaceDeviation, View, median};
 use crate::strategy::{Fused, Modality};
 
 /// A frame of a rig, and where its object is thought to be.
@@ -139,8 +138,8 @@ impl Calibrator {
             stages.drain(..stages.len().saturating_sub(1));
             fused.settings.restart_angle = 0.0;
         }
-        let frame =
-            Frame::new(&observation, self.object(*obj_id)?, hand.as_ref())?.with_rig(&self.rig);
+        fused.rig = Some(Arc::new(self.rig.clone()));
+        let frame = Frame::new(&observation, self.object(*obj_id)?, hand.as_ref())?;
         let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
         let information = self.information(&frame, &fused, *obj_id, &found.state)?;

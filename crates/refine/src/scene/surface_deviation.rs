@@ -4,10 +4,28 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3xX, Point3, Vector3};
 use prehend_geometry::TriMesh;
+use serde::{Deserialize, Serialize};
 
+use super::Object;
+use super::inducing_points::far_apart;
 use crate::error::RefineError;
-use crate::problem::{ModelErrorSettings, far_apart};
-use crate::scene::Object;
+
+/// How far the surface of an object is from that of its model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ModelErrorSettings {
+    /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
+    pub gp_sigma: f64,
+    /// Length scale of its Gaussian process over the surface \[m\].
+    pub length_scale: f64,
+}
+
+impl Default for ModelErrorSettings {
+    /// A scan, or a careful model, of a thing that fits into a hand.
+    fn default() -> Self {
+        Self { gp_sigma: 7e-4, length_scale: 20e-3 }
+    }
+}
 
 /// Distance between the places that describe the deviation, as a share of its length scale.
 const SPACING: f64 = 0.8;
@@ -27,21 +45,21 @@ const TOGETHER: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct SurfaceDeviation {
     /// What was expected beforehand.
-    pub(super) settings: ModelErrorSettings,
-    pub(super) nodes: Vec<Point3<f64>>,
+    pub(crate) settings: ModelErrorSettings,
+    pub(crate) nodes: Vec<Point3<f64>>,
     /// Factor of the correlations among the nodes.
     factor: Cholesky<f64, Dyn>,
     /// A column for each node: independent, and of unit variance beforehand.
-    pub(super) coefficients: Matrix3xX<f64>,
+    pub(crate) coefficients: Matrix3xX<f64>,
     /// Covariance of the coefficients in one direction: what is still not known of them.
-    pub(super) covariance: DMatrix<f64>,
+    pub(crate) covariance: DMatrix<f64>,
     /// Standard deviation of what it leaves, in each direction \[m\].
     left: f64,
 }
 
 impl SurfaceDeviation {
     /// None yet, of `object`; `None` if models are exact.
-    pub(super) fn new(object: &Object, settings: &ModelErrorSettings) -> Option<Self> {
+    pub(crate) fn new(object: &Object, settings: &ModelErrorSettings) -> Option<Self> {
         let places: Vec<_> = object.samples.iter().map(|sample| sample.point.coords).collect();
         let nodes = far_apart(&places, SPACING * settings.length_scale, MOST_NODES);
         let nodes: Vec<_> = nodes.into_iter().map(Point3::from).collect();
@@ -51,7 +69,7 @@ impl SurfaceDeviation {
     }
 
     /// Of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes no field.
-    pub(super) fn from_parts(
+    pub(crate) fn from_parts(
         settings: ModelErrorSettings,
         nodes: Vec<Point3<f64>>,
         coefficients: Matrix3xX<f64>,
@@ -73,17 +91,17 @@ impl SurfaceDeviation {
     }
 
     /// How many coefficients a direction has.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.nodes.len()
     }
 
     /// Variance of what patches of the surface are off by themselves \[m²\].
-    pub(super) fn own_variance(&self) -> f64 {
+    pub(crate) fn own_variance(&self) -> f64 {
         (OWN * self.settings.gp_sigma).powi(2)
     }
 
     /// What the coefficients are multiplied by for the displacement at `place` (model coordinates).
-    pub(super) fn features(&self, place: &Point3<f64>) -> DVector<f64> {
+    pub(crate) fn features(&self, place: &Point3<f64>) -> DVector<f64> {
         let ModelErrorSettings { gp_sigma, length_scale } = self.settings;
         let to = self.nodes.iter().map(|node| gp_sigma * correlation(node, place, length_scale));
         let mut features = DVector::from_iterator(self.count(), to);
@@ -97,7 +115,7 @@ impl SurfaceDeviation {
     }
 
     /// Changes the coefficients, of each node three, which have this covariance then.
-    pub(super) fn change(&mut self, change: &DVector<f64>, covariance: &DMatrix<f64>) {
+    pub(crate) fn change(&mut self, change: &DVector<f64>, covariance: &DMatrix<f64>) {
         self.coefficients.iter_mut().zip(change).for_each(|(value, change)| *value += change);
         let count = self.count();
         let of_axis = |axis: usize| {

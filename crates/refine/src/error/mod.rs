@@ -1,9 +1,11 @@
 //! Why a refinement could not be done.
 
+mod guard;
+
 use prehend_geometry::robot::RobotError;
 use thiserror::Error;
 
-use crate::data::Panicked;
+pub use self::guard::{Panicked, guard};
 
 /// Why a pose could not be refined.
 #[derive(Debug, Error)]

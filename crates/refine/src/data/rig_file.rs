@@ -7,11 +7,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::deviation::SurfaceDeviation;
-use super::parameters::{Play, Rig};
 use crate::data::bop::{DatasetError, read_json_in_range, write_atomically};
-use crate::problem::{DepthField, ImageWarp, ModelErrorSettings, RADIAL};
-use crate::scene::CameraCalibrationError;
+use crate::problem::{DepthField, ImageWarp, RADIAL};
+use crate::rig::{Play, Rig};
+use crate::scene::{CameraCalibrationError, ModelErrorSettings, SurfaceDeviation};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

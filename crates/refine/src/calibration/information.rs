@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::deviation::SurfaceDeviation;
-use super::parameters::Rig;
 use crate::problem::{Block, RIDGE, ScaledCholesky, State};
+use crate::rig::Rig;
+use crate::scene::SurfaceDeviation;
 use crate::strategy::Evidence;
 
 /// Normal equations of the rig's parameters and then of the object's coefficients (three of each node), with all that is the frame's own
@@ -212,12 +212,12 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::calibration::{Calibrator, CalibratorSettings};
     use crate::factor::{
         FreeSpaceFactor, FreeSpaceSettings, HandDepthFactor, HandDepthSettings, PointToPlaneFactor,
         PointToPlaneSettings,
     };
     use crate::problem::{DepthField, Factor, ImageWarp, NormalEquations, RADIAL};
-    use crate::rig::{Calibrator, CalibratorSettings};
     use crate::scene::{Frame, Observation, default_scene};
 
     /// Depth that is off by a smooth field is what a rig corrects, so its derivatives are those of a factor's cost by that correction.

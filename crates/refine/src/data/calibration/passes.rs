@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
-use super::calibrator::Calibrator;
 use super::frames::CalibrationFrames;
-use super::pass::{Pass, Visit};
-use crate::data::{AssetError, Workers, guard};
+use crate::calibration::{Calibrator, Pass, Visit};
+use crate::data::{AssetError, Workers};
+use crate::error::guard;
 
 /// Parameters that change by fewer of their deviations are found.
 const SETTLED: f64 = 0.05;

@@ -1,0 +1,86 @@
+//! Structure of the crates: no modules that import each other in a circle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Top-level modules of a crate by the ones that they import, tests left out.
+fn imports(sources: &Path) -> BTreeMap<String, BTreeSet<String>> {
+    let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for file in rust_files(sources) {
+        let inner = file.strip_prefix(sources).unwrap();
+        let top = inner.components().next().unwrap().as_os_str().to_str().unwrap();
+        let module = top.trim_end_matches(".rs").to_owned();
+        let is_test = file.file_stem().is_some_and(|stem| stem == "tests");
+        if ["lib", "bin", "main"].contains(&module.as_str()) || is_test {
+            continue;
+        }
+        let text = fs::read_to_string(&file).unwrap();
+        let code: String = text
+            .split("#[cfg(test)]\nmod ")
+            .flat_map(|part| part.split("#[cfg(test)]\npub(crate) mod "))
+            .next()
+            .unwrap()
+            .lines()
+            .filter(|line| !line.trim_start().starts_with("//"))
+            .collect::<Vec<_>>()
+            .join("\n");
+        let of_module = found.entry(module.clone()).or_default();
+        for part in code.split("crate::").skip(1) {
+            let name: String =
+                part.chars().take_while(|c| c.is_ascii_lowercase() || *c == '_').collect();
+            if name != module && part[name.len()..].starts_with("::") {
+                of_module.insert(name);
+            }
+        }
+    }
+    found
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// Modules that are left when those that import no others of them are taken away, one after the other: those in circles, and what imports these.
+fn circles(mut imports: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
+    loop {
+        let known: BTreeSet<String> = imports.keys().cloned().collect();
+        let is_leaf = |of: &BTreeSet<String>| of.is_disjoint(&known);
+        let leaves: Vec<String> =
+            imports.iter().filter(|(_, of)| is_leaf(of)).map(|(name, _)| name.clone()).collect();
+        if leaves.is_empty() {
+            return imports;
+        }
+        leaves.iter().for_each(|leaf| drop(imports.remove(leaf)));
+    }
+}
+
+#[test]
+fn modules_of_refine_form_no_circle() {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/refine/src");
+    let imports = imports(&sources);
+    assert!(imports.len() > 10 && imports["factor"].contains("problem"), "{imports:?}");
+    let left = circles(imports);
+    assert!(left.is_empty(), "in a circle, or above one: {left:#?}");
+}
+
+#[test]
+fn a_circle_is_found() {
+    let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::from([
+        ("a".into(), of(&["b"])),
+        ("b".into(), of(&["c"])),
+        ("c".into(), of(&["b", "d"])),
+        ("d".into(), of(&[])),
+    ]);
+    assert_eq!(circles(imports).into_keys().collect::<Vec<_>>(), ["a", "b", "c"]);
+}
