@@ -94,19 +94,14 @@ mod tests {
     #[test]
     fn what_becomes_of_a_frame_depends_on_no_other() {
         let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
-        let input = |mask: bool| {
-            let mut observation = observation.clone();
-            observation.mask.pixels_mut().iter_mut().for_each(|set| *set &= mask);
-            let (object, hand) = (Arc::clone(&object), Some(Arc::clone(&hand)));
-            FrameInput::new(observation, object, hand, None)
-        };
-        let inputs = [input(true), input(false), input(true)];
-        let job = |input| RefineJob { input, initial, rivals: None };
-        let jobs: Vec<_> = inputs.iter().map(job).collect();
+        let input = FrameInput::new(observation, object, Some(hand), None);
+        let behind = Isometry3::translation(0.0, 0.0, -2.0) * initial;
+        let job = |initial| RefineJob { input: &input, initial, rivals: None };
+        let jobs = [initial, behind, initial].map(job);
         let alone = jobs[0].run(&Method::default()).unwrap().estimate;
         for threads in [None, NonZeroUsize::new(1), NonZeroUsize::new(2)] {
             let done = refine_all(&jobs, &Method::default(), threads).unwrap();
-            assert!(matches!(done[1], Err(RefineError::EmptyMask)));
+            assert!(matches!(done[1], Err(RefineError::BehindCamera { .. })));
             for outcome in [&done[0], &done[2]] {
                 let estimate = &outcome.as_ref().ok().unwrap().estimate;
                 assert_eq!(estimate.t_cam_object(), alone.t_cam_object());

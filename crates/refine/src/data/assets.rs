@@ -143,6 +143,10 @@ impl FrameInput {
             return Ok(segmented);
         }
         let input = segmented.unwrap_or_else(|| self.clone());
+        if !input.observation.has_depth() {
+            let problem = "is estimated from depth, of which there is none".to_owned();
+            return Err(RefineError::Setting { name: "model_scale", problem });
+        }
         let found = fused.model_scale(&input.frame()?, t_cam_object)?;
         let object = Arc::new(input.object.scaled(found.scale)?);
         Ok(Some(Self { object, model_scale: Some(found), ..input }))
@@ -382,21 +386,22 @@ impl<'a> Assets<'a> {
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let mut observation = frame.unsegmented()?;
-        let segmented = match mask {
-            MaskOf::Object(sought) => self.masks.segment(&mut observation, frame, sought),
-            MaskOf::Number(number) => {
-                frame.segment(&mut observation, number).map(|()| Some(number))
+        let (number, segmented) = match mask {
+            MaskOf::Object(sought) => {
+                let number = self.masks.number(frame, sought);
+                (number, self.masks.segment(&mut observation, frame, sought, number))
             }
+            MaskOf::Number(number) => (Some(number), frame.segment(&mut observation, number)),
         };
-        let number = match segmented {
-            Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. })
-                if self.masks_optional =>
-            {
-                Some(0)
-            }
-            number => number?,
-        };
-        // Masks of other cameras have the same number.
+        match segmented {
+            Err(
+                DatasetError::Missing { .. }
+                | DatasetError::EmptyMask { .. }
+                | DatasetError::NoDetection { .. },
+            ) if self.masks_optional => {}
+            segmented => segmented?,
+        }
+        // Masks of other cameras have the same number; without one, what these saw does not count.
         if let Some(number) = number {
             for (view, t_cam_view) in frame.taken_together(&self.dataset, number)? {
                 observation = observation.with_view(view, t_cam_view);
@@ -405,10 +410,9 @@ impl<'a> Assets<'a> {
         let stated = present(frame.bodies(), !required.is_empty())?;
         let SceneBodies { gravity, mut bodies } = stated.unwrap_or_default();
         if let MaskOf::Object(sought) = mask {
-            bodies.retain(|body| !sought.is_it(body));
             let image = (sought.target.scene_id, sought.target.im_id);
-            let neighbors = self.neighbors.get(&image).into_iter().flatten();
-            bodies.extend(neighbors.filter(|body| !sought.is_it(body)).cloned());
+            bodies.extend(self.neighbors.get(&image).into_iter().flatten().cloned());
+            sought.take_from(&mut bodies);
         }
         if bodies.is_empty() && gravity.is_none() {
             return Ok((observation, None));
@@ -445,7 +449,7 @@ enum MaskOf<'a> {
     Number(usize),
 }
 
-/// Whether a mask tells which pixels show the object, and not only about where it is.
+/// True of a mask that tells which pixels show the object, and not only about where it is.
 fn tells_pixels(mask: &Mask) -> bool {
     mask.count() > 0 && !mask.is_box()
 }

@@ -1,6 +1,5 @@
 //! Where the masks of a dataset's frames come from.
 
-use std::fmt::Display;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
@@ -12,6 +11,8 @@ use crate::scene::{Object, Observation};
 
 /// A mask whose overlap with the object is below this share of another mask's is not the object's.
 const LEAST_SHARE: f64 = 0.5;
+/// Distance within which two bodies of one model are one \[radii\].
+const SAME_PLACE: f64 = 0.2;
 
 /// Source of the masks of a dataset's frames. Where there is no mask, or one that is a box, pixels are told by pose, depth and colors
 /// ([`FrameInput::prepared`](super::FrameInput::prepared)).
@@ -40,7 +41,12 @@ pub(super) struct Sought<'a> {
 }
 
 impl MaskSource {
-    /// Gives `observation`, which is of the image `frame`, the mask of an object; returns its number if it is one of the files.
+    /// Number of an object's mask among the files of the image `frame`, if masks come from these.
+    pub(super) fn number(&self, frame: &Frame<'_>, sought: &Sought<'_>) -> Option<usize> {
+        matches!(self, Self::Files).then(|| sought.number(frame))
+    }
+
+    /// Gives `observation`, which is of the image `frame`, the mask of an object, which has this `number` if it is one of the files.
     ///
     /// # Errors
     /// If there is no such mask, or it is broken or of another size than the image.
@@ -49,37 +55,43 @@ impl MaskSource {
         observation: &mut Observation,
         frame: &Frame<'_>,
         sought: &Sought<'_>,
-    ) -> Result<Option<usize>, DatasetError> {
-        let mask = match self {
-            Self::Files => {
-                let number = sought.number(frame);
-                return frame.segment(observation, number).map(|()| Some(number));
-            }
+        number: Option<usize>,
+    ) -> Result<(), DatasetError> {
+        let (mask, is_box) = match self {
+            Self::Files => return frame.segment(observation, number.unwrap_or_default()),
             Self::Detections(detections) => sought.detected(detections, observation)?,
-            Self::Boxes(Some(detections)) => {
-                boxed(&sought.detected(detections, observation)?, observation)
+            Self::Boxes(Some(detections)) => (sought.detected(detections, observation)?.0, true),
+            Self::Silhouettes => {
+                if let Some(silhouette) = sought.silhouette(observation) {
+                    observation.mask = silhouette;
+                }
+                return Ok(());
             }
-            Self::Silhouettes => match sought.silhouette(observation) {
-                Some(silhouette) => silhouette,
-                None => return Ok(None),
-            },
-            Self::Boxes(None) | Self::None => return Ok(None),
+            Self::Boxes(None) | Self::None => return Ok(()),
         };
-        let is_drawn = matches!(self, Self::Silhouettes);
-        observation.mask = if is_drawn { mask } else { frame.undistorted_mask(mask)? };
-        Ok(None)
+        // Behind a lens a box is none any more.
+        let mask = frame.undistorted_mask(mask)?;
+        observation.mask = if is_box { boxed(&mask) } else { mask };
+        Ok(())
     }
 }
 
 impl Sought<'_> {
-    /// True of the object itself among the bodies of its image: of the same model, and where it is as far as that is known. An object does not hide itself.
-    pub(super) fn is_it(&self, body: &Body) -> bool {
-        let is_same = body.kind == BodyKind::Object { obj_id: self.target.obj_id };
+    /// Takes the object itself from the `bodies` of its image: of those of its model the nearest to its pose, within its radius, and what is listed there again.
+    /// Without a pose all of its model are taken. An object does not hide itself.
+    pub(super) fn take_from(&self, bodies: &mut Vec<Body>) {
+        let kind = BodyKind::Object { obj_id: self.target.obj_id };
+        let Some(pose) = self.t_cam_object else { return bodies.retain(|body| body.kind != kind) };
         let center = self.object.center;
-        let is_there = |pose: &Isometry3<f64>| {
-            (pose * center - body.t_cam_base * center).norm() < self.object.radius
-        };
-        is_same && self.t_cam_object.is_none_or(is_there)
+        let distance =
+            |from: &Isometry3<f64>, body: &Body| (from * center - body.t_cam_base * center).norm();
+        let same = bodies.iter().filter(|body| body.kind == kind);
+        let nearest = same.min_by(|a, b| distance(pose, a).total_cmp(&distance(pose, b)));
+        let itself = nearest.filter(|body| distance(pose, body) < self.object.radius);
+        if let Some(itself) = itself.map(|body| body.t_cam_base) {
+            let same_place = SAME_PLACE * self.object.radius;
+            bodies.retain(|body| body.kind != kind || distance(&itself, body) > same_place);
+        }
     }
 
     /// Number of the mask among the files: that of [`Frame::mask_number`], unless another mask of the image has more than twice its intersection over union
@@ -131,45 +143,45 @@ impl Sought<'_> {
         Mask::new(depth.width(), depth.height(), set).ok()
     }
 
-    /// The mask, or the box as one, of the detection of the object.
+    /// The mask, or the box as one, of the detection of the object, and whether that is a box.
     fn detected(
         &self,
         detections: &Detections,
         observation: &Observation,
-    ) -> Result<Mask, DatasetError> {
+    ) -> Result<(Mask, bool), DatasetError> {
         let Target { scene_id, im_id, obj_id, .. } = *self.target;
-        let fault = |problem: &dyn Display| {
-            DatasetError::unusable(detections.file(), format!("{}: {problem}", self.target))
-        };
+        let file = detections.file();
         let (width, height) = (observation.camera.width, observation.camera.height);
-        let found = detections.of(scene_id, im_id, obj_id);
-        let all: Vec<Mask> = found.iter().filter_map(|found| found.mask(width, height)).collect();
-        if all.is_empty() {
-            return Err(match found.is_empty() {
-                true => fault(&"no detection of this object (category_id) in this image"),
-                false => {
-                    fault(&format!("the mask is not of the image's {width} x {height} pixels"))
-                }
-            });
+        let mut all = Vec::new();
+        for found in detections.of(scene_id, im_id, obj_id) {
+            let mask = found.mask(width, height).map_err(|[rows, columns]| {
+                let problem = format!(
+                    "{}: the mask is {columns}x{rows} pixels, the image {width}x{height}",
+                    self.target
+                );
+                DatasetError::unusable(file, problem)
+            })?;
+            all.push((mask, found.is_box()));
         }
         // The most confident one first.
         let best = match self.drawn(observation).filter(|_| all.len() > 1) {
             None => 0,
             Some(drawn) => {
-                let overlap = |k: usize| intersection_over_union(&all[k], drawn.pixels());
-                let overlaps: Vec<f64> = (0..all.len()).map(overlap).collect();
+                let overlap =
+                    |(mask, _): &(Mask, bool)| intersection_over_union(mask, drawn.pixels());
+                let overlaps: Vec<f64> = all.iter().map(overlap).collect();
                 (1..all.len())
                     .fold(0, |best, k| if overlaps[k] > overlaps[best] { k } else { best })
             }
         };
-        all.into_iter().nth(best).ok_or_else(|| fault(&"no detection"))
+        let none = || DatasetError::NoDetection { file: file.to_owned(), scene_id, im_id, obj_id };
+        all.into_iter().nth(best).ok_or_else(none)
     }
 }
 
 /// The bounding box of a mask.
-fn boxed(mask: &Mask, observation: &Observation) -> Mask {
-    let (width, height) = (observation.camera.width, observation.camera.height);
-    Mask::of_box(width, height, mask.bounds().unwrap_or_default())
+fn boxed(mask: &Mask) -> Mask {
+    Mask::of_box(mask.width(), mask.height(), mask.bounds().unwrap_or_default())
 }
 
 /// Intersection over union of a mask and of where there is `depth`.

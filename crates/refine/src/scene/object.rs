@@ -124,7 +124,7 @@ impl Object {
         })
     }
 
-    /// The object with a model that is larger by a factor about its center, of the same density.
+    /// The object with a model that is larger by a factor about its center; of the same mass if that is stated, else of the same density.
     ///
     /// # Errors
     /// If the mesh cannot be used.
@@ -133,10 +133,11 @@ impl Object {
         let about = |p: &Point3<f64>| self.center + (p - self.center) * factor;
         mesh.vertices.iter_mut().for_each(|vertex| *vertex = about(vertex));
         let Inertial { mass, center_of_mass, inertia } = &self.inertial;
+        let heavier = if self.inertial_assumed { factor.powi(3) } else { 1.0 };
         let inertial = Inertial {
-            mass: mass * factor.powi(3),
+            mass: mass * heavier,
             center_of_mass: about(center_of_mass),
-            inertia: inertia * factor.powi(5),
+            inertia: inertia * (heavier * factor.powi(2)),
         };
         let scaled = Self { inertial, ..self.with_surface(mesh, self.deviation.clone())? };
         Ok(Self { stated_size: None, ..scaled })

@@ -70,7 +70,12 @@ impl Tracker {
         match self.initial.filter(|_| !sight.tells) {
             Some(pose) if !sight.measured => self.learn_colors(sight, &pose)?,
             Some(pose) => {
-                if !self.segment(sight, &pose) {
+                let is_seen = self.segment(sight, &pose);
+                if sight.given.count() > 0 {
+                    let (given, mask) = (sight.given.pixels(), sight.observation.mask.pixels_mut());
+                    mask.iter_mut().zip(given).for_each(|(set, given)| *set &= given);
+                }
+                if !is_seen || sight.observation.mask.count() == 0 {
                     return Err(RefineError::OutOfView);
                 }
                 // The pose may be far off.

@@ -40,6 +40,21 @@ fn recall_is_over_all_targets_by_object_too() {
     let alone = told(&format!("{EVAL} --image 1"));
     assert_eq!(alone["bop"]["overall"]["targets"], 1);
     assert!((recall(&one, "ar") - 0.5 * recall(&alone, "ar")).abs() < 1e-12);
+
+    // Without depth there is nothing for VSD; without images `camera.json` has their size.
+    place.remove("ds/test/000001/depth");
+    for has_images in [true, false] {
+        if !has_images {
+            place.remove("ds/test/000001/rgb");
+            place.write("ds/camera.json", r#"{"width": 640, "height": 480}"#);
+        }
+        let of_color = told(EVAL);
+        let overall = &of_color["bop"]["overall"];
+        assert!(overall["ar"].is_null() && overall["ar_vsd"].is_null(), "{overall}");
+        for name in ["ar_mssd", "ar_mspd"] {
+            assert_eq!(recall(&of_color, name), recall(&all, name), "{name}");
+        }
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs;
 
 use nalgebra::Translation3;
 use prehend_geometry::TriMesh;
-use prehend_refine::data::bop::ResultRow;
+use prehend_refine::data::bop::{ResultRow, write_results};
 use prehend_render::Mask;
 use serde_json::{Value, json};
 
@@ -69,12 +69,12 @@ fn masks_come_from_files_detections_boxes_or_the_pose() {
         found.to_string().replace(&format!(r#""category_id":{obj_id}"#), r#""category_id":77"#);
     place.write("found.json", &other);
     let said = place.prehend(&format!("{REFINE} --detections found.json --out x.csv --restart"));
-    assert!(said.err.contains("found.json: scene 1 image 0 object"), "{}", said.err);
     assert!(
-        said.err.contains("no detection of this object (category_id) in this image"),
+        said.err.contains("found.json: scene 1 image 0: no detection of object"),
         "{}",
         said.err
     );
+    assert!(said.err.contains("no detection of object"), "{}", said.err);
 }
 
 #[test]
@@ -85,6 +85,17 @@ fn an_object_is_not_its_own_neighbor() {
     // The poses of all objects of the image, itself among them.
     place.succeed(&format!("{REFINE} --neighbors alone.csv --out again.csv"));
     assert_eq!(place.poses("again.csv")[0].t_cam_model, alone.t_cam_model);
+    // Another object there, which overlaps it, moves it.
+    place.copy(
+        &format!("ds/models/obj_{:06}.ply", alone.obj_id),
+        &format!("ds/models/obj_{:06}.ply", alone.obj_id + 1),
+    );
+    let beside = Translation3::new(0.02, 0.0, 0.0) * alone.t_cam_model;
+    let other = ResultRow { obj_id: alone.obj_id + 1, t_cam_model: beside, ..alone.clone() };
+    write_results(&place.path("other.csv"), &[other]).unwrap();
+    let said = place.prehend(&format!("{REFINE} --neighbors other.csv --out moved.csv"));
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_ne!(place.poses("moved.csv")[0].t_cam_model, alone.t_cam_model);
     // Scenes list all their objects as bodies.
     let translation: Vec<f64> =
         alone.t_cam_model.translation.vector.iter().map(|m| m * 1e3).collect();
@@ -132,7 +143,9 @@ fn a_missing_mask_says_what_does_without() {
     place.remove(MASK);
     let said = place.prehend(&format!("{REFINE} --out x.csv"));
     assert!(
-        said.err.contains("000000_000000.png: no such file or folder (--detections or"),
+        said.err.contains(
+            "000000_000000.png: no such file or folder (--mask-source none does without)"
+        ),
         "{}",
         said.err
     );

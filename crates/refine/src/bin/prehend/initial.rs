@@ -107,6 +107,7 @@ impl Initial {
             check_writable(&beside)?;
         }
         limit_threads(self.threads)?;
+        self.masks.require_files_or_detections()?;
         let dataset = self.selection.open()?;
         let (found, journal) = match self.noise {
             Some(level) => (self.perturbed(&dataset, level)?, None),

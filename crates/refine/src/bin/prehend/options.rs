@@ -98,6 +98,17 @@ impl Masks {
         })
     }
 
+    /// Refuses masks that poses would have to tell.
+    pub(crate) fn require_files_or_detections(&self) -> anyhow::Result<()> {
+        match self.mask_source {
+            MaskKind::Files => Ok(()),
+            kind => bail!(
+                "--mask-source {}: the search needs masks: of files, or of --detections",
+                format!("{kind:?}").to_lowercase()
+            ),
+        }
+    }
+
     /// The options in words, to be compared with those of an interrupted run.
     pub(crate) fn identity(&self) -> Result<String, DatasetError> {
         let detections = self.detections.as_deref().map(file_fingerprint).transpose()?;

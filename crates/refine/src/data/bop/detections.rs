@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::Mask;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::error::DatasetError;
 use super::json::{Numbers, Real, read_json};
@@ -29,7 +31,8 @@ pub(crate) struct Detection {
 /// Pixels of a detection.
 #[derive(Clone, Debug)]
 enum Shape {
-    Mask(Mask),
+    /// Height and width \[px\], and run lengths by columns, of unset and set pixels in turns.
+    Mask([usize; 2], Vec<u32>),
     /// Left, top, width and height \[px\].
     Box([f64; 4]),
 }
@@ -42,7 +45,15 @@ struct Entry {
     category_id: u32,
     score: Option<Real>,
     bbox: Option<Numbers<4>>,
-    segmentation: Option<RunLengths>,
+    segmentation: Option<Segmentation>,
+}
+
+/// Pixels of an object as COCO has them.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "is neither run lengths (counts and size) nor polygons")]
+enum Segmentation {
+    RunLengths(RunLengths),
+    Polygons(Vec<IgnoredAny>),
 }
 
 /// COCO's run lengths of a mask, by columns, of unset and set pixels in turns.
@@ -73,9 +84,16 @@ impl Detections {
                 DatasetError::field(file, &format!("[{k}].{name}"), problem)
             };
             let shape = match (entry.segmentation, entry.bbox) {
-                (Some(runs), _) => {
-                    let mask = runs.mask().map_err(|problem| fault("segmentation", &problem))?;
-                    Shape::Mask(mask)
+                (Some(Segmentation::Polygons(polygons)), _) => {
+                    let count = polygons.len();
+                    let problem =
+                        format!("{count} polygons: convert to run lengths (counts, size)");
+                    return Err(fault("segmentation", &problem));
+                }
+                (Some(Segmentation::RunLengths(runs)), _) => {
+                    let size = runs.size;
+                    let lengths = runs.lengths();
+                    Shape::Mask(size, lengths.map_err(|problem| fault("segmentation", &problem))?)
                 }
                 (None, Some(bbox)) if bbox.0[2] > 0.0 && bbox.0[3] > 0.0 => Shape::Box(bbox.0),
                 (None, Some(_)) => {
@@ -108,31 +126,49 @@ impl Detections {
 }
 
 impl Detection {
-    /// Its mask, or its box as a mask, in an image of `width` by `height` pixels; `None` if its mask has another size.
-    pub(crate) fn mask(&self, width: usize, height: usize) -> Option<Mask> {
+    /// Its mask, or its box as one, in an image of `width` by `height` pixels.
+    ///
+    /// # Errors
+    /// Height and width of its mask, if these are others.
+    pub(crate) fn mask(&self, width: usize, height: usize) -> Result<Mask, [usize; 2]> {
         match &self.shape {
-            Shape::Mask(mask) => {
-                (mask.width() == width && mask.height() == height).then(|| mask.clone())
+            Shape::Mask(size, _) if *size != [height, width] => Err(*size),
+            Shape::Mask(size, lengths) => {
+                let mut pixels = vec![false; width * height];
+                let mut at = 0;
+                for (k, length) in lengths.iter().enumerate() {
+                    let end = at + *length as usize;
+                    if k % 2 == 1 {
+                        (at..end).for_each(|k| pixels[k % height * width + k / height] = true);
+                    }
+                    at = end;
+                }
+                Mask::new(width, height, pixels).map_err(|_| *size)
             }
             Shape::Box([left, top, columns, rows]) => {
                 let [left, top, right, bottom] =
                     [*left, *top, left + columns, top + rows].map(|v| v.round().max(0.0) as usize);
                 let columns = [left, top, right.saturating_sub(left), bottom.saturating_sub(top)];
-                Some(Mask::of_box(width, height, columns))
+                Ok(Mask::of_box(width, height, columns))
             }
         }
+    }
+
+    /// True of a box.
+    pub(crate) fn is_box(&self) -> bool {
+        matches!(self.shape, Shape::Box(_))
     }
 }
 
 impl RunLengths {
-    fn mask(&self) -> Result<Mask, String> {
+    /// Run lengths, which fill the mask.
+    fn lengths(self) -> Result<Vec<u32>, String> {
         let [height, width] = self.size;
-        let lengths = match &self.counts {
-            Counts::Plain(lengths) => lengths.clone(),
-            Counts::Compressed(text) => decompressed(text)?,
+        let lengths = match self.counts {
+            Counts::Plain(lengths) => lengths,
+            Counts::Compressed(text) => decompressed(&text)?,
         };
-        let count =
-            width.checked_mul(height).filter(|n| *n <= prehend_geometry::limits::MAX_PIXELS);
+        let count = width.checked_mul(height).filter(|n| *n <= MAX_PIXELS);
         let count = count.ok_or_else(|| format!("size is {height} x {width} pixels"))?;
         let sum = lengths.iter().try_fold(0_u64, |sum, length| sum.checked_add(*length));
         if sum != Some(count as u64) {
@@ -141,16 +177,7 @@ impl RunLengths {
                 "the run lengths add up to {sum}, size is {height} x {width} = {count} pixels"
             ));
         }
-        let mut pixels = vec![false; count];
-        let mut at = 0_usize;
-        for (k, length) in lengths.iter().enumerate() {
-            let end = at + *length as usize;
-            if k % 2 == 1 {
-                (at..end).for_each(|k| pixels[k % height * width + k / height] = true);
-            }
-            at = end;
-        }
-        Mask::new(width, height, pixels).map_err(|error| error.to_string())
+        Ok(lengths.into_iter().map(|length| length as u32).collect())
     }
 }
 
@@ -207,7 +234,7 @@ mod tests {
             let found = read(&entry).unwrap();
             let found = found.of(1, 2, 5);
             assert_eq!(found[0].mask(4, 3).unwrap().pixels(), expected);
-            assert!(found[0].mask(3, 4).is_none());
+            assert_eq!(found[0].mask(3, 4).unwrap_err(), [3, 4]);
         }
     }
 
@@ -244,6 +271,13 @@ mod tests {
     }
 
     #[test]
+    fn polygons_are_refused() {
+        let entry = r#"[{"scene_id": 1, "image_id": 2, "category_id": 5, "segmentation": [[1.5, 2, 3, 4, 5, 6]]}]"#;
+        let error = read(entry).unwrap_err().to_string();
+        assert!(error.contains("[0].segmentation: 1 polygons: convert"), "{error}");
+    }
+
+    #[test]
     fn broken_masks_are_named() {
         let refused = |counts: &str| {
             let entry = format!(
@@ -257,6 +291,6 @@ mod tests {
         );
         assert!(refused(r#""2\u00e9""#).contains("no compressed run lengths"));
         assert!(refused("[18446744073709551615, 5]").contains("add up to more"));
-        assert!(refused("{}").contains("neither a list"));
+        assert!(refused("{}").contains("neither run lengths"));
     }
 }

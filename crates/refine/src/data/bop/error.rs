@@ -29,6 +29,18 @@ pub enum DatasetError {
         /// The file.
         file: PathBuf,
     },
+    /// A file of detections lacks an object of an image.
+    #[error("{}: scene {scene_id} image {im_id}: no detection of object {obj_id} (category_id)", file.display())]
+    NoDetection {
+        /// The file of detections.
+        file: PathBuf,
+        /// Scene.
+        scene_id: u32,
+        /// Image of the scene.
+        im_id: u32,
+        /// Object.
+        obj_id: u32,
+    },
     /// A file that lists things by key lacks this one.
     #[error("{}: no entry {key:?}", file.display())]
     NoEntry {

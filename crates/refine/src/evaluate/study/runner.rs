@@ -153,6 +153,7 @@ impl<'a> Runner<'a> {
         let steps = &self.design.steps;
         let mut poses: Vec<Pose> = Vec::new();
         let start = Instant::now();
+        let input = input.prepared(&row.t_cam_model, method)?.unwrap_or(input);
         let frame = input.frame()?;
         let initial = State::new(&frame, &row.t_cam_model)?;
         let refined = method.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {

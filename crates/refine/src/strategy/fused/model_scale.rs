@@ -23,6 +23,8 @@ pub struct ModelScale {
 
 /// Scales that are compared first, to either side of that of the model, in standard deviations of the prior; the step between them.
 const REACH: i32 = 3;
+/// Largest standard deviation of the prior: scales remain above zero.
+const MOST_SIGMA: f64 = 0.3;
 /// Steps to scales that are compared next, as a share of the one before, and how often.
 const FINER: f64 = 0.3;
 const ROUNDS: usize = 2;
@@ -39,6 +41,10 @@ impl Fused {
         initial: &Isometry3<f64>,
     ) -> Result<ModelScale, RefineError> {
         let sigma = self.settings.model_scale;
+        if !(0.0..=MOST_SIGMA).contains(&sigma) {
+            let problem = format!("is {sigma}, not between 0 and {MOST_SIGMA}");
+            return Err(RefineError::Setting { name: "model_scale", problem });
+        }
         let start = State::new(frame, initial)?;
         let found = self.run(frame, &start, &mut |_| ControlFlow::Continue(()))?;
         let mut known: Vec<(f64, f64)> = Vec::new();
@@ -47,16 +53,17 @@ impl Fused {
             let scale = 1.0 + f64::from(k) * step;
             known.push((scale, self.cost_at_scale(frame, &start, found.t_cam_object(), scale)?));
         }
-        let mut best = vertex(&known, step);
+        let mut best =
+            vertex(&known, step).unwrap_or_else(|| ModelScale { scale: lowest(&known), sigma });
         for _ in 0..ROUNDS {
             step *= FINER;
-            let near = [-step, 0.0, step].map(|off| best.scale + off);
-            let costs = near.map(|scale| {
-                let cost = self.cost_at_scale(frame, &start, found.t_cam_object(), scale)?;
-                Ok::<_, RefineError>((scale, cost))
-            });
-            let [below, at, above] = costs;
-            best = vertex(&[below?, at?, above?], step);
+            let mut near = Vec::new();
+            for off in [-step, 0.0, step] {
+                let scale = best.scale + off;
+                near.push((scale, self.cost_at_scale(frame, &start, found.t_cam_object(), scale)?));
+            }
+            // Where the cost is rough, what is known from farther away is better.
+            best = vertex(&near, step).unwrap_or(best);
         }
         Ok(best)
     }
@@ -91,18 +98,21 @@ impl Fused {
     }
 }
 
-/// Least of the parabola through the least of `known` scales with their costs \[nat\], a `step` apart, and its neighbors.
-fn vertex(known: &[(f64, f64)], step: f64) -> ModelScale {
-    let least = (0..known.len()).min_by(|a, b| known[*a].1.total_cmp(&known[*b].1)).unwrap_or(0);
-    let middle = least.clamp(1, known.len() - 2);
-    let [below, at, above] = [middle - 1, middle, middle + 1].map(|k| known[k].1);
-    let (slope, curvature) =
-        (0.5 * (above - below) / step, (above + below - 2.0 * at) / step.powi(2));
-    if curvature <= 0.0 || least != middle {
-        return ModelScale { scale: known[least].0, sigma: step };
-    }
-    let off = (-slope / curvature).clamp(-step, step);
-    ModelScale { scale: known[middle].0 + off, sigma: curvature.sqrt().recip() }
+/// The scale of the least cost.
+fn lowest(known: &[(f64, f64)]) -> f64 {
+    known.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1.0, |(scale, _)| *scale)
+}
+
+/// Minimum of the parabola through the scale of the least cost \[nat\] and its neighbors, a `step` apart, with C″^(−½); `None` if it is not between these.
+fn vertex(known: &[(f64, f64)], step: f64) -> Option<ModelScale> {
+    let least = (0..known.len()).min_by(|a, b| known[*a].1.total_cmp(&known[*b].1))?;
+    let (_, below) = *known.get(least.checked_sub(1)?)?;
+    let ((middle, at), (_, above)) = (known[least], *known.get(least + 1)?);
+    let slope = 0.5 * (above - below) / step;
+    let curvature = (above + below - 2.0 * at) / step.powi(2);
+    let is_parabola = curvature.is_finite() && curvature > 0.0;
+    is_parabola
+        .then(|| ModelScale { scale: middle - slope / curvature, sigma: curvature.sqrt().recip() })
 }
 
 #[cfg(test)]
@@ -127,9 +137,10 @@ mod tests {
     #[test]
     fn the_vertex_of_a_parabola_is_found() {
         let cost = |x: f64| (x, 3.0 + 0.5 * ((x - 1.02) / 0.01).powi(2));
-        let found = vertex(&[0.95, 1.0, 1.05].map(cost), 0.05);
+        let found = vertex(&[0.95, 1.0, 1.05].map(cost), 0.05).unwrap();
         assert!((found.scale - 1.02).abs() < 1e-9 && (found.sigma - 0.01).abs() < 1e-9);
         // Beyond the ends nothing is known.
-        assert_eq!(vertex(&[1.1, 1.15, 1.2].map(cost), 0.05).scale, 1.1);
+        assert_eq!(vertex(&[1.1, 1.15, 1.2].map(cost), 0.05), None);
+        assert_eq!(vertex(&[(0.9, f64::INFINITY), (1.0, 1.0), (1.1, 2.0)], 0.1), None);
     }
 }

@@ -268,13 +268,13 @@ impl DatasetRun<'_> {
             let (frame, fault) = frame_report(&scorer, job, refined, seconds(index));
             let t_cam_object = (&refined.pose).into();
             let mut draw = || -> Result<_, AssetError> {
+                let initial = &job.row.t_cam_model;
+                let required = Sensor::required_by(&self.method);
+                let input = assets.load_at(&job.target, initial, &required)?;
+                let input = input.prepared(initial, &self.method)?.unwrap_or(input);
                 report.draw(&FrameDrawing {
-                    input: &assets.load_at(
-                        &job.target,
-                        &job.row.t_cam_model,
-                        &Sensor::required_by(&self.method),
-                    )?,
-                    initial: Some(&job.row.t_cam_model),
+                    input: &input,
+                    initial: Some(initial),
                     t_cam_object: &t_cam_object,
                     covariance: refined.confidence.as_ref().map(|c| &c.covariance),
                     // Stages of the fused method minimize other losses each.
@@ -291,16 +291,18 @@ impl DatasetRun<'_> {
     }
 }
 
-/// What to do where there is no mask.
+/// Advice where there is no mask.
 fn hint(error: &anyhow::Error) -> &'static str {
     let lacks_mask = match error.downcast_ref::<AssetError>() {
-        Some(AssetError::Dataset(DatasetError::EmptyMask { .. })) => true,
+        Some(AssetError::Dataset(
+            DatasetError::EmptyMask { .. } | DatasetError::NoDetection { .. },
+        )) => true,
         Some(AssetError::Dataset(DatasetError::Missing { file })) => {
             file.components().any(|part| part.as_os_str() == "mask_visib")
         }
         _ => false,
     };
-    if lacks_mask { " (--detections or --mask-source none do without)" } else { "" }
+    if lacks_mask { " (--mask-source none does without)" } else { "" }
 }
 
 /// Frames that are drawn at most: pages stay small enough to be opened.

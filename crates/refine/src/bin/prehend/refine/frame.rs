@@ -36,10 +36,10 @@ pub(super) fn refine_frame(
         }
         terms = heuristic.gradients.iter().map(|g| g.name()).collect();
     }
+    let input = input.prepared(&t_cam_object, &configured)?.unwrap_or(input);
     let warnings = input.warnings(&t_cam_object).concat();
     let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
     warnings.iter().for_each(|warning| log::warn!("{warning}"));
-    let input = input.prepared(&t_cam_object, &configured)?.unwrap_or(input);
     let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
