@@ -16,7 +16,10 @@ use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{self, Hand, Inertial, Object, Observation, StatedSize, Warning, check_gravity};
+use crate::scene::{
+    self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, StatedSize,
+    Warning, check_gravity,
+};
 
 /// BOP models are in millimeters \[m\].
 const MILLIMETER: f64 = 1e-3;
@@ -113,6 +116,19 @@ impl FrameInput {
             scene::inspect_object(object),
             scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object),
         ]
+    }
+
+    /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.
+    ///
+    /// # Errors
+    /// Those of [`CorrectionTrial::new`].
+    pub fn try_corrections(
+        &self,
+        t_cam_object: &Isometry3<f64>,
+        settings: &CorrectionSettings,
+    ) -> Result<CorrectionTrial, RefineError> {
+        let Self { observation, object, hand, .. } = self;
+        CorrectionTrial::new(observation, object, hand.as_deref(), t_cam_object, settings)
     }
 
     /// Whether the frame brings the evidence that a gradient needs.

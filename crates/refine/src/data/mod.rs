@@ -8,6 +8,7 @@ pub mod bop;
 mod cache;
 mod contact;
 mod depth_camera;
+mod depth_values;
 pub mod details;
 mod frame_file;
 mod guard;

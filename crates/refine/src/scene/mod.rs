@@ -1,6 +1,7 @@
 //! What there is: one [`Observation`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
 
 mod calibration;
+mod correction;
 mod example;
 mod frame;
 mod hand;
@@ -14,6 +15,9 @@ mod touch;
 mod view;
 
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
+pub use correction::{
+    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
+};
 pub use example::{Scene, default_scene};
 pub use frame::{CameraView, Frame, Occluders};
 pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded};

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
@@ -38,6 +39,8 @@ pub struct Scene {
     pub(super) objects: JsonFile,
     pub(super) remaps: Arc<RemapCache>,
     pub(super) depth_remaps: Arc<RemapCache>,
+    /// Warnings of depth images that were given: of values that are none, and of images that measure nothing.
+    pub(super) told_of_depth: Arc<[AtomicBool; 2]>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
 }
@@ -84,10 +87,12 @@ impl Dataset {
     /// When that folder is absent or holds no scenes.
     pub fn open_split(root: &Path, split: &str) -> Result<Self, DatasetError> {
         let split_dir = root.join(split);
+        let told_of_depth = Arc::default();
         let scenes: BTreeMap<u32, Scene> = subfolders(&split_dir)?
             .iter()
             .filter_map(|name| Some((scene_id(name)?, split_dir.join(name))))
             .map(|(id, dir)| (id, Scene::new(id, dir, root)))
+            .map(|(id, scene)| (id, Scene { told_of_depth: Arc::clone(&told_of_depth), ..scene }))
             .collect();
         if scenes.is_empty() {
             return Err(no_scenes(&split_dir));
@@ -107,7 +112,8 @@ impl Dataset {
             let new = Scene::new(scene.id, scene.dir.clone(), &scene.root);
             let (remaps, depth_remaps) =
                 (Arc::clone(&scene.remaps), Arc::clone(&scene.depth_remaps));
-            (scene.id, Scene { remaps, depth_remaps, ..new })
+            let told_of_depth = Arc::clone(&scene.told_of_depth);
+            (scene.id, Scene { remaps, depth_remaps, told_of_depth, ..new })
         };
         Self {
             root: self.root.clone(),
@@ -160,6 +166,7 @@ impl Scene {
             objects: JsonFile::new(dir.join("scene_gt.json")),
             remaps: Arc::default(),
             depth_remaps: Arc::default(),
+            told_of_depth: Default::default(),
             rigs: OnceLock::new(),
             dir,
         }
