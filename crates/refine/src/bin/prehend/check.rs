@@ -152,7 +152,8 @@ fn explains(found: &Finding, warning: &Warning) -> bool {
     let unit = matches!(found.correction, Correction::ModelUnit | Correction::ModelAndPoseUnit);
     match warning.subject {
         Subject::Model => unit && warning.unit == "m",
-        Subject::Touch => false,
+        // Where the object is, not how hard it is felt.
+        Subject::Touch => found.agreement.is_some() && warning.unit == "cm",
         Subject::Hand => found.correction == Correction::FocalLength || found.agreement.is_some(),
         Subject::Pose | Subject::Mask | Subject::Depth => true,
     }

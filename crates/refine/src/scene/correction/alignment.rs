@@ -39,11 +39,9 @@ impl Alignment<'_> {
     pub(super) fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
         let start = self.placed(start)?;
         let radius = self.evidence.object.radius;
-        let turn = radius.recip();
         let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
         // Steps in units of the radius.
         let units = SVector::from([radius, radius, radius, 1.0, 1.0, 1.0, size, 0.0]);
-        debug_assert!(turn.is_finite());
         let mut inputs = start;
         for step in 0..self.settings.steps {
             // From far to near: at first all counts that is within reach.
@@ -54,7 +52,9 @@ impl Alignment<'_> {
             let twist = step.fixed_rows::<6>(0).into_owned();
             inputs.t_cam_object = perturb_about(&inputs.t_cam_object, &center, &twist);
             inputs.t_cam_object.rotation.renormalize();
+            // What is measured stays what it is: the model is scaled.
             inputs.depth_scale *= step[6].exp();
+            inputs.meters /= step[6].exp();
             let limit = self.settings.largest_size;
             let ratio = inputs.depth_scale / start.depth_scale;
             if !(limit.recip()..=limit).contains(&ratio) {

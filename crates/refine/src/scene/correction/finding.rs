@@ -87,7 +87,10 @@ fn explain(
     let [always, of_one] = settings.gain;
     let helps = |a: &&Attempt| {
         let count = a.frames.len();
-        let gain = always + of_one / (count as f64).sqrt();
+        let gain = match a.correction.is_unnamed() {
+            true => settings.unnamed_gain,
+            false => always + of_one / (count as f64).sqrt(),
+        };
         // Most of the group must need it.
         2 * count > group.len()
             && a.agreement >= settings.least

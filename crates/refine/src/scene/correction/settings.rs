@@ -35,6 +35,8 @@ pub struct CorrectionSettings {
     pub least: f64,
     /// Agreement that a correction must gain on average over many frames, and besides over the square root of their number.
     pub gain: [f64; 2],
+    /// The same of a correction by a value that nothing is known of beforehand: it fits itself to what hides the object.
+    pub unnamed_gain: f64,
     /// Corrections whose agreements differ by less are told apart by what is common: sizes and distances, then their order.
     pub tie: f64,
     /// Extent of objects that are held in hands \[m\].
@@ -71,6 +73,7 @@ impl Default for CorrectionSettings {
             fair: 0.6,
             least: 0.5,
             gain: [0.05, 0.15],
+            unnamed_gain: 0.4,
             tie: 0.03,
             extent: 0.15,
             oddness: 1.0,

@@ -63,22 +63,22 @@ pub(crate) fn inspect_pose(
     if !model::is_plausible(object) {
         return warnings;
     }
-    let compared = |t_cam_object: &Isometry3<f64>| {
-        compare(observation, object, hand, drawn.clone(), touch, t_cam_object)
+    let compared = |t_cam_object: &Isometry3<f64>, is_settled: bool| {
+        compare(observation, object, hand, drawn.clone(), touch, t_cam_object, is_settled)
     };
-    let found = compared(t_cam_object);
+    let found = compared(t_cam_object, false);
     let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
     // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
     let settled = found.iter().any(of_pose).then(|| {
         let hand = hand.map(|(hand, _)| hand);
         settled_pose(observation, object, hand, t_cam_object, &CorrectionSettings::default())
     });
-    let settled = settled.flatten().map(|pose| compared(&pose));
-    warnings.extend(settled.filter(|others| others.len() < found.len()).unwrap_or(found));
+    let settled = settled.flatten().map(|pose| compared(&pose, true));
+    warnings.extend(settled.unwrap_or(found));
     warnings
 }
 
-/// What looks wrong where the object at a pose and the hand, as it is `drawn`, are compared with what is seen.
+/// What looks wrong where the object at a pose and the hand, as it is `drawn`, are compared with what is seen; a pose that `is_settled` there fits.
 fn compare(
     observation: &Observation,
     object: &Object,
@@ -86,6 +86,7 @@ fn compare(
     drawn: Option<DepthImage>,
     touch: Option<(&Hand, &HandMeasurement)>,
     t_cam_object: &Isometry3<f64>,
+    is_settled: bool,
 ) -> Vec<Warning> {
     let z = (t_cam_object * object.center).z;
     let hand_drawn = drawn.is_some();
@@ -97,7 +98,7 @@ fn compare(
     let depth_wrong = blamed(Subject::Depth);
     let (off_object, mask_fits) =
         if depth_wrong { (None, false) } else { mask::off_object(&view, object, hand_fits) };
-    let at_pose = mask::at_pose(&view, z, mask_fits, hand_wrong);
+    let at_pose = if is_settled { None } else { mask::at_pose(&view, z, mask_fits, hand_wrong) };
     let pose_fits = at_pose.is_none();
     let mut warnings = of_depth;
     warnings.extend(at_pose);
