@@ -113,7 +113,7 @@ impl FrameInput {
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
         [
-            scene::inspect_object(object),
+            scene::inspect_object(object, hand.is_some()),
             scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object),
         ]
     }

@@ -23,7 +23,7 @@ pub use frame::{CameraView, Frame, Occluders};
 pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded};
 pub use hand::Hand;
 pub use inspect::{Subject, Warning};
-pub(crate) use inspect::{inspect_object, inspect_pose};
+pub(crate) use inspect::{inspect_object, inspect_pose, likely_unit};
 pub use object::{Inertial, Object, StatedSize};
 pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
 pub(crate) use region::{

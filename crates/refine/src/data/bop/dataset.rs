@@ -12,6 +12,7 @@ use super::error::DatasetError;
 use super::json::JsonFile;
 use super::lens::RemapCache;
 use super::models::Models;
+use super::one_camera::scene_camera;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
 /// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.
@@ -88,10 +89,11 @@ impl Dataset {
     pub fn open_split(root: &Path, split: &str) -> Result<Self, DatasetError> {
         let split_dir = root.join(split);
         let told_of_depth = Arc::default();
+        let camera = JsonFile::new(root.join("camera.json"));
         let scenes: BTreeMap<u32, Scene> = subfolders(&split_dir)?
             .iter()
             .filter_map(|name| Some((scene_id(name)?, split_dir.join(name))))
-            .map(|(id, dir)| (id, Scene::new(id, dir, root)))
+            .map(|(id, dir)| (id, Scene::new(id, dir, root, &camera)))
             .map(|(id, scene)| (id, Scene { told_of_depth: Arc::clone(&told_of_depth), ..scene }))
             .collect();
         if scenes.is_empty() {
@@ -102,14 +104,15 @@ impl Dataset {
             split_dir,
             scenes,
             models: Models::new(root.join("models")),
-            camera: JsonFile::new(root.join("camera.json")),
+            camera,
         })
     }
 
     /// The same with files that are read anew, for somebody may have gone on writing them.
     pub fn reread(&self) -> Self {
+        let camera = JsonFile::new(self.root.join("camera.json"));
         let again = |scene: &Scene| {
-            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root);
+            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root, &camera);
             let (remaps, depth_remaps) =
                 (Arc::clone(&scene.remaps), Arc::clone(&scene.depth_remaps));
             let told_of_depth = Arc::clone(&scene.told_of_depth);
@@ -120,7 +123,7 @@ impl Dataset {
             split_dir: self.split_dir.clone(),
             scenes: self.scenes.values().map(again).collect(),
             models: Models::new(self.root.join("models")),
-            camera: JsonFile::new(self.root.join("camera.json")),
+            camera,
         }
     }
 
@@ -156,11 +159,11 @@ impl Dataset {
 }
 
 impl Scene {
-    fn new(id: u32, dir: PathBuf, root: &Path) -> Self {
+    fn new(id: u32, dir: PathBuf, root: &Path, camera: &JsonFile) -> Self {
         Self {
             id,
             root: root.to_path_buf(),
-            camera: JsonFile::new(dir.join("scene_camera.json")),
+            camera: scene_camera(&dir, camera),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
             objects: JsonFile::new(dir.join("scene_gt.json")),

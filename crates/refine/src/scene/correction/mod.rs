@@ -13,6 +13,8 @@ mod inputs;
 mod kind;
 mod settings;
 mod size;
+#[cfg(test)]
+mod tests;
 mod trial;
 
 pub use self::finding::{Finding, find_corrections};

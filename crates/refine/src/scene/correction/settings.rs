@@ -27,8 +27,10 @@ pub struct CorrectionSettings {
     pub shift: [f64; 2],
     /// Standard deviation of their rotation \[rad\]: the coarser ones are off by 16° on average.
     pub turn: f64,
-    /// Agreement from which on nothing but rotations is tried, and sizes are believed: right inputs agree by nine tenths, of little hidden objects.
+    /// Agreement from which on nothing but rotations is tried: right inputs agree by nine tenths, of little hidden objects.
     pub good: f64,
+    /// Agreement from which on what a fit says of sizes is believed: a wrong focal length takes the hand's part of it away.
+    pub sized: f64,
     /// Agreement at the pose that mask and depth have from which on the pose to start from is not blamed.
     pub fair: f64,
     /// Agreement that a correction must lead to.
@@ -70,9 +72,10 @@ impl Default for CorrectionSettings {
             shift: [0.1, 0.3],
             turn: 0.5,
             good: 0.8,
+            sized: 0.7,
             fair: 0.6,
             least: 0.5,
-            gain: [0.05, 0.15],
+            gain: [0.03, 0.15],
             unnamed_gain: 0.4,
             tie: 0.03,
             extent: 0.15,

@@ -86,7 +86,7 @@ impl CorrectionTrial {
         let agreement = fit(&given, false).map_or(0.0, |(agreement, _)| agreement);
         let sized = fit(&given, true);
         let sized_agreement = sized.as_ref().map_or(0.0, |(agreement, _)| *agreement);
-        let sized = sized.filter(|_| evidence.has_depth && sized_agreement >= settings.good);
+        let sized = sized.filter(|_| evidence.has_depth && sized_agreement >= settings.sized);
         let size = sized.and_then(|(_, aligned)| {
             let size = Size::of(&aligned, &given)?;
             let focal = given.corrected(Correction::FocalLength, size.scale.exp());

@@ -18,14 +18,15 @@ mod warning;
 use nalgebra::{Isometry3, Translation3};
 use prehend_render::DepthImage;
 
+pub(crate) use self::model::likely_unit;
 pub use self::warning::{Subject, Warning};
 use super::correction::{CorrectionSettings, settled_pose};
 use super::view::View;
 use super::{Hand, HandMeasurement, Object, Observation};
 
-/// What looks wrong with an object's model; empty if all looks well.
-pub(crate) fn inspect_object(object: &Object) -> Vec<Warning> {
-    model::inspect(object)
+/// What looks wrong with an object's model; empty if all looks well. What was assumed of its mass and its inside matters if it is `held`.
+pub(crate) fn inspect_object(object: &Object, held: bool) -> Vec<Warning> {
+    model::inspect(object, held)
 }
 
 /// What looks wrong with an observation, and with the object at a pose (object → camera) in it; empty if all looks well.
