@@ -268,7 +268,7 @@ fn results_in_a_folder_are_named_as_bop_has_it() {
     let place = Workplace::new();
     fs::create_dir(place.path("my_results")).unwrap();
     place.succeed(&format!("{REFINE} --out my_results"));
-    assert_eq!(place.poses("my_results/fused_ds-test.csv").len(), 2);
+    assert_eq!(place.poses("my_results/combined_ds-test.csv").len(), 2);
 }
 
 #[test]

@@ -76,7 +76,10 @@ impl Check {
         let findings = mistakes(&mut assets, &jobs);
         let named = |(found, targets): (Finding, Vec<Target>)| {
             let message = found.message(&names_of_dataset(&dataset, poses, &targets)?);
-            log::warn!("{message}");
+            match &targets[..] {
+                [target] if jobs.len() > 1 => log::warn!("{target}: {message}"),
+                _ => log::warn!("{message}"),
+            }
             Ok((found, targets, message))
         };
         let findings = findings.into_iter().map(named).collect::<Result<Vec<_>, DatasetError>>()?;
@@ -91,10 +94,14 @@ impl Check {
             });
             match checked {
                 Ok((picture, warnings)) => {
+                    // Of many frames some alone were tried.
                     let alike =
                         |t: &Target| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id);
-                    let of_frame =
-                        || findings.iter().filter(|(_, targets, _)| targets.iter().any(alike));
+                    let is_meant = |targets: &[Target]| match targets {
+                        [only] => only == target,
+                        all => all.iter().any(alike),
+                    };
+                    let of_frame = || findings.iter().filter(|(_, targets, _)| is_meant(targets));
                     let mut remarks: Vec<String> =
                         of_frame().map(|(.., message)| message.clone()).collect();
                     for warning in &warnings {

@@ -28,22 +28,32 @@ pub struct Finding {
 }
 
 /// Corrections that make `trials`, each of a target, agree with what they show: first what all have in common, then what those of an object or of a scene
-/// have. Nothing for frames that agree, and for those that no correction helps.
+/// have, then single ones. Nothing for frames that agree, and for those that no correction helps.
 pub fn find_corrections(
     trials: &[(Target, CorrectionTrial)],
     settings: &CorrectionSettings,
 ) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut explained = vec![false; trials.len()];
-    let levels = [
-        (None, groups(trials, |_| 0)),
-        (Some(Scope::Object), groups(trials, |target| target.obj_id)),
-        (Some(Scope::Scene), groups(trials, |target| target.scene_id)),
+    let admits_all = |_: &Attempt| true;
+    let of_object = |a: &Attempt| a.correction.scope() == Scope::Object;
+    let of_scene = |a: &Attempt| a.correction.scope() == Scope::Scene;
+    // Of one frame alone only what nothing else could be.
+    let of_frame = |a: &Attempt| {
+        let is_vague = a.correction.is_rotation() || a.correction.is_unnamed();
+        !is_vague && a.agreement >= settings.good && a.given < settings.least
+    };
+    let alone = (0..trials.len()).map(|k| vec![k]).collect();
+    let levels: [(&dyn Fn(&Attempt) -> bool, Vec<Vec<usize>>); 4] = [
+        (&admits_all, groups(trials, |_| 0)),
+        (&of_object, groups(trials, |target| target.obj_id)),
+        (&of_scene, groups(trials, |target| target.scene_id)),
+        (&of_frame, alone),
     ];
-    for (scope, groups) in levels {
+    for (admits, groups) in levels {
         for group in groups {
             let open: Vec<usize> = group.into_iter().filter(|&k| !explained[k]).collect();
-            if let Some(finding) = explain(trials, &open, scope, settings) {
+            if let Some(finding) = explain(trials, &open, admits, settings) {
                 finding.frames.iter().for_each(|&k| explained[k] = true);
                 found.push(finding);
             }
@@ -75,11 +85,11 @@ struct Attempt {
     oddness: f64,
 }
 
-/// The correction of that scope that explains a group best, if it does; of any scope without one.
+/// The correction that explains a group best, if one of those that `admits` lets through does.
 fn explain(
     trials: &[(Target, CorrectionTrial)],
     group: &[usize],
-    scope: Option<Scope>,
+    admits: &dyn Fn(&Attempt) -> bool,
     settings: &CorrectionSettings,
 ) -> Option<Finding> {
     let attempts: Vec<Attempt> =
@@ -95,7 +105,7 @@ fn explain(
         2 * count > group.len()
             && a.agreement >= settings.least
             && a.agreement - a.given >= gain
-            && scope.is_none_or(|scope| a.correction.scope() == scope)
+            && admits(a)
     };
     let helpful: Vec<&Attempt> = attempts.iter().filter(helps).collect();
     let most = helpful.iter().map(|a| a.agreement).reduce(f64::max)?;

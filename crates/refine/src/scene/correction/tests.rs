@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
+use super::inputs::Inputs;
 use super::*;
 use crate::data::Target;
 use crate::scene::{Object, Scene, default_scene};
@@ -105,10 +106,33 @@ fn conventions_of_poses() {
         named(Correction::PoseInvertedOpenGl, &posed(|pose| (flip() * pose).inverse()));
     }
     named(Correction::RotationTransposed, 1.0, turned(|q| q.inverse()));
-    let quaternion = |w, x, y, z| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-    // (x, y, z, w) taken for (w, x, y, z), and the other way round.
-    named(Correction::QuaternionXyzw, 1.0, turned(move |q| quaternion(q.i, q.j, q.k, q.w)));
-    named(Correction::QuaternionWxyz, 1.0, turned(move |q| quaternion(q.k, q.w, q.i, q.j)));
+    named(Correction::QuaternionXyzw, 1.0, turned(|q| quaternion(q.i, q.j, q.k, q.w)));
+}
+
+fn quaternion(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+}
+
+/// Whatever an object looks like from there.
+#[test]
+fn corrections_undo_mistakes_of_rotation() {
+    let right = scenes().next().unwrap().initial;
+    let camera = scenes().next().unwrap().observation.camera;
+    type Mistake = fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>;
+    let mistakes: [(Correction, Mistake); 4] = [
+        (Correction::RotationTransposed, |q| q.inverse()),
+        (Correction::OpenGlRotation, |q| flip() * q),
+        // (x, y, z, w) taken for (w, x, y, z), and the other way round.
+        (Correction::QuaternionXyzw, |q| quaternion(q.i, q.j, q.k, q.w)),
+        (Correction::QuaternionWxyz, |q| quaternion(q.k, q.w, q.i, q.j)),
+    ];
+    for (correction, mistake) in mistakes {
+        let wrong = Isometry3::from_parts(right.translation, mistake(right.rotation));
+        assert!(wrong.rotation.angle_to(&right.rotation) > 0.3, "{correction:?}");
+        let corrected = Inputs::new(camera, wrong).corrected(correction, 1.0).t_cam_object;
+        assert!(corrected.rotation.angle_to(&right.rotation) < 1e-9, "{correction:?}");
+        assert_eq!(corrected.translation, right.translation);
+    }
 }
 
 #[test]
