@@ -47,6 +47,33 @@ def error(pose, truth, center):
     return np.concatenate([((truth - pose) @ place)[:3], axis * (0.5 * angle / np.sin(angle))])
 
 
+def test_a_made_up_frame_is_searched(example):
+    frame, _, truth = example
+    found = frame.search()
+    shares = [share for _, share in found]
+    assert shares == sorted(shares, reverse=True) and sum(shares) == pytest.approx(1.0)
+    first, rivals = found[0][0], [pose for pose, _ in found[1:]]
+    estimate = frame.refine(first, rivals=np.reshape(rivals, (-1, 4, 4)))
+    assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 1e-3
+    searched = prehend.search(frame.rgb, frame.depth, frame.K, frame.object, mask=frame.mask)
+    assert searched[0][0].shape == (4, 4)
+
+
+def test_color_or_depth_alone(example):
+    frame, initial, truth = example
+    for lacking in ["rgb", "depth"]:
+        alone = prehend.Frame(**inputs(frame, **{lacking: None}))
+        estimate = alone.refine(initial)
+        assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 5e-3
+    with pytest.raises(prehend.Error, match="one of them is needed"):
+        prehend.Frame(**inputs(frame, rgb=None, depth=None))
+
+
+def test_help_names_every_field():
+    for kind in [prehend.Estimate, prehend.Tracked]:
+        assert all(f"        {name}: " in kind.__doc__ for name in kind.__dataclass_fields__)
+
+
 def test_a_made_up_frame_is_refined(example, refined):
     frame, initial, truth = example
     before = np.linalg.norm(initial[:3, 3] - truth[:3, 3])

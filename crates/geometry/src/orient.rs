@@ -6,7 +6,8 @@ use crate::box_tree::{Bounds, BoxTree};
 use crate::closest::ClosestPoints;
 use crate::mesh::TriMesh;
 use crate::report::MeshReport;
-use crate::topology::{Edge, EdgeUse, components, edges};
+use crate::topology::{Edge, EdgeUse, components, edges, is_collapsed};
+use crate::weld::is_finite;
 
 /// A sum of signed volumes smaller than this fraction of the sum of their sizes is rounding, and its sign means
 /// nothing.
@@ -18,6 +19,30 @@ const PROBES: usize = 16;
 pub(crate) fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<f64>) -> f64 {
     let [a, b, c] = face.map(|v| positions[v as usize] - origin);
     a.dot(&b.cross(&c))
+}
+
+impl TriMesh {
+    /// The mesh with faces turned as [`TriMesh::cleaned`] turns them: neighbors alike, and shells outward. Vertices, attributes and the number of
+    /// faces stay.
+    ///
+    /// # Panics
+    /// If a face refers to a vertex that the mesh has not.
+    pub fn faced_outward(mut self) -> Self {
+        let weld = self.weld();
+        let all = weld.faces(&self);
+        let usable = |f: &[u32; 3]| {
+            !is_collapsed(f) && f.iter().all(|v| is_finite(&weld.positions[*v as usize]))
+        };
+        let kept: Vec<usize> = (0..all.len()).filter(|f| usable(&all[*f])).collect();
+        let mut turned: Vec<[u32; 3]> = kept.iter().map(|f| all[*f]).collect();
+        orient(&weld.positions, &mut turned, &mut MeshReport::default());
+        for (f, turned) in kept.into_iter().zip(turned) {
+            if turned != all[f] {
+                self.faces[f].swap(1, 2);
+            }
+        }
+        self
+    }
 }
 
 /// Makes neighbors agree and shells face outward, and counts the nested ones.
@@ -265,6 +290,23 @@ mod tests {
         close(volume(&[inside_out(big()), inside_out(hole()), apart()]), (73.0, 2, 1));
         // A cavity inside a cavity encloses less than nothing.
         close(volume(&[big(), inside_out(hole()), inside_out(core())]), (55.0, 0, 1));
+    }
+
+    #[test]
+    fn faces_are_turned_outward_where_they_are() {
+        let apart = cuboid([1.0; 3], [9.0, 0.0, 0.0]);
+        let right = together(&[cuboid([4.0; 3], [0.0; 3]), apart.clone()]);
+        let mut mesh = together(&[inside_out(cuboid([4.0; 3], [0.0; 3])), apart]);
+        // One face besides, and a degenerate one.
+        mesh.faces[1].swap(1, 2);
+        mesh.faces.push([0, 0, 1]);
+        let turned = mesh.clone().faced_outward();
+        assert_eq!(turned.vertices, mesh.vertices);
+        let (faces, rest) = turned.faces.split_at(right.faces.len());
+        let rolled = |f: &[u32; 3]| [*f, [f[1], f[2], f[0]], [f[2], f[0], f[1]]];
+        assert!(faces.iter().zip(&right.faces).all(|(f, r)| rolled(f).contains(r)));
+        assert_eq!(rest, [[0, 0, 1]]);
+        assert_eq!(turned.clone().faced_outward(), turned);
     }
 
     #[test]

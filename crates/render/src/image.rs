@@ -1,6 +1,6 @@
 //! Color, depth and mask images, and their files.
 
-use std::io::{BufReader, Cursor};
+use std::io::{BufReader, Cursor, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,7 @@ use image::{DynamicImage, ImageFormat};
 use prehend_geometry::limits::{MAX_FILE_BYTES, MAX_PIXELS};
 use prehend_geometry::{open_plain, read_plain, write_atomic};
 
+use crate::exif::{orientation, swaps_sides};
 use crate::projected::Region;
 
 /// Why an image could not be read, written or built.
@@ -152,7 +153,7 @@ image_type! {
 }
 
 impl RgbImage {
-    /// Reads a PNG or JPEG file; gray becomes three equal channels and alpha is dropped.
+    /// Reads a PNG or JPEG file; gray becomes three equal channels and alpha is dropped. As all images, it is turned as its EXIF metadata say.
     ///
     /// # Errors
     /// When the file cannot be read or decoded.
@@ -427,10 +428,12 @@ fn decode(bytes: &[u8], name: &Path) -> Result<DynamicImage, ImageError> {
     if u64::from(width) * u64::from(height) > MAX_PIXELS as u64 {
         return Err(ImageError::TooLarge { path: name.into(), width, height });
     }
-    reader()?.decode().map_err(codec)
+    let mut image = reader()?.decode().map_err(codec)?;
+    image.apply_orientation(orientation(Cursor::new(bytes)));
+    Ok(image)
 }
 
-/// Columns and rows of the image in a PNG or JPEG file, by its header: nothing is decoded.
+/// Columns and rows of the upright image in a PNG or JPEG file, by its header: nothing is decoded.
 ///
 /// # Errors
 /// When the file cannot be read, is no plain file or no image.
@@ -441,10 +444,14 @@ pub fn image_size(path: &Path) -> Result<(usize, usize), ImageError> {
         // The decoder of JPEG reads all of it.
         return Err(io(std::io::ErrorKind::FileTooLarge.into()));
     }
-    let reader = image::ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(io)?;
+    let reader =
+        image::ImageReader::new(BufReader::new(&file)).with_guessed_format().map_err(io)?;
     let size = reader.into_dimensions();
     let (width, height) = size.map_err(|source| ImageError::Codec { path: path.into(), source })?;
-    Ok((width as usize, height as usize))
+    let (width, height) = (width as usize, height as usize);
+    (&file).rewind().map_err(io)?;
+    let swapped = swaps_sides(orientation(BufReader::new(&file)));
+    Ok(if swapped { (height, width) } else { (width, height) })
 }
 
 /// Encodes in memory, to write the file atomically.

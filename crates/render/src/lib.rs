@@ -16,6 +16,7 @@ mod backend;
 pub mod camera;
 mod contour;
 pub mod distortion;
+mod exif;
 pub mod graphics;
 pub mod image;
 pub mod light;

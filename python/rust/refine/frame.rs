@@ -5,8 +5,9 @@ use std::sync::Arc;
 use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target};
 use prehend_refine::scene::check_gravity;
+use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_refine::{Observation, RefineError, RefineJob};
-use prehend_render::{Camera, Distortion, Mask, Remap};
+use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
 use super::hand::Hand;
@@ -15,7 +16,7 @@ use super::object::prepared;
 use super::poses::{pose, poses};
 use super::rig::Rig;
 use super::{estimate, images, run};
-use crate::arrays::{Numbers, in_order, vector};
+use crate::arrays::{Numbers, in_order, matrix, vector};
 use crate::error::{Raise, wrong};
 
 /// One segmented RGB-D frame of an object, with the hand that holds it where that is known: what `refine` starts from, prepared once.
@@ -23,7 +24,7 @@ use crate::error::{Raise, wrong};
 /// Camera frame: OpenCV's, x right, y down, z forward; pixel centers at integers.
 ///
 /// rgb: H × W × 3 of uint8. depth: H × W, registered to rgb; in meters, or whole numbers in units of `depth_scale` meters; 0 or not finite
-/// where missing. K: 3 × 3 [px]. mask: H × W, not zero on the visible part of the object. hand_pose: 4 × 4, camera ← base of the hand [m]. joints: by
+/// where missing. One of the two may be None: color or depth alone. K: 3 × 3 [px]. mask: H × W, not zero on the visible part of the object. hand_pose: 4 × 4, camera ← base of the hand [m]. joints: by
 /// name, or in the order of `hand.joints` [rad; m of prismatic ones]. touch: taxels × 3, the force of the object on each in the frame of its link [N],
 /// NaN where nothing is known. gravity: in the camera frame [m/s²]. lens: ("brown_conrady" or "kannala_brandt", coefficients in OpenCV's order),
 /// through which the images were taken; they are made those of a pinhole. rig: what corrects the frame; its object is corrected by `rig.corrected`.
@@ -40,8 +41,8 @@ impl Frame {
                         lens=None, rig=None))]
     #[allow(clippy::too_many_arguments, non_snake_case)] // as many as Python names, and as everybody calls it
     fn new(
-        rgb: Bound<'_, PyAny>,
-        depth: Bound<'_, PyAny>,
+        rgb: Option<Bound<'_, PyAny>>,
+        depth: Option<Bound<'_, PyAny>>,
         K: Numbers<'_>,
         object: Bound<'_, PyAny>,
         mask: Option<Bound<'_, PyAny>>,
@@ -54,8 +55,13 @@ impl Frame {
         lens: Option<(String, Vec<f64>)>,
         rig: Option<&Rig>,
     ) -> PyResult<Self> {
-        let color = images::color(&rgb)?;
-        let (width, height) = (color.width(), color.height());
+        let color = rgb.as_ref().map(images::color).transpose()?;
+        let depth = depth.map(|depth| images::depth(&depth, depth_scale)).transpose()?;
+        let size = color.as_ref().map(|color| (color.width(), color.height()));
+        let size = size.or(depth.as_ref().map(|depth| (depth.width(), depth.height())));
+        let (width, height) = size.ok_or_else(|| wrong("rgb and depth: one of them is needed"))?;
+        let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
+        let depth = depth.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
         let k: [f64; 9] = <[f64; 9]>::try_from(&*in_order(&K))
             .map_err(|_| wrong(format!("K: a matrix of 3 × 3 is expected, not {:?}", K.shape())))?;
         let camera = Camera::from_k(k, width, height).map_err(|e| wrong(format!("K: {e}")))?;
@@ -63,7 +69,6 @@ impl Frame {
             true => Ok(()),
             false => Err(wrong(format!("{what}: {size:?}, but rgb is {:?}", [height, width]))),
         };
-        let depth = images::depth(&depth, depth_scale)?;
         sized("depth", [depth.height(), depth.width()])?;
         let mask = match &mask {
             Some(mask) => {
@@ -129,6 +134,18 @@ impl Frame {
         let job = RefineJob { input: &self.input, initial, rivals };
         let refined = py.detach(|| job.run(&method)).raise()?;
         estimate::estimate(py, &refined)
+    }
+
+    /// Searches the object in the masked depth, without any pose to begin with: up to four poses (4 × 4, camera ← object [m]), each with its share, the best
+    /// first. `refine` takes the first, and the others as `rivals`. Python's other threads run on meanwhile.
+    fn search<'py>(&self, py: Python<'py>) -> PyResult<Vec<(Bound<'py, PyAny>, f64)>> {
+        let search = || -> Result<Vec<PoseCandidate>, RefineError> {
+            let object = Arc::clone(&self.input.object);
+            PoseSearch::new(object, SearchSettings::default())?.run(&self.input.frame()?)
+        };
+        let found = py.detach(search).raise()?;
+        let pose = |c: &PoseCandidate| Ok((matrix(py, &c.t_cam_object)?.into_any(), c.weight));
+        found.iter().map(pose).collect()
     }
 
     /// What looks wrong with object, frame and a pose in it, in words.

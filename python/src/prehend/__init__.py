@@ -34,7 +34,7 @@ from ._version import __version__
 from .columns import ANGULAR_VELOCITY, POSITION, QUATERNION, VELOCITY
 from .evaluation import Scores, calibrate, evaluate
 from .pullback import Gradient, Pullback, vjp
-from .refinement import Estimate, Tracked, refine
+from .refinement import Estimate, Tracked, refine, search
 from .render import Image, LinearizedLoss, RenderGradient
 
 __all__ = [
@@ -80,5 +80,6 @@ __all__ = [
     "perturb",
     "refine",
     "refine_batch",
+    "search",
     "vjp",
 ]

@@ -303,8 +303,8 @@ class Hand:
 class Frame:
     def __new__(
         cls,
-        rgb: ArrayLike,
-        depth: ArrayLike,
+        rgb: ArrayLike | None,
+        depth: ArrayLike | None,
         K: ArrayLike,
         object: Object | Mesh,
         *,
@@ -326,6 +326,7 @@ class Frame:
         iterations: int | None = None,
         rivals: ArrayLike | None = None,
     ) -> Estimate: ...
+    def search(self) -> list[tuple[NDArray[np.float64], float]]: ...
     def warnings(self, pose: ArrayLike) -> list[str]: ...
     @property
     def rgb(self) -> NDArray[np.uint8]: ...

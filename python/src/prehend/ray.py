@@ -151,7 +151,9 @@ def _refined(row: Result, entry: dict[str, Any]) -> Result:
     """The row with what the journal's entry says was found."""
     pose = np.eye(4)
     pose[:3] = np.reshape(entry["pose"], (3, 4))
-    return row._replace(pose=pose, score=entry["score"], time=-1.0)
+    # A method that knows no probability keeps the score of the initial pose.
+    score = row.score if entry["score"] is None else entry["score"]
+    return row._replace(pose=pose, score=score, time=-1.0)
 
 
 def _facts(source: Source, poses: File, rivals: File | None) -> dict[str, Any]:

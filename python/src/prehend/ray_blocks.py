@@ -154,6 +154,6 @@ def _refine(source: Source, dataset: Bop, job: Job) -> dict[str, Any]:
     return {
         "index": job.row,
         "pose": estimate.pose[:3].ravel().tolist(),
-        "score": -1.0 if estimate.probability is None else estimate.probability,
+        "score": estimate.probability,
         "warnings": estimate.warnings,
     }

@@ -18,60 +18,67 @@ from ._prehend import Frame, Hand, Mesh, Object, Rig
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A refined pose, and what is known of how good it is. Only the fused methods know more than the pose."""
+    """A refined pose, and what is known of how good it is. Only the fused methods know more than the pose.
+
+    Attributes:
+        pose: 4 × 4, camera ← object [m].
+        covariance: 6 × 6, of the pose's error as a small motion in the axes of the camera: first the displacement of the object's center
+            (`Object.center`) along x, y, z [m], then the rotation about x, y, z through that center [rad]. The true pose is the motion applied after `pose`.
+        probability: That model, data and pose are right, the last within 5 mm and 5° of the true one.
+        hypotheses: The poses that the search came upon (4 × 4), each with its share of the posterior; the first is `pose`.
+        warnings: What looks wrong with object, frame and initial pose.
+        fit: Probability that model and data are right, where that was asked.
+        misfits: Evidence that is more probably of something else (another object, another frame, a hand that is elsewhere) than not, and how probably.
+        disagreements: Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
+        scales: Errors over their nominal sizes, by group: "hand", "joints", "camera", "surface".
+        unobserved: Standard deviations of surface motion along directions that the evidence says hardly anything of [m].
+        ending: Why the search ended.
+        iterations: Iterations done.
+    """
 
     pose: NDArray[np.float64]
-    """4 × 4, camera ← object [m]."""
     covariance: NDArray[np.float64] | None = None
-    """6 × 6, of the pose's error as a small motion in the axes of the camera: first the displacement of the object's center (`Object.center`) along x, y, z
-    [m], then the rotation about x, y, z through that center [rad]. The true pose is the motion applied after `pose`."""
     probability: float | None = None
-    """That model, data and pose are right, the last within 5 mm and 5° of the true one."""
     hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
-    """The poses that the search came upon (4 × 4), each with its share of the posterior; the first is `pose`."""
     warnings: list[str] = field(default_factory=list)
-    """What looks wrong with object, frame and initial pose."""
     fit: float | None = None
-    """Probability that model and data are right, where that was asked."""
     misfits: list[tuple[str, float]] = field(default_factory=list)
-    """Evidence that is more probably of something else (another object, another frame, a hand that is elsewhere) than not, and how probably."""
     disagreements: list[tuple[str, float]] = field(default_factory=list)
-    """Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance."""
     scales: list[tuple[str, float]] = field(default_factory=list)
-    """Errors over their nominal sizes, by group: "hand", "joints", "camera", "surface"."""
     unobserved: list[float] = field(default_factory=list)
-    """Standard deviations of surface motion along directions that the evidence says hardly anything of [m]."""
     ending: str = ""
-    """Why the search ended."""
     iterations: int = 0
-    """Iterations done."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """What became of a frame of a `Tracker`."""
+    """What became of a frame of a `Tracker`.
+
+    Attributes:
+        pose: 4 × 4, camera ← object [m].
+        status: "followed" (from the frame before), "found" (anew), "predicted" (no time to look), or "lost"; of the last two
+            the pose is where the object should be.
+        covariance: As of `Estimate`, unless the pose was only predicted.
+        probability: That the pose is within 5 mm and 5° of the true one, unless it was only predicted.
+        hypotheses: As of `Estimate`.
+        doubt: Why the object was not followed, if that was tried.
+        iterations: Steps that lowered the cost.
+        seconds: Time that it took [s].
+    """
 
     pose: NDArray[np.float64]
-    """4 × 4, camera ← object [m]."""
     status: str
-    """"followed" (from the frame before), "found" (anew), "predicted" (no time to look), or "lost"; of the last two the pose is where the object should be."""
     covariance: NDArray[np.float64] | None = None
-    """As of `Estimate`, unless the pose was only predicted."""
     probability: float | None = None
-    """That the pose is within 5 mm and 5° of the true one, unless it was only predicted."""
     hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
-    """As of `Estimate`."""
     doubt: str | None = None
-    """Why the object was not followed, if that was tried."""
     iterations: int = 0
-    """Steps that lowered the cost."""
     seconds: float = 0.0
-    """Time that it took [s]."""
 
 
 def refine(
-    rgb: ArrayLike,
-    depth: ArrayLike,
+    rgb: ArrayLike | None,
+    depth: ArrayLike | None,
     K: ArrayLike,
     mesh: Mesh | Object,
     pose: ArrayLike,
@@ -95,8 +102,8 @@ def refine(
     such as degrees or millimeters, is a Python warning, and in `Estimate.warnings`; the probability knows nothing of it.
 
     Args:
-        rgb: H × W × 3 of uint8.
-        depth: H × W, registered to rgb; in meters, or whole numbers in units of `depth_scale` meters; 0 or not finite where missing.
+        rgb: H × W × 3 of uint8; None for depth alone.
+        depth: H × W, registered to rgb; in meters, or whole numbers in units of `depth_scale` meters; 0 or not finite where missing. None for color alone.
         K: 3 × 3 [px].
         mesh: The object. A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
         pose: Where to begin: 4 × 4, camera ← object [m].
@@ -142,3 +149,46 @@ def refine(
     for text in estimate.warnings:
         warnings.warn(text, stacklevel=2)
     return estimate
+
+
+def search(
+    rgb: ArrayLike | None,
+    depth: ArrayLike,
+    K: ArrayLike,
+    mesh: Mesh | Object,
+    *,
+    mask: ArrayLike,
+    hand: Hand | None = None,
+    hand_pose: ArrayLike | None = None,
+    joints: Mapping[str, float] | ArrayLike | None = None,
+    touch: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    depth_scale: float | None = None,
+    lens: tuple[str, Sequence[float]] | None = None,
+    rig: Rig | None = None,
+) -> list[tuple[NDArray[np.float64], float]]:
+    """Searches an object without any pose to begin with: the same as `Frame(rgb, depth, K, mesh, …).search()`, with arguments as of `refine`.
+
+    Returns:
+        Up to four poses (4 × 4, camera ← object [m]), each with its share, the best first. `refine` takes the first, and the others as `rivals`.
+
+    Raises:
+        Error: What is wrong with the input, or why nothing was found.
+    """
+    frame = Frame(
+        rgb,
+        depth,
+        K,
+        mesh,
+        mask=mask,
+        hand=hand,
+        hand_pose=hand_pose,
+        joints=joints,
+        touch=touch,
+        gravity=gravity,
+        depth_scale=depth_scale,
+        lens=lens,
+        rig=rig,
+    )
+    found: list[tuple[NDArray[np.float64], float]] = frame.search()
+    return found

@@ -207,6 +207,10 @@ impl Strategy for Heuristic {
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         self.walk(&factors, initial.clone(), frame.object().radius, &mut recorder);
         let mut estimate = recorder.estimate(None);
+        // One gradient leaves directions open that the curvature of the others would call sure.
+        if self.gradients.len() + self.factors.len() < 2 {
+            return Ok(estimate);
+        }
         // Of all evidence that there is. A frame that lacks what the fused estimator needs has none.
         let fused = self.factors.iter().cloned().fold(Fused::default(), Fused::with);
         let posterior = fused.posterior_at(frame, initial, &estimate.state);

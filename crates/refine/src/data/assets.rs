@@ -19,8 +19,8 @@ use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{
-    self, Hand, Inertial, Object, Observation, RegionEvidence, StatedSize, Subject, Warning,
-    check_gravity,
+    self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, RegionEvidence,
+    StatedSize, Subject, Warning, check_gravity,
 };
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
@@ -185,7 +185,20 @@ impl FrameInput {
         let Self { observation, object, hand, .. } = self;
         let mut of_frame = scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
         of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
-        [scene::inspect_object(object), of_frame]
+        [scene::inspect_object(object, hand.is_some()), of_frame]
+    }
+
+    /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.
+    ///
+    /// # Errors
+    /// Those of [`CorrectionTrial::new`].
+    pub fn try_corrections(
+        &self,
+        t_cam_object: &Isometry3<f64>,
+        settings: &CorrectionSettings,
+    ) -> Result<CorrectionTrial, RefineError> {
+        let Self { observation, object, hand, .. } = self;
+        CorrectionTrial::new(observation, object, hand.as_deref(), t_cam_object, settings)
     }
 
     /// Whether the frame brings the evidence that a gradient needs.

@@ -9,6 +9,7 @@ mod cache;
 mod calibration;
 mod contact;
 mod depth_camera;
+mod depth_values;
 pub mod details;
 mod frame_file;
 pub mod identity;

@@ -46,6 +46,7 @@ impl EvaluationModel {
             object: format!("{obj_id}"),
             reason: e.to_string(),
         };
+        let mesh = mesh.faced_outward();
         let drawn = RenderModel::new(&mesh).map_err(unusable)?;
         Ok(Self { points: ScoredModel::new(mesh.vertices, symmetries), diameter, drawn })
     }

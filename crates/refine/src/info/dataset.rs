@@ -11,6 +11,8 @@ use serde::Serialize;
 use super::InfoError;
 use super::lines::{line, listed};
 use crate::data::bop::{Dataset, DatasetError, Scene};
+use crate::data::load_mesh;
+use crate::scene::likely_unit;
 use crate::symmetry::Symmetries;
 
 /// One split of a dataset.
@@ -75,6 +77,16 @@ impl DatasetInfo {
         });
         let mut infos = Vec::new();
         for id in &objects {
+            match load_mesh(models, *id) {
+                Ok(mesh) => {
+                    let (low, high) = mesh.bounds().unwrap_or_default();
+                    let extent = (high - low).norm();
+                    warnings.extend(likely_unit(extent).map(|unit| {
+                        format!("the mesh of object {id} is {extent:.4} m across: multiply its vertices by {unit} to have it in millimeters")
+                    }));
+                }
+                Err(error) => warnings.push(error.to_string()),
+            }
             match models.info(*id) {
                 Ok(info) => infos.push(info),
                 Err(error) => warnings.push(error.to_string()),

@@ -9,6 +9,10 @@ use serde::Serialize;
 
 use super::lines::{line, spaced};
 use super::{DescribeOptions, InfoError};
+use crate::scene::likely_unit;
+
+/// Where units of meshes are said.
+const UNITS: &str = "--mesh-unit, mesh_unit in a frame file, millimeters in BOP's folders";
 
 /// A triangle mesh.
 #[derive(Clone, Debug, Serialize)]
@@ -90,6 +94,13 @@ impl MeshInfo {
             warnings.push(report.to_string());
         }
         let (low, high) = mesh.bounds().unwrap_or_default();
+        let extent = (high - low).norm();
+        if let Some(unit) = likely_unit(extent) {
+            let across = extent * unit;
+            warnings.push(format!(
+                "the mesh is {extent:.4} m across, {across:.4} m if its vertices are multiplied by {unit}: is its unit right ({UNITS})?"
+            ));
+        }
         Self {
             vertices: mesh.vertices.len(),
             faces: mesh.faces.len(),

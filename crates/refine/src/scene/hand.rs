@@ -55,7 +55,7 @@ impl Hand {
                     link: tree.links()[index].name.clone(),
                     reason: e.to_string(),
                 };
-                Ok((index, RenderModel::new(part).map_err(fault)?))
+                Ok((index, RenderModel::new(&part.clone().faced_outward()).map_err(fault)?))
             })
             .collect::<Result<_, RobotError>>()?;
         Ok(Self { tree, shape, taxels, bodies })

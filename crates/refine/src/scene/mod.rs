@@ -1,6 +1,7 @@
 //! What there is: one [`Observation`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
 
 mod calibration;
+mod correction;
 mod example;
 mod frame;
 mod hand;
@@ -17,13 +18,16 @@ mod touch;
 mod view;
 
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
+pub use correction::{
+    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
+};
 pub use example::{Scene, default_scene};
 pub use frame::{CameraView, Frame, Occluders};
 pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded};
 pub use hand::Hand;
 pub(crate) use inducing_points::far_apart;
 pub use inspect::{Subject, Warning};
-pub(crate) use inspect::{inspect_object, inspect_pose};
+pub(crate) use inspect::{inspect_object, inspect_pose, likely_unit};
 pub use object::{Inertial, Object, StatedSize};
 pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
 pub(crate) use region::{

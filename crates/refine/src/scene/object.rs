@@ -46,7 +46,7 @@ const SMOOTHED: f64 = 10e-3;
 pub struct Object {
     /// Name for messages.
     pub name: String,
-    /// The mesh in meters, as loaded.
+    /// The mesh in meters, as loaded, its faces turned outward.
     pub mesh: TriMesh,
     /// What cleaning found and did.
     pub report: MeshReport,
@@ -177,6 +177,8 @@ impl Object {
             )));
         }
         let (solid, report) = mesh.cleaned();
+        let turned = report.inverted_shells + report.flipped_faces > 0;
+        let mesh = if turned { mesh.faced_outward() } else { mesh };
         let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
         if solid.area() <= 1e-12 * (high - low).norm_squared() {
             return Err(fail("the mesh is degenerate: its faces have no area".into()));

@@ -32,7 +32,7 @@ fn a_rig_its_models_its_poses_and_a_report_are_written() {
     assert_eq!(rows.len(), 2);
     for row in &rows {
         let pe = pe_cm(&row.t_cam_model, &truth);
-        assert!(pe < 0.4 && row.score == -1.0, "{pe} cm");
+        assert!(pe < 0.4, "{pe} cm");
     }
     // The file is all that a refinement needs; frame by frame, the same is learnt in the end.
     let refine = "refine --dataset ds --poses ds/init.csv --image 0 --rig rig.json --out f.csv";

@@ -3,6 +3,7 @@
 use std::fs;
 use std::process::Stdio;
 
+use prehend_refine::data::bop::write_results;
 use serde_json::{Value, json};
 
 use crate::fixture::Workplace;
@@ -58,13 +59,15 @@ fn methods_are_picked_by_name_and_changed_by_options() {
     assert_eq!(depth["trace"]["terms"], json!(["depth"]));
     assert_eq!(depth["trace"]["iterations"].as_array().unwrap().len(), 4);
     assert_eq!(depth["iteration"], json!(3));
-    // The score is the confidence of a method that has one, and −1 of others.
-    let probability = depth["confidence"]["probability"].as_f64().unwrap();
-    assert!((place.poses("r.csv")[0].score - probability).abs() < 1e-12);
+    // The score is the probability of a method that knows one, and of others that of the initial pose: one gradient knows none.
+    let initial = place.poses("ds/init.csv")[0].score;
+    assert_eq!((&depth["confidence"], place.poses("r.csv")[0].score), (&Value::Null, initial));
     let two = trace("--method depth --terms depth,tactile --iterations 1");
     assert_eq!(two["trace"]["terms"], json!(["depth", "tactile"]));
+    let probability = two["confidence"]["probability"].as_f64().unwrap();
+    assert!((place.poses("r.csv")[0].score - probability).abs() < 1e-12);
     let robust = trace("--method robust-icp");
-    assert_eq!(place.poses("r.csv")[0].score, -1.0);
+    assert_eq!(place.poses("r.csv")[0].score, initial);
     assert_eq!(
         (&robust["iteration"], &robust["trace"]["terms"]),
         (&json!(60), &json!(["robust-icp"]))
@@ -149,12 +152,13 @@ fn check_draws_every_pose_and_warns() {
     let said = place.prehend("check --dataset ds --poses ds/init.csv --report look");
     assert_eq!(said.code, 0, "{}", said.err);
     for warning in [
-        "scene 1 image 0 object 5: sensor depth is 1",
-        "scene 1 image 1 object 5: the object's mass is unknown",
+        "ds/test/000001/scene_camera.json: depth_scale: depth is in another unit; multiply depth_scale by 0.001",
+        "object 5: the object's mass is unknown",
     ] {
-        assert!(said.err.contains(warning), "{}", said.err);
+        assert_eq!(said.err.matches(warning).count(), 1, "{}", said.err);
     }
-    assert!(place.read("look/index.html").contains("check depth_scale and units"));
+    assert_eq!(said.err.lines().count(), 2, "{}", said.err);
+    assert!(place.read("look/index.html").contains("depth is in another unit"));
 }
 
 /// A fault in the files of one image is named for that image, and for no other.
@@ -194,7 +198,8 @@ fn check_names_what_is_wrong_with_hand_forces_and_models() {
     let told = edited("ds/models/models_info.json", &|all| {
         all["5"]["diameter"] = json!(0.9 * all["5"]["diameter"].as_f64().unwrap());
     });
-    assert_eq!(told.matches("1.1111 times").count(), 2, "{told}");
+    assert_eq!(told.matches("object 5: the mesh is").count(), 1, "{told}");
+    assert!(told.contains("1.1111 times"), "{told}");
     assert_eq!(check(), "");
 }
 
@@ -202,26 +207,68 @@ fn check_names_what_is_wrong_with_hand_forces_and_models() {
 fn a_plain_bop_dataset_can_be_checked_and_refined() {
     let place = Workplace::new();
     place.remove("ds/test/000001/scene_tactile.json");
-    let check = || place.prehend("check --dataset ds --poses ds/init.csv --image 0 --report look");
-    let said = check();
-    let expected = "no ds/test/000001/scene_tactile.json: --method combined needs --terms physics,rendering,depth";
-    assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
+    const CHECK: &str = "check --dataset ds --poses ds/init.csv --image 0 --report look";
+    let told = |expected: &str| {
+        // What a plain BOP dataset does not have is nothing wrong.
+        place.succeed(CHECK);
+        let said = place.prehend(&format!("{CHECK} -v"));
+        assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
+    };
+    told(
+        "no ds/test/000001/scene_tactile.json: --method combined needs --terms physics,rendering,depth",
+    );
     place.succeed(&format!("{REFINE} --terms physics,rendering,depth --out r.csv"));
     place.remove("ds/test/000001/scene_bodies.json");
     place.remove("ds/hand");
     place.remove("ds/models/models_info.json");
-    let said = check();
-    let expected =
-        "no ds/test/000001/scene_bodies.json: --method combined needs --terms rendering,depth";
-    assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
-    let said = place.prehend(&format!("{REFINE} --terms rendering,depth --out r.csv"));
-    assert_eq!((said.code, place.poses("r.csv").len()), (0, 2), "{}", said.err);
-    assert!(
-        said.err.starts_with("warning: object 5: the object's mass is unknown"),
-        "{}",
+    told("no ds/test/000001/scene_bodies.json: --method combined needs --terms rendering,depth");
+    place.succeed(&format!("{REFINE} --terms rendering,depth --out r.csv"));
+    assert_eq!(place.poses("r.csv").len(), 2);
+}
+
+#[test]
+fn check_names_mistakes_by_file_and_field() {
+    let place = Workplace::new();
+    let rows = place.poses("ds/init.csv");
+    let check = |poses: &str| {
+        let said = place.prehend(&format!("check --dataset ds --poses {poses} --report look"));
+        assert_eq!((said.code, said.err.lines().count()), (0, 1), "{}", said.err);
         said.err
-    );
-    assert_eq!(said.err.lines().count(), 1);
+    };
+    let mut inverted = rows.clone();
+    inverted.iter_mut().for_each(|row| row.t_cam_model = row.t_cam_model.inverse());
+    write_results(&place.path("inverted.csv"), &inverted).unwrap();
+    let told = check("inverted.csv");
+    assert!(told.starts_with("warning: inverted.csv: R and t: poses are inverted"), "{told}");
+    assert!(told.contains("R ← Rᵀ, t ← −Rᵀt"), "{told}");
+    assert!(place.read("look/index.html").contains("poses are inverted"));
+    let mut meters = rows;
+    meters.iter_mut().for_each(|row| row.t_cam_model.translation.vector *= 1e-3);
+    write_results(&place.path("meters.csv"), &meters).unwrap();
+    let told = check("meters.csv");
+    assert!(told.contains("meters.csv: t: ") && told.contains("multiply t by 1000"), "{told}");
+}
+
+/// BOP folders of one camera have nothing but camera.json.
+#[test]
+fn one_camera_of_all_images() {
+    let place = Workplace::new();
+    place.succeed(&format!("{REFINE} --out r.csv"));
+    let entry = place.json("ds/test/000001/scene_camera.json")["0"].clone();
+    let k = &entry["cam_K"];
+    let camera = json!({"fx": k[0], "cx": k[2], "fy": k[4], "cy": k[5], "depth_scale": entry["depth_scale"]});
+    place.write("ds/camera.json", &camera.to_string());
+    place.remove("ds/test/000001/scene_camera.json");
+    place.succeed(&format!("{REFINE} --out other.csv"));
+    assert_eq!(place.read("r.csv"), place.read("other.csv"));
+}
+
+#[test]
+fn results_in_a_folder_are_named_as_bop_has_it() {
+    let place = Workplace::new();
+    fs::create_dir(place.path("my_results")).unwrap();
+    place.succeed(&format!("{REFINE} --out my_results"));
+    assert_eq!(place.poses("my_results/combined_ds-test.csv").len(), 2);
 }
 
 #[test]
@@ -303,7 +350,9 @@ fn a_frame_file_is_as_good_as_a_dataset() {
     assert!(told.contains("1 picture; open look/index.html"), "{told}");
     place.replace("ds/frame.json", "\"depth_unit_m\":0.0001", "\"depth_unit_m\":0.001");
     let said = place.prehend("check --frame ds/frame.json --report look");
-    assert!(said.err.starts_with("warning: sensor depth is 10."), "{}", said.err);
+    let expected = "warning: ds/frame.json: depth_unit_m: depth is in another unit; multiply depth_unit_m by 0.1";
+    assert!(said.err.starts_with(expected), "{}", said.err);
+    assert_eq!(said.err.lines().count(), 1, "{}", said.err);
     place.write("ds/frame.json", &frame.to_string());
     // Few, because contacts that come and go amplify what texts are rounded by.
     let printed = place.succeed("refine --frame ds/frame.json --method combined --iterations 3");

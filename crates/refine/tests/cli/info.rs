@@ -17,8 +17,10 @@ fn meshes() {
     let mesh = told(&place, path);
     assert_eq!((&mesh["kind"], &mesh["path"]), (&json!("mesh"), &json!(path)));
     assert_eq!((&mesh["watertight"], &mesh["mass"]), (&json!(true), &Value::Null));
-    assert_eq!(mesh["warnings"], json!([]));
+    let warning = mesh["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("m if its vertices are multiplied by 0.001"), "{warning}");
     let weighed = told(&place, &format!("{path} --mesh-unit mm --density 1000"));
+    assert_eq!(weighed["warnings"], json!([]));
     let size = |told: &Value| told["size_m"][2].as_f64().unwrap();
     assert!((size(&weighed) - 1e-3 * size(&mesh)).abs() < 1e-12);
     let mass = &weighed["mass"];

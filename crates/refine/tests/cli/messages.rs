@@ -24,7 +24,7 @@ fn told(place: &Workplace, options: &str, variable: (&str, &str)) -> String {
 fn levels_choose_what_is_told() {
     let place = place();
     let told = |options: &str, level: &str| told(&place, options, ("PREHEND_LOG", level));
-    let warned = |text: &str| text.contains("warning: scene 1 image 0 object 5: the object's mass");
+    let warned = |text: &str| text.contains("warning: object 5: the object's mass");
     let debugged = |text: &str| text.contains("debug: cache folder");
     assert!(warned(&told("", "")) && !debugged(&told("", "")));
     assert_eq!(told("--quiet", ""), "");

@@ -331,9 +331,10 @@ fn images_that_cannot_serve() {
     });
     let dataset = fixture.open();
     let frame = dataset.frame(4, 0).unwrap();
-    assert_eq!(frame.depth(), Err(DatasetError::NoDepth { file: depth.clone() }));
-    assert_eq!(frame.mask(0), Err(DatasetError::EmptyMask { file: mask }));
-    assert_eq!(frame.observation(0).unwrap_err(), DatasetError::NoDepth { file: depth });
+    assert_eq!(frame.depth(), Err(DatasetError::NoDepth { file: depth }));
+    assert_eq!(frame.mask(0), Err(DatasetError::EmptyMask { file: mask.clone() }));
+    // Without depth there is color.
+    assert_eq!(frame.observation(0).unwrap_err(), DatasetError::EmptyMask { file: mask });
     let error = dataset.frame(4, 3).unwrap().observation(0).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}: is 3x4 pixels but ", odd.display())), "{error}");
     assert!(error.ends_with("000003.jpg is 4x3"), "{error}");

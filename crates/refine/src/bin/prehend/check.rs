@@ -1,14 +1,19 @@
 //! `prehend check`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::data::{AssetError, Assets, FrameInput, load_frame_file};
+use prehend_refine::data::bop::{Dataset, DatasetError};
+use prehend_refine::data::{AssetError, Assets, FrameInput, Target, load_frame_file};
 use prehend_refine::evaluate::report::{Report, outline_picture};
-use prehend_refine::scene::Warning;
+use prehend_refine::scene::{
+    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning,
+    find_corrections,
+};
 use prehend_render::RgbImage;
 
 use crate::options::{Job, Selection};
@@ -46,7 +51,17 @@ impl Check {
     fn frame(&self, file: &Path) -> anyhow::Result<ExitCode> {
         let (input, t_cam_object) = load_frame_file(file, 0, cache().as_ref(), None)?;
         let mut report = Report::create(&self.report, "Input")?;
-        let (picture, warnings) = drawn(&input, &t_cam_object);
+        let settings = CorrectionSettings::default();
+        // No scene, no image, no object: one frame of a file of its own.
+        let target = Target { scene_id: 0, im_id: 0, obj_id: 0, instance: 0 };
+        let trial = input.try_corrections(&t_cam_object, &settings)?;
+        let findings = find_corrections(&[(target, trial)], &settings);
+        let names = names_of_frame(file);
+        let mut warnings: Vec<String> =
+            findings.iter().map(|found| found.message(&names)).collect();
+        let (picture, others) = drawn(&input, &t_cam_object);
+        let told = |warning: &Warning| findings.iter().any(|found| explains(found, warning));
+        warnings.extend(others.iter().filter(|w| !told(w)).map(Warning::to_string));
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         report.add_picture(&file.display().to_string(), &picture, &warnings)?;
         say(format!("1 picture; open {}", report.finish()?.display()))?;
@@ -58,19 +73,53 @@ impl Check {
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        let findings = mistakes(&mut assets, &jobs);
+        let named = |(found, targets): (Finding, Vec<Target>)| {
+            let message = found.message(&names_of_dataset(&dataset, poses, &targets)?);
+            match &targets[..] {
+                [target] if jobs.len() > 1 => log::warn!("{target}: {message}"),
+                _ => log::warn!("{message}"),
+            }
+            Ok((found, targets, message))
+        };
+        let findings = findings.into_iter().map(named).collect::<Result<Vec<_>, DatasetError>>()?;
         let mut report = Report::create(&self.report, "Input")?;
-        let mut done = 0;
+        let (mut done, mut introduced) = (0, BTreeSet::new());
         let bar = progress(jobs.len(), "drawing");
         for job in bar.wrap_iter(jobs.iter()) {
-            match check(&mut assets, job) {
+            let Job { target, row, .. } = job;
+            let checked = assets.load_at(target, &row.t_cam_model, &[]).map(|input| {
+                without(&dataset, &input, target);
+                drawn(&input, &row.t_cam_model)
+            });
+            match checked {
                 Ok((picture, warnings)) => {
+                    // Of many frames some alone were tried.
+                    let alike =
+                        |t: &Target| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id);
+                    let is_meant = |targets: &[Target]| match targets {
+                        [only] => only == target,
+                        all => all.iter().any(alike),
+                    };
+                    let of_frame = || findings.iter().filter(|(_, targets, _)| is_meant(targets));
+                    let mut remarks: Vec<String> =
+                        of_frame().map(|(.., message)| message.clone()).collect();
                     for warning in &warnings {
-                        warn(&bar, job.target, warning);
+                        if of_frame().any(|(found, ..)| explains(found, warning)) {
+                            continue;
+                        }
+                        let text = warning.to_string();
+                        if warning.subject != Subject::Model {
+                            warn(&bar, target, &text);
+                        } else if introduced.insert((target.obj_id, text.clone())) {
+                            warn(&bar, format!("object {}", target.obj_id), &text);
+                        }
+                        remarks.push(text);
                     }
-                    report.add_picture(&job.target.to_string(), &picture, &warnings)?;
+                    report.add_picture(&target.to_string(), &picture, &remarks)?;
                     done += 1;
                 }
-                Err(error) => failures.push(format!("{}: {error}", job.target)),
+                Err(error) => failures.push(format!("{target}: {error}")),
             }
         }
         if done > 0 {
@@ -80,30 +129,109 @@ impl Check {
     }
 }
 
-fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), AssetError> {
-    let input = assets.load(&job.target, &[])?;
-    let FrameInput { observation, hand, .. } = &input;
-    let touches = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
-    // Plain BOP datasets have neither file.
-    let absent = match hand {
-        None => Some(("scene_bodies.json", "rendering,depth")),
-        Some(_) if !touches => Some(("scene_tactile.json", "physics,rendering,depth")),
-        Some(_) => None,
+/// Mistakes that many of the frames have in common, each with the targets that it was found in. Frames that cannot be read are left out.
+fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Finding, Vec<Target>)> {
+    let settings = CorrectionSettings::default();
+    let stride = jobs.len().div_ceil(settings.frames).max(1);
+    let bar = progress(jobs.len() / stride, "comparing");
+    let mut attempt = |job: &Job| -> Result<(Target, CorrectionTrial), AssetError> {
+        let input = assets.load_at(&job.target, &job.row.t_cam_model, &[])?;
+        let trial = input.try_corrections(&job.row.t_cam_model, &settings)?;
+        let (agreement, scale) = (trial.agreement(), trial.model_scale());
+        log::debug!("{}: agreement {agreement:.3}, scale and deviation {scale:?}", job.target);
+        Ok((job.target, trial))
     };
-    let (picture, mut warnings) = drawn(&input, &job.row.t_cam_model);
-    if let Some((name, terms)) = absent {
-        let file = assets.dataset().scene(job.target.scene_id)?.dir().join(name);
-        let file = file.display();
-        let absent = format!("there is no {file}: --method combined needs --terms {terms}");
-        warnings.insert(0, absent);
+    let trials = bar.wrap_iter(jobs.iter().step_by(stride)).filter_map(|job| attempt(job).ok());
+    let trials: Vec<(Target, CorrectionTrial)> = trials.collect();
+    let targets = |found: &Finding| found.frames.iter().map(|&k| trials[k].0).collect();
+    let found = find_corrections(&trials, &settings);
+    found
+        .into_iter()
+        .map(|found| {
+            let targets = targets(&found);
+            (found, targets)
+        })
+        .collect()
+}
+
+/// Whether a warning tells of what a correction would mend.
+fn explains(found: &Finding, warning: &Warning) -> bool {
+    let unit = matches!(found.correction, Correction::ModelUnit | Correction::ModelAndPoseUnit);
+    match warning.subject {
+        Subject::Model => unit && warning.unit == "m",
+        // Where the object is, not how hard it is felt.
+        Subject::Touch => found.agreement.is_some() && warning.unit == "cm",
+        Subject::Hand => found.correction == Correction::FocalLength || found.agreement.is_some(),
+        Subject::Pose | Subject::Mask | Subject::Depth => true,
     }
-    Ok((picture, warnings))
+}
+
+/// Says what a plain BOP dataset does not have, and which methods need it.
+fn without(dataset: &Dataset, input: &FrameInput, target: &Target) {
+    let touches = input.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
+    let (name, terms) = match &input.hand {
+        None => ("scene_bodies.json", "rendering,depth"),
+        Some(_) if !touches => ("scene_tactile.json", "physics,rendering,depth"),
+        Some(_) => return,
+    };
+    if let Ok(scene) = dataset.scene(target.scene_id) {
+        let file = scene.dir().join(name);
+        log::info!(
+            "{target}: there is no {}: --method combined needs --terms {terms}",
+            file.display()
+        );
+    }
+}
+
+/// Files and fields of the poses on `targets`.
+fn names_of_dataset(
+    dataset: &Dataset,
+    poses: &Path,
+    targets: &[Target],
+) -> Result<FieldNames, DatasetError> {
+    let only = |id: fn(&Target) -> u32| {
+        let ids: BTreeSet<u32> = targets.iter().map(id).collect();
+        ids.first().copied().filter(|_| ids.len() == 1)
+    };
+    let scene = match only(|target| target.scene_id) {
+        Some(id) => dataset.scene(id)?.dir().to_owned(),
+        None => dataset.split_dir().join("*"),
+    };
+    let models = dataset.models();
+    let mesh = match only(|target| target.obj_id) {
+        Some(id) => models.mesh_path(id)?,
+        None => models.dir().join("*.ply"),
+    };
+    Ok(FieldNames {
+        poses: poses.display().to_string(),
+        rotation: "R",
+        translation: "t",
+        mesh: mesh.display().to_string(),
+        camera: scene.join("scene_camera.json").display().to_string(),
+        intrinsics: "cam_K",
+        depth_scale: "depth_scale",
+        masks: scene.join("mask_visib").display().to_string(),
+    })
+}
+
+/// Fields of a frame file.
+fn names_of_frame(file: &Path) -> FieldNames {
+    let file = file.display();
+    FieldNames {
+        poses: file.to_string(),
+        rotation: "pose",
+        translation: "pose.translation",
+        mesh: format!("{file}: mesh, mesh_unit"),
+        camera: file.to_string(),
+        intrinsics: "K",
+        depth_scale: "depth_unit_m",
+        masks: format!("{file}: mask"),
+    }
 }
 
 /// The object at a pose, and the hand, over their image; and what looks wrong.
-fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, Vec<String>) {
+fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, Vec<Warning>) {
     let FrameInput { observation, object, hand, .. } = input;
     let warnings = input.warnings(t_cam_object).concat();
-    let picture = outline_picture(observation, object, hand.as_deref(), t_cam_object);
-    (picture, warnings.iter().map(Warning::to_string).collect())
+    (outline_picture(observation, object, hand.as_deref(), t_cam_object), warnings)
 }

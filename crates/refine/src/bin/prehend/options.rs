@@ -174,6 +174,22 @@ impl Selection {
         }
     }
 
+    /// The results file `out`, or in a folder of that name the file that BOP's convention has for this dataset: METHOD_DATASET-SPLIT.csv.
+    pub(crate) fn results_file(&self, out: &Path, method: &str) -> Result<PathBuf, DatasetError> {
+        if !out.is_dir() {
+            return Ok(out.to_owned());
+        }
+        // Names are taken apart at these.
+        let plain = |path: &Path| -> String {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            name.replace(['_', '-'], "")
+        };
+        let dataset = self.open()?;
+        let root = self.dataset.canonicalize().unwrap_or_else(|_| self.dataset.clone());
+        let (name, split) = (plain(&root), plain(dataset.split_dir()));
+        Ok(out.join(format!("{}_{name}-{split}.csv", method.replace('_', "-"))))
+    }
+
     /// Whether an object of an image is meant.
     pub(crate) fn admits(&self, scene_id: u32, im_id: u32, obj_id: u32) -> bool {
         self.admits_image(scene_id, im_id) && admits(&self.object, obj_id)

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
@@ -10,6 +11,7 @@ use serde::Deserialize;
 use super::error::DatasetError;
 use super::json::JsonFile;
 use super::models::Models;
+use super::one_camera::scene_camera;
 use crate::scene::RemapCache;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
@@ -38,6 +40,8 @@ pub struct Scene {
     pub(super) objects: JsonFile,
     pub(super) remaps: Arc<RemapCache>,
     pub(super) depth_remaps: Arc<RemapCache>,
+    /// Warnings of depth images that were given: of values that are none, and of images that measure nothing.
+    pub(super) told_of_depth: Arc<[AtomicBool; 2]>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
 }
@@ -84,10 +88,13 @@ impl Dataset {
     /// When that folder is absent or holds no scenes.
     pub fn open_split(root: &Path, split: &str) -> Result<Self, DatasetError> {
         let split_dir = root.join(split);
+        let told_of_depth = Arc::default();
+        let camera = JsonFile::new(root.join("camera.json"));
         let scenes: BTreeMap<u32, Scene> = subfolders(&split_dir)?
             .iter()
             .filter_map(|name| Some((scene_id(name)?, split_dir.join(name))))
-            .map(|(id, dir)| (id, Scene::new(id, dir, root)))
+            .map(|(id, dir)| (id, Scene::new(id, dir, root, &camera)))
+            .map(|(id, scene)| (id, Scene { told_of_depth: Arc::clone(&told_of_depth), ..scene }))
             .collect();
         if scenes.is_empty() {
             return Err(no_scenes(&split_dir));
@@ -97,24 +104,26 @@ impl Dataset {
             split_dir,
             scenes,
             models: Models::new(root.join("models")),
-            camera: JsonFile::new(root.join("camera.json")),
+            camera,
         })
     }
 
     /// The same with files that are read anew, for somebody may have gone on writing them.
     pub fn reread(&self) -> Self {
+        let camera = JsonFile::new(self.root.join("camera.json"));
         let again = |scene: &Scene| {
-            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root);
+            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root, &camera);
             let (remaps, depth_remaps) =
                 (Arc::clone(&scene.remaps), Arc::clone(&scene.depth_remaps));
-            (scene.id, Scene { remaps, depth_remaps, ..new })
+            let told_of_depth = Arc::clone(&scene.told_of_depth);
+            (scene.id, Scene { remaps, depth_remaps, told_of_depth, ..new })
         };
         Self {
             root: self.root.clone(),
             split_dir: self.split_dir.clone(),
             scenes: self.scenes.values().map(again).collect(),
             models: Models::new(self.root.join("models")),
-            camera: JsonFile::new(self.root.join("camera.json")),
+            camera,
         }
     }
 
@@ -150,16 +159,17 @@ impl Dataset {
 }
 
 impl Scene {
-    fn new(id: u32, dir: PathBuf, root: &Path) -> Self {
+    fn new(id: u32, dir: PathBuf, root: &Path, camera: &JsonFile) -> Self {
         Self {
             id,
             root: root.to_path_buf(),
-            camera: JsonFile::new(dir.join("scene_camera.json")),
+            camera: scene_camera(&dir, camera),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
             objects: JsonFile::new(dir.join("scene_gt.json")),
             remaps: Arc::default(),
             depth_remaps: Arc::default(),
+            told_of_depth: Default::default(),
             rigs: OnceLock::new(),
             dir,
         }

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use nalgebra::Isometry3;
 use prehend_render::{
@@ -17,6 +18,7 @@ use super::lens::Lens;
 use super::pose::translation_from_mm;
 use super::touch::Tactile;
 use crate::data::depth_camera::DepthCamera;
+use crate::data::depth_values::drop_saturated;
 use crate::scene::Observation;
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
@@ -167,7 +169,7 @@ impl Frame<'_> {
         self.undistorted(&file, stored, size, Remap::rgb)
     }
 
-    /// Reads the depth image, registered to the color image.
+    /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.
     ///
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
@@ -185,7 +187,11 @@ impl Frame<'_> {
     /// The same, registered to a color image of that size; of the depth image's without one.
     fn depth_of(&self, color: Option<(usize, usize)>) -> Result<DepthImage, DatasetError> {
         let file = self.depth_path();
-        let stored = DepthImage::load(&file, self.depth_scale * 1e-3)?;
+        let unit = self.depth_scale * 1e-3;
+        let mut stored = DepthImage::load(&file, unit)?;
+        if let Some(warning) = drop_saturated(&mut stored, unit) {
+            self.warn_once(0, &file, warning);
+        }
         let size = (stored.width(), stored.height());
         let depth = match &self.depth_camera {
             None => self.undistorted(&file, stored, size, Remap::depth)?,
@@ -200,6 +206,13 @@ impl Frame<'_> {
             Err(DatasetError::NoDepth { file })
         } else {
             Ok(depth)
+        }
+    }
+
+    /// Warns of the depth image in `file`, once a dataset of each of two kinds.
+    fn warn_once(&self, kind: usize, file: &Path, warning: String) {
+        if !self.scene.told_of_depth[kind].swap(true, Ordering::Relaxed) {
+            log::warn!("{}: {warning} (other images are not named)", file.display());
         }
     }
 
@@ -326,7 +339,8 @@ impl Frame<'_> {
         self.scene.dir().join("depth").is_dir()
     }
 
-    /// The same with an empty mask. A scene without color has black pictures, one without depth measures nothing.
+    /// The same with an empty mask. A scene without color has black pictures, one without depth measures nothing, and so do depth images of zeros beside
+    /// color, of which is warned once a dataset.
     ///
     /// # Errors
     /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
@@ -346,12 +360,16 @@ impl Frame<'_> {
             let problem = "is of a camera beside the color camera, and the scene has no rgb";
             return Err(self.fault(&self.scene.camera, "depth_K", problem));
         }
-        let depth = if self.has_depth() || color.is_none() {
-            self.depth_of(size)?
-        } else {
-            let (width, height) = size.unwrap_or_default();
-            DepthImage::filled(width, height, 0.0)
+        let depth = (self.has_depth() || color.is_none()).then(|| self.depth_of(size));
+        let depth = match depth.transpose() {
+            Err(DatasetError::NoDepth { file }) if color.is_some() => {
+                self.warn_once(1, &file, "every depth is zero: color alone is used".to_owned());
+                None
+            }
+            read => read?,
         };
+        let (width, height) = size.unwrap_or_default();
+        let depth = depth.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
         let (width, height) = (depth.width(), depth.height());
         let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));

@@ -34,6 +34,16 @@ impl JsonFile {
         Self { path, root: OnceLock::new(), is_told: AtomicBool::new(false) }
     }
 
+    /// The same with `text` in place of what is in the file.
+    pub(super) fn with_text(path: PathBuf, text: &str) -> Self {
+        let file = Self::new(path);
+        let entries = Entries::new(text.as_bytes());
+        // Nothing else has read it yet.
+        let _ =
+            file.root.set(entries.map_err(|problem| DatasetError::unusable(&file.path, problem)));
+        file
+    }
+
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -53,6 +63,14 @@ impl JsonFile {
             Entries::new(&text).map_err(|problem| DatasetError::unusable(&self.path, problem))
         };
         self.root.get_or_init(read).as_ref().map_err(Clone::clone)
+    }
+
+    /// All of the file.
+    ///
+    /// # Errors
+    /// When it is absent or broken, or not of the type.
+    pub(super) fn whole<T: DeserializeOwned>(&self) -> Result<T, DatasetError> {
+        read_json(&self.path)
     }
 
     fn value(&self, name: &str) -> Result<Option<Value>, DatasetError> {

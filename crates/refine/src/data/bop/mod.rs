@@ -19,6 +19,7 @@ mod json;
 mod lens;
 mod models;
 mod models_info;
+mod one_camera;
 mod pose;
 mod results;
 mod rivals;

@@ -7,6 +7,7 @@ use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage, image_size};
 use super::layout::ImagesLayout;
 use crate::data::bop::{DatasetError, Lens};
 use crate::data::depth_camera::DepthCamera;
+use crate::data::depth_values::drop_saturated;
 use crate::scene::{Observation, RemapCache};
 
 impl ImagesLayout<'_> {
@@ -48,7 +49,15 @@ impl ImagesLayout<'_> {
             (None, _) => None,
             (Some(_), None) => return Err(field("depth_unit_m", "is missing".to_owned())),
             (Some(path), Some(unit)) => {
-                Some(DepthImage::load(&folder.join(path), unit.0).map_err(broken)?)
+                let path = folder.join(path);
+                let mut depth = DepthImage::load(&path, unit.0).map_err(broken)?;
+                if let Some(warning) = drop_saturated(&mut depth, unit.0) {
+                    log::warn!("{}: {warning}", path.display());
+                }
+                if depth.pixels().iter().all(|z| *z == 0.0) {
+                    log::warn!("{}: every depth is zero", path.display());
+                }
+                Some(depth)
             }
         };
         let mut mask = match self.mask {

@@ -5,6 +5,8 @@ use std::path::Path;
 use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::{DepthImage, Mask, RgbImage};
 
+use crate::data::depth_values::drop_saturated;
+
 use super::messages::{CompressedImage, Header, Image, Named, decode};
 
 /// What a topic of images shows.
@@ -71,7 +73,9 @@ pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
             return Err("compressed depth is read if it has 16 bits, not 32".to_owned());
         }
         let name = Path::new(image.format);
-        return DepthImage::decode(png, MILLIMETER, name).map_err(|e| e.to_string());
+        let mut depth = DepthImage::decode(png, MILLIMETER, name).map_err(|e| e.to_string())?;
+        drop_saturated(&mut depth, MILLIMETER);
+        return Ok(depth);
     }
     let image: Image<'_> = decode(data)?;
     let big = image.is_bigendian != 0;
@@ -81,7 +85,10 @@ pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
                 true => u16::from_be_bytes(bytes),
                 false => u16::from_le_bytes(bytes),
             };
-            let meters = |bytes| (f64::from(millimeters(bytes)) * MILLIMETER) as f32;
+            let meters = |bytes| match millimeters(bytes) {
+                u16::MAX => 0.0,
+                units => (f64::from(units) * MILLIMETER) as f32,
+            };
             rows(&image, 2)?.flat_map(|row| row.as_chunks().0).map(|b| meters(*b)).collect()
         }
         "32FC1" => {

@@ -16,14 +16,17 @@ mod touch;
 mod warning;
 
 use nalgebra::{Isometry3, Translation3};
+use prehend_render::DepthImage;
 
+pub(crate) use self::model::likely_unit;
 pub use self::warning::{Subject, Warning};
+use super::correction::{CorrectionSettings, settled_pose};
 use super::view::View;
-use super::{Hand, Object, Observation};
+use super::{Hand, HandMeasurement, Object, Observation};
 
-/// What looks wrong with an object's model; empty if all looks well.
-pub(crate) fn inspect_object(object: &Object) -> Vec<Warning> {
-    model::inspect(object)
+/// What looks wrong with an object's model; empty if all looks well. What was assumed of its mass and its inside matters if it is `held`.
+pub(crate) fn inspect_object(object: &Object, held: bool) -> Vec<Warning> {
+    model::inspect(object, held)
 }
 
 /// What looks wrong with an observation, and with the object at a pose (object → camera) in it; empty if all looks well.
@@ -61,6 +64,32 @@ pub(crate) fn inspect_pose(
     if !model::is_plausible(object) {
         return warnings;
     }
+    let compared = |t_cam_object: &Isometry3<f64>, is_settled: bool| {
+        compare(observation, object, hand, drawn.clone(), touch, t_cam_object, is_settled)
+    };
+    let found = compared(t_cam_object, false);
+    let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
+    // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
+    let settled = found.iter().any(of_pose).then(|| {
+        let hand = hand.map(|(hand, _)| hand);
+        settled_pose(observation, object, hand, t_cam_object, &CorrectionSettings::default())
+    });
+    let settled = settled.flatten().map(|pose| compared(&pose, true));
+    warnings.extend(settled.unwrap_or(found));
+    warnings
+}
+
+/// What looks wrong where the object at a pose and the hand, as it is `drawn`, are compared with what is seen; a pose that `is_settled` there fits.
+fn compare(
+    observation: &Observation,
+    object: &Object,
+    hand: Option<(&Hand, &HandMeasurement)>,
+    drawn: Option<DepthImage>,
+    touch: Option<(&Hand, &HandMeasurement)>,
+    t_cam_object: &Isometry3<f64>,
+    is_settled: bool,
+) -> Vec<Warning> {
+    let z = (t_cam_object * object.center).z;
     let hand_drawn = drawn.is_some();
     let view = View::new(observation, &observation.camera, object, drawn, t_cam_object);
     let of_depth = depth::inspect(&view, object);
@@ -70,9 +99,9 @@ pub(crate) fn inspect_pose(
     let depth_wrong = blamed(Subject::Depth);
     let (off_object, mask_fits) =
         if depth_wrong { (None, false) } else { mask::off_object(&view, object, hand_fits) };
-    let at_pose = mask::at_pose(&view, z, mask_fits, hand_wrong);
+    let at_pose = if is_settled { None } else { mask::at_pose(&view, z, mask_fits, hand_wrong) };
     let pose_fits = at_pose.is_none();
-    warnings.extend(of_depth);
+    let mut warnings = of_depth;
     warnings.extend(at_pose);
     warnings.extend(off_object);
     if let Some((hand, measured)) = touch.filter(|_| hand_fits && pose_fits) {

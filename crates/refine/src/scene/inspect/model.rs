@@ -16,20 +16,25 @@ const SIZE_TOLERANCE: f64 = 0.02;
 /// Ratios nearer than this to a power of ten are those of units.
 const UNIT_TOLERANCE: f64 = 0.1;
 
-/// What looks wrong with the model of `object`.
-pub(super) fn inspect(object: &Object) -> Vec<Warning> {
+/// What looks wrong with the model of `object`; what was assumed of its mass and its inside matters if it is `held`.
+pub(super) fn inspect(object: &Object, held: bool) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let stated = object.stated_size.as_ref();
     warnings.extend(stated.and_then(|stated| size(&object.mesh.vertices, stated)));
     if warnings.is_empty() && !is_plausible(object) {
         let extent = 2.0 * object.radius;
+        let mut finding = format!("the mesh is {extent:.4} m across");
+        if let Some(unit) = likely_unit(extent) {
+            finding +=
+                &format!(", {:.4} m if its vertices are multiplied by {unit}", extent * unit);
+        }
         warnings.push(
             Warning::new(Subject::Model, extent, "m")
-                .found(format!("the mesh is {extent:.4} m across"))
-                .hint("is it in meters, or in millimeters as BOP has it?"),
+                .found(finding)
+                .hint("is it in the unit that it is said to be: millimeters in BOP's folders, mesh_unit in a frame file?"),
         );
     }
-    if object.inertial_assumed {
+    if object.inertial_assumed && held {
         let mass = object.inertial.mass;
         let finding =
             format!("the object's mass is unknown: {mass:.3} kg was assumed from 500 kg/m³");
@@ -46,13 +51,20 @@ pub(super) fn inspect(object: &Object) -> Vec<Warning> {
                 .hint("is the mesh mirrored?"),
         );
     }
-    if !object.report.watertight {
+    if !object.report.watertight && held {
         let edges = object.report.open_edges;
         let finding =
             format!("the mesh is not closed ({edges} open edges): what is inside it is a guess");
         warnings.push(Warning::new(Subject::Model, edges as f64, "edges").found(finding));
     }
     warnings
+}
+
+/// Power of ten that makes an extent \[m\] that cannot be in meters one that can: that of millimeters and meters rather than another.
+pub(crate) fn likely_unit(extent: f64) -> Option<f64> {
+    let fits = |unit: &f64| PLAUSIBLE_EXTENT.contains(&(extent * unit));
+    let implausible = !PLAUSIBLE_EXTENT.contains(&extent);
+    [1e-3, 1e3, 1e-2, 1e2, 1e-1, 1e1, 1e-6, 1e6].into_iter().find(fits).filter(|_| implausible)
 }
 
 /// Whether the mesh of `object` can be in meters.

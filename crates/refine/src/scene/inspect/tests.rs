@@ -9,7 +9,7 @@ use super::*;
 use crate::scene::{HandMeasurement, Scene, StatedSize, default_scene};
 
 fn found(scene: &Scene, t_cam_object: &Isometry3<f64>) -> Vec<Warning> {
-    let mut all = inspect_object(&scene.object);
+    let mut all = inspect_object(&scene.object, true);
     all.extend(inspect_pose(&scene.observation, &scene.object, Some(&scene.hand), t_cam_object));
     all
 }
@@ -212,7 +212,7 @@ fn models_that_are_not_of_their_size() {
         change(&mut stated);
         let mut object = Arc::into_inner(scene.object).unwrap();
         object.stated_size = Some(stated);
-        inspect_object(&object)
+        inspect_object(&object, true)
     };
     assert_eq!(changed(&|_| ()), []);
     for (factor, words) in [

@@ -94,7 +94,8 @@ fn unwritable_outputs_fail_before_the_work() {
             "--poses none --out no/r.csv",
             "error: no/r.csv: cannot be written: there is no folder no",
         ),
-        ("--poses none --out ds", "error: ds: cannot be written: is a folder"),
+        // In a folder the file is named as BOP has it.
+        ("--poses none --out ds", "error: none: no such file"),
         ("--poses none --out file/r.csv", "error: file/r.csv: cannot be written: "),
         ("--poses init.csv --out r.csv --report file/x", "error: file/x: "),
         ("--poses none --out r.csv", "error: none: no such file"),

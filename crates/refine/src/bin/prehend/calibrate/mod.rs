@@ -32,7 +32,7 @@ pub(crate) struct Calibrate {
     /// Write the corrected models to this folder, as obj_ID.ply in millimeters [default: rig.models beside rig.json]
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     models: Option<PathBuf>,
-    /// Write the frames' poses here, as a BOP results file without scores; with --window, as they were with the rig until then
+    /// Write the frames' poses here, as a BOP results file with the scores of the initial poses; with --window, as they were with the rig until then
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     refined: Option<PathBuf>,
     /// Write a web page here: residuals before and after, by sensor, with pictures
@@ -114,7 +114,6 @@ impl Calibrate {
 fn rows(jobs: &[Job], poses: &BTreeMap<usize, Isometry3<f64>>) -> Vec<ResultRow> {
     let row = |(&index, pose): (&usize, &Isometry3<f64>)| ResultRow {
         t_cam_model: *pose,
-        score: -1.0,
         time: -1.0,
         ..jobs[index].row.clone()
     };

@@ -134,8 +134,8 @@ impl DatasetRun<'_> {
         let timed = |index| seconds(index).filter(|_| self.output.time);
         let row = |(&index, refined): (&usize, &Refined)| ResultRow {
             t_cam_model: (&refined.pose).into(),
-            // BOP leaves open what a score is; here it is the probability of being right, where the method knows it.
-            score: refined.confidence.as_ref().map_or(-1.0, |c| c.probability),
+            // BOP leaves open what a score is; here it is the probability of being right, and that of the initial pose where the method knows none.
+            score: refined.confidence.as_ref().map_or(jobs[index].row.score, |c| c.probability),
             time: timed(index).unwrap_or(-1.0),
             ..jobs[index].row.clone()
         };

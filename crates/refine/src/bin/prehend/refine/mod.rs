@@ -57,14 +57,19 @@ impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         let Self { selection, poses, rivals, masks, neighbors, .. } = &self;
         let Self { frame, rig, output, method, rendering, .. } = &self;
+        let named = |out: &PathBuf| match selection {
+            Some(selection) => selection.results_file(out, method.method().name),
+            None => Ok(out.clone()),
+        };
+        let out = output.out.as_ref().map(named).transpose()?;
         // What cannot be written must be known before the work, not after it.
-        if let Some(out) = &output.out {
+        if let Some(out) = &out {
             check_writable(out)?;
         }
         output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
         let backend = rendering.open()?;
-        match (frame, selection, poses, &output.out) {
+        match (frame, selection, poses, &out) {
             (Some(file), ..) => refine_frame(file, output, method, backend, rig.as_deref()),
             (None, Some(selection), Some(poses), Some(out)) => {
                 let configured = method.configured()?;

@@ -1,0 +1,285 @@
+//! A pose that is moved to where mask and depth have the object: poses to start from are off, and that is nothing to correct.
+
+use nalgebra::{Isometry3, Point3, SVector, Vector2, Vector3};
+use prehend_autodiff::Quadratic;
+use prehend_autodiff::lie::{perturb_about, twist_row};
+use prehend_geometry::RobustKernel;
+use prehend_render::{DepthImage, OutlinePoint, outline_points};
+
+use super::evidence::Evidence;
+use super::inputs::Inputs;
+use super::settings::CorrectionSettings;
+use crate::scene::view::median;
+
+/// Pose, logarithm of the scale of depth, logarithm of the focal length.
+pub(super) const UNKNOWNS: usize = 8;
+
+/// Damping of a step, as a part of the mean curvature.
+const DAMPING: f64 = 1e-3;
+
+/// Pixels beyond a mask's border at which depth tells what the border is of \[px\].
+const BEYOND: f64 = 3.0;
+
+/// Where mask and depth have the object.
+pub(super) struct Aligned {
+    pub(super) inputs: Inputs,
+    /// Sum of squares of outline, depth and pose by the unknowns, there.
+    pub(super) sum: Quadratic<UNKNOWNS>,
+}
+
+/// A fit of inputs to what a frame shows.
+pub(super) struct Alignment<'a> {
+    pub(super) evidence: &'a Evidence<'a>,
+    pub(super) settings: &'a CorrectionSettings,
+    pub(super) hand: Option<&'a DepthImage>,
+}
+
+impl Alignment<'_> {
+    /// With `start` moved and turned to where mask and depth have the object, and, if `sized`, with depth scaled; none where the object is not in view.
+    pub(super) fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
+        let start = self.placed(start)?;
+        let radius = self.evidence.object.radius;
+        let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
+        // Steps in units of the radius.
+        let units = SVector::from([radius, radius, radius, 1.0, 1.0, 1.0, size, 0.0]);
+        let mut inputs = start;
+        for step in 0..self.settings.steps {
+            // From far to near: at first all counts that is within reach.
+            let width = 1.0 + 4.0 * (1.0 - step as f64 / self.settings.steps as f64);
+            let sum = self.sum(&inputs, &start, width)?;
+            let step = sum.in_units(&units).damped_step(DAMPING).component_mul(&units);
+            let center = self.evidence.center(&inputs).coords;
+            let twist = step.fixed_rows::<6>(0).into_owned();
+            inputs.t_cam_object = perturb_about(&inputs.t_cam_object, &center, &twist);
+            inputs.t_cam_object.rotation.renormalize();
+            // What is measured stays what it is: the model is scaled.
+            inputs.depth_scale *= step[6].exp();
+            inputs.meters /= step[6].exp();
+            let limit = self.settings.largest_size;
+            let ratio = inputs.depth_scale / start.depth_scale;
+            if !(limit.recip()..=limit).contains(&ratio) {
+                return None;
+            }
+        }
+        let sum = self.sum(&inputs, &start, 1.0)?;
+        Some(Aligned { inputs, sum })
+    }
+
+    /// With the object moved to where the mask is, and where depth has it.
+    fn placed(&self, start: &Inputs) -> Option<Inputs> {
+        let mut inputs = *start;
+        let camera = inputs.camera;
+        let masked = self.mask_center(&inputs)?;
+        let measured = median(self.evidence.masked_points(&inputs).map(|(_, depth)| depth));
+        // That the object is in view where it is sought, it is put before the mask.
+        let mut center = self.evidence.center(&inputs);
+        if center.z.is_nan() || center.z <= 0.0 && inputs.is_placed {
+            return None;
+        }
+        if !inputs.is_placed {
+            let z = measured.unwrap_or(center.z.abs().max(2.0 * self.evidence.object.radius));
+            center = move_to(&mut inputs, &center, &camera.unproject(masked.x, masked.y, z));
+        }
+        for _ in 0..3 {
+            let drawn = self.evidence.drawn(&inputs);
+            let seen = || drawn.pixels().iter().enumerate().filter(|(_, z)| **z > 0.0);
+            let count = seen().count() as f64;
+            let surface = median(seen().map(|(_, z)| f64::from(*z)));
+            let z = match (measured, surface) {
+                (Some(measured), Some(surface)) => center.z + measured - surface,
+                _ => center.z,
+            };
+            let width = camera.width;
+            let at = match count > 0.0 {
+                true => {
+                    seen()
+                        .map(|(i, _)| Vector2::new((i % width) as f64, (i / width) as f64))
+                        .sum::<Vector2<f64>>()
+                        / count
+                }
+                false => camera.project(&center)?,
+            };
+            if z <= 0.0 {
+                return None;
+            }
+            let shift = camera.unproject(masked.x, masked.y, z) - camera.unproject(at.x, at.y, z);
+            let to = Point3::new(center.x * z / center.z, center.y * z / center.z, z) + shift;
+            center = move_to(&mut inputs, &center, &to);
+        }
+        inputs.t_cam_object.translation.vector.iter().all(|v| v.is_finite()).then_some(inputs)
+    }
+
+    fn mask_center(&self, inputs: &Inputs) -> Option<Vector2<f64>> {
+        let width = inputs.camera.width;
+        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
+        for index in 0..self.evidence.mask.pixels().len() {
+            if self.evidence.is_masked(inputs, index) {
+                sum += Vector2::new((index % width) as f64, (index / width) as f64);
+                count += 1.0;
+            }
+        }
+        (count > 0.0).then(|| sum / count)
+    }
+
+    /// Sum of squares at `inputs`, kernels so many times as wide as errors are.
+    fn sum(&self, inputs: &Inputs, start: &Inputs, width: f64) -> Option<Quadratic<UNKNOWNS>> {
+        let center = self.evidence.center(inputs).coords;
+        let mut sum = Quadratic::zeros();
+        self.add_depth(inputs, &center, width, &mut sum);
+        self.add_outline(inputs, &center, width, &mut sum)?;
+        self.add_prior(inputs, start, &center, &mut sum);
+        Some(sum)
+    }
+
+    fn add_depth(
+        &self,
+        inputs: &Inputs,
+        center: &Vector3<f64>,
+        width: f64,
+        sum: &mut Quadratic<UNKNOWNS>,
+    ) {
+        let Self { evidence, settings, .. } = self;
+        let object = &evidence.object;
+        let inverse = inputs.t_cam_object.inverse();
+        let sigma = settings.depth * object.radius;
+        let kernel = RobustKernel::Cauchy { scale: width };
+        let points: Vec<(Vector2<f64>, f64)> = evidence.masked_points(inputs).collect();
+        let share = settings.measurements / points.len().max(1) as f64;
+        for (pixel, depth) in &points {
+            let point = inputs.camera.unproject(pixel.x, pixel.y, *depth);
+            let Some(closest) = object.surface.closest(&(inverse * point), 2.0 * object.radius)
+            else {
+                continue;
+            };
+            let normal = inputs.t_cam_object.rotation * object.normals[closest.face as usize];
+            let to = point - inputs.t_cam_object * closest.point;
+            let residual = normal.dot(&to) / sigma;
+            let twist = twist_row(&(point.coords - center), &-normal);
+            let by_focal = -(normal.x * point.x + normal.y * point.y);
+            let row = joined(&twist, normal.dot(&point.coords), by_focal) / sigma;
+            sum.add_row(&row, residual, share * kernel.weight(residual * residual));
+        }
+    }
+
+    fn add_outline(
+        &self,
+        inputs: &Inputs,
+        center: &Vector3<f64>,
+        width: f64,
+        sum: &mut Quadratic<UNKNOWNS>,
+    ) -> Option<()> {
+        let Self { evidence, settings, .. } = self;
+        let camera = &inputs.camera;
+        let outline = outline_points(camera, &evidence.object.model, &inputs.t_cam_object);
+        if outline.is_empty() {
+            return None;
+        }
+        let kernel = RobustKernel::Cauchy { scale: width };
+        let reach = settings.reach * evidence.object.radius * camera.fx / center.z * width / 5.0;
+        let reach = reach.clamp(6.0, camera.width as f64 / 4.0);
+        let length: f64 = outline.iter().map(|point| point.length).sum();
+        for at in &outline {
+            let Some(border) = self.border(inputs, at, reach) else { continue };
+            let OutlinePoint { outward, point, .. } = at;
+            let (x, y, z) = (point.x, point.y, point.z);
+            let gradient = Vector3::new(
+                camera.fx * outward.x / z,
+                camera.fy * outward.y / z,
+                -(camera.fx * outward.x * x + camera.fy * outward.y * y) / (z * z),
+            );
+            let by_focal = -outward.dot(&(at.pixel - Vector2::new(camera.cx, camera.cy)));
+            let row = joined(&-twist_row(&(point.coords - center), &gradient), 0.0, by_focal)
+                / settings.outline;
+            let residual = border / settings.outline;
+            let weight = settings.measurements * at.length / length;
+            sum.add_row(&row, residual, weight * kernel.weight(residual * residual));
+        }
+        Some(())
+    }
+
+    /// How far outward of a point of the outline the mask's border is \[px\]; none where there is none within `reach`, or it is that of
+    /// something in front.
+    fn border(&self, inputs: &Inputs, at: &OutlinePoint, reach: f64) -> Option<f64> {
+        let (width, height) = (inputs.camera.width, inputs.camera.height);
+        let index = |along: f64| {
+            let pixel = at.pixel + at.outward * along;
+            let (x, y) = (pixel.x.round(), pixel.y.round());
+            let inside = x >= 1.0 && y >= 1.0 && x < width as f64 - 1.0 && y < height as f64 - 1.0;
+            inside.then(|| y as usize * width + x as usize)
+        };
+        let masked = |along: f64| index(along).map(|index| self.evidence.is_masked(inputs, index));
+        // From the outline to whichever side the border is on.
+        let inner = masked(0.0)?;
+        let side = if inner { 1.0 } else { -1.0 };
+        let mut along = 0.0;
+        while masked(along)? == inner {
+            along += side;
+            if along.abs() > reach {
+                return None;
+            }
+        }
+        let border = along - 0.5 * side;
+        let beyond = index(border + BEYOND)?;
+        let tolerance = self.settings.elsewhere * self.evidence.object.radius;
+        let hides = |depth: f64| depth > 0.0 && depth < at.point.z - tolerance;
+        let hand = self.hand.map_or(0.0, |hand| f64::from(hand.pixels()[beyond]) / inputs.meters);
+        (!hides(self.evidence.sensor(inputs, beyond)) && !hides(hand)).then_some(border)
+    }
+
+    /// That poses are about where they are said to be.
+    fn add_prior(
+        &self,
+        inputs: &Inputs,
+        start: &Inputs,
+        center: &Vector3<f64>,
+        sum: &mut Quadratic<UNKNOWNS>,
+    ) {
+        let turn = self.settings.turn;
+        let off =
+            (inputs.t_cam_object.rotation * start.t_cam_object.rotation.inverse()).scaled_axis();
+        let shift = self.shift_sigma(start);
+        let moved = center - self.evidence.center(start).coords;
+        for axis in 0..3 {
+            for (k, residual, sigma) in [(axis, moved[axis], shift), (axis + 3, off[axis], turn)] {
+                let mut row = SVector::zeros();
+                row[k] = sigma.recip();
+                sum.add_row(&row, residual / sigma, 1.0);
+            }
+        }
+    }
+
+    /// Standard deviation of the translation.
+    fn shift_sigma(&self, inputs: &Inputs) -> f64 {
+        let [of_distance, of_radius] = self.settings.shift;
+        of_distance * self.evidence.center(inputs).z.abs() + of_radius * self.evidence.object.radius
+    }
+
+    /// How plausible it is that `start` is in truth at `to`, 0 to 1.
+    pub(super) fn plausibility(&self, start: &Inputs, to: &Isometry3<f64>) -> f64 {
+        let turned = start.t_cam_object.rotation.angle_to(&to.rotation) / self.settings.turn;
+        let moved = match start.is_placed {
+            true => {
+                let moved = to * self.evidence.object.center - self.evidence.center(start);
+                moved.norm() / self.shift_sigma(start)
+            }
+            false => 0.0,
+        };
+        // An error in three directions, each as large as is expected, is nothing special.
+        let excess = |squares: f64| (squares - 3.0).max(0.0);
+        (-0.5 * (excess(turned * turned) + excess(moved * moved))).exp()
+    }
+}
+
+/// Moves what is at `from` to `to`, which it returns.
+fn move_to(inputs: &mut Inputs, from: &Point3<f64>, to: &Point3<f64>) -> Point3<f64> {
+    inputs.t_cam_object.translation.vector += to - from;
+    *to
+}
+
+fn joined(twist: &nalgebra::Vector6<f64>, by_depth: f64, by_focal: f64) -> SVector<f64, UNKNOWNS> {
+    let mut row = SVector::<f64, UNKNOWNS>::zeros();
+    row.fixed_rows_mut::<6>(0).copy_from(twist);
+    row[6] = by_depth;
+    row[7] = by_focal;
+    row
+}

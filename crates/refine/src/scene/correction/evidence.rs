@@ -1,0 +1,151 @@
+//! What a frame shows of an object, made small, in units of the model.
+
+use std::ops::Deref;
+
+use nalgebra::{Isometry3, Point3, Vector2};
+use prehend_render::{DepthImage, Mask, depth_map};
+
+use super::inputs::Inputs;
+use super::settings::CorrectionSettings;
+use crate::error::RefineError;
+use crate::scene::frame::hand_depth;
+use crate::scene::view::median;
+use crate::scene::{Hand, HandMeasurement, Object, Observation};
+
+/// Extents that render without trouble, in units of length.
+const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
+
+/// The object, or the same at another scale.
+pub(super) enum Model<'a> {
+    Given(&'a Object),
+    Scaled(Box<Object>),
+}
+
+impl Deref for Model<'_> {
+    type Target = Object;
+
+    fn deref(&self) -> &Object {
+        match self {
+            Self::Given(object) => object,
+            Self::Scaled(object) => object,
+        }
+    }
+}
+
+/// A frame's images and its object.
+pub(super) struct Evidence<'a> {
+    /// With a radius that renders: its unit is [`Inputs::meters`] of [`given`](Self::given).
+    pub(super) object: Model<'a>,
+    /// The inputs as they are.
+    pub(super) given: Inputs,
+    pub(super) hand: Option<(&'a Hand, &'a HandMeasurement)>,
+    pub(super) mask: Mask,
+    /// As measured \[m\], 0 where it is not.
+    pub(super) depth: DepthImage,
+    pub(super) has_depth: bool,
+    /// Column, row and depth \[m\] of some pixels with depth, of the mask, and of all others.
+    points: [Vec<(Vector2<f64>, f64)>; 2],
+}
+
+impl<'a> Evidence<'a> {
+    /// # Errors
+    /// If images have not the camera's size, or a model that has to be made larger cannot be used.
+    pub(super) fn new(
+        observation: &'a Observation,
+        object: &'a Object,
+        hand: Option<&'a Hand>,
+        t_cam_object: &Isometry3<f64>,
+        settings: &CorrectionSettings,
+    ) -> Result<Self, RefineError> {
+        observation.require_sizes()?;
+        let Observation { camera, mask, depth, .. } = observation;
+        let factor = camera.width.div_ceil(settings.width.max(1)).max(1);
+        let (mask, depth) = match factor {
+            1 => (mask.clone(), depth.clone()),
+            _ => (mask.downsampled(factor), depth.downsampled(factor)),
+        };
+        let camera = camera.scaled((factor as f64).recip());
+        let mut given = Inputs::new(camera, *t_cam_object);
+        let mut object = Model::Given(object);
+        let extent = 2.0 * object.radius;
+        if !RENDERED.contains(&extent) {
+            // Nothing but lengths changes: what is measured stays what it is.
+            let factor = 10_f64.powf(-(extent / settings.extent).log10().round());
+            let inertial = Some(object.inertial.clone());
+            object = Model::Scaled(Box::new(Object::new(
+                &object.name,
+                object.mesh.clone().scaled(factor),
+                inertial,
+                object.seed,
+            )?));
+            given.t_cam_object.translation.vector *= factor;
+            given.depth_scale *= factor;
+            given.meters /= factor;
+        }
+        let hand = hand.zip(observation.hand.as_ref());
+        let hand = hand.filter(|(hand, measured)| {
+            let pose = measured.t_cam_hand.to_homogeneous();
+            hand.check_joints(&measured.joints).is_ok()
+                && measured.joints.iter().chain(pose.iter()).all(|number| number.is_finite())
+        });
+        let points = [true, false].map(|masked| points(&mask, &depth, masked, settings.points));
+        let has_depth = !points[0].is_empty() || !points[1].is_empty();
+        Ok(Self { object, given, hand, mask, depth, has_depth, points })
+    }
+
+    /// Whether the mask, as `inputs` have it, is set at a pixel.
+    pub(super) fn is_masked(&self, inputs: &Inputs, index: usize) -> bool {
+        self.mask.pixels()[index] != inputs.mask_inverted
+    }
+
+    /// Column and row, and depth as `inputs` have it, of some masked pixels.
+    pub(super) fn masked_points(
+        &self,
+        inputs: &Inputs,
+    ) -> impl Iterator<Item = (Vector2<f64>, f64)> {
+        let scale = inputs.depth_scale;
+        let points = &self.points[usize::from(inputs.mask_inverted)];
+        points.iter().map(move |(pixel, depth)| (*pixel, depth * scale))
+    }
+
+    /// Depth that `inputs` have at a pixel, 0 for none.
+    pub(super) fn sensor(&self, inputs: &Inputs, index: usize) -> f64 {
+        f64::from(self.depth.pixels()[index]) * inputs.depth_scale
+    }
+
+    /// Depth of the object as `inputs` have it, 0 where it is not.
+    pub(super) fn drawn(&self, inputs: &Inputs) -> DepthImage {
+        depth_map(&inputs.camera, &[(&self.object.model, inputs.t_cam_object)])
+    }
+
+    /// Depth of the hand \[m\] before the camera of `inputs`, where the hand is known.
+    pub(super) fn hand_drawn(&self, inputs: &Inputs) -> Option<DepthImage> {
+        self.hand.map(|hand| hand_depth(&inputs.camera, Some(hand)))
+    }
+
+    /// Factor that makes depth under the mask that of the object.
+    pub(super) fn depth_ratio(&self) -> Option<f64> {
+        let given = &self.given;
+        let drawn = self.drawn(given);
+        let object = median(drawn.pixels().iter().filter(|z| **z > 0.0).map(|z| f64::from(*z)))?;
+        Some(object / median(self.masked_points(given).map(|(_, depth)| depth))?)
+    }
+
+    /// The point that poses turn about, in the camera frame.
+    pub(super) fn center(&self, inputs: &Inputs) -> Point3<f64> {
+        inputs.t_cam_object * self.object.center
+    }
+}
+
+/// Some `limit` pixels with depth that are `masked`, or are not, on a regular grid.
+fn points(mask: &Mask, depth: &DepthImage, masked: bool, limit: usize) -> Vec<(Vector2<f64>, f64)> {
+    let width = mask.width().max(1);
+    let there = |i: &usize| mask.pixels()[*i] == masked && depth.pixels()[*i] > 0.0;
+    let all: Vec<usize> = (0..mask.pixels().len()).filter(there).collect();
+    // An odd stride does not follow the columns.
+    let stride = (all.len() / limit.max(1)).max(1) | 1;
+    let point = |&i: &usize| {
+        (Vector2::new((i % width) as f64, (i / width) as f64), f64::from(depth.pixels()[i]))
+    };
+    all.iter().step_by(stride).map(point).collect()
+}

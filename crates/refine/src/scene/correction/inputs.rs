@@ -1,0 +1,110 @@
+//! What a correction may change of a frame's inputs.
+
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use prehend_render::Camera;
+
+use super::kind::Correction;
+
+/// A frame's inputs but for its images, lengths in units of the model as it was read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inputs {
+    pub(super) camera: Camera,
+    /// Object → camera.
+    pub(super) t_cam_object: Isometry3<f64>,
+    /// Depth over that of the image.
+    pub(super) depth_scale: f64,
+    /// What is not masked is the object's.
+    pub(super) mask_inverted: bool,
+    /// Meters of a unit of length.
+    pub(super) meters: f64,
+    /// The translation is not known.
+    pub(super) is_placed: bool,
+}
+
+impl Inputs {
+    pub(super) fn new(camera: Camera, t_cam_object: Isometry3<f64>) -> Self {
+        Self {
+            camera,
+            t_cam_object,
+            depth_scale: 1.0,
+            mask_inverted: false,
+            meters: 1.0,
+            is_placed: true,
+        }
+    }
+
+    /// With the translation `factor` times as long.
+    fn moved(mut self, factor: f64) -> Self {
+        self.t_cam_object.translation.vector *= factor;
+        self
+    }
+
+    /// With the model `factor` times as large.
+    fn sized(self, factor: f64) -> Self {
+        let Self { depth_scale, meters, .. } = self;
+        Self {
+            depth_scale: depth_scale / factor,
+            meters: meters * factor,
+            ..self.moved(factor.recip())
+        }
+    }
+
+    fn turned(mut self, rotation: UnitQuaternion<f64>) -> Self {
+        self.t_cam_object.rotation = rotation;
+        self
+    }
+
+    /// With axes of graphics engines (x right, y up, z back) made those of the camera.
+    fn flipped(mut self) -> Self {
+        let t_cv_gl = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+            Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0)),
+        ));
+        self.t_cam_object =
+            Isometry3::from_parts(Translation3::identity(), t_cv_gl) * self.t_cam_object;
+        self
+    }
+
+    /// With another camera.
+    fn seen_by(self, camera: impl FnOnce(&Camera) -> Camera) -> Self {
+        Self { camera: camera(&self.camera), ..self }
+    }
+
+    /// With a correction, whose factor is `value`.
+    pub(super) fn corrected(self, correction: Correction, value: f64) -> Self {
+        let Self { t_cam_object: pose, .. } = self;
+        let q = pose.rotation.into_inner().coords;
+        let inverse = Self { t_cam_object: pose.inverse(), ..self };
+        let quaternion = |w, x, y, z| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        match correction {
+            Correction::PoseUnit => self.moved(value),
+            Correction::ModelUnit | Correction::ModelScale => self.sized(value),
+            Correction::ModelAndPoseUnit => self.moved(value).sized(value),
+            Correction::DepthUnit | Correction::DepthScale => {
+                Self { depth_scale: self.depth_scale * value, ..self }
+            }
+            Correction::PoseInverted => inverse,
+            Correction::PoseInvertedOpenGl => inverse.flipped(),
+            Correction::RotationTransposed => self.turned(pose.rotation.inverse()),
+            // (x, y, z, w) was read as (w, x, y, z), and the other way round.
+            Correction::QuaternionXyzw => self.turned(quaternion(q.z, q.w, q.x, q.y)),
+            Correction::QuaternionWxyz => self.turned(quaternion(q.x, q.y, q.z, q.w)),
+            Correction::OpenGlAxes => self.flipped(),
+            Correction::OpenGlRotation => self.turned(self.flipped().t_cam_object.rotation),
+            Correction::PrincipalPointSwapped => {
+                self.seen_by(|camera| Camera { cx: camera.cy, cy: camera.cx, ..*camera })
+            }
+            Correction::CameraOfOtherSize => self.seen_by(|camera| Camera {
+                width: camera.width,
+                height: camera.height,
+                ..camera.scaled(value)
+            }),
+            Correction::FocalLength => self.seen_by(|camera| Camera {
+                fx: camera.fx * value,
+                fy: camera.fy * value,
+                ..*camera
+            }),
+            Correction::MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
+            Correction::Translation => Self { is_placed: false, ..self },
+        }
+    }
+}

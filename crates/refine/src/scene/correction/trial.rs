@@ -1,0 +1,157 @@
+//! Corrections of one frame's inputs, each tried.
+
+use nalgebra::{Isometry3, Matrix2, Matrix6, Matrix6x2, Vector2};
+use prehend_autodiff::Quadratic;
+use rayon::prelude::*;
+
+use super::agreement::{agreement, hand_share};
+use super::alignment::{Aligned, Alignment};
+use super::evidence::Evidence;
+use super::inputs::Inputs;
+use super::kind::{Correction, candidates};
+use super::settings::CorrectionSettings;
+use crate::error::RefineError;
+use crate::scene::{Hand, Object, Observation};
+
+/// What becomes of a frame by each correction.
+#[derive(Clone, Debug)]
+pub struct CorrectionTrial {
+    /// Agreement of the inputs as they are with what the frame shows, 0 to 1.
+    pub(super) given: f64,
+    /// The candidates; none of those that the frame needs not.
+    pub(super) tried: Vec<Option<Tried>>,
+    /// What it says of the model's scale and the focal length.
+    pub(super) size: Option<Size>,
+}
+
+/// One correction of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tried {
+    pub(super) correction: Correction,
+    pub(super) value: f64,
+    pub(super) agreement: f64,
+    /// Logarithm of the object's extent over a common one, without its sign.
+    pub(super) oddness: f64,
+}
+
+/// What a frame says of the logarithms x of the model's scale and of the focal length, each over what is said: its cost is ½ xᵀ`information` x − `vector`ᵀx,
+/// the pose being eliminated.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    /// Logarithm of the model's scale if the focal length is right.
+    pub(super) scale: f64,
+    pub(super) information: Matrix2<f64>,
+    pub(super) vector: Vector2<f64>,
+    /// Share of the hand's depth that the focal length, corrected by that factor, makes fit besides; where the hand is known.
+    pub(super) hand_gain: Option<f64>,
+}
+
+impl CorrectionTrial {
+    /// Agreement of mask, depth and hand with the object about where it is said to be, 0 to 1.
+    pub fn agreement(&self) -> f64 {
+        self.given
+    }
+
+    /// Factor of the model that outline and depth fit best with, and its standard deviation; nothing where they do not tell.
+    pub fn model_scale(&self) -> Option<[f64; 2]> {
+        let Size { scale, information, .. } = self.size?;
+        Some([scale.exp(), information[(0, 0)].sqrt().recip()])
+    }
+
+    /// Tries what would make `observation` show `object` about at `t_cam_object` \[m\].
+    ///
+    /// # Errors
+    /// If images have not the camera's size, or the object's mesh cannot be used at another scale.
+    pub fn new(
+        observation: &Observation,
+        object: &Object,
+        hand: Option<&Hand>,
+        t_cam_object: &Isometry3<f64>,
+        settings: &CorrectionSettings,
+    ) -> Result<Self, RefineError> {
+        let evidence = Evidence::new(observation, object, hand, t_cam_object, settings)?;
+        let given = evidence.given;
+        let hand_drawn = evidence.hand_drawn(&given);
+        let fit = |inputs: &Inputs, sized: bool| {
+            // The hand is seen by another camera elsewhere.
+            let own =
+                (inputs.camera != given.camera).then(|| evidence.hand_drawn(inputs)).flatten();
+            let hand = own.as_ref().or(hand_drawn.as_ref());
+            let alignment = Alignment { evidence: &evidence, settings, hand };
+            let aligned = alignment.align(inputs, sized)?;
+            let fits = agreement(&evidence, &aligned.inputs, hand, settings);
+            let plausible = alignment.plausibility(inputs, &aligned.inputs.t_cam_object);
+            Some((fits * plausible, aligned))
+        };
+        let agreement = fit(&given, false).map_or(0.0, |(agreement, _)| agreement);
+        let sized = fit(&given, true);
+        let sized_agreement = sized.as_ref().map_or(0.0, |(agreement, _)| *agreement);
+        let sized = sized.filter(|_| evidence.has_depth && sized_agreement >= settings.sized);
+        let size = sized.and_then(|(_, aligned)| {
+            let size = Size::of(&aligned, &given)?;
+            let focal = given.corrected(Correction::FocalLength, size.scale.exp());
+            let share =
+                |inputs: &Inputs| hand_share(&evidence, inputs, &evidence.hand_drawn(inputs)?);
+            let gain = share(&focal).zip(share(&given)).map(|(focal, given)| focal - given);
+            Some(Size { hand_gain: gain, ..size })
+        });
+        // A model of another size is no other mistake.
+        let given_agreement = agreement.max(sized_agreement);
+        let to_fit = 0.5 * given.camera.width as f64 / given.camera.cx;
+        let attempt = |&(correction, value): &(Correction, f64)| {
+            let needed = given_agreement < settings.good || correction.is_rotation();
+            if !(needed && value.is_finite() && value > 0.0) {
+                return None;
+            }
+            let inputs = given.corrected(correction, value);
+            let (agreement, meters) = match fit(&inputs, false) {
+                Some((agreement, aligned)) => (agreement, aligned.inputs.meters),
+                None => (0.0, inputs.meters),
+            };
+            // How far the object's size is from what is common.
+            let extent = 2.0 * evidence.object.radius * meters;
+            let oddness = (extent / settings.extent).ln().abs();
+            Some(Tried { correction, value, agreement, oddness })
+        };
+        let tried = candidates(to_fit, evidence.depth_ratio()).par_iter().map(attempt).collect();
+        Ok(Self { given: given_agreement, tried, size })
+    }
+}
+
+/// The pose that mask and depth have, within what poses to start from are off, if object and `observation` agree there.
+pub(in crate::scene) fn settled_pose(
+    observation: &Observation,
+    object: &Object,
+    hand: Option<&Hand>,
+    t_cam_object: &Isometry3<f64>,
+    settings: &CorrectionSettings,
+) -> Option<Isometry3<f64>> {
+    let evidence = Evidence::new(observation, object, hand, t_cam_object, settings).ok()?;
+    let given = evidence.given;
+    let hand = evidence.hand_drawn(&given);
+    let alignment = Alignment { evidence: &evidence, settings, hand: hand.as_ref() };
+    let settled = alignment.align(&given, false)?.inputs;
+    let plausible = alignment.plausibility(&given, &settled.t_cam_object);
+    let agreement = plausible * agreement(&evidence, &settled, hand.as_ref(), settings);
+    (agreement >= settings.fair && settled.meters == 1.0).then_some(settled.t_cam_object)
+}
+
+impl Size {
+    /// What remains once the pose is eliminated from the sum of squares (Schur's complement); none where outline and depth leave the pose open.
+    fn of(aligned: &Aligned, given: &Inputs) -> Option<Self> {
+        let Quadratic { hessian, gradient, .. } = &aligned.sum;
+        let pose: Matrix6<f64> = hessian.fixed_view::<6, 6>(0, 0).into_owned();
+        let cross: Matrix6x2<f64> = hessian.fixed_view::<6, 2>(0, 6).into_owned();
+        let factor = pose.cholesky()?;
+        let (of_pose, of_size) = (gradient.fixed_rows::<6>(0), gradient.fixed_rows::<2>(6));
+        let information =
+            hessian.fixed_view::<2, 2>(6, 6) - cross.transpose() * factor.solve(&cross);
+        let gradient = of_size - cross.transpose() * factor.solve(&of_pose);
+        // Depth that has to be nearer is a model that has to be larger.
+        let sign = Matrix2::new(-1.0, 0.0, 0.0, 1.0);
+        let (information, gradient) = (sign * information * sign, sign * gradient);
+        let scale = (given.depth_scale / aligned.inputs.depth_scale).ln();
+        let vector = information * Vector2::new(scale, 0.0) - gradient;
+        Some(Self { scale, information, vector, hand_gain: None })
+    }
+}
