@@ -44,7 +44,7 @@ pub fn find_corrections(
         !is_vague && a.agreement >= settings.good && a.given < settings.least
     };
     let alone = (0..trials.len()).map(|k| vec![k]).collect();
-    let levels: [(&dyn Fn(&Attempt) -> bool, Vec<Vec<usize>>); 4] = [
+    let levels: [(Admits<'_>, Vec<Vec<usize>>); 4] = [
         (&admits_all, groups(trials, |_| 0)),
         (&of_object, groups(trials, |target| target.obj_id)),
         (&of_scene, groups(trials, |target| target.scene_id)),
@@ -75,6 +75,9 @@ pub(super) fn groups(
     groups.into_values().collect()
 }
 
+/// Attempts that are looked at.
+type Admits<'a> = &'a dyn Fn(&Attempt) -> bool;
+
 /// A correction of a group of frames, with means over those in which it was tried.
 struct Attempt {
     correction: Correction,
@@ -89,7 +92,7 @@ struct Attempt {
 fn explain(
     trials: &[(Target, CorrectionTrial)],
     group: &[usize],
-    admits: &dyn Fn(&Attempt) -> bool,
+    admits: Admits<'_>,
     settings: &CorrectionSettings,
 ) -> Option<Finding> {
     let attempts: Vec<Attempt> =
