@@ -14,10 +14,10 @@ use crate::data::bop::{
 };
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::Robots;
-use crate::data::targets::Target;
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
+use crate::scene::Target;
 use crate::scene::{
     self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, RegionEvidence,
     StatedSize, Subject, Warning, check_gravity,

@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 use prehend_render::{DepthImage, Mask, depth_map};
 
 use super::bop::{Body, BodyKind, DatasetError, Detections, Frame};
-use super::targets::Target;
+use crate::scene::Target;
 use crate::scene::{Object, Observation};
 
 /// A mask whose overlap with the object is below this share of another mask's is not the object's.

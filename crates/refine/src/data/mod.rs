@@ -39,7 +39,9 @@ pub use mask_source::MaskSource;
 pub use noise::NoiseLevel;
 pub use pose::{PlainPose, pose_from_matrix};
 pub(crate) use smooth_field::smooth_field;
+pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
-pub use targets::{Target, find_targets};
 pub use times::{Times, join_times};
 pub use workers::Workers;
+
+pub use crate::scene::Target;

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 
-use crate::data::targets::Target;
+use crate::scene::Target;
 
 /// Noise level of initial poses. Errors are added to the pose's own translation and rotation, as PE and OE measure them, so
 /// that the stated means hold for any choice of the model's origin.

@@ -1,31 +1,12 @@
 //! Targets: the objects to be localized, by image.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 use serde::Deserialize;
 
 use crate::data::bop::{Dataset, DatasetError, read_json};
-
-/// One object to be localized in one image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Target {
-    /// Scene of the split.
-    pub scene_id: u32,
-    /// Image of the scene.
-    pub im_id: u32,
-    /// The object.
-    pub obj_id: u32,
-    /// Which of the image's targets it is, from 0: the instance that [`crate::data::bop::Frame::mask`] asks for.
-    pub instance: usize,
-}
-
-impl fmt::Display for Target {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "scene {} image {} object {}", self.scene_id, self.im_id, self.obj_id)
-    }
-}
+use crate::scene::Target;
 
 /// BOP's list of targets, in the dataset's folder.
 const LIST: &str = "test_targets_bop19.json";

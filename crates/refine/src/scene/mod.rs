@@ -14,6 +14,7 @@ mod remap_cache;
 mod sensing;
 mod sequence;
 mod surface_deviation;
+mod target;
 mod touch;
 mod view;
 
@@ -36,5 +37,6 @@ pub(crate) use region::{
 pub(crate) use remap_cache::RemapCache;
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
+pub use target::Target;
 pub use touch::{BinaryContact, ContactPatch, ProximityReading, TouchReading};
 pub(crate) use view::{Pixel, View, median};

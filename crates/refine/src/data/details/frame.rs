@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::column::{Column, Values};
-use crate::data::targets::Target;
+use crate::scene::Target;
 use crate::strategy::PosteriorSummary;
 
 /// What is known of a frame.

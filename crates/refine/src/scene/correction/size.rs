@@ -6,7 +6,7 @@ use super::finding::{Finding, groups};
 use super::kind::Correction;
 use super::settings::CorrectionSettings;
 use super::trial::{CorrectionTrial, Size};
-use crate::data::Target;
+use crate::scene::Target;
 use crate::scene::view::median;
 
 /// Standard deviations of a normal distribution in the median of absolute deviations.

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::inputs::Inputs;
 use super::*;
-use crate::data::Target;
+use crate::scene::Target;
 use crate::scene::{Object, Scene, default_scene};
 
 /// Scenes of one object, each about at its first pose.
