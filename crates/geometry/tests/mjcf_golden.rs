@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
+use prehend_geometry::ReadOptions;
 use prehend_geometry::mjcf::{
     Actuator, Body, Dynamics, Equality, EqualityKind, Geom, Joint, JointIndex, JointKind, Model,
     Shape, SolverParameters, Tendon, Transmission,
@@ -166,6 +167,7 @@ impl Differences {
                 self.add("mesh bounds", 0.1, &bounds, &golden["bounds"]);
                 return;
             }
+            Shape::HeightField(_) => ("hfield", Vec::new()),
         };
         assert_eq!(kind, text(&golden["kind"]));
         let expected = numbers(&golden["size"])[..size.len()].to_vec();
@@ -186,8 +188,9 @@ impl Differences {
         let name = &actuator.name;
         assert_eq!(name, text(&golden["name"]));
         let (kind, target) = match actuator.transmission {
-            Transmission::Joint(joint) => ("joint", &model.joint(joint).name),
+            Transmission::Joint { joint, .. } => ("joint", &model.joint(joint).name),
             Transmission::Tendon(tendon) => ("tendon", &model.tendons[tendon].name),
+            other => panic!("{other:?}"),
         };
         assert_eq!(
             (kind, target.as_str()),
@@ -204,7 +207,7 @@ impl Differences {
             golden["integrates"].as_bool().unwrap(),
             "{name}"
         );
-        self.add("actuator gear", 1.0, &[actuator.gear], &golden["gear"]);
+        self.add("actuator gear", 1.0, &actuator.gear[..1], &golden["gear"]);
         self.add("actuator gain", 0.1, &actuator.gain, &golden["gain"]);
         let by_ratio = golden["by_ratio"].as_bool().unwrap();
         let bias = if by_ratio { "bias by damping ratio" } else { "actuator bias" };
@@ -226,7 +229,7 @@ impl Differences {
         self.add(
             "tendon spring",
             1.0,
-            &[tendon.spring_range.0, tendon.spring_range.1],
+            &tendon.spring_range.map_or([f64::NAN; 2], |(low, high)| [low, high]),
             &golden["spring"],
         );
         let told = [tendon.stiffness, tendon.damping, tendon.friction_loss, tendon.armature];
@@ -244,6 +247,7 @@ impl Differences {
         };
         let kind = text(&golden["kind"]);
         match &equality.kind {
+            EqualityKind::Tendon { .. } => panic!("not among the golden values"),
             EqualityKind::Connect { bodies: of, anchors } => {
                 assert_eq!(kind, "connect");
                 assert_eq!(bodies(of), numbers(&golden["bodies"]));
@@ -356,7 +360,20 @@ impl Differences {
 
 fn compare(folder: &Path, golden: &Value) -> Model {
     let file = text(&golden["file"]);
-    let model = Model::from_file(folder.join(file)).unwrap();
+    let partial = ReadOptions { partial: true, ..ReadOptions::default() };
+    let mut model = Model::from_file_with(folder.join(file), &partial).unwrap();
+    // What came later is compared in the simulator's tests.
+    let known: Vec<&str> =
+        golden["actuators"].as_array().unwrap().iter().map(|a| text(&a["name"])).collect();
+    let mask: Vec<bool> =
+        model.actuators.iter().map(|own| known.contains(&own.name.as_str())).collect();
+    for key in &mut model.keyframes {
+        let mut keep = mask.iter();
+        key.controls.retain(|_| *keep.next().unwrap());
+    }
+    model.actuators.retain(|own| known.contains(&own.name.as_str()));
+    model.equalities.retain(|own| !matches!(own.kind, EqualityKind::Tendon { .. }));
+    model.tendons.retain(|own| own.parts.is_empty());
     let mut differences = Differences::default();
     differences.model(&model, golden);
     differences.check(file);
@@ -374,19 +391,7 @@ fn a_model_that_uses_all_that_is_read_is_as_mujoco_has_it() {
     // All that it has beside is named.
     let left_out: Vec<(&str, Option<&str>)> =
         model.warnings.iter().map(|w| (w.place.element.as_str(), w.attribute.as_deref())).collect();
-    let expected = [
-        ("option", Some("integrator")),
-        ("light", None),
-        ("camera", None),
-        ("geom", Some("fluidshape")),
-        ("joint", Some("damping")),
-        ("spatial", None),
-        ("tendon", None),
-        ("general", None),
-        ("general", None),
-        ("motor", None),
-        ("sensor", None),
-    ];
+    let expected = [("geom", Some("fluidshape")), ("general", None)];
     assert_eq!(left_out, expected);
 }
 

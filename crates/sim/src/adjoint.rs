@@ -246,8 +246,9 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
         let link = |(a, b): (&Link<S>, &Link)| (a.parent, &a.joint) == (b.parent, &b.joint);
         a.bodies() == b.bodies() && a.tree.links().iter().zip(b.tree.links()).all(link)
     };
-    let force =
-        |(a, b): (&JointForce<S>, &JointForce)| a.axes == b.axes && Arc::ptr_eq(a.law(), b.law());
+    let force = |(a, b): (&JointForce<S>, &JointForce)| {
+        (&a.axes, &a.path, a.input) == (&b.axes, &b.path, b.input) && Arc::ptr_eq(a.law(), b.law())
+    };
     a.bodies.len() == b.bodies.len()
         && a.articulations.len() == b.articulations.len()
         && a.joint_forces.len() == b.joint_forces.len()

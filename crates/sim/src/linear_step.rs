@@ -152,5 +152,7 @@ impl World {
         self.sticking().next().is_none()
             && !self.joints().any(|joint| matches!(joint, Joint::Custom(_)))
             && !self.joint_forces.iter().flat_map(|force| &force.axes).any(curved)
+            && !self.joint_forces.iter().any(|force| force.path.is_some() || force.input.is_some())
+            && self.transmissions.is_empty()
     }
 }

@@ -13,10 +13,12 @@ mod linear_contacts;
 mod matter;
 pub(crate) mod neighbors;
 mod pair_function;
+pub(crate) mod path;
 mod seen;
 mod sensors;
 pub(crate) mod trajectory;
 mod trajectory_checks;
+pub(crate) mod transmission;
 pub(crate) mod weld;
 
 use std::fmt;
@@ -35,6 +37,7 @@ use body_id::BodyId;
 use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
 use joint_force::JointForce;
+use transmission::Transmissions;
 use weld::Weld;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
@@ -55,6 +58,8 @@ pub struct World<S: Scalar = f64> {
     pub joint_forces: Vec<JointForce<S>>,
     /// Which frames springs hold together.
     pub welds: Vec<Weld<S>>,
+    /// What transmissions of robots do beyond forces along joints.
+    pub transmissions: Transmissions,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
 }
@@ -69,6 +74,7 @@ impl World {
             articulations: Vec::new(),
             joint_forces: Vec::new(),
             welds: Vec::new(),
+            transmissions: Transmissions::default(),
             gravity,
         }
     }
@@ -237,6 +243,7 @@ impl<S: Scalar> World<S> {
             articulations: self.articulations.iter().map(|own| own.map(&f)).collect(),
             joint_forces: self.joint_forces.iter().map(|force| force.map(&f)).collect(),
             welds: self.welds.iter().map(|weld| weld.map(&f)).collect(),
+            transmissions: self.transmissions.clone(),
             gravity: self.gravity.map(&f),
         }
     }

@@ -26,6 +26,57 @@ pub(crate) fn inside(folder: &Path, name: &str) -> Result<PathBuf, &'static str>
     }
 }
 
+/// A folder, and how far from it files may lie that a file in it names.
+#[derive(Clone, Debug)]
+pub(crate) struct Folder {
+    pub(crate) path: PathBuf,
+    reach: Reach,
+}
+
+#[derive(Clone, Debug)]
+enum Reach {
+    /// In the folder or below.
+    Own,
+    /// In this folder, above it, or below.
+    Within(PathBuf),
+    Anywhere,
+}
+
+impl Folder {
+    /// A folder alone.
+    pub(crate) fn own(path: &Path) -> Self {
+        Self { path: path.to_path_buf(), reach: Reach::Own }
+    }
+
+    /// A folder with all that is in `root`.
+    pub(crate) fn within(path: &Path, root: &Path) -> Self {
+        Self { path: path.to_path_buf(), reach: Reach::Within(root.to_path_buf()) }
+    }
+
+    /// A folder with all that there is.
+    pub(crate) fn anywhere(path: &Path) -> Self {
+        Self { path: path.to_path_buf(), reach: Reach::Anywhere }
+    }
+
+    /// The file `name`, seen from the folder, whether or not it exists.
+    pub(crate) fn file(&self, name: &str) -> Result<PathBuf, &'static str> {
+        let root = match &self.reach {
+            Reach::Own => return inside(&self.path, name),
+            Reach::Within(root) => Some(root),
+            Reach::Anywhere => None,
+        };
+        let path = self.path.join(name.trim().replace('\\', "/"));
+        let Some(root) = root else { return Ok(path) };
+        let root = root.canonicalize().map_err(|_| "the root folder does not exist")?;
+        match path.canonicalize() {
+            Ok(file) if file.starts_with(&root) => Ok(path),
+            Ok(_) => Err("the path leaves the root of the file's package"),
+            // What does not exist has no content that could be given away.
+            Err(_) => Ok(path),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -38,6 +89,21 @@ mod tests {
             assert_eq!(inside(folder, name), Err(OUTSIDE), "{name}");
         }
         assert_eq!(inside(Path::new(""), "a.png").unwrap(), Path::new("./a.png"));
+    }
+
+    #[test]
+    fn a_package_reaches_to_its_root() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("package/robots");
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in ["secret", "package/mesh", "package/robots/own"] {
+            std::fs::write(root.path().join(name), "x").unwrap();
+        }
+        let within = Folder::within(&folder, &root.path().join("package"));
+        assert!(within.file("../mesh").is_ok() && within.file("own").is_ok());
+        assert!(within.file("../../secret").is_err());
+        assert!(Folder::anywhere(&folder).file("../../secret").is_ok());
+        assert_eq!(Folder::own(&folder).file("../mesh"), Err(OUTSIDE));
     }
 
     #[cfg(unix)]

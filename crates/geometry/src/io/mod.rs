@@ -66,7 +66,15 @@ impl TriMesh {
 /// Descriptions of robots often come without the materials that their meshes name.
 pub(crate) fn load_shape(path: &Path) -> Result<TriMesh, MeshError> {
     let mesh = match extension(path).as_str() {
-        "obj" => checked(obj::parse_shape(&read(path)?, path)?, path)?,
+        "obj" => {
+            let bytes = read(path)?;
+            let mesh = obj::parse_shape(&bytes, path)?;
+            // Points alone are those of a hull.
+            match mesh.faces.is_empty().then(|| obj::points(&bytes).convex_hull()).flatten() {
+                Some(hull) => hull,
+                None => checked(mesh, path)?,
+            }
+        }
         _ => TriMesh::load(path)?,
     };
     Ok(TriMesh::new(mesh.vertices, mesh.faces))

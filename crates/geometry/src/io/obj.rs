@@ -73,6 +73,17 @@ pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErro
     Ok(whole)
 }
 
+/// The positions alone, with no faces.
+pub(super) fn points(bytes: &[u8]) -> TriMesh {
+    let lines = bytes.split(|b| *b == b'\n').filter_map(|line| std::str::from_utf8(line).ok());
+    let points = lines.filter_map(|line| {
+        let mut words = line.strip_prefix("v ")?.split_whitespace().map(str::parse::<f64>);
+        let mut next = || words.next()?.ok().filter(|x| x.is_finite());
+        Some(Point3::new(next()?, next()?, next()?))
+    });
+    TriMesh::new(points.collect(), Vec::new())
+}
+
 /// Refuses indices before the first element and beyond [`u32`], with which `tobj` computes offsets that overflow.
 fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
     // Of positions, texture coordinates and normals: a face counts back from the last one above it.

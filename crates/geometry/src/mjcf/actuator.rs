@@ -1,9 +1,12 @@
-//! What drives joints and tendons.
+//! What drives joints, tendons and sites.
 
 use std::cell::OnceCell;
+use std::collections::BTreeSet;
+
+use nalgebra::Isometry3;
 
 use super::class::{Classes, MAIN};
-use super::compiler::Compiler;
+use super::compiler::Compilers;
 use super::drive::{Drive, DriveKind, Drives};
 use super::element::Element;
 use super::error::MjcfError;
@@ -15,10 +18,43 @@ use super::{JointIndex, Model};
 /// What an actuator pulls at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Transmission {
-    /// A hinge or slide.
-    Joint(JointIndex),
+    /// A joint. Of a ball the first three numbers of `gear` are along the body's axes, or the parent's with `in_parent`; of a free
+    /// joint the first three along the world's and the others so.
+    Joint {
+        /// Which.
+        joint: JointIndex,
+        /// Whether torques are along the axes of the parent.
+        in_parent: bool,
+    },
     /// A tendon of the model, by index.
     Tendon(usize),
+    /// A force and a torque by `gear`, along the axes of a site, or of another that the length is measured from.
+    Site {
+        /// The frame.
+        site: PlacedFrame,
+        /// The frame that it is measured from; without one the length is zero.
+        reference: Option<PlacedFrame>,
+    },
+    /// A rod between a crank and a slider, whose position is the length.
+    SliderCrank {
+        /// Where the rod hangs on the crank.
+        crank: PlacedFrame,
+        /// Where it hangs on the slider, which moves along the z axis.
+        slider: PlacedFrame,
+        /// Length of the rod \[m\].
+        rod: f64,
+    },
+    /// The contacts of a body, which it holds on to; `None` is the world.
+    Adhesion(Option<usize>),
+}
+
+/// A frame on a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedFrame {
+    /// The body; `None` is the world.
+    pub body: Option<usize>,
+    /// The frame → body frame.
+    pub t_body_frame: Isometry3<f64>,
 }
 
 /// How the control becomes the actuator's input.
@@ -40,8 +76,8 @@ pub struct Actuator {
     pub name: String,
     /// What it pulls at.
     pub transmission: Transmission,
-    /// Its length for that of what it pulls at.
-    pub gear: f64,
+    /// Its length for that of what it pulls at: the first number, but of sites, balls and free joints, which have one for each direction.
+    pub gear: [f64; 6],
     /// Force for the input: constant, by length and by its rate.
     pub gain: [f64; 3],
     /// Force without input: constant, by length and by its rate.
@@ -54,23 +90,41 @@ pub struct Actuator {
     pub force_range: Option<(f64, f64)>,
     /// Smallest and largest input, where it is limited; only of actuators with dynamics.
     pub activation_range: Option<(f64, f64)>,
+    /// How far ahead the input is by which it drives \[s\]: by the model's time step where it is to act early.
+    pub ahead: f64,
+    /// Share of critical damping by which the rate's bias is still to be found, where the length is that of a cable or of a site: with all
+    /// joints at their references the bias is −2 times it times √(gain · inertia at the length).
+    pub damping_ratio: Option<f64>,
 }
 
 /// What is known of an actuator before it is complete.
 #[derive(Clone)]
 pub(super) struct Spec {
     gear: [f64; 6],
+    /// Length of a crank's rod \[m\].
+    rod: f64,
+    is_early: bool,
     control: ([f64; 2], Limited),
     force: ([f64; 2], Limited),
     activation: ([f64; 2], Limited),
     drives: Drives,
+    group: i32,
 }
 
 impl Default for Spec {
     fn default() -> Self {
         let free = ([0.0; 2], Limited::Auto);
         let gear = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        Self { gear, control: free, force: free, activation: free, drives: Drives::default() }
+        Self {
+            gear,
+            rod: 0.0,
+            is_early: false,
+            control: free,
+            force: free,
+            activation: free,
+            drives: Drives::default(),
+            group: 0,
+        }
     }
 }
 
@@ -84,6 +138,14 @@ impl Spec {
 
     fn read(&mut self, e: &Element, kind: DriveKind) -> Result<Drive, MjcfError> {
         e.leading("gear", &mut self.gear)?;
+        self.is_early = e.switch("actearly")?.unwrap_or(self.is_early);
+        self.rod = e.number("cranklength")?.unwrap_or(self.rod);
+        self.group = e.integer("group")?.unwrap_or(self.group);
+        for field in ["armature", "damping"] {
+            if e.list(field, 3)?.is_some_and(|list| list.iter().any(|x| *x != 0.0)) {
+                e.refuse_attribute(field, "of actuators is not read");
+            }
+        }
         for (range, limited, value) in [
             ("ctrlrange", "ctrllimited", &mut self.control),
             ("forcerange", "forcelimited", &mut self.force),
@@ -99,7 +161,7 @@ impl Spec {
 /// The actuators of `root` that are read, and for each that is written its index among them.
 pub(super) fn read(
     root: &Element,
-    compiler: &Compiler,
+    compilers: &Compilers,
     classes: &Classes,
     model: &Model,
     names: &Names,
@@ -108,8 +170,13 @@ pub(super) fn read(
     let reflected = OnceCell::new();
     let (mut all, mut taken) = (Vec::new(), Taken::default());
     let mut written = Vec::new();
+    let mut disabled = BTreeSet::new();
+    for e in root.sections("option") {
+        let groups = e.list("actuatorgroupdisable", 31)?.unwrap_or_default();
+        disabled.extend(groups.into_iter().map(|group| group as i32));
+    }
     for e in root.in_sections("actuator") {
-        let built = build(e, compiler, classes, (model, names), &reflected)?;
+        let built = build(e, compilers, classes, (model, names), &reflected, &disabled)?;
         written.push(built.is_some().then_some(all.len()));
         let Some(actuator) = built else { continue };
         taken.add(e, "actuator")?;
@@ -120,30 +187,47 @@ pub(super) fn read(
 
 fn build(
     e: &Element,
-    compiler: &Compiler,
+    compilers: &Compilers,
     classes: &Classes,
     (model, names): (&Model, &Names),
     reflected: &OnceCell<Option<Reflected>>,
+    disabled: &BTreeSet<i32>,
 ) -> Result<Option<Actuator>, MjcfError> {
     let Some(kind) = DriveKind::of(&e.tag) else {
         e.refuse("left out: actuators of this kind are not read");
         return Ok(None);
     };
-    let Some(transmission) = transmission(e, model, names)? else { return Ok(None) };
-    e.take();
     let mut spec = classes.of(e, MAIN)?.actuator.clone();
     let drive = spec.read(e, kind)?;
+    let Some(transmission) = transmission(e, &spec, model, names)? else { return Ok(None) };
+    e.take();
     let Some((mut gain, mut bias, dynamics)) = drive.resolved() else {
         e.refuse("left out: gains, biases or dynamics of its kind are not read");
         return Ok(None);
     };
-    let gear = spec.gear[0];
+    let (gear, compiler) = (spec.gear, compilers.of(e));
+    let mut damping_ratio = None;
     if drive.has_damping_ratio() {
         let reflected = reflected.get_or_init(|| Reflected::new(model)).as_ref();
-        let mass = reflected.map(|r| r.of(model, transmission, gear)).ok_or_else(|| {
+        let reflected = reflected.ok_or_else(|| {
             e.invalid("dampratio", "needs mass: some of what moves weighs nothing")
         })?;
-        bias[2] = -2.0 * bias[2] * (gain[0] * mass).sqrt();
+        match reflected.of(model, transmission, &gear) {
+            Some(mass) => bias[2] = -2.0 * bias[2] * (gain[0] * mass).sqrt(),
+            None => (damping_ratio, bias[2]) = (Some(bias[2]), 0.0),
+        }
+    }
+    // The rate of a filter that is integrated exactly fades within the step.
+    let ahead = match dynamics {
+        Dynamics::Filter(time) if drive.is_exact() && time > 0.0 => {
+            time * -(-model.time_step / time).exp_m1()
+        }
+        _ => model.time_step,
+    };
+    let ahead = if spec.is_early && dynamics != Dynamics::Direct { ahead } else { 0.0 };
+    // Of a group that is turned off.
+    if disabled.contains(&spec.group) {
+        (gain, bias) = ([0.0; 3], [0.0; 3]);
     }
     // Nothing drives with a gain of minus zero.
     [&mut gain, &mut bias].into_iter().flatten().for_each(|x| *x += 0.0);
@@ -153,8 +237,9 @@ fn build(
     let mut activation_range = range(["actlimited", "actrange"], spec.activation)?;
     if drive.inherit_range > 0.0 {
         let own = match transmission {
-            Transmission::Joint(joint) => model.joint(joint).range,
+            Transmission::Joint { joint, .. } => model.joint(joint).range,
             Transmission::Tendon(tendon) => model.tendons[tendon].range,
+            _ => None,
         };
         let (low, high) = own.ok_or_else(|| {
             e.invalid("inheritrange", "needs a range of what the actuator pulls at")
@@ -177,31 +262,47 @@ fn build(
         control_range,
         force_range: range(["forcelimited", "forcerange"], spec.force)?,
         activation_range,
+        ahead,
+        damping_ratio,
     }))
 }
 
-/// What the actuator `e` pulls at; `None`, after a refusal, where that is not read.
+/// The transmission of the actuator `e`; `None`, after a refusal, where it is not read.
 fn transmission(
     e: &Element,
+    spec: &Spec,
     model: &Model,
     names: &Names,
 ) -> Result<Option<Transmission>, MjcfError> {
-    if e.has("tendon") {
+    let frame = |field| -> Result<PlacedFrame, MjcfError> {
+        let (body, t_body_frame) = names.site(e, field)?;
+        Ok(PlacedFrame { body, t_body_frame })
+    };
+    Ok(Some(if e.has("tendon") {
         let found = names.tendon(e, "tendon")?;
         if found.is_none() {
             e.refuse("left out: the tendon that it pulls at is not read");
         }
         return Ok(found.map(Transmission::Tendon));
-    }
-    let field = ["joint", "jointinparent"].into_iter().find(|f| e.has(f));
-    let Some(field) = field else {
-        e.refuse("left out: it pulls neither at a joint nor at a tendon");
-        return Ok(None);
-    };
-    let joint = names.joint(e, field)?;
-    if model.joint(joint).kind.velocities() > 1 {
-        e.refuse("left out: it pulls neither at a hinge nor at a slide");
-        return Ok(None);
-    }
-    Ok(Some(Transmission::Joint(joint)))
+    } else if e.has("site") {
+        let site = frame("site")?;
+        let reference = e.has("refsite").then(|| frame("refsite")).transpose()?;
+        Transmission::Site { site, reference }
+    } else if e.has("cranksite") {
+        let (crank, slider) = (frame("cranksite")?, frame("slidersite")?);
+        if spec.rod <= 0.0 {
+            return Err(e.invalid("cranklength", "must be positive"));
+        }
+        Transmission::SliderCrank { crank, slider, rod: spec.rod }
+    } else if e.has("body") {
+        Transmission::Adhesion(names.body(e, "body")?)
+    } else {
+        let field = ["joint", "jointinparent"].into_iter().find(|f| e.has(f));
+        let Some(field) = field else {
+            return Err(e.misplaced("pulls at nothing"));
+        };
+        let joint = names.joint(e, field)?;
+        let in_parent = field == "jointinparent" && model.joint(joint).kind.velocities() > 1;
+        Transmission::Joint { joint, in_parent }
+    }))
 }

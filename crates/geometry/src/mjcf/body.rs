@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::class::{Classes, MAIN};
-use super::compiler::{Compiler, InertiaFrom};
+use super::compiler::{Compilers, InertiaFrom};
 use super::element::{Element, Use};
 use super::error::MjcfError;
 use super::geom::{Assets, Geom};
@@ -57,12 +57,12 @@ struct Spot {
 /// Reads the tree of `root`.
 pub(super) fn read(
     root: &Element,
-    compiler: &Compiler,
+    compilers: &Compilers,
     classes: &Classes,
     assets: &Assets<'_>,
 ) -> Result<Tree, MjcfError> {
     let mut reader = Reader {
-        compiler,
+        compilers,
         classes,
         assets,
         tree: Tree::default(),
@@ -80,7 +80,7 @@ pub(super) fn read(
 }
 
 struct Reader<'a> {
-    compiler: &'a Compiler,
+    compilers: &'a Compilers,
     classes: &'a Classes,
     assets: &'a Assets<'a>,
     tree: Tree,
@@ -100,7 +100,8 @@ impl Reader<'_> {
                 "body" => self.body(child, spot)?,
                 "frame" => {
                     let class = self.classes.index(child, "childclass", spot.class)?;
-                    let t_body_frame = spot.t_body_frame * orientation::pose(child, self.compiler)?;
+                    let t_body_frame =
+                        spot.t_body_frame * orientation::pose(child, self.compilers.of(child))?;
                     child.text("name");
                     self.content(child, Spot { t_body_frame, class, ..spot })?;
                 }
@@ -118,13 +119,14 @@ impl Reader<'_> {
     }
 
     fn body(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
-        let t_parent_body = spot.t_body_frame * orientation::pose(e, self.compiler)?;
+        let compiler = self.compilers.of(e);
+        let t_parent_body = spot.t_body_frame * orientation::pose(e, compiler)?;
         self.body_names.add(e, "body")?;
         let name = e.name();
         if name == "world" {
             return Err(e.duplicate("body"));
         }
-        let written = inertial::written(e, self.compiler)?;
+        let written = inertial::written(e, compiler)?;
         let index = self.tree.bodies.len();
         self.tree.bodies.push(Body {
             name,
@@ -137,7 +139,7 @@ impl Reader<'_> {
             gravity_compensation: e.number("gravcomp")?.unwrap_or(0.0),
         });
         // Whose inertia is written need not have shapes that could weigh.
-        let infers = match self.compiler.inertia_from {
+        let infers = match compiler.inertia_from {
             InertiaFrom::Geoms => true,
             InertiaFrom::Either => written.is_none(),
             InertiaFrom::Element => false,
@@ -150,7 +152,7 @@ impl Reader<'_> {
             Some(parts) => Inertial::joined(parts),
             None => written,
         };
-        self.tree.bodies[index].inertial = inertial::bounded(inertial, self.compiler);
+        self.tree.bodies[index].inertial = inertial::bounded(inertial, compiler);
         Ok(())
     }
 
@@ -159,11 +161,11 @@ impl Reader<'_> {
             return Err(e.misplaced("the world has no joints"));
         };
         let joint = if e.tag == "freejoint" {
-            joint::Spec::free(e, self.compiler)?
+            joint::Spec::free(e, self.compilers.of(e))?
         } else {
             let mut spec = self.classes.of(e, spot.class)?.joint.clone();
-            spec.read(e, self.compiler)?;
-            spec.build(e, self.compiler, &spot.t_body_frame)?
+            spec.read(e, self.compilers.of(e))?;
+            spec.build(e, self.compilers.of(e), &spot.t_body_frame)?
         };
         let body = &self.tree.bodies[index];
         if joint.kind == JointKind::Free && (body.parent.is_some() || !body.joints.is_empty()) {
@@ -179,10 +181,10 @@ impl Reader<'_> {
 
     fn geom(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         let mut spec = self.classes.of(e, spot.class)?.geom.clone();
-        spec.read(e, self.compiler)?;
+        spec.read(e, self.compilers.of(e))?;
         let weighs = spot.body.is_some_and(|b| self.weights[b].is_some());
-        let built = spec.build(e, self.compiler, self.assets, &spot.t_body_frame, weighs)?;
-        let Some((geom, weight)) = built else { return Ok(()) };
+        let (geom, weight) =
+            spec.build(e, self.compilers.of(e), self.assets, &spot.t_body_frame, weighs)?;
         self.geom_names.add(e, "geom")?;
         match spot.body {
             None => self.tree.geoms.push(geom),
@@ -196,7 +198,7 @@ impl Reader<'_> {
 
     fn site(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         let mut spec = self.classes.of(e, spot.class)?.site.clone();
-        spec.read(e, self.compiler)?;
+        spec.read(e, self.compilers.of(e))?;
         self.site_names.add(e, "site")?;
         let site = spec.build(e, &spot.t_body_frame)?;
         match spot.body {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::compiler::Compiler;
+use super::compiler::Compilers;
 use super::element::Element;
 use super::error::MjcfError;
 use super::{actuator, equality, geom, joint, material, mesh, site, tendon};
@@ -31,27 +31,32 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    pub(super) fn read(root: &Element, compiler: &Compiler) -> Result<Self, MjcfError> {
+    pub(super) fn read(root: &Element, compilers: &Compilers) -> Result<Self, MjcfError> {
         let names = BTreeMap::from([("main".to_owned(), MAIN)]);
         let mut all = Self { all: vec![Class::default()], names };
         for e in root.sections("default") {
-            // Some files name the outermost class otherwise.
-            if let Some(name) = e.text("class") {
-                all.names.insert(name.to_owned(), MAIN);
+            // An attached model has an outermost class of its own.
+            let index = if e.scope == 0 { MAIN } else { all.all.len() };
+            if index > MAIN {
+                all.all.push(Class::default());
             }
-            all.fill(MAIN, e, compiler)?;
+            // Some files name the outermost class otherwise.
+            for name in [e.text("class"), e.text("alias")].into_iter().flatten() {
+                all.names.insert(name.to_owned(), index);
+            }
+            all.fill(index, e, compilers)?;
         }
         Ok(all)
     }
 
     /// Reads what is in `e` into the class `index`, then the classes within, which begin as it ended.
-    fn fill(&mut self, index: usize, e: &Element, compiler: &Compiler) -> Result<(), MjcfError> {
+    fn fill(&mut self, index: usize, e: &Element, compilers: &Compilers) -> Result<(), MjcfError> {
         let class = &mut self.all[index];
         for child in e.children.iter().filter(|c| c.tag != "default") {
             let is_known = match child.tag.as_str() {
-                "joint" => class.joint.read(child, compiler).map(|()| true),
-                "geom" => class.geom.read(child, compiler).map(|()| true),
-                "site" => class.site.read(child, compiler).map(|()| true),
+                "joint" => class.joint.read(child, compilers.of(child)).map(|()| true),
+                "geom" => class.geom.read(child, compilers.of(child)).map(|()| true),
+                "site" => class.site.read(child, compilers.of(child)).map(|()| true),
                 "mesh" => class.mesh.read(child).map(|()| true),
                 "material" => class.material.read(child).map(|()| true),
                 "tendon" => class.tendon.read(child).map(|()| true),
@@ -73,7 +78,7 @@ impl Classes {
                 return Err(child.invalid("class", "is the name of another"));
             }
             self.all.push(self.all[index].clone());
-            self.fill(next, child, compiler)?;
+            self.fill(next, child, compilers)?;
         }
         Ok(())
     }

@@ -37,8 +37,18 @@ pub(super) struct Compiler {
     pub(super) fit_bounds: bool,
 }
 
+/// The compilers of a model and of all that are attached to it, by the scope of their elements.
+pub(super) struct Compilers(pub(super) Vec<Compiler>);
+
+impl Compilers {
+    /// The compiler that `e` is read with.
+    pub(super) fn of(&self, e: &Element) -> &Compiler {
+        &self.0[e.scope]
+    }
+}
+
 impl Compiler {
-    /// What the `compiler` elements in `root` say.
+    /// Settings of the `compiler` elements in `root`.
     pub(super) fn read(root: &Element) -> Result<Self, MjcfError> {
         let mut all = Self {
             degrees: true,

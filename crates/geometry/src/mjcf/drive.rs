@@ -13,16 +13,20 @@ pub(super) enum DriveKind {
     Velocity,
     IntegratedVelocity,
     Damper,
+    Cylinder,
+    Adhesion,
 }
 
 impl DriveKind {
-    const ALL: [(&str, Self); 6] = [
+    const ALL: [(&str, Self); 8] = [
         ("general", Self::General),
         ("motor", Self::Motor),
         ("position", Self::Position),
         ("velocity", Self::Velocity),
         ("intvelocity", Self::IntegratedVelocity),
         ("damper", Self::Damper),
+        ("cylinder", Self::Cylinder),
+        ("adhesion", Self::Adhesion),
     ];
 
     pub(super) fn of(tag: &str) -> Option<Self> {
@@ -47,6 +51,7 @@ enum Activation {
     None,
     Integrator,
     Filter,
+    ExactFilter,
     Other,
 }
 
@@ -86,10 +91,15 @@ impl Drive {
         let dynamics = match self.activation {
             Activation::None => Dynamics::Direct,
             Activation::Integrator => Dynamics::Integrator,
-            Activation::Filter => Dynamics::Filter(self.time_constant),
+            Activation::Filter | Activation::ExactFilter => Dynamics::Filter(self.time_constant),
             Activation::Other => return None,
         };
         Some((of(self.gain_form, self.gain)?, of(self.bias_form, self.bias)?, dynamics))
+    }
+
+    /// Whether its filter is integrated exactly.
+    pub(super) fn is_exact(&self) -> bool {
+        self.activation == Activation::ExactFilter
     }
 
     /// Whether the last bias is the damping ratio of a servo of positions.
@@ -115,7 +125,7 @@ impl Drive {
             ("none", Activation::None),
             ("integrator", Activation::Integrator),
             ("filter", Activation::Filter),
-            ("filterexact", Activation::Filter),
+            ("filterexact", Activation::ExactFilter),
             ("muscle", Activation::Other),
             ("user", Activation::Other),
         ];
@@ -156,11 +166,11 @@ impl Drive {
 /// What a default class says of one of the shorthands also is what `general` begins with, and what it says of `general`
 /// all of them begin with.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Drives([Drive; 6]);
+pub(super) struct Drives([Drive; 8]);
 
 impl Default for Drives {
     fn default() -> Self {
-        Self([Drive::GENERAL; 6])
+        Self([Drive::GENERAL; 8])
     }
 }
 
@@ -191,6 +201,19 @@ impl Drives {
             DriveKind::IntegratedVelocity => {
                 drive.read_position(e)?;
                 drive.activation = Activation::Integrator;
+            }
+            DriveKind::Cylinder => {
+                drive.time_constant = e.magnitude("timeconst")?.unwrap_or(drive.time_constant);
+                drive.activation = Activation::Filter;
+                let diameter = e.magnitude("diameter")?;
+                let area = diameter.map(|d| 0.25 * std::f64::consts::PI * d * d);
+                drive.gain[0] = area.or(e.magnitude("area")?).unwrap_or(drive.gain[0]);
+                (drive.gain_form, drive.bias_form) = (Form::Fixed, Form::Affine);
+                e.leading("bias", &mut drive.bias)?;
+            }
+            DriveKind::Adhesion => {
+                let gain = e.magnitude("gain")?.unwrap_or(drive.gain[0]);
+                *drive = Drive { gain: [gain, 0.0, 0.0], ..Drive::GENERAL };
             }
             DriveKind::Damper => {
                 let damping = e.magnitude("kv")?.unwrap_or(-drive.gain[2]);

@@ -6,6 +6,8 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
+
 use super::error::{MjcfError, Place};
 
 /// What has become of an element or an attribute.
@@ -19,7 +21,7 @@ pub(super) enum Use {
     Refused(&'static str),
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Attribute {
     name: String,
     value: String,
@@ -27,7 +29,7 @@ struct Attribute {
 }
 
 /// An element with what is below it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Element {
     /// Its tag.
     pub(super) tag: String,
@@ -37,6 +39,8 @@ pub(super) struct Element {
     /// The file that it comes from.
     pub(super) file: Option<Arc<Path>>,
     line: u32,
+    /// Which of the models it is from, whose compiler it is read with: the first is the whole.
+    pub(super) scope: usize,
     used: Cell<Use>,
 }
 
@@ -54,8 +58,80 @@ impl Element {
             children: Vec::new(),
             file,
             line,
+            scope: 0,
             used: Cell::new(Use::None),
         }
+    }
+
+    /// An element without attributes in the place of this one.
+    pub(super) fn empty(&self, tag: &str) -> Self {
+        let (file, line, scope) = (self.file.clone(), self.line, self.scope);
+        let (attributes, children) = (Vec::new(), Vec::new());
+        Self {
+            tag: tag.to_owned(),
+            attributes,
+            children,
+            file,
+            line,
+            scope,
+            used: Cell::new(Use::None),
+        }
+    }
+
+    /// Gives it and all in it the scope of one model.
+    pub(super) fn set_scope(&mut self, scope: usize) {
+        self.scope = scope;
+        self.children.iter_mut().for_each(|child| child.set_scope(scope));
+    }
+
+    /// How many elements it is with all in it.
+    pub(super) fn count(&self) -> usize {
+        1 + self.children.iter().map(Self::count).sum::<usize>()
+    }
+
+    /// Gives an attribute this value.
+    pub(super) fn set(&mut self, name: &str, value: impl Into<String>) {
+        let value = value.into();
+        match self.attributes.iter_mut().find(|a| a.name == name) {
+            Some(attribute) => attribute.value = value,
+            None => {
+                let (name, used) = (name.to_owned(), Cell::new(Use::Read));
+                self.attributes.push(Attribute { name, value, used });
+            }
+        }
+    }
+
+    /// Gives it the attributes `pos` and `quat` of a pose.
+    pub(super) fn place_at(&mut self, pose: &Isometry3<f64>) {
+        let (t, q) = (pose.translation.vector, pose.rotation);
+        self.set("pos", format!("{:e} {:e} {:e}", t.x, t.y, t.z));
+        self.set("quat", format!("{:e} {:e} {:e} {:e}", q.w, q.i, q.j, q.k));
+    }
+
+    /// Adds `child` to the last child called `section`, which is made where there is none.
+    pub(super) fn append(&mut self, section: &str, child: Element) {
+        if !self.children.iter().any(|own| own.tag == section) {
+            let own = self.empty(section);
+            self.children.push(own);
+        }
+        if let Some(own) = self.children.iter_mut().rfind(|own| own.tag == section) {
+            own.children.push(child);
+        }
+    }
+
+    /// The element at the end of the way `path`, child by child.
+    pub(super) fn at(&self, path: &[usize]) -> &Self {
+        path.iter().fold(self, |e, place| &e.children[*place])
+    }
+
+    /// [`at`](Self::at), to be changed.
+    pub(super) fn at_mut(&mut self, path: &[usize]) -> &mut Self {
+        path.iter().fold(self, |e, place| &mut e.children[*place])
+    }
+
+    /// The text of an attribute, which does not count as reading it.
+    pub(super) fn peek(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|a| a.name == name).map(|a| a.value.as_str())
     }
 
     /// Where it is.

@@ -52,6 +52,13 @@ pub enum EqualityKind {
         /// zero without a second joint.
         polynomial: [f64; 5],
     },
+    /// The length of the first tendon follows that of the second, or stays as it is.
+    Tendon {
+        /// The first tendon, and the second where there is one.
+        tendons: (usize, Option<usize>),
+        /// Coefficients as of joints, from their lengths with all joints at their references.
+        polynomial: [f64; 5],
+    },
 }
 
 /// What is known of a constraint before it is complete.
@@ -90,8 +97,16 @@ pub(super) fn read(
             "connect" => reader.connect(e)?,
             "weld" => reader.weld(e)?,
             "joint" => reader.joint(e)?,
+            "tendon" => {
+                let first = names.tendon(e, "tendon1")?;
+                let second = if e.has("tendon2") { names.tendon(e, "tendon2")? } else { None };
+                let Some(first) = first else { continue };
+                let mut polynomial = [0.0, 1.0, 0.0, 0.0, 0.0];
+                e.leading("polycoef", &mut polynomial)?;
+                EqualityKind::Tendon { tendons: (first, second), polynomial }
+            }
             _ => {
-                e.refuse("left out: only connect, weld and joint are read");
+                e.refuse("left out: only connect, weld, joint and tendon are read");
                 continue;
             }
         };

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use super::warning::Warning;
+
 /// An element of a model's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -101,6 +103,9 @@ pub enum MjcfError {
         /// Body, joint, mesh or the like.
         kind: &'static str,
     },
+    /// Something that changes masses, degrees of freedom, contacts or actuation and is not supported.
+    #[error("{0}: not supported (with `partial`, it is left out)")]
+    Unsupported(Box<Warning>),
     /// An element that must not be where it is.
     #[error("{place}: {reason}")]
     Structure {

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::compiler::Compiler;
 use super::element::Element;
 use super::error::MjcfError;
+use super::height_field::HeightFields;
 use super::mesh::Meshes;
 use super::shape::{Kind, Shape};
 use super::solver::SolverParameters;
@@ -58,6 +59,7 @@ pub(super) struct Spec {
     rotation: UnitQuaternion<f64>,
     ends: Option<[f64; 6]>,
     mesh: Option<String>,
+    height_field: Option<String>,
     fit_scale: f64,
     mass: Option<f64>,
     density: f64,
@@ -83,6 +85,7 @@ impl Default for Spec {
             rotation: UnitQuaternion::identity(),
             ends: None,
             mesh: None,
+            height_field: None,
             fit_scale: 1.0,
             mass: None,
             density: 1000.0,
@@ -109,6 +112,8 @@ impl Spec {
         self.rotation = orientation::read(e, compiler)?.unwrap_or(self.rotation);
         self.ends = e.numbers("fromto")?.or(self.ends);
         self.mesh = e.text("mesh").map(str::to_owned).or_else(|| self.mesh.take());
+        self.height_field =
+            e.text("hfield").map(str::to_owned).or_else(|| self.height_field.take());
         self.fit_scale = e.number("fitscale")?.unwrap_or(self.fit_scale);
         self.mass = e.magnitude("mass")?.or(self.mass);
         self.density = e.magnitude("density")?.unwrap_or(self.density);
@@ -129,7 +134,7 @@ impl Spec {
     }
 
     /// The geom of `e`, which lies in a frame of its body's, and, where it `weighs`, its part of the body in the body's
-    /// frame; `None` where shapes of its kind are not read.
+    /// frame.
     pub(super) fn build(
         self,
         e: &Element,
@@ -137,15 +142,14 @@ impl Spec {
         assets: &Assets<'_>,
         t_body_frame: &Isometry3<f64>,
         weighs: bool,
-    ) -> Result<Option<(Geom, Option<Inertial>)>, MjcfError> {
-        if self.kind == Kind::Other {
-            e.refuse("left out: height fields and distance fields are not read");
-            return Ok(None);
-        }
+    ) -> Result<(Geom, Option<Inertial>), MjcfError> {
         let (t_frame_geom, size) = self.placed(e)?;
         let mut t_body_geom = t_body_frame * t_frame_geom;
-        let shape = if let Some(name) = &self.mesh {
-            let mesh = assets.meshes.get(e, name, compiler)?;
+        let shape = if self.kind == Kind::HeightField {
+            let name = self.height_field.as_deref().ok_or_else(|| e.missing("hfield"))?;
+            Shape::HeightField(assets.height_fields.get(e, name)?)
+        } else if let Some(name) = &self.mesh {
+            let mesh = assets.meshes.get(e, name)?;
             if self.kind == Kind::Mesh {
                 Shape::Mesh(mesh.mesh.clone())
             } else {
@@ -163,7 +167,7 @@ impl Spec {
             shape.ok_or_else(|| e.invalid("size", "must be positive"))?
         };
         let inertial = match weighs && self.counts(compiler) {
-            true => self.inertial(e, compiler, assets, &shape)?,
+            true => self.inertial(e, assets, &shape)?,
             false => None,
         };
         let own = self.material.as_ref().map(|name| {
@@ -184,7 +188,7 @@ impl Spec {
             group: self.group,
             rgba: self.rgba.or(own.transpose()?).unwrap_or([0.5, 0.5, 0.5, 1.0]),
         };
-        Ok(Some((geom, inertial.map(|i| i.moved(&t_body_geom)))))
+        Ok((geom, inertial.map(|i| i.moved(&t_body_geom))))
     }
 
     /// Whether its mass is part of its body's.
@@ -199,7 +203,6 @@ impl Spec {
     fn inertial(
         &self,
         e: &Element,
-        compiler: &Compiler,
         assets: &Assets<'_>,
         shape: &Shape,
     ) -> Result<Option<Inertial>, MjcfError> {
@@ -208,7 +211,7 @@ impl Spec {
                 if self.is_shell {
                     e.refuse_attribute("shellinertia", "is for the mesh to say, not for its geom");
                 }
-                assets.meshes.get(e, name, compiler)?.of_unit_density()
+                assets.meshes.get(e, name)?.of_unit_density()
             }
             _ => mass::of_unit_density(shape, self.is_shell),
         };
@@ -250,5 +253,6 @@ impl Spec {
 /// What geoms refer to by name.
 pub(super) struct Assets<'a> {
     pub(super) meshes: Meshes<'a>,
+    pub(super) height_fields: HeightFields<'a>,
     pub(super) materials: BTreeMap<String, [f32; 4]>,
 }

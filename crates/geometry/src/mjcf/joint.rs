@@ -2,9 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
+use super::Model;
 use super::compiler::Compiler;
 use super::element::Element;
 use super::error::MjcfError;
+use super::reflected::Reflected;
 use super::solver::SolverParameters;
 use super::value::Limited;
 
@@ -58,10 +60,14 @@ pub struct Joint {
     pub reference: f64,
     /// Stiffness of its spring \[N m/rad or N/m\].
     pub stiffness: f64,
+    /// Its force by the square and the cube of the deflection, where it is not linear.
+    pub higher_stiffness: [f64; 2],
     /// The position at which that spring is slack \[rad or m\].
     pub spring_reference: f64,
     /// Viscous damping \[N m s/rad or N s/m\].
     pub damping: f64,
+    /// The damper's force by v|v| and v³ of the rate v, where it is not linear.
+    pub higher_damping: [f64; 2],
     /// Dry friction \[N m or N\].
     pub friction_loss: f64,
     /// Inertia of what turns with it behind gears \[kg m² or kg\].
@@ -72,6 +78,30 @@ pub struct Joint {
     pub limit_solver: SolverParameters,
     /// How far from the end of the range the limit begins to act \[rad or m\].
     pub limit_margin: f64,
+    /// Whether the weight that is carried along it counts as an actuator's.
+    pub carries_by_actuator: bool,
+    /// Time constant \[s\] and damping ratio \[1\] that its stiffness and damping follow from, once the model is whole.
+    pub(super) spring_damper: Option<[f64; 2]>,
+}
+
+/// Gives joints that tell a time constant and a damping ratio their stiffness and damping: those of the inertia that each moves with all joints at
+/// their references, everything else free to move.
+pub(super) fn settle(root: &Element, model: &mut Model) -> Result<(), MjcfError> {
+    let told = |joint: &Joint| joint.spring_damper.is_some_and(|[t, r]| t > 0.0 && r > 0.0);
+    if !model.bodies.iter().flat_map(|b| &b.joints).any(told) {
+        return Ok(());
+    }
+    let reflected = Reflected::new(model)
+        .ok_or_else(|| root.misplaced("springdamper needs mass: some of what moves has none"))?;
+    for index in model.joint_indices().collect::<Vec<_>>() {
+        let inertia = reflected.of_joint(index, model.joint(index).kind.velocities());
+        let joint = &mut model.bodies[index.body].joints[index.joint];
+        if let Some([time, ratio]) = joint.spring_damper.filter(|_| told(joint)) {
+            joint.stiffness = inertia / (time * ratio).powi(2);
+            joint.damping = 2.0 * inertia / time;
+        }
+    }
+    Ok(())
 }
 
 /// What is known of a joint before it is complete.
@@ -87,12 +117,14 @@ pub(super) struct Spec {
     spring_reference: f64,
     force_range: [f64; 2],
     force_limited: Limited,
-    stiffness: f64,
-    damping: f64,
+    stiffness: [f64; 3],
+    damping: [f64; 3],
     friction_loss: f64,
     armature: f64,
     limit: SolverParameters,
     margin: f64,
+    carries_by_actuator: bool,
+    spring_damper: Option<[f64; 2]>,
 }
 
 impl Default for Spec {
@@ -107,12 +139,14 @@ impl Default for Spec {
             spring_reference: 0.0,
             force_range: [0.0; 2],
             force_limited: Limited::Auto,
-            stiffness: 0.0,
-            damping: 0.0,
+            stiffness: [0.0; 3],
+            damping: [0.0; 3],
             friction_loss: 0.0,
             armature: 0.0,
             limit: SolverParameters::default(),
             margin: 0.0,
+            carries_by_actuator: false,
+            spring_damper: None,
         }
     }
 }
@@ -134,11 +168,14 @@ impl Spec {
         self.spring_reference = e.number("springref")?.unwrap_or(self.spring_reference);
         self.force_range = e.numbers("actuatorfrcrange")?.unwrap_or(self.force_range);
         self.force_limited = e.limited("actuatorfrclimited")?.unwrap_or(self.force_limited);
-        self.stiffness = e.coefficient("stiffness")?.unwrap_or(self.stiffness);
-        self.damping = e.coefficient("damping")?.unwrap_or(self.damping);
+        self.stiffness = e.coefficients("stiffness")?.unwrap_or(self.stiffness);
+        self.damping = e.coefficients("damping")?.unwrap_or(self.damping);
         self.friction_loss = e.magnitude("frictionloss")?.unwrap_or(self.friction_loss);
         self.armature = e.magnitude("armature")?.unwrap_or(self.armature);
         self.margin = e.number("margin")?.unwrap_or(self.margin);
+        self.carries_by_actuator =
+            e.switch("actuatorgravcomp")?.unwrap_or(self.carries_by_actuator);
+        self.spring_damper = e.numbers("springdamper")?.or(self.spring_damper);
         self.limit.read(e, ["solreflimit", "solimplimit"])
     }
 
@@ -178,14 +215,18 @@ impl Spec {
             anchor: t_body_frame * Point3::from(self.anchor),
             range: range.map(|(low, high)| (angle(low), angle(high))),
             reference: position(self.reference),
-            stiffness: self.stiffness,
+            stiffness: self.stiffness[0],
+            higher_stiffness: [self.stiffness[1], self.stiffness[2]],
             spring_reference: position(self.spring_reference),
-            damping: self.damping,
+            damping: self.damping[0],
+            higher_damping: [self.damping[1], self.damping[2]],
             friction_loss: self.friction_loss,
             armature: self.armature,
             actuator_force_range: force,
             limit_solver: self.limit,
             limit_margin: self.margin,
+            carries_by_actuator: self.carries_by_actuator,
+            spring_damper: self.spring_damper,
         })
     }
 

@@ -39,10 +39,10 @@ pub(super) fn read(
             if matches!(kind, JointKind::Ball | JointKind::Free) {
                 let quaternion = &mut positions[end - 4..end];
                 let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
-                if norm < 1e-14 {
-                    return Err(e.invalid("qpos", "has a quaternion of zeros"));
+                match norm > 1e-14 {
+                    true => quaternion.iter_mut().for_each(|x| *x /= norm),
+                    false => quaternion.copy_from_slice(&[1.0, 0.0, 0.0, 0.0]),
                 }
-                quaternion.iter_mut().for_each(|x| *x /= norm);
             }
             at = end;
         }
@@ -63,27 +63,30 @@ pub(super) fn read(
     Ok(all)
 }
 
-/// As many numbers as there are in `default`, which stands where there are none.
+/// As many numbers as there are in `default`, which stands where there are none; those that are missing at the end are zero.
 fn filled(e: &Element, field: &'static str, default: Vec<f64>) -> Result<Vec<f64>, MjcfError> {
-    let Some(list) = e.list(field, usize::MAX)? else { return Ok(default) };
+    let Some(mut list) = e.list(field, usize::MAX)? else { return Ok(default) };
     let (given, expected) = (list.len(), default.len());
-    if given != expected {
+    if given > expected {
         return Err(e.invalid(field, format!("has {given} numbers, and the model {expected}")));
     }
+    list.resize(expected, 0.0);
     Ok(list)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::Model;
+    use crate::read_options::ReadOptions;
 
     fn read(key: &str) -> Result<Model, String> {
+        let partial = ReadOptions { partial: true, ..ReadOptions::default() };
         let xml = format!(
             "<mujoco><worldbody><body pos=\"0 0 1\"><freejoint/><geom size=\"1\"/></body><body><joint name=\"q\" ref=\"180\"/>\
             <geom size=\"1\"/></body></worldbody><actuator><muscle joint=\"q\"/><motor joint=\"q\"/></actuator>\
             <keyframe><key {key}/></keyframe></mujoco>"
         );
-        Model::from_str(&xml, None).map_err(|e| e.to_string())
+        Model::from_str_with(&xml, None, &partial).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -101,8 +104,11 @@ mod tests {
 
     #[test]
     fn lists_must_fit_the_model() {
-        let error = read("name=\"k\" qvel=\"1\"").unwrap_err();
-        assert!(error.contains("key 'k': qvel has 1 numbers, and the model 7"), "{error}");
-        assert!(read("qpos=\"1 2 3 0 0 0 0 4\"").unwrap_err().contains("quaternion of zeros"));
+        let error = read("name=\"k\" qvel=\"1 2 3 4 5 6 7 8\"").unwrap_err();
+        assert!(error.contains("key 'k': qvel has 8 numbers, and the model 7"), "{error}");
+        // As MuJoCo has it: zeros at the end, and no turn where a quaternion is zero.
+        let frame = read("qvel=\"1\" qpos=\"1 2\"").unwrap().keyframes.remove(0);
+        assert_eq!(frame.velocities, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(frame.positions, [1.0, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     }
 }

@@ -15,6 +15,12 @@ use crate::inertial::Inertial;
 pub(super) fn of_unit_density(shape: &Shape, shell: bool) -> Option<Inertial> {
     let (mass, squares) = match *shape {
         Shape::Plane { .. } | Shape::Mesh(_) => return None,
+        // As MuJoCo has it: a box of half the greatest height around the origin.
+        Shape::HeightField(ref field) => {
+            let [x, y] = field.half_extents;
+            let half_extents = Vector3::new(x, y, 0.25 * field.height + 0.5 * field.base);
+            return of_unit_density(&Shape::Box { half_extents }, shell);
+        }
         Shape::Sphere { radius: r } => ball(r, shell),
         Shape::Capsule { radius: r, half_length: h } => {
             // A tube, and two half balls moved apart by h along z: their centers are 3/8 r beyond, of shells r/2.

@@ -2,20 +2,21 @@
 
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::class::{Classes, MAIN};
-use super::compiler::Compiler;
+use super::compiler::{Compiler, Compilers};
 use super::element::Element;
 use super::error::MjcfError;
 use super::mesh_mass::{self, MeshInertia};
-use super::orientation;
+use super::{builtin_mesh, msh, orientation, submodel};
 use crate::inertial::Inertial;
-use crate::io::{folder, load_shape};
+use crate::io::folder::Folder;
+use crate::io::load_shape;
 use crate::limits::MAX_ELEMENTS;
 use crate::mesh::TriMesh;
 
@@ -46,9 +47,6 @@ impl Spec {
                 .ok_or_else(|| e.invalid("refquat", "must not be zero"))?;
         }
         self.inertia = e.keyword("inertia", &MeshInertia::WORDS)?.unwrap_or(self.inertia);
-        if self.inertia == MeshInertia::Convex {
-            e.refuse_attribute("inertia", "of the convex hull not known: that of the mesh");
-        }
         e.text("maxhullvert");
         Ok(())
     }
@@ -91,7 +89,8 @@ struct Asset<'a> {
 /// The meshes of a model by name.
 pub(super) struct Meshes<'a> {
     assets: BTreeMap<String, Asset<'a>>,
-    folder: Option<&'a Path>,
+    folder: Option<&'a Folder>,
+    compilers: &'a Compilers,
     read: RefCell<BTreeMap<String, Rc<Mesh>>>,
 }
 
@@ -99,7 +98,8 @@ impl<'a> Meshes<'a> {
     pub(super) fn new(
         root: &'a Element,
         classes: &Classes,
-        folder: Option<&'a Path>,
+        folder: Option<&'a Folder>,
+        compilers: &'a Compilers,
     ) -> Result<Self, MjcfError> {
         let mut assets = BTreeMap::new();
         for element in root.in_sections("asset").filter(|e| e.tag == "mesh") {
@@ -114,31 +114,32 @@ impl<'a> Meshes<'a> {
                     stem.to_string_lossy().into_owned()
                 }
             };
-            for field in ["file", "vertex", "face"] {
+            for field in ["file", "vertex", "face", "builtin", "params"] {
                 element.text(field);
             }
             if assets.insert(name, Asset { element, spec }).is_some() {
                 return Err(element.duplicate("mesh"));
             }
         }
-        Ok(Self { assets, folder, read: RefCell::default() })
+        Ok(Self { assets, folder, compilers, read: RefCell::default() })
     }
 
     /// The mesh that `geom` names.
-    pub(super) fn get(
-        &self,
-        geom: &Element,
-        name: &str,
-        compiler: &Compiler,
-    ) -> Result<Rc<Mesh>, MjcfError> {
+    pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Rc<Mesh>, MjcfError> {
         if let Some(mesh) = self.read.borrow().get(name) {
             return Ok(mesh.clone());
         }
         let asset = self.assets.get(name).ok_or_else(|| geom.unknown("mesh", name))?;
-        let raw = match asset.element.text("file") {
-            Some(file) => self.load(asset.element, file, compiler)?,
-            None => written(asset.element)?,
+        let e = asset.element;
+        let mut raw = match (e.text("file"), e.text("builtin")) {
+            (Some(file), _) => self.load(e, file, self.compilers.of(e))?,
+            (None, Some(kind)) => builtin_mesh::made(e, kind)?,
+            (None, None) => written(e)?,
         };
+        if raw.faces.is_empty() {
+            let flat = || e.invalid("vertex", "is in a plane: it has no convex hull");
+            raw = raw.convex_hull().ok_or_else(flat)?;
+        }
         let spec = &asset.spec;
         let (mesh, inertia) = (Arc::new(spec.apply(raw)), spec.inertia);
         let mesh = Rc::new(Mesh { mesh, inertia, unit: OnceCell::new() });
@@ -156,28 +157,22 @@ impl<'a> Meshes<'a> {
         };
         let relative = Path::new(&compiler.mesh_folder).join(file);
         // Meshes of an included file may lie beside it.
-        let beside =
-            e.file.as_deref().and_then(Path::parent).and_then(|p| p.strip_prefix(folder).ok());
-        let places: [PathBuf; 2] =
-            [relative.clone(), beside.unwrap_or(Path::new("")).join(relative)];
-        for place in places {
-            let path = folder::inside(folder, &place.to_string_lossy())
-                .map_err(|reason| e.unusable(name, reason))?;
-            if path.is_file() {
-                return load_shape(&path).map_err(|error| e.unusable(name, error.to_string()));
-            }
+        let path =
+            submodel::found(folder, e, &relative).map_err(|reason| e.unusable(name, reason))?;
+        if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("msh")) {
+            return msh::load(&path).map_err(|reason| e.unusable(name, reason));
         }
-        Err(e.unusable(name, "no such file"))
+        load_shape(&path).map_err(|error| e.unusable(name, error.to_string()))
     }
 }
 
-/// A mesh whose vertices and faces are in the model itself.
+/// A mesh whose vertices are in the model itself, with faces where it has some.
 fn written(e: &Element) -> Result<TriMesh, MjcfError> {
     let vertices = e.list("vertex", 3 * MAX_ELEMENTS)?.ok_or_else(|| e.missing("file"))?;
-    let faces = e.list("face", 3 * MAX_ELEMENTS)?.ok_or_else(|| e.missing("face"))?;
+    let faces = e.list("face", 3 * MAX_ELEMENTS)?.unwrap_or_default();
     let count = vertices.len() / 3;
-    if count == 0 || faces.is_empty() {
-        return Err(e.invalid("face", "must not be empty"));
+    if count == 0 {
+        return Err(e.invalid("vertex", "must not be empty"));
     }
     for (field, list) in [("vertex", &vertices), ("face", &faces)] {
         if list.len() % 3 != 0 {
@@ -253,12 +248,14 @@ mod tests {
             ("0 1 4", "face refers to vertex 4 of 4"),
             ("0 1 -1", "face refers to vertex -1"),
             ("0 1", "not three each"),
-            ("", "face must not be empty"),
             ("0 1 2", "holds no volume"),
         ] {
             let error = with(faces).unwrap_err();
             assert!(error.contains(part), "{error}");
         }
-        assert!(read(vertices, None).unwrap_err().contains("face is missing"));
+        // Without faces it is a hull.
+        assert!(with("").is_ok() && read(vertices, None).is_ok());
+        let flat = "name=\"a\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0\"";
+        assert!(read(flat, None).unwrap_err().contains("no convex hull"));
     }
 }

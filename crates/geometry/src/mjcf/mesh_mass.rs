@@ -34,7 +34,8 @@ pub(super) fn of_unit_density(mesh: &TriMesh, inertia: MeshInertia) -> Option<In
     match inertia {
         MeshInertia::Exact => exact(mesh),
         MeshInertia::Shell => shell(mesh),
-        MeshInertia::Legacy | MeshInertia::Convex => legacy(mesh),
+        MeshInertia::Convex => exact(&mesh.convex_hull()?),
+        MeshInertia::Legacy => legacy(mesh),
     }
 }
 

@@ -12,7 +12,9 @@ use super::contact;
 use super::element::Element;
 use super::equality::{self, Equality};
 use super::error::MjcfError;
+use super::flags::Flags;
 use super::geom::{Assets, Geom};
+use super::height_field::HeightFields;
 use super::joint::{Joint, JointKind};
 use super::keyframe::{self, Keyframe};
 use super::mesh::Meshes;
@@ -20,7 +22,9 @@ use super::names::Names;
 use super::site::Site;
 use super::tendon::{self, Tendon};
 use super::warning::{self, Warning};
-use super::{material, source};
+use super::{joint, material, source, submodel};
+use crate::io::folder::Folder;
+use crate::read_options::ReadOptions;
 
 /// A joint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -61,20 +65,27 @@ pub struct Model {
 }
 
 impl Model {
-    /// Reads an MJCF file. Meshes and included files are looked for in its folder or below, and nowhere else.
+    /// Reads an MJCF file. Meshes and included files are looked for in its folder, below, and in its package ([`ReadOptions::root`]).
+    ///
+    /// # Errors
+    /// [`MjcfError`], naming file, element and attribute: [`MjcfError::Unsupported`] of what changes masses, degrees of freedom, contacts or actuation and
+    /// is not supported.
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, MjcfError> {
+        Self::from_file_with(path, &ReadOptions::default())
+    }
+
+    /// [`from_file`](Self::from_file) with options.
     ///
     /// # Errors
     /// [`MjcfError`], naming file, element and attribute.
-    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, MjcfError> {
+    pub fn from_file_with(
+        path: impl AsRef<Path>,
+        options: &ReadOptions,
+    ) -> Result<Self, MjcfError> {
         let path = path.as_ref();
-        let folder = match path.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p,
-            _ => Path::new("."),
-        };
-        Self::from_tree(
-            &source::parse(&source::read(path)?, Some(path), Some(folder))?,
-            Some(folder),
-        )
+        let folder = options.folder(path);
+        let root = source::parse(&source::read(path)?, Some(path), Some(&folder))?;
+        Self::from_tree(root, Some(&folder), options.partial)
     }
 
     /// Reads MJCF text. Meshes and included files are looked for in `asset_dir` and never outside of it.
@@ -82,17 +93,37 @@ impl Model {
     /// # Errors
     /// [`MjcfError`], naming element and attribute.
     pub fn from_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, MjcfError> {
-        Self::from_tree(&source::parse(xml, None, asset_dir)?, asset_dir)
+        Self::from_str_with(xml, asset_dir, &ReadOptions::default())
     }
 
-    fn from_tree(root: &Element, folder: Option<&Path>) -> Result<Self, MjcfError> {
-        let compiler = Compiler::read(root)?;
-        let classes = Classes::read(root, &compiler)?;
+    /// [`from_str`](Self::from_str) with options, of which only `partial` matters.
+    ///
+    /// # Errors
+    /// [`MjcfError`], naming element and attribute.
+    pub fn from_str_with(
+        xml: &str,
+        asset_dir: Option<&Path>,
+        options: &ReadOptions,
+    ) -> Result<Self, MjcfError> {
+        let folder = asset_dir.map(Folder::own);
+        let root = source::parse(xml, None, folder.as_ref())?;
+        Self::from_tree(root, folder.as_ref(), options.partial)
+    }
+
+    fn from_tree(
+        mut root: Element,
+        folder: Option<&Folder>,
+        partial: bool,
+    ) -> Result<Self, MjcfError> {
+        let compilers = submodel::unfold(&mut root, folder)?;
+        let root = &root;
+        let classes = Classes::read(root, &compilers)?;
         let assets = Assets {
-            meshes: Meshes::new(root, &classes, folder)?,
+            meshes: Meshes::new(root, &classes, folder, &compilers)?,
+            height_fields: HeightFields::new(root, folder, &compilers)?,
             materials: material::read(root, &classes)?,
         };
-        let tree = body::read(root, &compiler, &classes, &assets)?;
+        let tree = body::read(root, &compilers, &classes, &assets)?;
         let mut model = Self {
             name: root.text("model").unwrap_or("MuJoCo Model").to_owned(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
@@ -111,17 +142,26 @@ impl Model {
             model.gravity = e.numbers("gravity")?.map_or(model.gravity, Vector3::from);
             model.time_step = e.number("timestep")?.unwrap_or(model.time_step);
         }
-        model.scale_masses(&compiler);
+        let flags = Flags::read(root)?;
+        if flags.no_gravity {
+            model.gravity = Vector3::zeros();
+        }
+        model.scale_masses(&compilers.0[0]);
         let mut names = Names::new(&model);
         model.exclusions = contact::exclusions(root, &names)?;
-        model.equalities = equality::read(root, &classes, &model, &names)?;
-        model.tendons = tendon::read(root, &compiler, &classes, &model, &names)?;
+        model.tendons = tendon::read(root, &compilers, &classes, &model, &names)?;
         names.add_tendons(root, &model.tendons);
-        let (actuators, written) = actuator::read(root, &compiler, &classes, &model, &names)?;
+        joint::settle(root, &mut model)?;
+        model.equalities = equality::read(root, &classes, &model, &names)?;
+        let (actuators, written) = actuator::read(root, &compilers, &classes, &model, &names)?;
         model.actuators = actuators;
+        flags.apply(&mut model);
         model.keyframes = keyframe::read(root, &model, &written)?;
         model.warnings = warning::warnings(root);
-        Ok(model)
+        match model.warnings.iter().find(|warning| warning.changes && !partial) {
+            Some(warning) => Err(MjcfError::Unsupported(Box::new(warning.clone()))),
+            None => Ok(model),
+        }
     }
 
     fn scale_masses(&mut self, compiler: &Compiler) {

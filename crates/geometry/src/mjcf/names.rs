@@ -8,7 +8,7 @@ use super::element::Element;
 use super::error::MjcfError;
 use super::joint::JointKind;
 use super::tendon::Tendon;
-use super::{JointIndex, Model};
+use super::{Geom, JointIndex, Model};
 
 /// The names that things of one kind have.
 #[derive(Default)]
@@ -31,6 +31,8 @@ pub(super) struct Names {
     tendons: BTreeMap<String, Option<usize>>,
     /// The body that each is on, and its pose there.
     sites: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
+    /// The body that each is on, and its place among that body's geoms.
+    geoms: BTreeMap<String, (Option<usize>, usize)>,
 }
 
 impl Names {
@@ -40,7 +42,11 @@ impl Names {
             joints: BTreeMap::new(),
             tendons: BTreeMap::new(),
             sites: BTreeMap::new(),
+            geoms: BTreeMap::new(),
         };
+        for (place, geom) in model.world_geoms.iter().enumerate() {
+            names.geoms.insert(geom.name.clone(), (None, place));
+        }
         for site in &model.world_sites {
             names.sites.insert(site.name.clone(), (None, site.t_body_site));
         }
@@ -48,6 +54,9 @@ impl Names {
             names.bodies.insert(body.name.clone(), Some(b));
             for (j, joint) in body.joints.iter().enumerate() {
                 names.joints.insert(joint.name.clone(), JointIndex { body: b, joint: j });
+            }
+            for (place, geom) in body.geoms.iter().enumerate() {
+                names.geoms.insert(geom.name.clone(), (Some(b), place));
             }
             for site in &body.sites {
                 names.sites.insert(site.name.clone(), (Some(b), site.t_body_site));
@@ -57,6 +66,7 @@ impl Names {
         names.bodies.remove("");
         names.joints.remove("");
         names.sites.remove("");
+        names.geoms.remove("");
         names
     }
 
@@ -103,6 +113,18 @@ impl Names {
             JointKind::Hinge | JointKind::Slide => Ok(joint),
             _ => Err(e.invalid(field, "names neither a hinge nor a slide")),
         }
+    }
+
+    /// The body of the geom that the attribute `field` of `e` names (`None` is the world), and the geom.
+    pub(super) fn geom<'a>(
+        &self,
+        e: &Element,
+        field: &'static str,
+        model: &'a Model,
+    ) -> Result<(Option<usize>, &'a Geom), MjcfError> {
+        let (body, place) = find(&self.geoms, e, field)?;
+        let all = body.map_or(&model.world_geoms, |body| &model.bodies[body].geoms);
+        Ok((body, &all[place]))
     }
 
     /// The site that the attribute `field` of `e` names: its body (`None` is the world) and its pose there.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::height_field::HeightField;
 use crate::mesh::TriMesh;
 
 /// A shape in its own frame; round ones are about the z axis.
@@ -45,6 +46,8 @@ pub enum Shape {
     },
     /// A mesh, scaled to meters, of positions and faces alone. The geoms that show it share it.
     Mesh(Arc<TriMesh>),
+    /// Terrain.
+    HeightField(Arc<HeightField>),
 }
 
 /// What the `type` of a geom may be.
@@ -57,8 +60,7 @@ pub(super) enum Kind {
     Ellipsoid,
     Box,
     Mesh,
-    /// Height fields and distance fields.
-    Other,
+    HeightField,
 }
 
 impl Kind {
@@ -70,8 +72,9 @@ impl Kind {
         ("ellipsoid", Self::Ellipsoid),
         ("box", Self::Box),
         ("mesh", Self::Mesh),
-        ("hfield", Self::Other),
-        ("sdf", Self::Other),
+        ("hfield", Self::HeightField),
+        // The distance field of a mesh.
+        ("sdf", Self::Mesh),
     ];
 
     /// The shape of these sizes, which has no mesh; `None` where one of the sizes that it needs is not positive.
@@ -83,7 +86,7 @@ impl Kind {
             Self::Cylinder => (2, Shape::Cylinder { radius: a, half_length: b }),
             Self::Ellipsoid => (3, Shape::Ellipsoid { radii: Vector3::new(a, b, c) }),
             Self::Box => (3, Shape::Box { half_extents: Vector3::new(a, b, c) }),
-            Self::Mesh | Self::Other => return None,
+            Self::Mesh | Self::HeightField => return None,
         };
         [a, b, c].iter().take(needed).all(|&x| x > 0.0).then_some(shape)
     }

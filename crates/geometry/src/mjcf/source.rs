@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::element::Element;
 use super::error::MjcfError;
-use crate::io::folder::inside;
+use crate::io::folder::Folder;
 use crate::io::read_plain;
 use crate::limits::{MAX_MJCF_BYTES, MAX_MJCF_DEPTH, MAX_MJCF_ELEMENTS};
 
@@ -24,7 +24,7 @@ pub(super) fn read(path: &Path) -> Result<String, MjcfError> {
 pub(super) fn parse(
     xml: &str,
     file: Option<&Path>,
-    folder: Option<&Path>,
+    folder: Option<&Folder>,
 ) -> Result<Element, MjcfError> {
     let mut source = Source { folder, included: BTreeSet::new(), bytes: 0, elements: 0 };
     let root = source.document(xml, file.map(Arc::from), Path::new(""), 0)?;
@@ -37,7 +37,7 @@ pub(super) fn parse(
 }
 
 struct Source<'a> {
-    folder: Option<&'a Path>,
+    folder: Option<&'a Folder>,
     /// Files that have been included, with respect to the folder.
     included: BTreeSet<PathBuf>,
     bytes: usize,
@@ -59,14 +59,16 @@ impl Source<'_> {
     ) -> Result<Element, MjcfError> {
         self.bytes += xml.len();
         within("bytes", self.bytes, MAX_MJCF_BYTES)?;
+        // What comes before the first tag is blank in some files.
+        let trimmed = xml.trim_start_matches('\u{feff}').trim_start();
         let options = roxmltree::ParsingOptions {
             nodes_limit: 4 * MAX_MJCF_ELEMENTS as u32,
             ..Default::default()
         };
-        let document = roxmltree::Document::parse_with_options(xml, options).map_err(|e| {
+        let document = roxmltree::Document::parse_with_options(trimmed, options).map_err(|e| {
             MjcfError::Xml { file: file.as_deref().map(Path::to_path_buf), message: e.to_string() }
         })?;
-        let lines = Lines::new(xml);
+        let lines = Lines::new(xml, xml.len() - trimmed.len());
         let mut found = Vec::new();
         self.element(document.root_element(), &file, &lines, beside, depth, &mut found)?;
         let nothing = || MjcfError::Xml {
@@ -117,7 +119,7 @@ impl Source<'_> {
         let places = [PathBuf::from(name), beside.join(name)];
         let mut reason = "no such file";
         for relative in places {
-            let path = match inside(folder, &relative.to_string_lossy()) {
+            let path = match folder.file(&relative.to_string_lossy()) {
                 Ok(path) if path.is_file() => path,
                 Ok(_) => continue,
                 Err(outside) => {
@@ -138,17 +140,22 @@ impl Source<'_> {
 }
 
 /// Where the lines of a text begin.
-struct Lines(Vec<usize>);
+struct Lines {
+    starts: Vec<usize>,
+    /// Bytes before those that are counted.
+    before: usize,
+}
 
 impl Lines {
-    fn new(text: &str) -> Self {
+    fn new(text: &str, before: usize) -> Self {
         let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
-        Self(std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect())
+        let starts = std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect();
+        Self { starts, before }
     }
 
     /// The number, from 1, of the line that holds the byte `at`.
     fn number(&self, at: usize) -> u32 {
-        self.0.partition_point(|&start| start <= at) as u32
+        self.starts.partition_point(|&start| start <= at + self.before) as u32
     }
 }
 

@@ -1,13 +1,15 @@
-//! Tendons that are sums of joints.
+//! Tendons: sums of joints, and cables through sites, over pulleys and around geoms.
+
+use nalgebra::{Isometry3, Point3};
 
 use super::class::{Class, Classes, MAIN};
-use super::compiler::Compiler;
+use super::compiler::{Compiler, Compilers};
 use super::element::Element;
 use super::error::MjcfError;
 use super::names::{Names, Taken};
 use super::solver::SolverParameters;
 use super::value::Limited;
-use super::{JointIndex, Model};
+use super::{JointIndex, Model, Shape};
 
 /// A joint's part in a tendon.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,21 +20,57 @@ pub struct TendonJoint {
     pub coefficient: f64,
 }
 
-/// A tendon whose length is a sum of joint positions, each times its coefficient.
+/// A point or an obstacle along a cable. Of bodies, `None` is the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TendonPart {
+    /// It runs through this point.
+    Site {
+        /// The body.
+        body: Option<usize>,
+        /// In the body's frame \[m\].
+        point: Point3<f64>,
+    },
+    /// Between the sites before and after, it runs around a sphere, or a cylinder about the z axis.
+    Around {
+        /// The body.
+        body: Option<usize>,
+        /// The obstacle's frame → body frame.
+        t_body_geom: Isometry3<f64>,
+        /// \[m\]
+        radius: f64,
+        /// Whether it is a cylinder, which has no ends here.
+        is_cylinder: bool,
+        /// A body and a point in its frame \[m\] on whose side it runs: inside, where the point is in the obstacle.
+        side: Option<(Option<usize>, Point3<f64>)>,
+    },
+    /// From here on its length is divided by `divisor`, and it need not begin where it ended before.
+    Pulley {
+        /// \[1\]
+        divisor: f64,
+    },
+}
+
+/// A tendon, whose length is a sum of joint positions, each times its coefficient, or that of a cable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tendon {
     /// Its name, empty where it has none.
     pub name: String,
-    /// The joints along it.
+    /// The joints along it; none of a cable.
     pub joints: Vec<TendonJoint>,
+    /// The parts of a cable, one after the other.
+    pub parts: Vec<TendonPart>,
     /// Smallest and largest length, where it is limited.
     pub range: Option<(f64, f64)>,
     /// Stiffness of its spring, force for length.
     pub stiffness: f64,
-    /// The lengths between which its spring is slack.
-    pub spring_range: (f64, f64),
+    /// Its force by the square and the cube of the deflection, where it is not linear.
+    pub higher_stiffness: [f64; 2],
+    /// The lengths between which its spring is slack; `None` of a cable is its length with all joints at their spring's reference.
+    pub spring_range: Option<(f64, f64)>,
     /// Viscous damping, force for the length's rate.
     pub damping: f64,
+    /// The damper's force by v|v| and v³ of the rate v, where it is not linear.
+    pub higher_damping: [f64; 2],
     /// Dry friction, a force.
     pub friction_loss: f64,
     /// Inertia of what moves with its length.
@@ -50,10 +88,10 @@ pub(super) struct Spec {
     limited: Limited,
     force_range: [f64; 2],
     force_limited: Limited,
-    stiffness: f64,
+    stiffness: [f64; 3],
     /// Negative where it is to be found from the joints.
     spring: [f64; 2],
-    damping: f64,
+    damping: [f64; 3],
     friction_loss: f64,
     armature: f64,
     limit: SolverParameters,
@@ -66,9 +104,9 @@ impl Default for Spec {
             limited: Limited::Auto,
             force_range: [0.0; 2],
             force_limited: Limited::Auto,
-            stiffness: 0.0,
+            stiffness: [0.0; 3],
             spring: [-1.0; 2],
-            damping: 0.0,
+            damping: [0.0; 3],
             friction_loss: 0.0,
             armature: 0.0,
             limit: SolverParameters::default(),
@@ -82,7 +120,7 @@ impl Spec {
         self.limited = e.limited("limited")?.unwrap_or(self.limited);
         self.force_range = e.numbers("actuatorfrcrange")?.unwrap_or(self.force_range);
         self.force_limited = e.limited("actuatorfrclimited")?.unwrap_or(self.force_limited);
-        self.stiffness = e.coefficient("stiffness")?.unwrap_or(self.stiffness);
+        self.stiffness = e.coefficients("stiffness")?.unwrap_or(self.stiffness);
         if let Some(length) = e.list("springlength", 2)? {
             self.spring = match length[..] {
                 [low, high] => [low, high],
@@ -90,7 +128,7 @@ impl Spec {
                 _ => return Err(e.invalid("springlength", "must have 1 or 2 numbers")),
             };
         }
-        self.damping = e.coefficient("damping")?.unwrap_or(self.damping);
+        self.damping = e.coefficients("damping")?.unwrap_or(self.damping);
         self.friction_loss = e.magnitude("frictionloss")?.unwrap_or(self.friction_loss);
         self.armature = e.magnitude("armature")?.unwrap_or(self.armature);
         self.limit.read(e, ["solreflimit", "solimplimit"])
@@ -103,28 +141,35 @@ impl Spec {
         model: &Model,
         names: &Names,
     ) -> Result<Tendon, MjcfError> {
-        let mut joints = Vec::new();
+        let (mut joints, mut parts) = (Vec::new(), Vec::new());
+        if e.tag == "spatial" {
+            parts = cable(e, model, names)?;
+        }
         for part in e.sections("joint") {
             let joint = names.single_joint(part, "joint", model)?;
             let coefficient = part.number("coef")?.ok_or_else(|| part.missing("coef"))?;
             joints.push(TendonJoint { joint, coefficient });
         }
-        if joints.is_empty() {
+        if joints.is_empty() && parts.is_empty() {
             return Err(e.misplaced("a tendon needs a joint"));
         }
         let slack = |t: &TendonJoint| t.coefficient * model.joint(t.joint).spring_reference;
         let spring_range = match self.spring {
-            [-1.0, -1.0] => [joints.iter().map(slack).sum(); 2],
-            written => written,
+            [-1.0, -1.0] if joints.is_empty() => None,
+            [-1.0, -1.0] => Some([joints.iter().map(slack).sum(); 2]),
+            written => Some(written),
         };
         let force = ["actuatorfrclimited", "actuatorfrcrange"];
         Ok(Tendon {
             name: e.name(),
             joints,
+            parts,
             range: compiler.range(e, ["limited", "range"], self.limited, self.range)?,
-            stiffness: self.stiffness,
-            spring_range: spring_range.into(),
-            damping: self.damping,
+            stiffness: self.stiffness[0],
+            higher_stiffness: [self.stiffness[1], self.stiffness[2]],
+            spring_range: spring_range.map(<(f64, f64)>::from),
+            damping: self.damping[0],
+            higher_damping: [self.damping[1], self.damping[2]],
             friction_loss: self.friction_loss,
             armature: self.armature,
             actuator_force_range: compiler.range(e, force, self.force_limited, self.force_range)?,
@@ -133,18 +178,18 @@ impl Spec {
     }
 }
 
-/// The fixed tendons of `root`.
+/// The tendons of `root`.
 pub(super) fn read(
     root: &Element,
-    compiler: &Compiler,
+    compilers: &Compilers,
     classes: &Classes,
     model: &Model,
     names: &Names,
 ) -> Result<Vec<Tendon>, MjcfError> {
     let (mut all, mut taken) = (Vec::new(), Taken::default());
     for e in root.in_sections("tendon") {
-        if e.tag != "fixed" {
-            e.refuse("left out: only tendons that are sums of joints are read");
+        if !matches!(e.tag.as_str(), "fixed" | "spatial") {
+            e.refuse("left out: tendons are fixed or spatial");
             continue;
         }
         e.take();
@@ -152,9 +197,68 @@ pub(super) fn read(
         let mut spec = class.tendon.clone();
         spec.read(e)?;
         taken.add(e, "tendon")?;
-        all.push(spec.build(e, compiler, model, names)?);
+        all.push(spec.build(e, compilers.of(e), model, names)?);
     }
     Ok(all)
+}
+
+/// The parts of a cable.
+fn cable(e: &Element, model: &Model, names: &Names) -> Result<Vec<TendonPart>, MjcfError> {
+    let mut parts = Vec::new();
+    let point = |part: &Element, field| -> Result<_, MjcfError> {
+        let (body, t_body_site) = names.site(part, field)?;
+        Ok((body, Point3::from(t_body_site.translation.vector)))
+    };
+    for part in &e.children {
+        part.take();
+        parts.push(match part.tag.as_str() {
+            "site" => {
+                let (body, point) = point(part, "site")?;
+                TendonPart::Site { body, point }
+            }
+            "geom" => {
+                let side = part.has("sidesite").then(|| point(part, "sidesite")).transpose()?;
+                let (body, geom) = names.geom(part, "geom", model)?;
+                let (radius, is_cylinder) = match geom.shape {
+                    Shape::Sphere { radius } => (radius, false),
+                    Shape::Cylinder { radius, .. } => (radius, true),
+                    _ => return Err(part.invalid("geom", "is neither a sphere nor a cylinder")),
+                };
+                let t_body_geom = geom.t_body_geom;
+                TendonPart::Around { body, t_body_geom, radius, is_cylinder, side }
+            }
+            "pulley" => {
+                let divisor = part.number("divisor")?.ok_or_else(|| part.missing("divisor"))?;
+                if divisor <= 0.0 {
+                    return Err(part.invalid("divisor", "must be positive"));
+                }
+                TendonPart::Pulley { divisor }
+            }
+            _ => return Err(part.misplaced("is neither a site nor a geom nor a pulley")),
+        });
+    }
+    // Obstacles lie between sites, and a cable has two ends.
+    let is_site = |k: Option<usize>| {
+        k.and_then(|k| parts.get(k)).is_some_and(|p| matches!(p, TendonPart::Site { .. }))
+    };
+    for (k, part) in parts.iter().enumerate() {
+        let fits = match part {
+            TendonPart::Around { .. } => is_site(k.checked_sub(1)) && is_site(Some(k + 1)),
+            TendonPart::Site { .. } => {
+                let after =
+                    parts.get(k + 1).is_some_and(|p| !matches!(p, TendonPart::Pulley { .. }));
+                after || k > 0 && !matches!(parts[k - 1], TendonPart::Pulley { .. })
+            }
+            TendonPart::Pulley { .. } => is_site(Some(k + 1)),
+        };
+        if !fits {
+            return Err(e.children[k].misplaced("a cable leads from site to site"));
+        }
+    }
+    if parts.is_empty() {
+        return Err(e.misplaced("a tendon needs two sites"));
+    }
+    Ok(parts)
 }
 
 #[cfg(test)]
@@ -177,10 +281,10 @@ mod tests {
                 "<fixed name=\"t\" {attributes}><joint joint=\"x\" coef=\"2\"/><joint joint=\"y\" coef=\"-1\"/></fixed>"
             ))
         };
-        let (low, high) = fixed("").unwrap().spring_range;
+        let (low, high) = fixed("").unwrap().spring_range.unwrap();
         assert!((low - 0.1).abs() < 1e-15 && low == high);
-        assert_eq!(fixed("springlength=\"0.5\"").unwrap().spring_range, (0.5, 0.5));
-        assert_eq!(fixed("springlength=\"0.5 1\"").unwrap().spring_range, (0.5, 1.0));
+        assert_eq!(fixed("springlength=\"0.5\"").unwrap().spring_range, Some((0.5, 0.5)));
+        assert_eq!(fixed("springlength=\"0.5 1\"").unwrap().spring_range, Some((0.5, 1.0)));
         assert!(fixed("springlength=\"\"").unwrap_err().contains("springlength must have"));
         assert!(read("<fixed/>").unwrap_err().contains("fixed: a tendon needs a joint"));
         let error = read("<fixed><joint joint=\"z\" coef=\"1\"/></fixed>").unwrap_err();

@@ -71,16 +71,12 @@ impl Element {
         Ok(Some(numbers))
     }
 
-    /// The first coefficient of a polynomial, not negative. The others, of higher powers, are left out.
-    pub(super) fn coefficient(&self, field: &'static str) -> Result<Option<f64>, MjcfError> {
-        let list = self.list(field, 3)?.unwrap_or_default();
-        if list.iter().skip(1).any(|&c| c != 0.0) {
-            self.refuse_attribute(field, "read as its first, linear coefficient alone");
-        }
-        match list.first() {
-            Some(&c) if c < 0.0 => Err(self.invalid(field, "must not be negative")),
-            first => Ok(first.copied()),
-        }
+    /// The coefficients of a polynomial without a constant, up to the third power; the first is not negative.
+    pub(super) fn coefficients(&self, field: &'static str) -> Result<Option<[f64; 3]>, MjcfError> {
+        let Some(list) = self.list(field, 3)? else { return Ok(None) };
+        let mut all = [0.0; 3];
+        all[..list.len()].copy_from_slice(&list);
+        if all[0] < 0.0 { Err(self.invalid(field, "must not be negative")) } else { Ok(Some(all)) }
     }
 
     /// A whole number.

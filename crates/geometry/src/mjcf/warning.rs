@@ -17,6 +17,8 @@ pub struct Warning {
     pub count: usize,
     /// What became of it.
     pub reason: &'static str,
+    /// Whether it changes masses, degrees of freedom, contacts or actuation.
+    pub changes: bool,
 }
 
 impl fmt::Display for Warning {
@@ -53,41 +55,88 @@ const LOOKS: &[&str] = &[
     "info",
 ];
 
-/// Elements and attributes below `root` that nothing has asked for, and those asked for in vain, each kind once.
+/// Elements that change nothing of how a model moves: what is drawn, measured or noted, and how MuJoCo allots memory and solves.
+const HARMLESS: &[&str] = &[
+    "visual",
+    "statistic",
+    "light",
+    "camera",
+    "texture",
+    "skin",
+    "custom",
+    "size",
+    "sensor",
+    "extension",
+    "flag",
+    "lengthrange",
+    // Contacts are for the world to make.
+    "pair",
+];
+
+/// Attributes of the medium around a model, which there is none of.
+const MEDIUM: &[&str] = &["density", "viscosity", "wind"];
+
+/// Attributes that change how a model moves where they are not read.
+const DYNAMIC: &[&str] = &[
+    "armature",
+    "damping",
+    "stiffness",
+    "springdamper",
+    "scale",
+    "massscale",
+    "lengthrange",
+    "delay",
+    "nsample",
+];
+
+/// Elements and attributes below `root` that nothing has asked for, and those asked for in vain, each kind once. What only draws or measures is
+/// passed over, and so is how MuJoCo solves.
 pub(super) fn warnings(root: &Element) -> Vec<Warning> {
     let mut found: Vec<Warning> = Vec::new();
     let mut known: BTreeMap<(String, Option<String>, &'static str), usize> = BTreeMap::new();
-    let mut add = |element: &Element, attribute: Option<&str>, reason: &'static str| {
+    let mut add = |element: &Element, attribute: Option<&str>, reason, changes| {
         let attribute = attribute.map(str::to_owned);
         let at =
             *known.entry((element.tag.clone(), attribute.clone(), reason)).or_insert(found.len());
         match found.get_mut(at) {
             Some(warning) => warning.count += 1,
-            None => found.push(Warning { place: element.place(), attribute, count: 1, reason }),
+            None => {
+                let place = element.place();
+                found.push(Warning { place, attribute, count: 1, reason, changes });
+            }
         }
     };
-    let mut open = vec![root];
-    while let Some(element) = open.pop() {
+    let mut open = vec![(root, false)];
+    while let Some((element, in_default)) = open.pop() {
+        let tag = element.tag.as_str();
+        if HARMLESS.contains(&tag) {
+            continue;
+        }
+        // A class changes nothing but what is of it.
+        let in_default = in_default || tag == "default";
         match element.used() {
+            Use::None if tag == "deformable" => {}
             Use::None => {
-                add(element, None, "not read");
+                add(element, None, "not read", !in_default);
                 continue;
             }
             Use::Refused(reason) => {
-                add(element, None, reason);
+                add(element, None, reason, !in_default);
                 continue;
             }
             Use::Read => {}
         }
         for (name, used) in element.attributes() {
+            let changes = !in_default && DYNAMIC.contains(&name);
             match used {
                 Use::None if LOOKS.contains(&name) => {}
-                Use::None => add(element, Some(name), "not read"),
-                Use::Refused(reason) => add(element, Some(name), reason),
+                Use::None if matches!(tag, "option" | "compiler") && !MEDIUM.contains(&name) => {}
+                Use::None => add(element, Some(name), "not read", changes),
+                Use::Refused(reason) => add(element, Some(name), reason, changes),
                 Use::Read => {}
             }
         }
-        open.extend(element.children.iter().rev());
+        open.extend(element.children.iter().rev().map(|child| (child, in_default)));
     }
     found
 }
@@ -95,21 +144,26 @@ pub(super) fn warnings(root: &Element) -> Vec<Warning> {
 #[cfg(test)]
 mod tests {
     use super::super::Model;
+    use crate::read_options::ReadOptions;
 
     #[test]
     fn what_is_not_read_is_named_once() {
-        let xml = "<mujoco><option cone=\"elliptic\"/>\n<worldbody><light/><light/><geom size=\"1\" rgba=\"1 0 0 1\" gap=\"0\"/>\n\
-            <body><geom size=\"1\" gap=\"1\"/><replicate count=\"2\"><geom size=\"1\"/></replicate></body></worldbody>\n\
-            <actuator><muscle name=\"m\" tendon=\"t\"/></actuator><sensor><gyro/></sensor></mujoco>";
-        let model = Model::from_str(xml, None).unwrap();
+        let xml = "<mujoco><option cone=\"elliptic\" viscosity=\"1\"/>\n<worldbody><light/><light/><geom size=\"1\" rgba=\"1 0 0 1\" gap=\"0\"/>\n\
+            <body><geom size=\"1\" gap=\"1\"/><composite/></body></worldbody>\n\
+            <actuator><plugin name=\"m\" joint=\"t\"/></actuator><sensor><gyro/></sensor></mujoco>";
+        let error = Model::from_str(xml, None).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "line 3: composite: not read: not supported (with `partial`, it is left out)"
+        );
+        let options = ReadOptions { partial: true, ..ReadOptions::default() };
+        let model = Model::from_str_with(xml, None, &options).unwrap();
         let found: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         let expected = [
-            "line 1: option: cone: not read",
-            "line 2: light: not read (2 times)",
+            "line 1: option: viscosity: not read",
             "line 2: geom: gap: not read (2 times)",
-            "line 3: replicate: not read",
-            "line 4: muscle 'm': left out: actuators of this kind are not read",
-            "line 4: sensor: not read",
+            "line 3: composite: not read",
+            "line 4: plugin 'm': left out: actuators of this kind are not read",
         ];
         assert_eq!(found, expected);
     }

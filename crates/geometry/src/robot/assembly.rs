@@ -31,6 +31,7 @@ impl KinematicTree {
             variables: Vec::new(),
             ranges: Vec::new(),
             floating: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 

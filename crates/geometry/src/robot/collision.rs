@@ -4,15 +4,17 @@
 //! their vertices on the true surface: facets lie up to `radius * (1 - cos(π / 48))` = 0.21 % of the radius inside it
 //! (34 µm at 15.7 mm), on a sphere up to twice as much.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry;
 
 use super::{RobotError, origin};
 use crate::closest;
-use crate::io::folder;
+use crate::io::folder::Folder;
+use crate::io::load_shape;
 use crate::mesh::TriMesh;
+use crate::read_options::ReadOptions;
 use crate::shapes;
 
 /// Columns of facets around a cylinder, a capsule or a sphere.
@@ -21,22 +23,28 @@ const COLUMNS: usize = 48;
 /// One mesh a collision tag of `link`, in the link frame \[m\].
 pub(super) fn parts(
     link: &urdf_rs::Link,
-    asset_dir: Option<&Path>,
+    folder: Option<&Folder>,
+    options: &ReadOptions,
+    warnings: &mut Vec<String>,
 ) -> Result<Vec<TriMesh>, RobotError> {
     let owner = || format!("link '{}'", link.name);
-    link.collision
-        .iter()
-        .map(|collision| {
-            let mesh = geometry(&link.name, &collision.geometry, asset_dir)?;
-            Ok(mesh.transformed(&origin::isometry(&owner, &collision.origin)?))
-        })
-        .collect()
+    let mut parts = Vec::with_capacity(link.collision.len());
+    for collision in &link.collision {
+        let t_link_part = origin::isometry(&owner, &collision.origin)?;
+        match geometry(&link.name, &collision.geometry, folder, options) {
+            Ok(mesh) => parts.push(mesh.transformed(&t_link_part)),
+            Err(error) if options.partial => warnings.push(format!("{error}: left out")),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(parts)
 }
 
 fn geometry(
     link: &str,
     geometry: &Geometry,
-    asset_dir: Option<&Path>,
+    folder: Option<&Folder>,
+    options: &ReadOptions,
 ) -> Result<TriMesh, RobotError> {
     let positive = |field: &'static str, sizes: &[f64]| {
         if sizes.iter().all(|s| s.is_finite() && *s > 0.0) {
@@ -68,8 +76,8 @@ fn geometry(
                 file: filename.clone(),
                 reason,
             };
-            let path = resolve(filename, asset_dir).map_err(error)?;
-            let loaded = TriMesh::load(&path).map_err(|e| error(e.to_string()))?;
+            let path = resolve(filename, folder, options).map_err(error)?;
+            let loaded = load_shape(&path).map_err(|e| error(e.to_string()))?;
             let mut mesh = TriMesh::new(loaded.vertices, loaded.faces);
             let scale = scale.map_or([1.0; 3], |s| s.0);
             if !scale.iter().all(|s| s.is_finite() && *s != 0.0) {
@@ -89,29 +97,49 @@ fn geometry(
     }
 }
 
-/// The file a mesh name stands for: inside `asset_dir`, whatever the name.
+/// The file a mesh name stands for: inside `folder`, whatever the name, or in its package.
 ///
-/// `package://name/path` is `path` or `name/path` within the folder, whichever exists.
-fn resolve(file: &str, asset_dir: Option<&Path>) -> Result<PathBuf, String> {
-    let Some(asset_dir) = asset_dir else {
+/// `package://name/path` is in the folder of that package, where it is given. Else it is `path` or `name/path` in the folder of the description or one
+/// above it, whichever exists.
+fn resolve(file: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result<PathBuf, String> {
+    let Some(folder) = folder else {
         return Err("mesh files need a folder to be looked for in".into());
     };
-    let candidates: Vec<&str> = match file.strip_prefix("package://") {
+    let package = ["package://", "model://"].iter().find_map(|prefix| file.strip_prefix(prefix));
+    let candidates: Vec<String> = match package {
         Some(rest) => {
-            rest.split_once('/').map(|(_, path)| path).into_iter().chain([rest]).collect()
+            let (name, path) = rest.split_once('/').unwrap_or(("", rest));
+            if let Some(own) = options.packages.get(name) {
+                let path = Folder::own(own).file(path)?;
+                let known = path.is_file().then_some(path);
+                return known.ok_or_else(|| format!("no such file in {}", own.display()));
+            }
+            let levels = folder.path.canonicalize().map_or(0, |own| own.components().count());
+            let above = (0..levels.max(1)).map(|level| "../".repeat(level));
+            above.flat_map(|up| [format!("{up}{path}"), format!("{up}{rest}")]).collect()
         }
-        None if file.contains("://") => {
-            return Err("only package:// and relative paths are read".into());
-        }
-        None => vec![file],
+        None => match file.strip_prefix("file://") {
+            Some(path) => vec![path.to_owned()],
+            None if file.contains("://") => {
+                return Err("only package://, model://, file:// and relative paths are read".into());
+            }
+            None => vec![file.to_owned()],
+        },
     };
+    let mut reason = None;
     for name in &candidates {
-        let path = folder::inside(asset_dir, name)?;
-        if path.is_file() {
-            return Ok(path);
+        match folder.file(name) {
+            Ok(path) if path.is_file() => return Ok(path),
+            Ok(_) => {}
+            Err(outside) => reason = reason.or(Some(outside)),
         }
     }
-    Err(format!("no such file in {}", asset_dir.display()))
+    let none = || format!("no such file in {}", folder.path.display());
+    Err(match (package, reason) {
+        (None, Some(reason)) => reason.to_owned(),
+        (Some(rest), Some(reason)) if rest.contains("..") => reason.to_owned(),
+        _ => none(),
+    })
 }
 
 #[cfg(test)]

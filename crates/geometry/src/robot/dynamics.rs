@@ -2,9 +2,11 @@
 
 use nalgebra::{Matrix3, Point3};
 
-use super::RobotError;
 use super::origin::{finite, isometry};
+use super::{Link, RobotError};
 use crate::inertial::Inertial;
+use crate::mass::mass_properties;
+use crate::read_options::ReadOptions;
 
 /// Mass and inertia of `link` in its frame; `None` without an `inertial` tag, and where it is at the origin and all zeros, which
 /// reads the same.
@@ -26,6 +28,35 @@ pub(super) fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>, RobotEr
     let inertia = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
     let inertial = Inertial { mass: mass.value, com: Point3::origin(), inertia };
     Ok(Some(inertial.moved(&t_link_inertial)))
+}
+
+/// Warns of an inertia that no body can have, or replaces it by that of the collision shapes where that is wanted.
+pub(super) fn judge(link: &mut Link, options: &ReadOptions, warnings: &mut Vec<String>) {
+    let Some(inertial) = link.inertial.filter(|inertial| !is_possible(inertial)) else { return };
+    let name = &link.name;
+    let what = format!("link '{name}': no body has its inertia");
+    if options.inertia_from_geometry {
+        // Overlaps count twice, which a uniform density over the sum makes good for.
+        let solids = link.parts.iter().filter_map(|part| mass_properties(part, 1.0).ok());
+        let solids: Vec<Inertial> = solids
+            .map(|s| Inertial { mass: s.mass, com: s.center_of_mass, inertia: s.inertia })
+            .collect();
+        if let Some(unit) = Inertial::joined(&solids) {
+            let inertia = unit.inertia * (inertial.mass / unit.mass);
+            link.inertial = Some(Inertial { mass: inertial.mass, com: unit.com, inertia });
+            warnings.push(format!("{what}: that of its collision shapes is taken"));
+            return;
+        }
+    }
+    warnings.push(what);
+}
+
+/// Whether a body can have this inertia: no principal moment is negative, or greater than the sum of the others.
+fn is_possible(inertial: &Inertial) -> bool {
+    let moments = inertial.inertia.symmetric_eigenvalues();
+    let (sum, most) = (moments.sum(), moments.max());
+    let is_extended = most > 0.0 || inertial.mass == 0.0;
+    is_extended && moments.min() >= -1e-9 * most.abs() && 2.0 * most <= sum * (1.0 + 1e-6)
 }
 
 /// Damping and dry friction of `joint`; `None` without a `dynamics` tag.

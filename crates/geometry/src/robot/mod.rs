@@ -7,6 +7,7 @@ mod collision;
 mod dynamics;
 mod error;
 mod kinematics;
+mod lenient;
 mod limits;
 mod origin;
 mod posed;
@@ -111,6 +112,7 @@ pub struct KinematicTree {
     ranges: Vec<limits::Range>,
     /// The first link of each body that floats beside the base.
     floating: Vec<usize>,
+    warnings: Vec<String>,
 }
 
 impl KinematicTree {
@@ -144,6 +146,11 @@ impl KinematicTree {
     /// are its own.
     pub fn floating_bodies(&self) -> &[usize] {
         &self.floating
+    }
+
+    /// Parts of its description that are against the format and were put right.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Index of the link of that name.

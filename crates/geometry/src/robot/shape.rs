@@ -38,7 +38,9 @@ impl LinkShape {
             .map(|bounds| {
                 let spacing = spacing.max((bounds.1 - bounds.0).max() / MOST_CELLS);
                 let build = || {
-                    SdfGrid::from_fn(bounds, spacing, margin, |p, _| union_distance(&closest, p))
+                    SdfGrid::from_fn(bounds, spacing, margin, |p, bound| {
+                        union_distance(&closest, p, bound)
+                    })
                 };
                 match cache {
                     Some(cache) => cache.grid(parts, bounds, [spacing, margin], build),
@@ -70,7 +72,7 @@ impl LinkShape {
     /// The smallest of the bodies' own distances: exact outside; inside where bodies overlap it
     /// understates the depth, which never exceeds the depth in the union.
     pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
-        union_distance(&self.closest, point)
+        union_distance(&self.closest, point, f64::INFINITY)
     }
 }
 
@@ -93,15 +95,15 @@ impl DistanceField for LinkShape {
     }
 }
 
-/// Smallest signed distance to any of the bodies.
-fn union_distance(bodies: &[ClosestPoints], point: &Point3<f64>) -> f64 {
+/// Smallest signed distance to any of the bodies, where it is at most `bound` from zero.
+fn union_distance(bodies: &[ClosestPoints], point: &Point3<f64>, bound: f64) -> f64 {
     bodies.iter().fold(f64::INFINITY, |best, body| {
         let gap = box_distance(&body.bounds(), point);
         if gap > best.max(0.0) {
             return best;
         }
         // Outside its box a body matters only if nearer than the best; inside it may also be deeper.
-        let limit = if gap > 0.0 { best.max(0.0) } else { f64::INFINITY };
+        let limit = if gap > 0.0 { best.max(0.0).min(bound) } else { bound };
         body.signed_distance_within(point, limit).map_or(best, |(distance, _)| best.min(distance))
     })
 }

@@ -9,27 +9,37 @@ use urdf_rs::JointType;
 
 use super::origin::{finite, isometry};
 use super::{
-    Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, dynamics, limits, tree,
+    Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, dynamics, lenient, limits,
+    tree,
 };
+use crate::io::folder::Folder;
 use crate::io::read_plain;
 use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
+use crate::read_options::ReadOptions;
 
 impl KinematicTree {
-    /// Reads a URDF file; mesh files are looked for in its folder.
+    /// Reads a URDF file; mesh files are looked for in its folder, below, and in its package ([`ReadOptions::root`]).
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
     pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
+        Self::from_urdf_file_with(path, &ReadOptions::default())
+    }
+
+    /// [`from_urdf_file`](Self::from_urdf_file) with options.
+    ///
+    /// # Errors
+    /// [`RobotError`], naming this file.
+    pub fn from_urdf_file_with(
+        path: impl AsRef<Path>,
+        options: &ReadOptions,
+    ) -> Result<Self, RobotError> {
         let path = path.as_ref();
         let read_error = |source| RobotError::Read { path: path.into(), source };
         let bytes = read_plain(path, MAX_URDF_BYTES).map_err(read_error)?;
         let text = String::from_utf8(bytes)
             .map_err(|e| read_error(io::Error::new(io::ErrorKind::InvalidData, e)))?;
-        let folder = match path.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p,
-            _ => Path::new("."),
-        };
-        Self::from_urdf_str(&text, Some(folder))
+        Self::from_urdf(&text, Some(&options.folder(path)), options)
             .map_err(|source| RobotError::InFile { path: path.into(), source: Box::new(source) })
     }
 
@@ -42,8 +52,17 @@ impl KinematicTree {
     /// # Errors
     /// [`RobotError`], naming the link, joint or mesh file.
     pub fn from_urdf_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, RobotError> {
+        Self::from_urdf(xml, asset_dir.map(Folder::own).as_ref(), &ReadOptions::default())
+    }
+
+    fn from_urdf(
+        xml: &str,
+        folder: Option<&Folder>,
+        options: &ReadOptions,
+    ) -> Result<Self, RobotError> {
         check_size(xml)?;
-        let urdf = urdf_rs::read_from_string(xml)
+        let (xml, mut warnings) = lenient::put_right(xml.trim_start(), options.partial)?;
+        let urdf = urdf_rs::read_from_string(&xml)
             .map_err(|error| RobotError::Urdf { message: error.to_string() })?;
         if urdf.links.is_empty() {
             return Err(RobotError::Urdf { message: "the robot has no links".into() });
@@ -54,8 +73,11 @@ impl KinematicTree {
             .links
             .iter()
             .map(|l| {
-                let (parts, inertial) = (collision::parts(l, asset_dir)?, dynamics::inertial(l)?);
-                Ok(Link { name: l.name.clone(), parts, inertial })
+                let (parts, inertial) =
+                    (collision::parts(l, folder, options, &mut warnings)?, dynamics::inertial(l)?);
+                let mut link = Link { name: l.name.clone(), parts, inertial };
+                dynamics::judge(&mut link, options, &mut warnings);
+                Ok(link)
             })
             .collect::<Result<Vec<_>, RobotError>>()?;
         let variables: Vec<String> = urdf
@@ -101,7 +123,8 @@ impl KinematicTree {
                         }
                         // Against the format, some descriptions lack the tag: no limit is meant, not a joint that
                         // cannot move.
-                        let absent = [l.lower, l.upper, l.effort, l.velocity] == [0.0; 4];
+                        let absent = [l.lower, l.upper, l.effort, l.velocity] == [0.0; 4]
+                            || (l.lower, l.upper) == (f64::NEG_INFINITY, f64::INFINITY);
                         (!absent).then_some((l.lower, l.upper))
                     }
                     _ => None,
@@ -126,7 +149,17 @@ impl KinematicTree {
         let (order, root) = tree::order(&links, &joints)?;
         let ranges = limits::ranges(&joints, &variables)?;
         let floating = Vec::new();
-        Ok(Self { name: urdf.name, links, joints, order, root, variables, ranges, floating })
+        Ok(Self {
+            name: urdf.name,
+            links,
+            joints,
+            order,
+            root,
+            variables,
+            ranges,
+            floating,
+            warnings,
+        })
     }
 }
 
@@ -319,7 +352,7 @@ mod tests {
             assert!(matches!(error, RobotError::TooLarge { limit: MAX_URDF_DEPTH, .. }), "{error}");
         }
         // Many tags side by side are no nest, nor are comments and values that look like tags.
-        let link = |k: i32| format!("<!-- <a> --><link name=\"l{k}\"></link><x y='<>'/>");
+        let link = |k: i32| format!("<!-- <a> --><link name=\"l{k}\"></link><x y='>'/>");
         let links: String = (0..300).map(link).collect();
         let error =
             KinematicTree::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);

@@ -51,6 +51,7 @@ pub struct JointInfo {
 impl RobotInfo {
     pub(super) fn of_urdf(path: &Path, warnings: &mut Vec<String>) -> Result<Self, InfoError> {
         let tree = KinematicTree::from_urdf_file(path)?;
+        warnings.extend_from_slice(tree.warnings());
         let mut joints = Vec::new();
         for joint in tree.joints() {
             let motion = match joint.motion {
@@ -123,6 +124,22 @@ impl RobotInfo {
     }
 }
 
+/// Joints that are listed at most, so that it all fits a screen.
+const MOST_LISTED: usize = 16;
+
+impl RobotInfo {
+    /// How many joints there are, of each kind.
+    fn motions(&self) -> String {
+        let kinds = ["revolute", "prismatic", "ball", "free"].into_iter().filter_map(|kind| {
+            let count = self.joints.iter().filter(|joint| joint.motion == kind).count();
+            (count > 0).then(|| format!("{count} {kind}"))
+        });
+        let kinds: Vec<String> = kinds.collect();
+        let count = self.joints.len();
+        if kinds.is_empty() { format!("{count}") } else { format!("{count}: {}", kinds.join(", ")) }
+    }
+}
+
 impl fmt::Display for RobotInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { format, links, shapes, actuators, keyframes, .. } = self;
@@ -132,8 +149,10 @@ impl fmt::Display for RobotInfo {
             line(f, "actuators", actuators)?;
             line(f, "keyframes", keyframes)?;
         }
-        line(f, "joints", self.joints.len())?;
-        for JointInfo { name, motion, child, limits, mimics } in &self.joints {
+        line(f, "joints", self.motions())?;
+        for JointInfo { name, motion, child, limits, mimics } in
+            self.joints.iter().take(MOST_LISTED)
+        {
             let limits = match limits {
                 Some([low, high]) => format!("{low:.3} to {high:.3}"),
                 None => "no limits".to_owned(),
@@ -141,6 +160,9 @@ impl fmt::Display for RobotInfo {
             let mimics = mimics.as_ref().map(|m| format!(", follows {m}")).unwrap_or_default();
             writeln!(f, "    {name}: {motion}, {limits}, moves {child}{mimics}")?;
         }
-        Ok(())
+        match self.joints.len().checked_sub(MOST_LISTED) {
+            Some(more @ 1..) => writeln!(f, "    and {more} more: --json lists all"),
+            _ => Ok(()),
+        }
     }
 }

@@ -1,18 +1,23 @@
 //! The factor of a mass matrix that has the branches of its tree.
 
+use std::borrow::Cow;
+
 use nalgebra::DMatrix;
 
 /// L of M = Lᵀ L, lower triangular: entries are zero where neither degree of freedom moves the other (Featherstone, section 6.5).
 pub(crate) struct TreeFactor<'a> {
     lower: DMatrix<f64>,
     /// Of each degree of freedom: the one that carries it.
-    parents: &'a [Option<usize>],
+    parents: Cow<'a, [Option<usize>]>,
 }
 
 impl<'a> TreeFactor<'a> {
     /// Of a mass matrix; `None` if it is not positive definite.
-    pub(crate) fn new(mass: &DMatrix<f64>, parents: &'a [Option<usize>]) -> Option<Self> {
-        let mut lower = mass.clone();
+    pub(crate) fn new(
+        mass: &DMatrix<f64>,
+        parents: impl Into<Cow<'a, [Option<usize>]>>,
+    ) -> Option<Self> {
+        let (mut lower, parents) = (mass.clone(), parents.into());
         for k in (0..parents.len()).rev() {
             let pivot = lower[(k, k)];
             if !(pivot > 0.0 && pivot.is_finite()) {
@@ -20,13 +25,13 @@ impl<'a> TreeFactor<'a> {
             }
             let root = pivot.sqrt();
             lower[(k, k)] = root;
-            for i in carriers(parents, k) {
+            for i in carriers(&parents, k) {
                 lower[(k, i)] /= root;
             }
-            for i in carriers(parents, k) {
+            for i in carriers(&parents, k) {
                 let factor = lower[(k, i)];
                 lower[(i, i)] -= factor * factor;
-                for j in carriers(parents, i) {
+                for j in carriers(&parents, i) {
                     lower[(i, j)] -= factor * lower[(k, j)];
                 }
             }
@@ -39,12 +44,12 @@ impl<'a> TreeFactor<'a> {
         let n = self.parents.len();
         for i in (0..n).rev() {
             transposed.column_mut(i).unscale_mut(self.lower[(i, i)]);
-            for j in carriers(self.parents, i) {
+            for j in carriers(&self.parents, i) {
                 subtract(transposed, j, i, self.lower[(i, j)]);
             }
         }
         for i in 0..n {
-            for j in carriers(self.parents, i) {
+            for j in carriers(&self.parents, i) {
                 subtract(transposed, i, j, self.lower[(i, j)]);
             }
             transposed.column_mut(i).unscale_mut(self.lower[(i, i)]);

@@ -20,6 +20,8 @@ pub struct AffineActuator {
     pub control_range: [f64; 2],
     /// Smallest and largest force \[N m or N\]; infinite without limits.
     pub force_range: [f64; 2],
+    /// Once around, where length and control are on a circle: the length that counts is the nearest to the control. Zero elsewhere.
+    pub period: f64,
 }
 
 impl Parameters for AffineActuator {
@@ -49,16 +51,22 @@ impl Parameters for AffineActuator {
 
 impl JointLaw for AffineActuator {
     fn effort<S: Scalar>(&self, [control]: [S; 1], position: S, velocity: S) -> S {
+        let control = within(control, self.control_range);
+        let turns = match self.period > 0.0 {
+            true => ((control.value() - position.value()) / self.period).round(),
+            false => 0.0,
+        };
+        let position = position.plus(turns * self.period);
         let affine = |[constant, by_length, by_rate]: [f64; 3]| {
             position.times(by_length) + velocity.times(by_rate) + S::constant(constant)
         };
-        let force = affine(self.gain) * within(control, self.control_range) + affine(self.bias);
+        let force = affine(self.gain) * control + affine(self.bias);
         within(force, self.force_range)
     }
 }
 
 /// `x`, but no less and no more than the ends of `range`.
-fn within<S: Scalar>(x: S, [low, high]: [f64; 2]) -> S {
+pub(super) fn within<S: Scalar>(x: S, [low, high]: [f64; 2]) -> S {
     match x.value() {
         value if value < low => S::constant(low),
         value if value > high => S::constant(high),

@@ -16,6 +16,7 @@ fn laws() -> Vec<Box<dyn DynJointLaw>> {
         bias: [0.1, -1.0, -0.2],
         control_range: [-1.0, 1.0],
         force_range: everything,
+        period: 0.0,
     };
     vec![
         Box::new(JointSpring { stiffness: 2.0, rest: 0.3 }),

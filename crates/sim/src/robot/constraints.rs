@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use crate::articulated::tree_factor::TreeFactor;
 use crate::error::SimulationError;
 use crate::joint_law::damper::JointDamper;
+use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::friction::JointFriction;
 use crate::joint_law::limits::JointLimits;
 use crate::joint_law::spring::JointSpring;
@@ -25,25 +27,17 @@ impl World {
         damping: f64,
         friction: f64,
     ) -> Result<(), SimulationError> {
-        if damping > 0.0 {
-            self.add_coupled_force(axes, Arc::new(JointDamper { damping }))?;
-        }
-        if friction > 0.0 {
-            let law = JointFriction { friction, velocity_scale: FRICTION_SCALE };
-            self.add_coupled_force(axes, Arc::new(law))?;
-        }
-        Ok(())
+        losses(damping, friction).try_for_each(|law| self.add_coupled_force(axes, law).map(|_| ()))
     }
 
     /// Adds limits of this stiffness \[N m/rad or N/m\] along a sum of joints.
     pub(super) fn add_limits(
         &mut self,
         axes: &[(JointAxis, f64)],
-        (lower, upper): (f64, f64),
+        range: (f64, f64),
         stiffness: f64,
     ) -> Result<(), SimulationError> {
-        let limits = JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING };
-        self.add_coupled_force(axes, Arc::new(limits)).map(|_| ())
+        self.add_coupled_force(axes, limits(range, stiffness)).map(|_| ())
     }
 
     /// Holds a sum of joints where it is `rest`, with this stiffness and damping.
@@ -57,21 +51,55 @@ impl World {
         self.add_coupled_force(axes, Arc::new(JointDamper { damping })).map(|_| ())
     }
 
-    /// The inertia along a sum of joints of the last articulation, whose mass matrix has this inverse.
-    pub(super) fn inertia_along(&self, inverse: &DMatrix<f64>, axes: &[(JointAxis, f64)]) -> f64 {
-        let mut along = DVector::zeros(inverse.nrows());
+    /// The inertia along a sum of joints of the last articulation, whose mobility this is.
+    pub(super) fn inertia_along(&self, mobility: &Mobility, axes: &[(JointAxis, f64)]) -> f64 {
+        let mut along = DMatrix::zeros(mobility.freedoms, 1);
         for (JointAxis { link, index }, factor) in axes {
             if let Ok((articulation, own)) = self.link_of(*link) {
                 let [_, freedoms] = self.articulations[articulation].tree.range(own);
                 along[freedoms.start + index] += factor;
             }
         }
-        1.0 / along.dot(&(inverse * &along))
+        1.0 / along.dot(&mobility.times(&along))
     }
 
-    /// The inverse of the last articulation's mass matrix, with its joints at their neutral coordinates.
-    pub(super) fn inverse_mass(&self) -> DMatrix<f64> {
+    /// The mobility of the last articulation, with its joints at their neutral coordinates.
+    pub(super) fn mobility(&self) -> Mobility {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        tree.kinematics(&tree.neutral(), &vec![0.0; tree.freedoms()]).inverse_mass_matrix()
+        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.freedoms()]).mass_matrix();
+        let factor = TreeFactor::new(&mass, tree.carriers().to_vec());
+        Mobility { freedoms: tree.freedoms(), factor }
+    }
+}
+
+/// Damping \[N m s/rad or N s/m\] and dry friction \[N m or N\], where they are positive.
+pub(super) fn losses(damping: f64, friction: f64) -> impl Iterator<Item = Arc<dyn DynJointLaw>> {
+    let damper =
+        (damping > 0.0).then(|| -> Arc<dyn DynJointLaw> { Arc::new(JointDamper { damping }) });
+    let friction = (friction > 0.0).then(|| -> Arc<dyn DynJointLaw> {
+        Arc::new(JointFriction { friction, velocity_scale: FRICTION_SCALE })
+    });
+    damper.into_iter().chain(friction)
+}
+
+/// Limits of this stiffness \[N m/rad or N/m\].
+pub(super) fn limits((lower, upper): (f64, f64), stiffness: f64) -> Arc<dyn DynJointLaw> {
+    Arc::new(JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING })
+}
+
+/// The inverse of a mass matrix.
+pub(super) struct Mobility {
+    pub(super) freedoms: usize,
+    /// Of the mass matrix; none where something that moves has no mass.
+    factor: Option<TreeFactor<'static>>,
+}
+
+impl Mobility {
+    /// M⁻¹ B; no numbers where something that moves has no mass.
+    pub(super) fn times(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        let Some(factor) = &self.factor else { return b.map(|_| f64::NAN) };
+        let mut transposed = b.transpose();
+        factor.solve_transposed(&mut transposed);
+        transposed.transpose()
     }
 }

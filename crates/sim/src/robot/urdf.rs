@@ -18,12 +18,15 @@ pub struct UrdfOptions {
     pub base: Joint,
     /// Time constant of limits and of joints that mimic others \[s\].
     pub time_constant: f64,
+    /// Inertia behind the gears of each joint \[kg m² or kg\], of which URDF says nothing.
+    pub armature: f64,
 }
 
 impl Default for UrdfOptions {
     /// A base fixed at the world's origin, limits that give way for 5 ms.
     fn default() -> Self {
-        Self { t_world_base: Isometry3::identity(), base: Joint::Fixed, time_constant: 5e-3 }
+        let t_world_base = Isometry3::identity();
+        Self { t_world_base, base: Joint::Fixed, time_constant: 5e-3, armature: 0.0 }
     }
 }
 
@@ -81,7 +84,7 @@ impl World {
         bodies: &[BodyId],
         options: &UrdfOptions,
     ) -> Result<(), SimulationError> {
-        let inverse = self.inverse_mass();
+        let mobility = self.mobility();
         for joint in robot.joints().iter().filter(|joint| joint.motion != Motion::Fixed) {
             let axis = JointAxis::from(bodies[joint.child]);
             let own = [(axis, 1.0)];
@@ -89,7 +92,7 @@ impl World {
                 [joint.damping, joint.friction].map(Option::unwrap_or_default);
             self.add_losses(&own, damping, friction)?;
             if let Some(range) = joint.limits {
-                let inertia = self.inertia_along(&inverse, &own);
+                let inertia = self.inertia_along(&mobility, &own);
                 self.add_limits(&own, range, inertia / options.time_constant.powi(2))?;
             }
             let Drive::Variable { index, multiplier, offset } = joint.drive else { continue };
@@ -99,7 +102,7 @@ impl World {
             });
             if let Some(leader) = leader.filter(|leader| leader.name != joint.name) {
                 let axes = [(axis, 1.0), (bodies[leader.child].into(), -multiplier)];
-                let inertia = self.inertia_along(&inverse, &axes);
+                let inertia = self.inertia_along(&mobility, &axes);
                 let stiffness = inertia / options.time_constant.powi(2);
                 let damping = 2.0 * inertia / options.time_constant;
                 self.add_coupling(&axes, offset, [stiffness, damping])?;
@@ -121,6 +124,9 @@ fn links(robot: &KinematicTree, options: &UrdfOptions) -> (Vec<Link>, Vec<usize>
         let (parent, t_parent_joint) = (parents[next], at[next]);
         let massless = Link::massless(&own.name, kinds[next].clone());
         let mut link = Link { parent, t_parent_joint, ..massless };
+        if next > 0 && !matches!(link.joint, Joint::Fixed) {
+            link.armature = options.armature;
+        }
         if let Some(inertial) = &own.inertial {
             (link.mass, link.com, link.inertia) = (inertial.mass, inertial.com, inertial.inertia);
         }

@@ -14,7 +14,7 @@ use super::World;
 use super::body::Body;
 use super::body_id::BodyId;
 use super::joint_force::JointAxis;
-use crate::articulated::adjoint::{Acting, accelerations, link_states};
+use crate::articulated::adjoint::link_states;
 use crate::articulated::{Articulation, Joint, Link};
 use crate::error::SimulationError;
 use crate::robot::driven::JointState;
@@ -220,7 +220,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    pub(super) fn joint_place(
+    pub(crate) fn joint_place(
         &self,
         states: &[State<S>],
         body: BodyId,
@@ -297,9 +297,8 @@ impl<S: Scalar> World<S> {
         for ((own, joints), efforts) in self.articulated(states).zip(&efforts) {
             let [coordinates, velocities] = &own.coordinates(joints);
             let wrenches: Vec<Vector6<S>> = own.bodies.iter().map(|body| wrenches[*body]).collect();
-            let (gravity, wrenches) = (self.gravity, &wrenches);
-            let acting = Acting { gravity, coordinates, velocities, efforts, wrenches };
-            let accelerations = accelerations(&own.tree, &acting);
+            let accelerations =
+                self.accelerated(own, joints, [coordinates, velocities], efforts, &wrenches);
             for (index, link) in own.tree.links().iter().enumerate() {
                 let [_, freedoms] = own.tree.range(index);
                 all.push(link.joint.rate_of_velocities(&accelerations.as_slice()[freedoms]));

@@ -1,12 +1,14 @@
 //! What acts along the joints of a world.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
 use super::World;
 use super::body_id::BodyId;
-use crate::articulated::Joint;
+use super::path::Path;
+use crate::articulated::{Joint, Kinematics};
 use crate::contact::error::LawError;
 use crate::contact::range::ParameterRange;
 use crate::error::SimulationError;
@@ -39,6 +41,14 @@ pub struct JointForceId(pub(crate) usize);
 pub struct JointForce<S: Scalar = f64> {
     /// The axes of one articulation whose positions, times these factors, add up to that of the law, and that share its effort so.
     pub axes: Vec<(JointAxis, f64)>,
+    /// What it acts along beside the axes, in the articulation of the first.
+    pub(crate) path: Option<Arc<Path>>,
+    /// The axis whose velocity is the first of its parameters, and how far ahead that is \[s\].
+    pub(crate) input: Option<(JointAxis, f64)>,
+    /// The number of a group whose sum of forces is bounded, and the bounds.
+    pub(crate) bound: Option<(usize, [f64; 2])>,
+    /// Whether it counts where the sum of actuators is bounded.
+    pub(crate) is_actuator: bool,
     law: Arc<dyn DynJointLaw>,
     params: Vec<S>,
 }
@@ -46,7 +56,7 @@ pub struct JointForce<S: Scalar = f64> {
 impl<S: Scalar> JointForce<S> {
     pub(super) fn new(axes: Vec<(JointAxis, f64)>, law: Arc<dyn DynJointLaw>) -> Self {
         let params = law.param_values().into_iter().map(S::constant).collect();
-        Self { axes, law, params }
+        Self { axes, path: None, input: None, bound: None, is_actuator: false, law, params }
     }
 
     /// The law.
@@ -73,6 +83,10 @@ impl<S: Scalar> JointForce<S> {
         Ok(())
     }
 
+    fn is_along(&self, axis: JointAxis) -> bool {
+        self.path.is_none() && matches!(self.axes[..], [(own, _)] if own == axis)
+    }
+
     /// Whether the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
@@ -86,6 +100,10 @@ impl<S: Scalar> JointForce<S> {
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> JointForce<T> {
         JointForce {
             axes: self.axes.clone(),
+            path: self.path.clone(),
+            input: self.input,
+            bound: self.bound,
+            is_actuator: self.is_actuator,
             law: Arc::clone(&self.law),
             params: self.params.iter().map(|p| f(*p)).collect(),
         }
@@ -94,8 +112,29 @@ impl<S: Scalar> JointForce<S> {
     /// The same force among other bodies.
     pub(crate) fn with_bodies(&self, body: impl Fn(BodyId) -> BodyId) -> Self {
         let mut force = self.clone();
-        force.axes.iter_mut().for_each(|(axis, _)| axis.link = body(axis.link));
+        let axes = force.axes.iter_mut().map(|(axis, _)| axis);
+        axes.chain(force.input.as_mut().map(|(axis, _)| axis))
+            .for_each(|axis| axis.link = body(axis.link));
         force
+    }
+}
+
+/// Scales down the forces of groups whose sum is out of its bounds.
+fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
+    let mut sums: BTreeMap<(usize, usize), S> = BTreeMap::new();
+    for (force, along, effort) in acting.iter() {
+        if let Some((group, _)) = force.bound {
+            *sums.entry((along.articulation, group)).or_insert_with(S::zero) += *effort;
+        }
+    }
+    for (force, along, effort) in acting {
+        let Some((group, [low, high])) = force.bound else { continue };
+        let Some(sum) = sums.get(&(along.articulation, group)) else { continue };
+        match sum.value() {
+            value if value < low => *effort *= S::constant(low) / *sum,
+            value if value > high => *effort *= S::constant(high) / *sum,
+            _ => {}
+        }
     }
 }
 
@@ -176,24 +215,96 @@ impl<S: Scalar> World<S> {
 
     /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
     pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
-        let mut efforts: Vec<Vec<S>> =
-            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect();
+        let none = || -> Vec<Vec<S>> {
+            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect()
+        };
+        let is_bounded = !self.transmissions.bounds.is_empty();
+        let (mut efforts, mut driven) = (none(), if is_bounded { none() } else { Vec::new() });
+        let mut places: Vec<Option<Kinematics<'_, S>>> =
+            self.articulations.iter().map(|_| None).collect();
+        let mut acting = Vec::with_capacity(self.joint_forces.len());
         for force in &self.joint_forces {
-            let Some(Along { articulation, freedoms, position, velocity }) =
-                self.along(force, states)
-            else {
-                continue;
+            let Some(along) = self.along_at(force, states, &mut places) else { continue };
+            let effort = match force.input.and_then(|input| self.input(input, states)) {
+                None => force.law().lifted(force.params(), along.position, along.velocity),
+                Some(input) => {
+                    let mut params = force.params().to_vec();
+                    params[0] = input;
+                    force.law().lifted(&params, along.position, along.velocity)
+                }
             };
-            let effort = force.law().lifted(force.params(), position, velocity);
-            for (freedom, factor) in freedoms {
-                efforts[articulation][freedom] += effort * factor;
+            acting.push((force, along, effort));
+        }
+        bound_groups(&mut acting);
+        for (force, along, effort) in acting {
+            let all = if is_bounded && force.is_actuator { &mut driven } else { &mut efforts };
+            for (freedom, factor) in along.freedoms {
+                all[along.articulation][freedom] += effort * factor;
+            }
+        }
+        let mut carried: Vec<Vec<S>> = Vec::new();
+        if !self.transmissions.carried.is_empty() {
+            carried = none();
+            for (index, own) in self.articulations.iter().enumerate() {
+                let at = self.placed(index, states, &mut places);
+                self.add_carried(own, at, &mut carried[index]);
+            }
+        }
+        for (articulation, freedom, [low, high], counts) in self.bounded() {
+            let own = &mut driven[articulation][freedom];
+            if let Some(carried) = carried.get_mut(articulation).filter(|_| counts) {
+                *own += std::mem::replace(&mut carried[freedom], S::zero());
+            }
+            match own.value() {
+                value if value < low => *own = S::constant(low),
+                value if value > high => *own = S::constant(high),
+                _ => {}
+            }
+        }
+        for more in [driven, carried] {
+            for (own, more) in efforts.iter_mut().zip(more) {
+                own.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
             }
         }
         efforts
     }
 
+    /// The velocity of an axis some time ahead, by the forces along it alone, which moves a unit of inertia.
+    fn input(&self, (axis, ahead): (JointAxis, f64), states: &[State<S>]) -> Option<S> {
+        let [position, velocity] = self.joint_motion(states, axis).ok()?;
+        let own = self.joint_forces.iter().filter(|force| ahead > 0.0 && force.is_along(axis));
+        let rate = own.fold(S::zero(), |sum, force| {
+            sum + force.law().lifted(force.params(), position, velocity)
+        });
+        Some(velocity + rate.times(ahead))
+    }
+
+    /// The kinematics of an articulation, found once.
+    fn placed<'a, 'b>(
+        &'a self,
+        articulation: usize,
+        states: &[State<S>],
+        places: &'b mut [Option<Kinematics<'a, S>>],
+    ) -> &'b Kinematics<'a, S> {
+        places[articulation].get_or_insert_with(|| {
+            let own = &self.articulations[articulation];
+            let [q, v] = own.coordinates(&states[self.joint_range(articulation)]);
+            own.tree.kinematics(&q, &v)
+        })
+    }
+
     /// Where a force acts.
     pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
+        let mut places: Vec<_> = self.articulations.iter().map(|_| None).collect();
+        self.along_at(force, states, &mut places)
+    }
+
+    fn along_at<'a>(
+        &'a self,
+        force: &JointForce<S>,
+        states: &[State<S>],
+        places: &mut [Option<Kinematics<'a, S>>],
+    ) -> Option<Along<S>> {
         let (first, _) = force.axes.first()?;
         let (articulation, _) = self.link_of(first.link).ok()?;
         let (own, joints) = (&self.articulations[articulation], self.joint_range(articulation));
@@ -203,6 +314,19 @@ impl<S: Scalar> World<S> {
             position: S::zero(),
             velocity: S::zero(),
         };
+        if let Some(path) = &force.path {
+            let at = self.placed(articulation, states, places);
+            let [_, velocities] = own.coordinates(states.get(joints)?);
+            let length = path.length(at, false);
+            along.position = length.value;
+            for (freedom, slope) in length.slopes.into_iter().enumerate() {
+                along.velocity += slope * velocities[freedom];
+                if !slope.is_constant_zero() {
+                    along.freedoms.push((freedom, slope));
+                }
+            }
+            return Some(along);
+        }
         for (JointAxis { link, index }, factor) in &force.axes {
             let link = own.bodies().iter().position(|body| body == link)?;
             let (joint, state) = (&own.tree.links()[link].joint, states.get(joints.start + link)?);

@@ -252,6 +252,7 @@ impl<S: Scalar> World<S> {
             articulations: self.articulations.clone(),
             joint_forces: self.joint_forces.clone(),
             welds: self.welds.clone(),
+            transmissions: self.transmissions.clone(),
             gravity: self.gravity,
         })
     }

@@ -137,6 +137,7 @@ impl Island {
                 .filter(|weld| weld.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
                 .map(|weld| weld.with_bodies(body))
                 .collect(),
+            transmissions: world.transmissions.with_bodies(|id| self.has(id), body),
             gravity: world.gravity,
         }
     }

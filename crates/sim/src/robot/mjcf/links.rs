@@ -95,3 +95,9 @@ impl Chain {
 fn name_of(joint: &MjcfJoint, body: &Body) -> String {
     if joint.name.is_empty() { body.name.clone() } else { joint.name.clone() }
 }
+
+/// The link whose velocity is the state of an actuator: it moves nothing.
+pub(super) fn activation(actuator: &str) -> Link {
+    let joint = Joint::Revolute(nalgebra::Vector3::z_axis());
+    Link::massless(format!("activation of {actuator}"), joint).with_armature(1.0)
+}

@@ -1,8 +1,9 @@
 //! Loops and couplings of a model.
 
-use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3};
+use nalgebra::{DMatrix, Isometry3, Point3};
 use prehend_geometry::mjcf::{EqualityKind, Model, SolverParameters};
 
+use super::super::constraints::Mobility;
 use super::forces::stiffness;
 use super::{MjcfError, MjcfOptions, MjcfRobot};
 use crate::world::World;
@@ -33,7 +34,7 @@ impl World {
         model: &Model,
         robot: &MjcfRobot,
         options: &MjcfOptions,
-        inverse: &DMatrix<f64>,
+        mobility: &Mobility,
         warnings: &mut Vec<String>,
     ) -> Result<(), MjcfError> {
         let ground = std::cell::OnceCell::new();
@@ -50,7 +51,7 @@ impl World {
                     let bodies = ends(self, bodies);
                     let frames = placed(anchors, fixed, &options.t_world_model);
                     let held =
-                        self.held(bodies, &frames, inverse, &equality.solver, options.softness);
+                        self.held(bodies, &frames, mobility, &equality.solver, options.softness);
                     self.add_weld(Weld { bodies, frames, stiffness: weld(held, 0.0) })?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
@@ -60,9 +61,13 @@ impl World {
                     // Axes of the second body as the first has them.
                     frames[0].rotation *= *rotation;
                     let held =
-                        self.held(bodies, &frames, inverse, &equality.solver, options.softness);
+                        self.held(bodies, &frames, mobility, &equality.solver, options.softness);
                     let stiffness = weld(held, *torque_scale);
                     self.add_weld(Weld { bodies, frames, stiffness })?;
+                }
+                EqualityKind::Tendon { .. } => {
+                    let name = &equality.name;
+                    warnings.push(format!("equality '{name}': of tendons"));
                 }
                 EqualityKind::Joint { joints: (first, second), polynomial } => {
                     let [constant, slope, rest @ ..] = *polynomial;
@@ -82,7 +87,7 @@ impl World {
                         axes.extend(axis(*second).map(|axis| (axis, -slope)));
                         target -= slope * model.joint(*second).reference;
                     }
-                    let inertia = self.inertia_along(inverse, &axes);
+                    let inertia = self.inertia_along(mobility, &axes);
                     let held = stiffness(&equality.solver, inertia, options.softness);
                     self.add_coupling(&axes, target, held)?;
                 }
@@ -96,12 +101,12 @@ impl World {
         &self,
         bodies: [BodyId; 2],
         frames: &[Isometry3<f64>; 2],
-        inverse: &DMatrix<f64>,
+        mobility: &Mobility,
         solver: &SolverParameters,
         softness: f64,
     ) -> [f64; 2] {
         let points = frames.map(|frame| frame.translation.vector.into());
-        stiffness(solver, self.mass_between(bodies, points, inverse), softness)
+        stiffness(solver, self.mass_between(bodies, points, mobility), softness)
     }
 
     /// What a force between points of two bodies of the last articulation has to accelerate at most \[kg\].
@@ -109,18 +114,18 @@ impl World {
         &self,
         bodies: [BodyId; 2],
         points: [Point3<f64>; 2],
-        inverse: &DMatrix<f64>,
+        mobility: &Mobility,
     ) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
         let rest = vec![0.0; tree.freedoms()];
         let at = tree.kinematics(&tree.neutral(), &rest);
-        let mut relative = Matrix3xX::zeros(tree.freedoms());
+        let mut relative = DMatrix::zeros(3, tree.freedoms());
         for ((body, point), sign) in bodies.into_iter().zip(points).zip([1.0, -1.0]) {
             if let Ok((_, link)) = self.link_of(body) {
                 relative += at.jacobian(link, &point).rows(0, 3) * sign;
             }
         }
-        let mobility = &relative * inverse * relative.transpose();
+        let mobility = &relative * mobility.times(&relative.transpose());
         // By the least mobile direction: others are damped the more. One in which next to nothing moves does not count.
         if mobility.iter().any(|x| !x.is_finite()) {
             return f64::NAN;

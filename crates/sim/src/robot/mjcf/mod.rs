@@ -1,19 +1,20 @@
 //! Robots in MJCF.
 
 mod forces;
+mod lengths;
 mod links;
 mod loops;
+mod motion;
 mod shapes;
 
-use nalgebra::{Isometry3, Quaternion, Unit};
-use prehend_geometry::mjcf::{JointKind, Model};
+use nalgebra::Isometry3;
+use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Shape as MjcfShape, Transmission};
 use thiserror::Error;
 
 use crate::articulated::Joint;
 use crate::error::SimulationError;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
-use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use crate::world::joint_force::{JointAxis, JointForceId};
@@ -32,13 +33,16 @@ pub struct MjcfOptions {
     /// Time constants of loops and couplings as a part of those in the file. MuJoCo pushes within its constraints against what would violate them;
     /// springs alone have to be stiffer to give way no more. Limits have those of the file.
     pub softness: f64,
+    /// Whether to go on without what of the model has no counterpart and yet changes how it moves.
+    pub partial: bool,
 }
 
 impl Default for MjcfOptions {
     /// At the world's origin, with shapes, time constants of loops a fifth of the file's.
     fn default() -> Self {
         let (t_world_model, shape_options) = (Isometry3::identity(), ShapeOptions::default());
-        Self { t_world_model, base: Joint::Fixed, shapes: true, shape_options, softness: 0.2 }
+        let (base, partial) = (Joint::Fixed, false);
+        Self { t_world_model, base, shapes: true, shape_options, softness: 0.2, partial }
     }
 }
 
@@ -53,6 +57,8 @@ pub struct MjcfRobot {
     pub actuators: Vec<(String, JointForceId)>,
     /// What of the model has no counterpart, in words.
     pub warnings: Vec<String>,
+    /// The link of each actuator with a state, whose velocity is that state, in the order of MuJoCo's `act`.
+    pub activations: Vec<BodyId>,
     names: Vec<String>,
     /// Of each joint, in the order of positions in MuJoCo, the link that it moves.
     moved: Vec<(JointKind, BodyId)>,
@@ -73,39 +79,6 @@ impl MjcfRobot {
     pub fn actuator(&self, name: &str) -> Option<JointForceId> {
         Some(self.actuators.iter().find(|(own, _)| own == name)?.1)
     }
-
-    /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
-    ///
-    /// # Errors
-    /// If they are too few or too many, or the states are not those of the world.
-    pub fn set_positions(
-        &self,
-        world: &World,
-        states: &mut [State],
-        positions: &[f64],
-    ) -> Result<(), MjcfError> {
-        let expected = self.moved.iter().map(|(kind, _)| kind.positions()).sum();
-        if positions.len() != expected {
-            return Err(MjcfError::Positions { given: positions.len(), expected });
-        }
-        let mut rest = positions;
-        for (kind, link) in &self.moved {
-            let (own, after) = rest.split_at(kind.positions());
-            rest = after;
-            let turned = |q: &[f64]| {
-                let turn = Unit::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
-                [turn.i, turn.j, turn.k, turn.w]
-            };
-            let position = match kind {
-                JointKind::Hinge | JointKind::Slide => own.to_vec(),
-                JointKind::Ball => turned(own).to_vec(),
-                JointKind::Free => own[..3].iter().copied().chain(turned(&own[3..])).collect(),
-            };
-            world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
-        }
-        world.place_links(states);
-        Ok(())
-    }
 }
 
 /// Why a robot in MJCF cannot become part of a world.
@@ -125,6 +98,28 @@ pub enum MjcfError {
     /// Positions that are too few or too many.
     #[error("{given} positions for a model of {expected}")]
     Positions {
+        /// How many were given.
+        given: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// Something that changes how the model moves, and that a world has no counterpart of.
+    #[error("{what}: there is no counterpart (with `partial`, it is left out)")]
+    NoCounterpart {
+        /// What, with its name.
+        what: String,
+    },
+    /// States of actuators that are too few or too many.
+    #[error("{given} activations for a model of {expected}")]
+    Activations {
+        /// How many were given.
+        given: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// Velocities that are too few or too many.
+    #[error("{given} velocities for a model of {expected}")]
+    Velocities {
         /// How many were given.
         given: usize,
         /// How many it has.
@@ -159,54 +154,99 @@ impl World {
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
-        warnings.extend(left_out(model));
-        let chain = links::Chain::new(model, options);
+        for (what, changes) in left_out(model, options) {
+            if changes && !options.partial {
+                return Err(MjcfError::NoCounterpart { what });
+            }
+            warnings.push(what);
+        }
+        let mut chain = links::Chain::new(model, options);
+        let activated = model.actuators.iter().filter(|own| own.dynamics != Dynamics::Direct);
+        let first = chain.links.len();
+        chain.links.extend(activated.map(|own| links::activation(&own.name)));
         let links = self.add_articulation(chain.links)?;
+        let mut states = links[first..].iter().copied();
+        let activations = model.actuators.iter().map(|own| match own.dynamics {
+            Dynamics::Direct => None,
+            _ => states.next(),
+        });
+        let activations: Vec<Option<BodyId>> = activations.collect();
         let robot = MjcfRobot {
             bodies: chain.bodies.iter().map(|link| links[*link]).collect(),
             joints: named(&chain.joints, |link| links[link]),
             actuators: Vec::new(),
             warnings: Vec::new(),
+            activations: links[first..].to_vec(),
             names: model.bodies.iter().map(|body| body.name.clone()).collect(),
             moved: chain.joints.iter().map(|joint| (joint.kind, links[joint.link])).collect(),
         };
         if options.shapes {
             self.add_shapes(model, &robot, options)?;
         }
-        let axes: Vec<JointAxis> =
-            chain.joints.iter().map(|joint| links[joint.link].into()).collect();
-        let inverse = self.inverse_mass();
-        let mut forces = forces::Forces::new(self, model, axes, &inverse, &mut warnings);
+        for (body, id) in model.bodies.iter().zip(&robot.bodies) {
+            if body.gravity_compensation != 0.0 {
+                self.transmissions.carried.push((*id, body.gravity_compensation));
+            }
+        }
+        let Some(link) = links.first().copied() else { return Ok(robot) };
+        let joints = model.joint_indices().zip(&chain.joints);
+        let axes: Vec<_> =
+            joints.map(|(index, own)| (index, links[own.link].into(), own.link)).collect();
+        let mobility = self.mobility();
+        let lengths = lengths::Lengths {
+            model,
+            bodies: &chain.bodies,
+            axes: &axes,
+            t_world_model: options.t_world_model,
+        };
+        let references = self.reference_coordinates(model, &robot)?;
+        let mut forces = forces::Forces {
+            world: self,
+            model,
+            lengths,
+            link,
+            activations,
+            mobility: &mobility,
+            references,
+            actuators: Vec::new(),
+        };
         forces.add_all()?;
         let actuators = forces.actuators;
-        self.add_loops(model, &robot, options, &inverse, &mut warnings)?;
+        self.add_loops(model, &robot, options, &mobility, &mut warnings)?;
         Ok(MjcfRobot { actuators, warnings, ..robot })
     }
 }
 
-/// What of the model has no counterpart.
-fn left_out(model: &Model) -> impl Iterator<Item = String> {
-    let bodies = model.bodies.iter().filter(|body| body.gravity_compensation != 0.0);
-    let bodies =
-        bodies.map(|body| format!("body '{}': its weight is not carried for it", body.name));
+/// Parts of the model without a counterpart, and whether they change how it moves.
+fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (String, bool)> {
     let joints = model.joint_indices().map(|index| model.joint(index));
     let joints = joints.flat_map(|joint| {
-        let free = joint.kind == JointKind::Free;
-        let acts = joint.damping > 0.0 || joint.stiffness > 0.0 || joint.friction_loss > 0.0;
+        let turns = matches!(joint.kind, JointKind::Ball | JointKind::Free);
         let left = [
-            (joint.actuator_force_range.is_some(), "its bound on actuators' forces"),
-            (joint.limit_margin != 0.0, "the margin of its limits"),
-            (free && acts, "what acts along a free joint"),
+            (joint.limit_margin != 0.0, "the margin of its limits", false),
+            (
+                turns && (joint.higher_stiffness, joint.higher_damping) != ([0.0; 2], [0.0; 2]),
+                "the polynomials of a ball or free joint",
+                true,
+            ),
+            (turns && joint.friction_loss > 0.0, "the dry friction of a ball or free joint", true),
         ];
         let name = joint.name.clone();
-        left.into_iter()
-            .filter(|(is, _)| *is)
-            .map(move |(_, what)| format!("joint '{name}': {what}"))
+        let left = left.into_iter().filter(|(is, ..)| *is);
+        left.map(move |(_, what, changes)| (format!("joint '{name}': {what}"), changes))
     });
-    let tendons = model.tendons.iter().filter(|tendon| tendon.actuator_force_range.is_some());
-    let tendons =
-        tendons.map(|tendon| format!("tendon '{}': its bound on actuators' forces", tendon.name));
-    bodies.chain(joints).chain(tendons)
+    let actuators = model.actuators.iter().filter_map(|own| match own.transmission {
+        Transmission::Adhesion(_) => {
+            Some((format!("actuator '{}': its hold on what touches a body", own.name), true))
+        }
+        _ => None,
+    });
+    let geoms = model.world_geoms.iter().chain(model.bodies.iter().flat_map(|body| &body.geoms));
+    let terrain = geoms.filter(|geom| options.shapes && geom.collides()).filter_map(|geom| {
+        let is_terrain = matches!(geom.shape, MjcfShape::HeightField(_));
+        is_terrain.then(|| (format!("geom '{}': contacts of a height field", geom.name), true))
+    });
+    joints.chain(actuators).chain(terrain)
 }
 
 fn named(joints: &[links::ChainJoint], body: impl Fn(usize) -> BodyId) -> Vec<(String, JointAxis)> {

@@ -33,7 +33,7 @@ impl World {
                 own.field = Some(shape.field().clone());
             }
         }
-        for geom in model.world_geoms.iter().filter(|geom| geom.collides()) {
+        for geom in model.world_geoms.iter().filter(|geom| touches(geom)) {
             let wrong = |error| MjcfError::Shape { body: geom.name.clone(), error };
             let shape = match geom.shape {
                 MjcfShape::Plane { .. } => {
@@ -65,7 +65,7 @@ impl World {
 /// Of all geoms of a body that collide; none if there are none.
 fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeError> {
     let mut parts = Vec::new();
-    for geom in geoms.iter().filter(|geom| geom.collides()) {
+    for geom in geoms.iter().filter(|geom| touches(geom)) {
         let (shape, t_geom_shape) = part(&geom.shape)?;
         parts.push((pose(&(geom.t_body_geom * t_geom_shape)), shape));
     }
@@ -73,6 +73,11 @@ fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeE
         return Ok(None);
     }
     Ok(Some(Shape::from_parry_with(&Compound::new(parts), options)?))
+}
+
+/// Whether a geom collides and has a shape here: terrain has none.
+fn touches(geom: &Geom) -> bool {
+    geom.collides() && !matches!(geom.shape, MjcfShape::HeightField(_))
 }
 
 /// The shape of parry, whose round ones are about y, and where it is in the geom's frame.
@@ -97,6 +102,8 @@ fn part(shape: &MjcfShape) -> Result<(SharedShape, Isometry3<f64>), ShapeError> 
         MjcfShape::Box { half_extents } => {
             (SharedShape::new(Cuboid::new(vector(half_extents))), own)
         }
+        // Refused before.
+        MjcfShape::HeightField(_) => return Err(ShapeError::NotConvex),
         MjcfShape::Mesh(mesh) => {
             let points: Vec<Vector> = mesh.vertices.iter().map(|p| vector(&p.coords)).collect();
             (SharedShape::new(hull(&points)?), own)

@@ -3,6 +3,7 @@
 mod authored;
 mod golden;
 mod gripper;
+mod kinds;
 mod urdf;
 
 use std::path::PathBuf;

@@ -1,0 +1,121 @@
+//! Names in a model and what refers to them.
+
+use std::collections::BTreeSet;
+
+use super::element::Element;
+
+/// What can have a name that others refer to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Named {
+    Body,
+    Joint,
+    Geom,
+    Site,
+    Frame,
+    Camera,
+    Light,
+    Tendon,
+    Actuator,
+    Class,
+    Asset,
+    Other,
+}
+
+/// Names of one tree, by what has them.
+pub(super) type Names = BTreeSet<(Named, String)>;
+
+/// What the attribute `field` of `e` refers to.
+pub(super) fn referred(e: &Element, field: &str) -> Option<Named> {
+    let of_object = |field: &str| match e.peek(field)? {
+        "body" | "xbody" => Some(Named::Body),
+        "joint" => Some(Named::Joint),
+        "geom" => Some(Named::Geom),
+        "site" => Some(Named::Site),
+        "camera" => Some(Named::Camera),
+        "tendon" => Some(Named::Tendon),
+        "actuator" => Some(Named::Actuator),
+        _ => None,
+    };
+    Some(match field {
+        "body" | "body1" | "body2" | "target" | "bodyname" => Named::Body,
+        "joint" | "joint1" | "joint2" | "jointinparent" => Named::Joint,
+        "site" | "site1" | "site2" | "refsite" | "slidersite" | "cranksite" | "sidesite" => {
+            Named::Site
+        }
+        "geom" | "geom1" | "geom2" => Named::Geom,
+        "tendon" | "tendon1" | "tendon2" => Named::Tendon,
+        "actuator" => Named::Actuator,
+        "camera" => Named::Camera,
+        "class" | "childclass" | "alias" => Named::Class,
+        "mesh" | "material" | "hfield" | "texture" => Named::Asset,
+        "objname" => of_object("objtype")?,
+        "refname" => of_object("reftype")?,
+        _ => return None,
+    })
+}
+
+/// What an element is of the kind that `section` holds, where it has a name.
+pub(super) fn named(e: &Element, section: &str) -> Named {
+    match (section, e.tag.as_str()) {
+        ("worldbody", "body") => Named::Body,
+        ("worldbody", "joint" | "freejoint") => Named::Joint,
+        ("worldbody", "geom") => Named::Geom,
+        ("worldbody", "site") => Named::Site,
+        ("worldbody", "frame") => Named::Frame,
+        ("worldbody", "camera") => Named::Camera,
+        ("worldbody", "light") => Named::Light,
+        ("tendon", _) => Named::Tendon,
+        ("actuator", _) => Named::Actuator,
+        ("asset", _) => Named::Asset,
+        _ => Named::Other,
+    }
+}
+
+/// Adds the names of `e` and of all below it to `names`.
+pub(super) fn collect(e: &Element, section: &str, names: &mut Names) {
+    if let Some(name) = e.peek("name") {
+        names.insert((named(e, section), name.to_owned()));
+    }
+    e.children.iter().for_each(|child| collect(child, section, names));
+}
+
+/// Whether `e` or something in it refers to one of `names`, and whether nothing refers to anything else.
+pub(super) fn refers(e: &Element, names: &Names) -> (bool, bool) {
+    let (mut any, mut all) = (false, true);
+    for (field, _) in e.attributes() {
+        let Some(kind) = referred(e, field).filter(|k| !matches!(k, Named::Class | Named::Asset))
+        else {
+            continue;
+        };
+        let name = e.peek(field).unwrap_or_default();
+        let known = names.contains(&(kind, name.to_owned()));
+        any |= known;
+        all &= known || (kind == Named::Body && name == "world");
+    }
+    for child in &e.children {
+        let (some, every) = refers(child, names);
+        any |= some;
+        all &= every;
+    }
+    (any, all)
+}
+
+/// Changes the names of `e` and of all in it, and its references to `names`, or to all where there are none, by `change`.
+pub(super) fn rename(e: &mut Element, names: Option<&Names>, change: &dyn Fn(&str) -> String) {
+    if let Some(name) = e.peek("name") {
+        let changed = change(name);
+        e.set("name", changed);
+    }
+    let fields: Vec<String> = e.attributes().map(|(name, _)| name.to_owned()).collect();
+    for field in fields {
+        let Some(kind) = referred(e, &field) else { continue };
+        // The default class of an element that names a class is itself a name.
+        let name = e.peek(&field).unwrap_or_default().to_owned();
+        let is_world = kind == Named::Body && name == "world";
+        let known = names.is_none_or(|names| names.contains(&(kind, name.clone())));
+        if known && !is_world && !name.is_empty() {
+            e.set(&field, change(&name));
+        }
+    }
+    e.children.iter_mut().for_each(|child| rename(child, names, change));
+}

@@ -1,0 +1,214 @@
+//! A robot's bodies, joints and actuators, and its smooth dynamics in given states, as JSON for comparison with other programs.
+//!
+//! `cargo run --release -p prehend-sim --example robot_dynamics -- robot.xml [--partial] [--root DIR] < states.jsonl`
+//!
+//! MJCF by default, URDF by the file's extension. The first line printed describes the model. For each line read, an object of `qpos`, `qvel`, `qacc`,
+//! `ctrl` and `act` as MuJoCo has them (of a URDF `q`, `v` and `a` by joint), one is printed with the poses of all bodies, the mass matrix, the
+//! accelerations without limits, equalities, dry friction and contacts, and the efforts that `qacc` takes.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write};
+use std::path::Path;
+
+use anyhow::Context;
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+use prehend_geometry::mjcf::{EqualityKind, Model, Transmission};
+use prehend_geometry::robot::{Drive, KinematicTree, Motion};
+use prehend_geometry::{Inertial, ReadOptions};
+use prehend_sim::{BodyId, MjcfOptions, MjcfRobot, State, UrdfOptions, World};
+use serde_json::{Value, json};
+
+/// Degrees of freedom up to which mass matrices are printed.
+const LARGEST_PRINTED: usize = 400;
+
+fn main() -> anyhow::Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let file = arguments.next().context("give a robot's file")?;
+    let mut options = ReadOptions::default();
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--partial" => options.partial = true,
+            "--inertia-from-geometry" => options.inertia_from_geometry = true,
+            "--root" => options.root = arguments.next().map(Into::into),
+            other => anyhow::bail!("unknown option {other}"),
+        }
+    }
+    let mut out = std::io::stdout().lock();
+    let robot: Box<dyn Robot> = match Path::new(&file).extension() {
+        Some(e) if e == "urdf" => Box::new(Urdf::new(&file, &options)?),
+        _ => Box::new(Mjcf::new(&file, &options)?),
+    };
+    writeln!(out, "{}", robot.description())?;
+    for line in std::io::stdin().lock().lines() {
+        writeln!(out, "{}", robot.at(&serde_json::from_str(&line?)?)?)?;
+        out.flush()?;
+    }
+    Ok(())
+}
+
+trait Robot {
+    fn description(&self) -> Value;
+    fn at(&self, state: &Value) -> anyhow::Result<Value>;
+}
+
+struct Mjcf {
+    model: Model,
+    world: World,
+    robot: MjcfRobot,
+}
+
+impl Mjcf {
+    fn new(file: &str, read: &ReadOptions) -> anyhow::Result<Self> {
+        let whole = Model::from_file_with(file, read)?;
+        let mut model = whole.clone();
+        // Smooth dynamics alone.
+        model.equalities.iter_mut().for_each(|e| e.active = false);
+        model.tendons.iter_mut().for_each(|t| (t.range, t.friction_loss) = (None, 0.0));
+        for joint in model.bodies.iter_mut().flat_map(|b| &mut b.joints) {
+            (joint.range, joint.friction_loss) = (None, 0.0);
+        }
+        let mut world = World::new(model.gravity);
+        let partial = read.partial;
+        let options = MjcfOptions { shapes: false, partial, ..MjcfOptions::default() };
+        let robot = world.add_mjcf(&model, &options)?;
+        // Ranges are part of the description.
+        Ok(Self { model: whole, world, robot })
+    }
+}
+
+impl Robot for Mjcf {
+    fn description(&self) -> Value {
+        let bodies = self.model.bodies.iter().map(|b| body(&b.name, b.inertial.as_ref()));
+        let joints =
+            self.model.bodies.iter().flat_map(|b| &b.joints).map(
+                |j| json!({"name": j.name, "kind": format!("{:?}", j.kind), "range": j.range}),
+            );
+        let actuators = self.model.actuators.iter().map(|a| {
+            let transmission = match a.transmission {
+                Transmission::Joint { .. } => "joint",
+                Transmission::Tendon(_) => "tendon",
+                Transmission::Site { .. } => "site",
+                Transmission::SliderCrank { .. } => "slider-crank",
+                Transmission::Adhesion(_) => "adhesion",
+            };
+            json!({"name": a.name, "transmission": transmission, "control": a.control_range})
+        });
+        let warnings = self.model.warnings.iter().map(ToString::to_string);
+        json!({
+            "bodies": bodies.collect::<Vec<_>>(),
+            "joints": joints.collect::<Vec<_>>(),
+            "actuators": actuators.collect::<Vec<_>>(),
+            "tendons": self.model.tendons.len(),
+            "equalities": self.model.equalities.iter().map(|e| match e.kind {
+                EqualityKind::Connect { .. } => "connect",
+                EqualityKind::Weld { .. } => "weld",
+                EqualityKind::Joint { .. } => "joint",
+                EqualityKind::Tendon { .. } => "tendon",
+            }).collect::<Vec<_>>(),
+            "keyframes": self.model.keyframes.len(),
+            "warnings": warnings.chain(self.robot.warnings.iter().cloned()).collect::<Vec<_>>(),
+        })
+    }
+
+    fn at(&self, state: &Value) -> anyhow::Result<Value> {
+        let [qpos, qvel, qacc, ctrl, act] =
+            ["qpos", "qvel", "qacc", "ctrl", "act"].map(|key| numbers(&state[key]));
+        let mut world = self.world.clone();
+        for ((_, id), control) in self.robot.actuators.iter().zip(ctrl) {
+            world.joint_force_mut(*id).set_param("control", control)?;
+        }
+        let mut states = world.neutral_states();
+        self.robot.set_positions(&world, &mut states, &qpos)?;
+        self.robot.set_velocities(&world, &mut states, &qvel)?;
+        self.robot.set_activations(&world, &mut states, &act)?;
+        let acceleration = self.robot.accelerations(&world, &states);
+        let mass = self.robot.mass_matrix(&world, &states);
+        let effort = &mass * (DVector::from_vec(qacc) - DVector::from_column_slice(&acceleration));
+        Ok(output(&states, &self.robot.bodies, &mass, &acceleration, effort.as_slice()))
+    }
+}
+
+struct Urdf {
+    tree: KinematicTree,
+    world: World,
+    bodies: Vec<BodyId>,
+}
+
+impl Urdf {
+    fn new(file: &str, read: &ReadOptions) -> anyhow::Result<Self> {
+        let tree = KinematicTree::from_urdf_file_with(file, read)?;
+        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        // Where joints move no mass, next to none.
+        let [plain, least] =
+            [0.0, 1e-9].map(|armature| UrdfOptions { armature, ..UrdfOptions::default() });
+        let bodies = world
+            .add_articulated_robot(&tree, None, &plain)
+            .or_else(|_| world.add_articulated_robot(&tree, None, &least))?;
+        world.joint_forces.clear();
+        Ok(Self { tree, world, bodies })
+    }
+}
+
+impl Robot for Urdf {
+    fn description(&self) -> Value {
+        let bodies = self.tree.links().iter().map(|l| body(&l.name, l.inertial.as_ref()));
+        let moving = self.tree.joints().iter().filter(|j| j.motion != Motion::Fixed);
+        let joints = moving.map(|j| {
+            let mimics = !matches!(j.drive, Drive::Variable { index, .. } if self.tree.joint_names()[index] == j.name);
+            json!({"name": j.name, "range": j.limits, "mimics": mimics})
+        });
+        json!({"bodies": bodies.collect::<Vec<_>>(), "joints": joints.collect::<Vec<_>>()})
+    }
+
+    fn at(&self, state: &Value) -> anyhow::Result<Value> {
+        let mut states = self.world.neutral_states();
+        let own = &self.world.articulations[0];
+        let (n, mut order) = (own.tree.freedoms(), Vec::new());
+        let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
+        for joint in self.tree.joints().iter().filter(|j| j.motion != Motion::Fixed) {
+            let body = self.bodies[joint.child];
+            let place = own.bodies().iter().position(|link| *link == body).context("no link")?;
+            let freedom = own.tree.range(place)[1].start;
+            for (to, key) in [(&mut q, "q"), (&mut v, "v"), (&mut a, "a")] {
+                to[freedom] =
+                    state[key][&joint.name].as_f64().context("a joint without a value")?;
+            }
+            order.push((joint.name.clone(), freedom));
+            self.world.set_joint(&mut states, body, &[q[freedom]], &[v[freedom]])?;
+        }
+        let at = own.tree.kinematics(&q, &v).under(self.world.gravity);
+        let (mass, effort) = (at.mass_matrix(), at.inverse_dynamics(&a));
+        let acceleration = at.forward_dynamics(&vec![0.0; n]);
+        let mut all =
+            output(&states, &self.bodies, &mass, acceleration.as_slice(), effort.as_slice());
+        all["order"] = json!(order.into_iter().collect::<BTreeMap<_, _>>());
+        Ok(all)
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+}
+
+fn body(name: &str, inertial: Option<&Inertial>) -> Value {
+    let inertia = inertial.map(|i| i.inertia.iter().copied().collect::<Vec<f64>>());
+    let com = inertial.map(|i| i.com.coords.iter().copied().collect::<Vec<f64>>());
+    json!({"name": name, "mass": inertial.map_or(0.0, |i| i.mass), "com": com, "inertia": inertia})
+}
+
+fn output(
+    states: &[State],
+    bodies: &[BodyId],
+    mass: &DMatrix<f64>,
+    acceleration: &[f64],
+    effort: &[f64],
+) -> Value {
+    let pose = |t: Isometry3<f64>| t.to_homogeneous().iter().copied().collect::<Vec<f64>>();
+    let poses: Vec<_> = bodies.iter().map(|body| pose(states[*body].pose)).collect();
+    json!({
+        "poses": poses,
+        "mass": if mass.nrows() > LARGEST_PRINTED { &[] } else { mass.as_slice() },
+        "acceleration": acceleration,
+        "effort": effort,
+    })
+}

@@ -1,0 +1,176 @@
+//! Positions, velocities and accelerations of all joints in MuJoCo's order and axes.
+
+use nalgebra::{DMatrix, Matrix3, Quaternion, Unit, Vector3};
+use prehend_geometry::mjcf::{JointKind, Model};
+
+use super::{MjcfError, MjcfRobot};
+use crate::state::State;
+use crate::world::World;
+
+impl MjcfRobot {
+    /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
+    ///
+    /// # Errors
+    /// If they are too few or too many, or the states are not those of the world.
+    pub fn set_positions(
+        &self,
+        world: &World,
+        states: &mut [State],
+        positions: &[f64],
+    ) -> Result<(), MjcfError> {
+        let expected = self.moved.iter().map(|(kind, _)| kind.positions()).sum();
+        if positions.len() != expected {
+            return Err(MjcfError::Positions { given: positions.len(), expected });
+        }
+        let mut rest = positions;
+        for (kind, link) in &self.moved {
+            let (own, after) = rest.split_at(kind.positions());
+            rest = after;
+            let turned = |q: &[f64]| {
+                let turn = Unit::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+                [turn.i, turn.j, turn.k, turn.w]
+            };
+            let position = match kind {
+                JointKind::Hinge | JointKind::Slide => own.to_vec(),
+                JointKind::Ball => turned(own).to_vec(),
+                JointKind::Free => own[..3].iter().copied().chain(turned(&own[3..])).collect(),
+            };
+            world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
+        }
+        world.place_links(states);
+        Ok(())
+    }
+
+    /// Sets the velocities of all joints in MuJoCo's order and axes, its `qvel`: a free joint's velocity is along the axes of the model's world, its
+    /// angular velocity along the body's.
+    ///
+    /// # Errors
+    /// If they are too few or too many, or the states are not those of the world.
+    pub fn set_velocities(
+        &self,
+        world: &World,
+        states: &mut [State],
+        velocities: &[f64],
+    ) -> Result<(), MjcfError> {
+        let expected = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
+        if velocities.len() != expected {
+            return Err(MjcfError::Velocities { given: velocities.len(), expected });
+        }
+        let mut rest = velocities;
+        for (kind, link) in &self.moved {
+            let (own, after) = rest.split_at(kind.velocities());
+            rest = after;
+            let joint = world.joint(states, *link)?;
+            let mut velocity = own.to_vec();
+            if *kind == JointKind::Free {
+                let along =
+                    axes(&joint.position).transpose() * Vector3::from_column_slice(&own[..3]);
+                velocity[..3].copy_from_slice(along.as_slice());
+            }
+            world.write_joint(states, *link, &joint.position, &velocity)?;
+        }
+        world.place_links(states);
+        Ok(())
+    }
+
+    /// Sets the states of actuators that have one, MuJoCo's `act`.
+    ///
+    /// # Errors
+    /// If they are too few or too many, or the states are not those of the world.
+    pub fn set_activations(
+        &self,
+        world: &World,
+        states: &mut [State],
+        activations: &[f64],
+    ) -> Result<(), MjcfError> {
+        let (given, expected) = (activations.len(), self.activations.len());
+        if given != expected {
+            return Err(MjcfError::Activations { given, expected });
+        }
+        for (link, activation) in self.activations.iter().zip(activations) {
+            world.write_joint(states, *link, &[0.0], &[*activation])?;
+        }
+        Ok(())
+    }
+
+    /// Accelerations of all joints in MuJoCo's order and axes, its `qacc`.
+    ///
+    /// # Panics
+    /// If there are fewer states than those of the world.
+    pub fn accelerations(&self, world: &World, states: &[State]) -> Vec<f64> {
+        let wrenches = world.wrenches(states, 0);
+        let mut all = Vec::new();
+        for (kind, link) in &self.moved {
+            let Ok((place, joint)) = world.joint_place(states, *link) else { continue };
+            let mut own = joint.accelerations(&wrenches[place]);
+            if *kind == JointKind::Free {
+                let State { pose, linear, angular } = &states[place];
+                let along = Vector3::from_column_slice(&own[..3]) + angular.cross(linear);
+                own[..3].copy_from_slice((pose.rotation * along).as_slice());
+            }
+            all.extend(own);
+        }
+        all
+    }
+
+    /// The mass matrix in MuJoCo's order and axes, with the armature of joints and tendons.
+    ///
+    /// # Panics
+    /// If there are fewer states than those of the world.
+    pub fn mass_matrix(&self, world: &World, states: &[State]) -> DMatrix<f64> {
+        let Some(Ok((articulation, _))) = self.moved.first().map(|(_, link)| world.link_of(*link))
+        else {
+            return DMatrix::zeros(0, 0);
+        };
+        let own = world.mass_matrix(articulation, states);
+        let count = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
+        // Velocities of the articulation by MuJoCo's.
+        let mut turned = DMatrix::zeros(own.nrows(), count);
+        let mut column = 0;
+        for (kind, link) in &self.moved {
+            let Ok((_, link_index)) = world.link_of(*link) else { continue };
+            let [_, freedoms] = world.articulations[articulation].tree.range(link_index);
+            let n = kind.velocities();
+            turned.view_mut((freedoms.start, column), (n, n)).fill_with_identity();
+            if let (JointKind::Free, Ok(joint)) = (kind, world.joint(states, *link)) {
+                let axes = axes(&joint.position).transpose();
+                turned.view_mut((freedoms.start, column), (3, 3)).copy_from(&axes);
+            }
+            column += n;
+        }
+        turned.transpose() * own * turned
+    }
+}
+
+impl World {
+    /// Coordinates of the last articulation, which is `robot`'s, with all joints at their references and at those of their springs.
+    pub(super) fn reference_coordinates(
+        &self,
+        model: &Model,
+        robot: &MjcfRobot,
+    ) -> Result<[Vec<f64>; 2], MjcfError> {
+        let reference = model.reference_positions();
+        let mut slack = reference.clone();
+        let mut at = 0;
+        for joint in model.joint_indices().map(|index| model.joint(index)) {
+            if matches!(joint.kind, JointKind::Hinge | JointKind::Slide) {
+                slack[at] = joint.spring_reference;
+            }
+            at += joint.kind.positions();
+        }
+        let own = self.articulations.len() - 1;
+        let mut states = self.neutral_states();
+        let mut coordinates = |positions: &[f64]| -> Result<Vec<f64>, MjcfError> {
+            robot.set_positions(self, &mut states, positions)?;
+            let [q, _] = self.articulations[own].coordinates(&states[self.joint_range(own)]);
+            Ok(q)
+        };
+        Ok([coordinates(&reference)?, coordinates(&slack)?])
+    }
+}
+
+/// Axes of a free link in the frame of its joint.
+fn axes(position: &[f64]) -> Matrix3<f64> {
+    let turn = Quaternion::new(position[6], position[3], position[4], position[5]);
+    Unit::new_normalize(turn).to_rotation_matrix().into_inner()
+}
