@@ -244,6 +244,18 @@ def test_other_threads_run_while_a_frame_is_refined(example, refined):
     assert all((estimate.pose == refined.pose).all() for estimate in found)
 
 
+def test_sizes_of_errors_have_names(example):
+    frame, initial, _ = example
+    estimate = frame.refine(initial, noise={"model.scale": "5%"})
+    scale, sigma = estimate.model_scale
+    assert abs(scale - 1) < 0.03 and 0 < sigma < 0.05
+    assert frame.refine(initial).model_scale is None
+    with pytest.raises(prehend.Error, match="noise: warmth: there is no size"):
+        frame.refine(initial, noise={"warmth": "5%"})
+    with pytest.raises(prehend.Error, match="noise: is of the fused methods, not of 'icp'"):
+        frame.refine(initial, method="icp", noise={"joints": "1deg"})
+
+
 def test_a_bad_frame_loses_no_other(example, refined):
     frame, initial, _ = example
     behind = initial.copy()

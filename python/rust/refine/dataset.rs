@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::PyArray;
 use numpy::ndarray::IxDyn;
-use prehend_refine::data::bop::{self, GroundTruth};
-use prehend_refine::data::{Assets, Target, find_targets, user_cache};
+use prehend_refine::data::bop::{self, Detections, GroundTruth};
+use prehend_refine::data::{Assets, MaskSource, Target, find_targets, user_cache};
 use pyo3::prelude::*;
 
 use super::frame::Frame;
@@ -33,15 +33,25 @@ impl Dataset {
 #[pymethods]
 impl Dataset {
     #[new]
-    #[pyo3(signature = (path, split=None, *, rig=None, seed=0))]
-    fn new(path: PathBuf, split: Option<&str>, rig: Option<&Rig>, seed: u64) -> PyResult<Self> {
+    #[pyo3(signature = (path, split=None, *, rig=None, detections=None, seed=0))]
+    fn new(
+        path: PathBuf,
+        split: Option<&str>,
+        rig: Option<&Rig>,
+        detections: Option<PathBuf>,
+        seed: u64,
+    ) -> PyResult<Self> {
         let dataset = match split {
             Some(split) => bop::Dataset::open_split(&path, split),
             None => bop::Dataset::open(&path),
         };
         let dataset = Arc::new(dataset.raise()?);
+        let detections = detections.map(|file| Detections::load(&file)).transpose().raise()?;
+        let masks =
+            detections.map_or(MaskSource::Files, |found| MaskSource::Detections(Arc::new(found)));
         let assets = Assets::owning(Arc::clone(&dataset), seed)
             .with_cache(user_cache())
+            .with_masks(masks)
             .with_rig(rig.map(|rig| Arc::clone(&rig.rig)))
             .with_optional_masks();
         Ok(Self { dataset, assets: Mutex::new(assets) })

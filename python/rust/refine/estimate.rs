@@ -46,6 +46,7 @@ pub(super) fn estimate<'py>(py: Python<'py>, refined: &Refined) -> PyResult<Boun
         fields.set_item("misfits", summary.misfits)?;
         fields.set_item("disagreements", summary.disagreements)?;
         fields.set_item("scales", summary.scales)?;
+        fields.set_item("model_scale", summary.model_scale)?;
         let unobserved: Vec<f64> = summary.unobserved_mm.iter().map(|mm| 1e-3 * mm).collect();
         fields.set_item("unobserved", unobserved)?;
         fields.set_item("ending", summary.ending)?;

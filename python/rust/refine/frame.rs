@@ -15,7 +15,8 @@ use super::measured::{Joints, measured};
 use super::object::prepared;
 use super::poses::{pose, poses};
 use super::rig::Rig;
-use super::{estimate, images, run};
+use super::run::{self, Noise};
+use super::{estimate, images};
 use crate::arrays::{Numbers, in_order, matrix, vector};
 use crate::error::{Raise, wrong};
 
@@ -118,8 +119,9 @@ impl Frame {
 
     /// Refines a pose of the object (4 × 4, camera ← object [m]): an `Estimate`. Python's other threads run on meanwhile.
     ///
-    /// `rivals` (n × 4 × 4) are the other poses that a search ended with, where the pose comes from one. `iterations` limits those of each stage.
-    #[pyo3(signature = (pose, *, method="fused", iterations=None, rivals=None))]
+    /// `rivals` (n × 4 × 4) are the other poses that a search ended with, where the pose comes from one. `iterations` limits those of each stage. `noise` has sizes of errors by name, as
+    /// `prehend refine --noise` does: `{"model.scale": "5%"}` estimates the size of the model.
+    #[pyo3(signature = (pose, *, method="fused", iterations=None, rivals=None, noise=None))]
     fn refine<'py>(
         &self,
         py: Python<'py>,
@@ -127,8 +129,9 @@ impl Frame {
         method: &str,
         iterations: Option<usize>,
         rivals: Option<Numbers<'py>>,
+        noise: Option<Noise>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let method = run::method(method, iterations)?;
+        let method = run::method(method, iterations, noise.as_ref())?;
         let initial = self::pose(&pose, "pose")?;
         let rivals = rivals.map(|rivals| poses(&rivals, "rivals")).transpose()?;
         let job = RefineJob { input: &self.input, initial, rivals };

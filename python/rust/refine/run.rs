@@ -1,5 +1,6 @@
 //! Methods by name, and many frames at once.
 
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
 use prehend_refine::{Method, NamedMethod, RefineJob, refine_all};
@@ -17,8 +18,15 @@ pub(super) fn at_least_one(number: usize, what: &str) -> PyResult<NonZeroUsize> 
     NonZeroUsize::new(number).ok_or_else(|| wrong(format!("{what}: at least 1 is expected")))
 }
 
-/// The method of that name.
-pub(super) fn method(name: &str, iterations: Option<usize>) -> PyResult<Method> {
+/// Sizes of errors by name, as `prehend refine --noise` has them.
+pub(super) type Noise = BTreeMap<String, String>;
+
+/// The method of that name, with errors of these sizes.
+pub(super) fn method(
+    name: &str,
+    iterations: Option<usize>,
+    noise: Option<&Noise>,
+) -> PyResult<Method> {
     let unknown = || {
         let names: Vec<_> = NamedMethod::all().iter().map(|method| method.name).collect();
         wrong(format!("method: '{name}' is unknown: one of {}", names.join(", ")))
@@ -27,12 +35,19 @@ pub(super) fn method(name: &str, iterations: Option<usize>) -> PyResult<Method> 
     if let Some(iterations) = iterations {
         method.set_iterations(at_least_one(iterations, "iterations")?.get());
     }
+    for (quantity, size) in noise.into_iter().flatten() {
+        let Method::Fused(fused) = &mut method else {
+            return Err(wrong(format!("noise: is of the fused methods, not of '{name}'")));
+        };
+        let set = fused.settings.set_nominal_size(quantity, size);
+        set.map_err(|error| wrong(format!("noise: {quantity}: {error}")))?;
+    }
     Ok(method)
 }
 
 /// The names of all methods, and what each is.
 #[pyfunction]
-pub(crate) fn methods() -> std::collections::BTreeMap<&'static str, &'static str> {
+pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
     NamedMethod::all().iter().map(|method| (method.name, method.summary)).collect()
 }
 
@@ -41,16 +56,17 @@ pub(crate) fn methods() -> std::collections::BTreeMap<&'static str, &'static str
 ///
 /// `threads` is how many threads work, all cores if it is not given; poses are the same for any number.
 #[pyfunction]
-#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, threads=None))]
+#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, threads=None))]
 pub(crate) fn refine_batch<'py>(
     py: Python<'py>,
     frames: Vec<Py<Frame>>,
     poses: Numbers<'py>,
     method: &str,
     iterations: Option<usize>,
+    noise: Option<Noise>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let method = self::method(method, iterations)?;
+    let method = self::method(method, iterations, noise.as_ref())?;
     let threads = threads.map(|threads| at_least_one(threads, "threads")).transpose()?;
     let poses = self::poses(&poses, "poses")?;
     let (count, given) = (frames.len(), poses.len());

@@ -325,6 +325,7 @@ class Frame:
         method: str = "fused",
         iterations: int | None = None,
         rivals: ArrayLike | None = None,
+        noise: Mapping[str, str] | None = None,
     ) -> Estimate: ...
     def search(self) -> list[tuple[NDArray[np.float64], float]]: ...
     def warnings(self, pose: ArrayLike) -> list[str]: ...
@@ -384,6 +385,7 @@ class Dataset:
         split: str | None = None,
         *,
         rig: Rig | None = None,
+        detections: str | PathLike[str] | None = None,
         seed: int = 0,
     ) -> Self: ...
     @property
@@ -403,6 +405,7 @@ def refine_batch(
     *,
     method: str = "fused",
     iterations: int | None = None,
+    noise: Mapping[str, str] | None = None,
     threads: int | None = None,
 ) -> list[Estimate | Error]: ...
 def example_frame(seed: int = 0) -> tuple[Frame, NDArray[np.float64], NDArray[np.float64]]: ...

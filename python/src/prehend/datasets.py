@@ -27,7 +27,7 @@ class Bop(Dataset):
     """A split of a BOP dataset, `test` or the only one if none is named: its images, and beside them hand, touch and truth where it has them.
 
     Iterating yields a `Frame` for each of `targets`, with its mask empty where there is no file of one. Objects and hands are prepared once, and corrected
-    by `rig`, if one is given. Files are read when they are needed.
+    by `rig`, if one is given. `detections` is a file of BOP's detections that masks come from, in place of `mask_visib/`. Files are read when they are needed.
     """
 
     def __iter__(self) -> Iterator[Frame]:

@@ -31,6 +31,7 @@ class Estimate:
         misfits: Evidence that is more probably of something else (another object, another frame, a hand that is elsewhere) than not, and how probably.
         disagreements: Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
         scales: Errors over their nominal sizes, by group: "hand", "joints", "camera", "surface".
+        model_scale: Size of the object by that of its model, and its standard deviation, where that is estimated (`noise={"model.scale": "5%"}`).
         unobserved: Standard deviations of surface motion along directions that the evidence says hardly anything of [m].
         ending: Why the search ended.
         iterations: Iterations done.
@@ -45,6 +46,7 @@ class Estimate:
     misfits: list[tuple[str, float]] = field(default_factory=list)
     disagreements: list[tuple[str, float]] = field(default_factory=list)
     scales: list[tuple[str, float]] = field(default_factory=list)
+    model_scale: tuple[float, float] | None = None
     unobserved: list[float] = field(default_factory=list)
     ending: str = ""
     iterations: int = 0
@@ -95,6 +97,7 @@ def refine(
     method: str = "fused",
     iterations: int | None = None,
     rivals: ArrayLike | None = None,
+    noise: Mapping[str, str] | None = None,
 ) -> Estimate:
     """Refines the pose of an object in one frame: the same as `Frame(rgb, depth, K, mesh, …).refine(pose, …)`.
 
@@ -107,7 +110,7 @@ def refine(
         K: 3 × 3 [px].
         mesh: The object. A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
         pose: Where to begin: 4 × 4, camera ← object [m].
-        mask: H × W, not zero on the visible part of the object. All methods need it.
+        mask: H × W, not zero on the visible part of the object. Without it, pose, depth and colors tell the object.
         hand: The hand that holds the object; it needs `hand_pose` and `joints`.
         hand_pose: 4 × 4, camera ← base of the hand [m].
         joints: Positions by name, or in the order of `hand.joints` [rad; m of prismatic ones].
@@ -118,6 +121,7 @@ def refine(
         method: One of `methods()`.
         iterations: At most so many in each stage.
         rivals: n × 4 × 4, the other poses that a search ended with, if `pose` comes from one.
+        noise: Sizes of errors by name, as `prehend refine --noise` has them, such as `{"hand.translation": "5mm", "model.scale": "5%"}`.
 
     Raises:
         Error: What is wrong with the input, or why nothing was found.
@@ -145,7 +149,7 @@ def refine(
         lens=lens,
         rig=rig,
     )
-    estimate: Estimate = frame.refine(pose, method=method, iterations=iterations, rivals=rivals)
+    estimate: Estimate = frame.refine(pose, method=method, iterations=iterations, rivals=rivals, noise=noise)
     for text in estimate.warnings:
         warnings.warn(text, stacklevel=2)
     return estimate

@@ -104,8 +104,8 @@ impl Appearance {
         self.ratios.are_known()
     }
 
-    /// Finds what of `sight` shows `object`, which should be at `t_cam_object`, and how far its pixels are the object's; false if nothing is seen of it. In a first
-    /// frame without a mask the object is stated to be `about` somewhere.
+    /// Finds what of `sight` shows `object`, which should be at `t_cam_object`, and how far its pixels are the object's; false if nothing is seen of it. A single
+    /// frame without a mask has an object that is stated to be `about` somewhere.
     pub(super) fn look(
         &self,
         sight: &mut Sight,

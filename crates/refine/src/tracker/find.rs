@@ -36,7 +36,7 @@ impl Tracker {
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
-        self.segment_first(sight)?;
+        self.segment_first(sight, false)?;
         let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
         let sight = &*sight;
         let mut frame = self.frame(sight, &object, hand.as_ref())?;
@@ -65,10 +65,11 @@ impl Tracker {
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
 
-    /// Finds the pixels of a first frame that show the object, which is about where it begins if that is known.
-    fn segment_first(&mut self, sight: &mut Sight) -> Result<(), RefineError> {
+    /// Finds the pixels of a first frame that show the object, which is about where it begins if that is known. Of a frame that `is_single` the initial pose tells
+    /// pixels to the end; a film goes on by its colors.
+    fn segment_first(&mut self, sight: &mut Sight, is_single: bool) -> Result<(), RefineError> {
         match self.initial.filter(|_| !sight.tells) {
-            Some(pose) if !sight.measured => self.learn_colors(sight, &pose)?,
+            Some(pose) if !sight.measured => self.learn_colors(sight, &pose, is_single)?,
             Some(pose) => {
                 let is_seen = self.segment(sight, &pose);
                 if sight.given.count() > 0 {
@@ -99,7 +100,7 @@ impl Tracker {
         observation.require_sizes()?;
         self.start_from(t_cam_object);
         let mut sight = Sight::new(observation, self.hand.as_ref(), Images::default());
-        self.segment_first(&mut sight)?;
+        self.segment_first(&mut sight, true)?;
         Ok((sight.observation, sight.regions))
     }
 
@@ -108,23 +109,25 @@ impl Tracker {
         &mut self,
         sight: &mut Sight,
         initial: &Isometry3<f64>,
+        is_single: bool,
     ) -> Result<(), RefineError> {
         let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let about = is_single.then_some(initial);
         let mut pose = *initial;
         for _ in 0..COLOR_ROUNDS {
             self.appearance = Appearance::default();
-            if !self.appearance.look(sight, &object, &pose, Some(initial)) {
+            if !self.appearance.look(sight, &object, &pose, about) {
                 return Err(RefineError::OutOfView);
             }
             self.appearance.learn(sight, &object, &pose);
-            self.appearance.look(sight, &object, &pose, Some(initial));
+            self.appearance.look(sight, &object, &pose, about);
             // The pose may be far off.
             sight.focus = None;
             let frame = self.frame(sight, &object, hand.as_ref())?;
             let start = State::new(&frame, initial)?;
             pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
         }
-        self.appearance.look(sight, &object, &pose, Some(initial));
+        self.appearance.look(sight, &object, &pose, about);
         sight.focus = None;
         Ok(())
     }
