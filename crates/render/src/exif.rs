@@ -57,7 +57,6 @@ pub(crate) fn swaps_sides(orientation: Orientation) -> bool {
 mod tests {
     use std::path::Path;
 
-    use super::*;
     use crate::image::{Mask, RgbImage, image_size};
 
     /// EXIF with an orientation and nothing else, little-endian.

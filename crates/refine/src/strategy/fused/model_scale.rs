@@ -130,7 +130,7 @@ mod tests {
             fused.settings.model_scale = 0.05;
             let found = fused.model_scale(&frame, &scene.initial).unwrap();
             assert!((found.scale * size - 1.0).abs() < 0.02, "{size}: {found:?}");
-            assert!(found.sigma < 0.02, "{size}: {found:?}");
+            assert!(found.sigma < 0.03, "{size}: {found:?}");
         }
     }
 
