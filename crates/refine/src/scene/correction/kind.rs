@@ -171,7 +171,7 @@ impl Correction {
                 "{poses}: {r} and {t}: poses are inverted (camera in the object's frame, inverted extrinsics); invert them: R ← Rᵀ, t ← −Rᵀt"
             ),
             Self::PoseInvertedOpenGl => format!(
-                "{poses}: {r} and {t}: poses are inverted, of a camera with axes of OpenGL in the object's frame; invert them (R ← Rᵀ, t ← −Rᵀt), then negate                  the second and third row of R and of t"
+                "{poses}: {r} and {t}: poses are inverted, of a camera with axes of OpenGL in the object's frame; invert them (R ← Rᵀ, t ← −Rᵀt), then negate the second and third row of R and of t"
             ),
             Self::RotationTransposed => {
                 format!("{poses}: {r}: rotations are transposed; write R row by row, R ← Rᵀ")
