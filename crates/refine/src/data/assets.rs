@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use prehend_geometry::{GridCache, TriMesh};
-use prehend_render::Mask;
 
 use crate::baselines::GradientKind;
 use crate::data::bop::{
@@ -17,10 +16,9 @@ use crate::data::robots::Robots;
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::Target;
 use crate::scene::{
     self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, RegionEvidence,
-    StatedSize, Subject, Warning, check_gravity,
+    StatedSize, Subject, Target, Warning, check_gravity,
 };
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
@@ -135,7 +133,7 @@ impl FrameInput {
             _ => Fused::default(),
         };
         let fused = Fused { rig: self.rig.clone(), ..fused };
-        let segmented = match tells_pixels(&self.observation.mask) {
+        let segmented = match self.observation.is_segmented() {
             true => None,
             false => Some(self.segmented(t_cam_object, fused.settings.clone())?),
         };
@@ -460,11 +458,6 @@ impl<'a> Assets<'a> {
 enum MaskOf<'a> {
     Object(&'a Sought<'a>),
     Number(usize),
-}
-
-/// True of a mask that tells which pixels show the object, and not only about where it is.
-fn tells_pixels(mask: &Mask) -> bool {
-    mask.count() > 0 && !mask.is_box()
 }
 
 /// What was read; `None` where the file or its entry is absent and need not be there.

@@ -106,6 +106,11 @@ impl Observation {
         Self { camera, color, depth, mask, gravity: None, hand: None, views: Vec::new() }
     }
 
+    /// True of a mask that tells which pixels show the object, and not only about where it is: it is neither empty nor a box.
+    pub(crate) fn is_segmented(&self) -> bool {
+        self.mask.count() > 0 && !self.mask.is_box()
+    }
+
     /// With what another camera saw at the same moment, whose coordinates `t_cam_view` takes to those of this one \[m\]. Hand and gravity are this one's.
     pub fn with_view(mut self, view: Self, t_cam_view: Isometry3<f64>) -> Self {
         let observation = Self { gravity: None, views: Vec::new(), ..view };

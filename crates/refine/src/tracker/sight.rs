@@ -48,8 +48,8 @@ impl Sight {
         let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
         draw_hand_depth(own(&mut hand_depth), &observation.camera, hand);
         own(&mut depth).copy_from(&observation.depth);
+        let tells = observation.is_segmented();
         let given = mem::replace(&mut observation.mask, mask);
-        let tells = given.count() > 0 && !given.is_box();
         let measured = observation.has_depth();
         Self { given, tells, observation, hand_depth, depth, measured, regions: None, focus: None }
     }
