@@ -1,51 +1,72 @@
 //! Many frames at once.
 
 use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
 
 use nalgebra::Isometry3;
+use prehend_render::Backend;
 
 use crate::data::{FrameInput, Workers};
 use crate::error::{RefineError, guard};
 use crate::method::Method;
-use crate::refine::refine;
+use crate::problem::State;
 use crate::scene::Warning;
-use crate::strategy::Estimate;
+use crate::strategy::{DiagnosisSummary, Estimate, Observer, Strategy};
 
-/// A frame, and where to begin.
+/// Refinement of a frame from an initial pose.
 pub struct RefineJob<'a> {
-    /// The frame.
+    /// Frame.
     pub input: &'a FrameInput,
-    /// Object → camera \[m\].
+    /// Initial pose, object → camera \[m\].
     pub initial: Isometry3<f64>,
-    /// The other poses that a search ended with, if `initial` comes from one: [`Frame::with_rivals`](crate::Frame::with_rivals).
+    /// Other poses that a search ended with, if `initial` comes from one: [`Frame::with_rivals`](crate::Frame::with_rivals).
     pub rivals: Option<Vec<Isometry3<f64>>>,
+    /// Renderer; `None` is the processor.
+    pub backend: Option<Arc<dyn Backend>>,
+    /// Whether the fused estimator also refines without each sensor: [`Fused::diagnose`](crate::strategy::Fused::diagnose).
+    pub diagnose: bool,
 }
 
-/// What becomes of a [`RefineJob`].
+/// Outcome of a [`RefineJob`].
 pub struct Refined {
-    /// The pose, and how sure it is.
+    /// Pose, with its posterior.
     pub estimate: Estimate,
-    /// What looks wrong with object, frame and initial pose.
+    /// Poses without each sensor, where that was asked for.
+    pub diagnosis: Vec<DiagnosisSummary>,
+    /// Faults seen in the object's model.
+    pub object_warnings: Vec<Warning>,
+    /// Faults seen in frame and initial pose.
     pub warnings: Vec<Warning>,
+    /// Wall time of the refinement, the diagnosis left out \[s\].
+    pub seconds: f64,
 }
 
-impl RefineJob<'_> {
-    /// Refines the frame. Gradients of the heuristic for which the frame brings no evidence drop out.
+impl<'a> RefineJob<'a> {
+    /// Refinement of `input` from `initial` (object → camera \[m\]) on the processor.
+    pub fn new(input: &'a FrameInput, initial: Isometry3<f64>) -> Self {
+        Self { input, initial, rivals: None, backend: None, diagnose: false }
+    }
+
+    /// Refines the frame; `observe` hears of every iteration.
     ///
     /// # Errors
-    /// Those of [`refine`], and if the pose that is found is not finite.
-    pub fn run(&self, method: &Method) -> Result<Refined, RefineError> {
-        let mut method = method.with_rig(self.input.rig.as_ref());
-        if let Method::Heuristic(heuristic) = &mut method {
-            heuristic.gradients.retain(|&gradient| self.input.offers(gradient));
-        }
-        let prepared = self.input.prepared(&self.initial, &method)?;
+    /// Those of [`refine`](crate::refine), and if the pose that is found is not finite.
+    pub fn run(&self, method: &Method, observe: &mut Observer<'_>) -> Result<Refined, RefineError> {
+        let start = Instant::now();
+        let prepared = self.input.prepared(&self.initial, method)?;
         let input = prepared.as_ref().unwrap_or(self.input);
         let mut frame = input.frame()?;
+        if let Some(backend) = &self.backend {
+            frame = frame.with_backend(Arc::clone(backend));
+        }
         if let Some(rivals) = &self.rivals {
             frame = frame.with_rivals(rivals.clone());
         }
-        let mut estimate = refine(&frame, &self.initial, &method)?;
+        let method = method.with_rig(input.rig.as_ref());
+        let initial = State::new(&frame, &self.initial)?;
+        let mut estimate = method.run(&frame, &initial, observe)?;
         if let Some(posterior) = &mut estimate.posterior {
             posterior.model_scale = input.model_scale;
         }
@@ -54,12 +75,20 @@ impl RefineJob<'_> {
         if !numbers.all(|v| v.is_finite()) {
             return Err(RefineError::Diverged);
         }
-        Ok(Refined { estimate, warnings: self.input.warnings(&self.initial).concat() })
+        let seconds = start.elapsed().as_secs_f64();
+        let diagnosis = match &method {
+            Method::Fused(fused) if self.diagnose => DiagnosisSummary::of(
+                &fused.diagnose_estimate(&frame, &initial, estimate.clone())?,
+            ),
+            _ => Vec::new(),
+        };
+        let [object_warnings, warnings] = input.warnings(&self.initial);
+        Ok(Refined { estimate, diagnosis, object_warnings, warnings, seconds })
     }
 }
 
-/// Refines frames side by side, with so many threads in all, or as many as there are cores. What becomes of a frame depends neither on the others
-/// nor on the number of threads.
+/// Refines frames side by side, with `threads` threads in all, or as many as there are cores. Results depend neither on the other frames nor on the
+/// number of threads. Gradients of the heuristic for which a frame brings no evidence drop out.
 ///
 /// # Errors
 /// If the system gives no threads; what is wrong with a frame is in its place, panics too.
@@ -77,17 +106,19 @@ pub fn refine_all(
         done[index] = Some(outcome);
         Ok(())
     };
-    workers.run(&indices, || |&index: &usize| guard(|| jobs[index].run(method)), keep)?;
+    let run = |&index: &usize| {
+        let method = jobs[index].input.supported(method);
+        guard(|| jobs[index].run(&method, &mut |_| ControlFlow::Continue(())))
+    };
+    workers.run(&indices, || run, keep)?;
     // None is missing.
     Ok(done.into_iter().flatten().collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::problem::{Factor, Rows, State};
+    use crate::problem::{Factor, Rows};
     use crate::scene::{Scene, default_scene};
     use crate::strategy::Fused;
 
@@ -96,9 +127,10 @@ mod tests {
         let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
         let input = FrameInput::new(observation, object, Some(hand), None);
         let behind = Isometry3::translation(0.0, 0.0, -2.0) * initial;
-        let job = |initial| RefineJob { input: &input, initial, rivals: None };
+        let job = |initial| RefineJob::new(&input, initial);
         let jobs = [initial, behind, initial].map(job);
-        let alone = jobs[0].run(&Method::default()).unwrap().estimate;
+        let alone = jobs[0].run(&Method::default(), &mut |_| ControlFlow::Continue(()));
+        let alone = alone.unwrap().estimate;
         for threads in [None, NonZeroUsize::new(1), NonZeroUsize::new(2)] {
             let done = refine_all(&jobs, &Method::default(), threads).unwrap();
             assert!(matches!(done[1], Err(RefineError::BehindCamera { .. })));
@@ -134,7 +166,7 @@ mod tests {
             FrameInput::new(observation, Arc::clone(&object), hand, None)
         };
         let inputs = [input(true), input(false), input(true)];
-        let job = |input| RefineJob { input, initial, rivals: None };
+        let job = |input| RefineJob::new(input, initial);
         let jobs: Vec<_> = inputs.iter().map(job).collect();
         let done = refine_all(&jobs, &Fused::default().with(Faulty).into(), None).unwrap();
         assert!(matches!(done[1], Err(RefineError::Panicked(_))));

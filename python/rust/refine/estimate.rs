@@ -38,7 +38,8 @@ pub(super) fn estimate<'py>(py: Python<'py>, refined: &Refined) -> PyResult<Boun
     let (found, posterior) = (&refined.estimate, refined.estimate.posterior.as_ref());
     fields.set_item("pose", matrix(py, found.t_cam_object())?)?;
     describe(&fields, posterior)?;
-    let warnings: Vec<String> = refined.warnings.iter().map(ToString::to_string).collect();
+    let warnings = refined.object_warnings.iter().chain(&refined.warnings);
+    let warnings: Vec<String> = warnings.map(ToString::to_string).collect();
     fields.set_item("warnings", warnings)?;
     fields.set_item("iterations", found.trace.iterations.len().saturating_sub(1))?;
     if let Some(summary) = posterior.map(PosteriorSummary::from) {

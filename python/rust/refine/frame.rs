@@ -1,5 +1,6 @@
 //! Frames: all that is known of one moment.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use numpy::PyUntypedArrayMethods;
@@ -134,8 +135,10 @@ impl Frame {
         let method = run::method(method, iterations, noise.as_ref())?;
         let initial = self::pose(&pose, "pose")?;
         let rivals = rivals.map(|rivals| poses(&rivals, "rivals")).transpose()?;
-        let job = RefineJob { input: &self.input, initial, rivals };
-        let refined = py.detach(|| job.run(&method)).raise()?;
+        let job = RefineJob { rivals, ..RefineJob::new(&self.input, initial) };
+        let method = self.input.supported(&method);
+        let run = || job.run(&method, &mut |_| ControlFlow::Continue(()));
+        let refined = py.detach(run).raise()?;
         estimate::estimate(py, &refined)
     }
 

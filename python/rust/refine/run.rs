@@ -74,10 +74,8 @@ pub(crate) fn refine_batch<'py>(
         return Err(wrong(format!("poses: {count} are expected, one a frame, not {given}")));
     }
     let frames = frames.iter().map(|frame| &frame.get().input);
-    let jobs: Vec<RefineJob<'_>> = frames
-        .zip(poses)
-        .map(|(input, initial)| RefineJob { input, initial, rivals: None })
-        .collect();
+    let jobs: Vec<RefineJob<'_>> =
+        frames.zip(poses).map(|(input, initial)| RefineJob::new(input, initial)).collect();
     let done = py.detach(|| refine_all(&jobs, &method, threads)).raise()?;
     let results = PyList::empty(py);
     for outcome in &done {

@@ -11,17 +11,13 @@ use crate::baselines::GradientKind;
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, Frame, Models, ResultRow, SceneBodies,
 };
+use crate::data::frame_input::FrameInput;
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::Robots;
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{
-    self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, RegionEvidence,
-    StatedSize, Subject, Target, Warning, check_gravity,
-};
-use crate::strategy::{Fused, FusedSettings, ModelScale};
-use crate::tracker::{Tracker, TrackerSettings};
+use crate::scene::{Hand, Inertial, Object, Observation, StatedSize, Target, check_gravity};
 
 /// Standard deviations of the poses of neighbors, in each direction and about each axis \[m, rad\].
 const NEIGHBOR_SIGMAS: [f64; 2] = [2e-3, 0.02];
@@ -84,130 +80,6 @@ impl Sensor {
             GradientKind::Rendering | GradientKind::Depth => None,
         };
         heuristic.gradients.iter().filter_map(sensor).collect()
-    }
-}
-
-/// A frame ready to be refined.
-#[derive(Clone)]
-pub struct FrameInput {
-    /// What was sensed.
-    pub observation: Observation,
-    /// The object.
-    pub object: Arc<Object>,
-    /// The hand, where it is known.
-    pub hand: Option<Arc<Hand>>,
-    /// The rig, by which all this is corrected, where it is known.
-    pub rig: Option<Arc<Rig>>,
-    /// Size of the object by that of its model, if the model was scaled by that.
-    pub model_scale: Option<ModelScale>,
-    /// True if pixels of the mask were told by the pose.
-    is_segmented: bool,
-    /// Regions, where no mask tells them.
-    regions: Option<Arc<RegionEvidence>>,
-}
-
-impl FrameInput {
-    /// Frame of an object, in a hand if that is known, corrected by `rig` already.
-    pub fn new(
-        observation: Observation,
-        object: Arc<Object>,
-        hand: Option<Arc<Hand>>,
-        rig: Option<Arc<Rig>>,
-    ) -> Self {
-        let (model_scale, is_segmented, regions) = (None, false, None);
-        Self { observation, object, hand, rig, model_scale, is_segmented, regions }
-    }
-
-    /// The frame as `method` needs it, where it is not so yet, of an object about at `t_cam_object` \[m\]: if its mask is empty or a box, with the pixels that show
-    /// the object told by its pose, by depth and by colors; if the size of the model is to be estimated, with a model of that size.
-    ///
-    /// # Errors
-    /// If nothing of the object is seen there.
-    pub fn prepared(
-        &self,
-        t_cam_object: &Isometry3<f64>,
-        method: &Method,
-    ) -> Result<Option<Self>, RefineError> {
-        let fused = match method {
-            Method::Fused(fused) => (**fused).clone(),
-            _ => Fused::default(),
-        };
-        let fused = Fused { rig: self.rig.clone(), ..fused };
-        let segmented = match self.observation.is_segmented() {
-            true => None,
-            false => Some(self.segmented(t_cam_object, fused.settings.clone())?),
-        };
-        if fused.settings.model_scale <= 0.0 {
-            return Ok(segmented);
-        }
-        let input = segmented.unwrap_or_else(|| self.clone());
-        if !input.observation.has_depth() {
-            let problem = "is estimated from depth, of which there is none".to_owned();
-            return Err(RefineError::Setting { name: "model_scale", problem });
-        }
-        let found = fused.model_scale(&input.frame()?, t_cam_object)?;
-        let object = Arc::new(input.object.scaled(found.scale)?);
-        Ok(Some(Self { object, model_scale: Some(found), ..input }))
-    }
-
-    fn segmented(
-        &self,
-        t_cam_object: &Isometry3<f64>,
-        fused: FusedSettings,
-    ) -> Result<Self, RefineError> {
-        let Self { object, hand, rig, .. } = self;
-        let settings = TrackerSettings { fused, ..TrackerSettings::default() };
-        let mut tracker = Tracker::new(Arc::clone(object), hand.clone(), settings)?;
-        if let Some(rig) = rig {
-            tracker = tracker.with_rig(Arc::clone(rig));
-        }
-        let (observation, regions) = tracker.segmented(self.observation.clone(), t_cam_object)?;
-        Ok(Self { observation, is_segmented: true, regions, ..self.clone() })
-    }
-
-    /// The frame.
-    ///
-    /// # Errors
-    /// Those of [`scene::Frame::new`].
-    pub fn frame(&self) -> Result<scene::Frame<'_>, RefineError> {
-        let mut frame = scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())?;
-        if let Some(regions) = &self.regions {
-            frame = frame.with_regions(regions);
-        }
-        Ok(frame)
-    }
-
-    /// What looks wrong with the object's model, then with the frame and the object's pose in it, `t_cam_object`: units, frames,
-    /// sensors, and what was assumed.
-    pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
-        let Self { observation, object, hand, .. } = self;
-        let mut of_frame = scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
-        of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
-        [scene::inspect_object(object, hand.is_some()), of_frame]
-    }
-
-    /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.
-    ///
-    /// # Errors
-    /// Those of [`CorrectionTrial::new`].
-    pub fn try_corrections(
-        &self,
-        t_cam_object: &Isometry3<f64>,
-        settings: &CorrectionSettings,
-    ) -> Result<CorrectionTrial, RefineError> {
-        let Self { observation, object, hand, .. } = self;
-        CorrectionTrial::new(observation, object, hand.as_deref(), t_cam_object, settings)
-    }
-
-    /// Whether the frame brings the evidence that a gradient needs.
-    pub fn offers(&self, gradient: GradientKind) -> bool {
-        match gradient {
-            GradientKind::Rendering | GradientKind::Depth => true,
-            GradientKind::Physics => self.hand.is_some() && self.observation.gravity.is_some(),
-            GradientKind::Tactile => {
-                self.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
-            }
-        }
     }
 }
 

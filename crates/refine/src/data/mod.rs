@@ -12,6 +12,7 @@ mod depth_camera;
 mod depth_values;
 pub mod details;
 mod frame_file;
+mod frame_input;
 pub mod identity;
 mod journal;
 mod mask_source;
@@ -26,13 +27,14 @@ mod targets;
 mod times;
 mod workers;
 
-pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
+pub use assets::{AssetError, Assets, Sensor, load_mesh};
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
 pub use calibration::{Calibrated, CalibrationFrames, Passes};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
+pub use frame_input::FrameInput;
 pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;

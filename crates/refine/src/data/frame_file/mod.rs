@@ -17,8 +17,8 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 
 use self::layout::Layout;
-use crate::data::assets::FrameInput;
 use crate::data::bop::{DatasetError, read_json};
+use crate::data::frame_input::FrameInput;
 use crate::rig::Rig;
 use crate::scene::{Hand, Object, Observation, check_gravity};
 

@@ -1,12 +1,11 @@
 //! `prehend refine --dataset`: many frames, side by side, resumable.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
-use anyhow::bail;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 use prehend_refine::data::details::{FrameDetails, write_details};
@@ -18,7 +17,7 @@ use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
-use prehend_refine::{Method, State, guard, refine};
+use prehend_refine::{Method, RefineJob, guard};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -55,7 +54,7 @@ pub(super) struct DatasetRun<'a> {
 
 /// A refined frame as the journal has it.
 #[derive(Serialize, Deserialize)]
-struct Refined {
+struct RefinedFrame {
     pose: PlainPose,
     iteration: usize,
     iterations: usize,
@@ -88,7 +87,7 @@ impl DatasetRun<'_> {
         let create = |folder| Report::create(folder, "Refined poses");
         let report = self.output.report.as_deref().map(create).transpose()?;
         let journal = beside(self.out, "journal");
-        let (mut journal, mut refined): (_, BTreeMap<usize, Refined>) =
+        let (mut journal, mut refined): (_, BTreeMap<usize, RefinedFrame>) =
             Journal::open(&journal, &self.identity(&dataset)?, self.output.restart)?;
         let mut times = Times::open(&beside(self.out, "times.csv"), !refined.is_empty())?;
         let open: Vec<(usize, &Job)> =
@@ -132,7 +131,7 @@ impl DatasetRun<'_> {
         let seconds = |index: usize| times.of(index, name);
         // Files have no times unless asked: a resumed run would not end with the same ones.
         let timed = |index| seconds(index).filter(|_| self.output.time);
-        let row = |(&index, refined): (&usize, &Refined)| ResultRow {
+        let row = |(&index, refined): (&usize, &RefinedFrame)| ResultRow {
             t_cam_model: (&refined.pose).into(),
             // BOP leaves open what a score is; here it is the probability of being right, and that of the initial pose where the method knows none.
             score: refined.confidence.as_ref().map_or(jobs[index].row.score, |c| c.probability),
@@ -150,7 +149,7 @@ impl DatasetRun<'_> {
             }
             // A full disk must not cost the poses.
             if let Some(Err(error)) = self.output.details.as_deref().map(|file| {
-                let details = |(&i, r): (&usize, &Refined)| details(&jobs[i], r, timed(i));
+                let details = |(&i, r): (&usize, &RefinedFrame)| details(&jobs[i], r, timed(i));
                 write_details(file, &refined.iter().map(details).collect::<Vec<_>>())
             }) {
                 failures.push(format!("--details: {error}"));
@@ -199,48 +198,31 @@ impl DatasetRun<'_> {
     }
 
     /// Refines one frame; also returns the seconds that it took.
-    fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(Refined, f64)> {
+    fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(RefinedFrame, f64)> {
         let input = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
             assets.load_at(&job.target, &job.row.t_cam_model, &Sensor::required_by(&self.method))?
         };
-        let initial = &job.row.t_cam_model;
-        let start = Instant::now();
-        let input = input.prepared(initial, &self.method)?.unwrap_or(input);
-        let mut frame = input.frame()?.with_backend(Arc::clone(&self.backend));
-        if let Some(rivals) = &job.rivals {
-            frame = frame.with_rivals(rivals.clone());
-        }
-        let method = self.method.with_rig(input.rig.as_ref());
-        let mut found = refine(&frame, initial, &method)?;
-        if let Some(posterior) = &mut found.posterior {
-            posterior.model_scale = input.model_scale;
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        let diagnosis = match &method {
-            Method::Fused(fused) if self.output.diagnose => {
-                let initial = State::new(&frame, initial)?;
-                DiagnosisSummary::of(&fused.diagnose_estimate(&frame, &initial, found.clone())?)
-            }
-            _ => Vec::new(),
+        let refine = RefineJob {
+            rivals: job.rivals.clone(),
+            backend: Some(Arc::clone(&self.backend)),
+            diagnose: self.output.diagnose,
+            ..RefineJob::new(&input, job.row.t_cam_model)
         };
-        let [object_warnings, warnings] = input
-            .warnings(initial)
-            .map(|warnings| warnings.iter().map(Warning::to_string).collect());
-        let refined = Refined {
+        let refined = refine.run(&self.method, &mut |_| ControlFlow::Continue(()))?;
+        let found = refined.estimate;
+        let texts = |warnings: Vec<Warning>| warnings.iter().map(Warning::to_string).collect();
+        let entry = RefinedFrame {
             pose: PlainPose::from(found.t_cam_object()),
             iteration: found.iteration,
             iterations: found.trace.iterations.len().saturating_sub(1),
-            warnings,
-            object_warnings,
+            warnings: texts(refined.warnings),
+            object_warnings: texts(refined.object_warnings),
             confidence: found.posterior.as_ref().map(PosteriorSummary::from),
-            diagnosis,
+            diagnosis: refined.diagnosis,
             trace: self.keeps_trace().then_some(found.trace),
         };
-        if !refined.pose.is_finite() {
-            bail!("the refined pose is not finite");
-        }
-        Ok((refined, seconds))
+        Ok((entry, refined.seconds))
     }
 
     /// Reports all refined frames in their order and returns the page; of frames that cannot be drawn `failures` hears.
@@ -249,7 +231,7 @@ impl DatasetRun<'_> {
         mut report: Report,
         (dataset, assets): (&Dataset, &Mutex<Assets<'_>>),
         jobs: &[Job],
-        (refined, seconds): (&BTreeMap<usize, Refined>, &dyn Fn(usize) -> Option<f64>),
+        (refined, seconds): (&BTreeMap<usize, RefinedFrame>, &dyn Fn(usize) -> Option<f64>),
         failures: &mut Vec<String>,
     ) -> Result<PathBuf, DatasetError> {
         let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
@@ -309,8 +291,8 @@ fn hint(error: &anyhow::Error) -> &'static str {
 const DRAWN: usize = 200;
 
 /// Frames that are drawn: all, or those whose poses are the least probable.
-fn least_sure(refined: &BTreeMap<usize, Refined>) -> BTreeSet<usize> {
-    let probability = |r: &Refined| r.confidence.as_ref().map_or(0.0, |c| c.probability);
+fn least_sure(refined: &BTreeMap<usize, RefinedFrame>) -> BTreeSet<usize> {
+    let probability = |r: &RefinedFrame| r.confidence.as_ref().map_or(0.0, |c| c.probability);
     let mut all: Vec<(f64, usize)> = refined.iter().map(|(k, r)| (probability(r), *k)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     all.into_iter().take(DRAWN).map(|(_, index)| index).collect()
@@ -320,7 +302,7 @@ fn least_sure(refined: &BTreeMap<usize, Refined>) -> BTreeSet<usize> {
 fn frame_report(
     scorer: &Scorer<'_>,
     job: &Job,
-    refined: &Refined,
+    refined: &RefinedFrame,
     seconds: Option<f64>,
 ) -> (FrameReport, Option<AssetError>) {
     let (initial, pose) = (job.row.t_cam_model, Isometry3::from(&refined.pose));
@@ -357,7 +339,7 @@ fn frame_report(
 }
 
 /// What the table has of a frame.
-fn details(job: &Job, refined: &Refined, seconds: Option<f64>) -> FrameDetails {
+fn details(job: &Job, refined: &RefinedFrame, seconds: Option<f64>) -> FrameDetails {
     FrameDetails {
         target: job.target,
         t_cam_model: (&refined.pose).into(),
@@ -370,7 +352,7 @@ fn details(job: &Job, refined: &Refined, seconds: Option<f64>) -> FrameDetails {
     }
 }
 
-fn summary(job: &Job, refined: &Refined, seconds: Option<f64>) -> serde_json::Value {
+fn summary(job: &Job, refined: &RefinedFrame, seconds: Option<f64>) -> serde_json::Value {
     let t_mm = refined.pose.translation_m.map(|v| v * 1e3);
     let warnings: Vec<&String> = refined.object_warnings.iter().chain(&refined.warnings).collect();
     json!({

@@ -9,7 +9,7 @@ use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
-use prehend_refine::{Method, State};
+use prehend_refine::{Method, RefineJob, Refined};
 use prehend_render::Backend;
 use serde_json::json;
 
@@ -28,29 +28,25 @@ pub(super) fn refine_frame(
     let (rig, cache) = (open_rig(rig)?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
     let mut configured = method.configured()?;
-    let mut terms = Vec::new();
-    if let Method::Heuristic(heuristic) = &mut configured {
-        // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
-        if method.terms.is_none() {
-            heuristic.gradients.retain(|&g| input.offers(g));
-        }
-        terms = heuristic.gradients.iter().map(|g| g.name()).collect();
+    // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
+    if method.terms.is_none() {
+        configured = input.supported(&configured);
     }
-    let input = input.prepared(&t_cam_object, &configured)?.unwrap_or(input);
-    let warnings = input.warnings(&t_cam_object).concat();
-    let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
-    warnings.iter().for_each(|warning| log::warn!("{warning}"));
-    let frame = input.frame()?.with_backend(backend);
-    let initial = State::new(&frame, &t_cam_object)?;
+    let terms: Vec<&str> = match &configured {
+        Method::Heuristic(heuristic) => heuristic.gradients.iter().map(|g| g.name()).collect(),
+        _ => Vec::new(),
+    };
+    let job = RefineJob { backend: Some(backend), ..RefineJob::new(&input, t_cam_object) };
     let bar = progress(configured.iterations(), "refining");
-    let mut refined = configured.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {
-        bar.set_position(p.iteration as u64);
-        ControlFlow::Continue(())
-    })?;
+    let Refined { estimate: refined, object_warnings, warnings, .. } =
+        job.run(&configured, &mut |p| {
+            bar.set_position(p.iteration as u64);
+            ControlFlow::Continue(())
+        })?;
     bar.finish_and_clear();
-    if let Some(posterior) = &mut refined.posterior {
-        posterior.model_scale = input.model_scale;
-    }
+    let warnings = object_warnings.iter().chain(&warnings);
+    let warnings: Vec<String> = warnings.map(Warning::to_string).collect();
+    warnings.iter().for_each(|warning| log::warn!("{warning}"));
     let pose = refined.t_cam_object();
     let PlainPose { translation_m, quaternion_wxyz } = pose.into();
     let matrix = pose.to_homogeneous();
