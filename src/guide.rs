@@ -11,12 +11,12 @@ macro_rules! chapter {
     };
 }
 
+chapter!(quick_start, "quick-start.md");
 chapter!(concepts, "concepts.md");
 chapter!(frames_and_units, "frames-and-units.md");
-chapter!(quick_start, "quick-start.md");
-chapter!(contact_law, "contact-law.md");
-chapter!(factor, "factor.md");
 chapter!(robot, "robot.md");
 chapter!(rig, "rig.md");
 chapter!(performance, "performance.md");
+chapter!(contact_law, "contact-law.md");
+chapter!(factor, "factor.md");
 chapter!(coming_from, "coming-from.md");
