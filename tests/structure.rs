@@ -1,8 +1,17 @@
-//! Structure of the crates: no modules that import each other in a circle.
+//! Structure of the crates: no modules that import each other in a circle, and a budget of lines each.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
+
+/// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
+const BUDGETS: [(&str, usize); 5] = [
+    ("autodiff", 4_610),
+    ("geometry", 15_800),
+    ("sim", 17_130),
+    ("render", 10_900),
+    ("refine", 33_170),
+];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
@@ -73,6 +82,56 @@ fn modules_of_refine_form_no_circle() {
     assert!(imports.len() > 10 && imports["factor"].contains("problem"), "{imports:?}");
     let left = circles(imports);
     assert!(left.is_empty(), "in a circle, or above one: {left:#?}");
+}
+
+/// Lines of a file that are neither blank, nor comments, nor of items for tests alone.
+fn lines_of_code(text: &str) -> usize {
+    let (mut count, mut depth) = (0, 0);
+    let (mut of_tests, mut begun) = (false, false);
+    for line in text.lines().map(str::trim) {
+        of_tests |= line.starts_with("#[cfg(test)]");
+        if !of_tests {
+            count += usize::from(!line.is_empty() && !line.starts_with("//"));
+            continue;
+        }
+        // To the end of the item: its last brace, or a semicolon outside of any.
+        if line.starts_with("#[") {
+            continue;
+        }
+        depth += line.matches('{').count() as i64 - line.matches('}').count() as i64;
+        begun |= line.contains('{');
+        if depth <= 0 && (begun || line.ends_with(';')) {
+            (of_tests, begun, depth) = (false, false, 0);
+        }
+    }
+    count
+}
+
+#[test]
+fn crates_keep_their_budgets_of_lines() {
+    let mut above = Vec::new();
+    for (name, budget) in BUDGETS {
+        let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
+        let mut lines = 0;
+        for file in rust_files(&sources).unwrap() {
+            let inner = file.strip_prefix(&sources).unwrap_or(&file);
+            let of_tests = inner.iter().any(|part| part == "tests" || part == "tests.rs");
+            lines += if of_tests { 0 } else { lines_of_code(&fs::read_to_string(&file).unwrap()) };
+        }
+        assert!(lines > 1_000, "{name}: {lines} lines");
+        println!("{name}: {lines} of {budget} lines");
+        if lines > budget {
+            above.push(format!("{name}: {lines} lines, budget {budget}"));
+        }
+    }
+    assert!(above.is_empty(), "{above:?}");
+}
+
+#[test]
+fn lines_are_counted_without_comments_and_tests() {
+    let file = "//! A.\n\nuse a;\n#[cfg(test)]\nuse b;\nfn c() {\n    // d\n    e();\n}\n\
+                #[cfg(test)]\nmod tests {\n    fn f() {\n    }\n}\nstruct G;\n";
+    assert_eq!(lines_of_code(file), 5);
 }
 
 #[test]
