@@ -35,7 +35,7 @@ def folder(command, tmp_path_factory):
     command(folder, "synth --out ds --objects 004_sugar_box,061_foam_brick --frames 4 --frames-per-grasp 2")
     command(folder, f"refine {given} --out refined.csv --report refine")
     command(folder, f"track {given} --out tracked.csv --report track")
-    command(folder, f"study main {given.replace('--poses ', '--poses low=')} --methods depth --iterations 5 --out study --report page")
+    command(folder, f"study main {given.replace('--poses ', '--poses low=')} --methods depth --iterations 5 --out study.csv --report page")
     command(folder, f"calibrate {given} --passes 2 --out rig.json --report calibrate")
     return folder
 
@@ -167,7 +167,7 @@ def test_a_frame_shows_residuals_confidence_and_touch(opened):
 
 @pytest.mark.parametrize(("name", "texts"), {
     "track": ["Tracked objects", "found", "Probability of being right", "Error of position"],
-    "page": ["Main study", "depth", "means over 8 frames", "|ΔIV| cm³"],
+    "page": ["Study: main", "depth", "means over 8 frames", "|ΔIV| cm³"],
     "calibrate": ["Rig", "Residuals by sensor", "depth scale", "outlines of object and hand"],
 }.items())
 def test_pages_of_other_commands(opened, name, texts):

@@ -9,6 +9,7 @@ use prehend_geometry::hand::load_taxels;
 use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
 use prehend_refine::data::{Assets, Journal, Target, Times, find_targets, load_frame_file};
+use prehend_refine::evaluate::study::StudyFile;
 use prehend_refine::rig::Rig;
 use prehend_render::{DepthImage, RgbImage};
 use serde_json::Value;
@@ -94,6 +95,7 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "rig", form: Form::Json, read: rig },
     Parser { name: "journal", form: Form::Text, read: journal },
     Parser { name: "times", form: Form::Text, read: times },
+    Parser { name: "study", form: Form::Text, read: study },
     #[cfg(feature = "mcap")]
     Parser { name: "mcap", form: Form::Mcap, read: log },
 ];
@@ -281,6 +283,17 @@ fn times(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     fs::write(&file, bytes)?;
     let times = Times::open(&file, true)?;
     assert!(times.means().values().all(|(mean, _)| mean.is_finite()));
+    Ok(())
+}
+
+fn study(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let file = small.path("broken.study.csv");
+    fs::write(&file, bytes)?;
+    StudyFile::open(&file, false)?.finish(std::iter::empty())?;
+    // What is in order stays as it is.
+    let ordered = fs::read(&file)?;
+    StudyFile::open(&file, false)?.finish(std::iter::empty())?;
+    assert_eq!(fs::read(&file)?, ordered);
     Ok(())
 }
 

@@ -50,6 +50,7 @@ pub fn write() -> Result<()> {
     keep("results", "pose.csv", POSES.as_bytes())?;
     keep("journal", "run.journal", include_bytes!("seeds/run.journal"))?;
     keep("times", "times.csv", include_bytes!("seeds/times.csv"))?;
+    keep("study", "study.csv", include_bytes!("seeds/study.csv"))?;
     keep("frame", "right.json", FRAME.as_bytes())?;
     keep("rig", "rig.json", include_bytes!("seeds/rig.json"))?;
     #[cfg(feature = "mcap")]

@@ -407,15 +407,8 @@ fn help_names_what_is_needed() {
 #[test]
 fn no_help_text_names_a_default_twice() {
     let place = Workplace::empty();
-    let study =
-        ["main", "gradients", "noise", "steps", "evidence", "confidence", "robustness", "merge"];
-    let single = ["refine", "initial", "track", "eval", "calibrate", "check", "info"];
-    let commands = single
-        .into_iter()
-        .chain(["symmetry", "synth", "completions", "man"])
-        .map(str::to_owned)
-        .chain(study.map(|name| format!("study {name}")));
-    for command in commands {
+    let single = ["refine", "initial", "study", "track", "eval", "calibrate", "check", "info"];
+    for command in single.into_iter().chain(["symmetry", "synth", "completions", "man"]) {
         for length in ["-h", "--help"] {
             let help = place.succeed(&format!("{command} {length}"));
             // An option begins with its name, and lasts to the next one.
@@ -434,19 +427,12 @@ fn no_help_text_names_a_default_twice() {
 
 /// Names of before the spelling was made one.
 #[test]
-fn old_names_of_methods_and_faults_still_work() {
+fn old_names_of_methods_still_work() {
     let place = Workplace::new();
     let refine = "refine --dataset ds --poses ds/init.csv --image 0 --iterations 1";
     place.succeed(&format!("{refine} --method fused-without-colour --out old.csv"));
     place.succeed(&format!("{refine} --method fused-without-color --out new.csv"));
     assert_eq!(place.read("old.csv"), place.read("new.csv"));
-    place.succeed(
-        "study robustness --dataset ds --poses low=ds/init.csv --image 0 --iterations 1 \
-         --methods fused-only-colour --sweeps missing-colour --out old",
-    );
-    let records = place.read("old/records.jsonl");
-    assert!(records.contains("fused-only-color missing-color 50") && !records.contains("colour"));
-    place.succeed("study posterior --help");
 }
 
 #[test]

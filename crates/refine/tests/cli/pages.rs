@@ -23,8 +23,7 @@ fn every_command_has_a_manual_page() {
     let page = place.succeed("man");
     assert!(page.contains(".TH prehend 1") && page.contains("prehend\\-refine(1)"), "{page}");
     assert_eq!(place.succeed("man --out share/man1"), "");
-    for name in ["prehend", "prehend-refine", "prehend-study", "prehend-study-main", "prehend-info"]
-    {
+    for name in ["prehend", "prehend-refine", "prehend-study", "prehend-info"] {
         let page = place.read(&format!("share/man1/{name}.1"));
         assert!(page.contains(&format!(".TH {name} 1")) && page.contains(".SH OPTIONS"), "{name}");
     }

@@ -137,21 +137,26 @@ fn a_killed_study_resumes() {
     let study = |out: &str| {
         format!("study noise --dataset ds --poses low=init.csv --iterations 2 --out {out}")
     };
-    let whole = place.succeed(&study("whole"));
-    kill_midway(&place, &study("part"), "part/records.jsonl", "part");
-    let told = place.succeed(&study("part"));
-    let tables = |text: &str| text.split("\nSeconds").next().unwrap().to_owned();
-    assert_eq!(tables(&told), tables(&whole));
-    for name in crate::study::OUTPUTS {
-        assert_eq!(
-            place.read(&format!("part/{name}")),
-            place.read(&format!("whole/{name}")),
-            "{name}"
-        );
-    }
-    assert!(place.read("part/times.csv").lines().count() >= 7);
-    let said = place.prehend(&study("part").replace("--iterations 2", "--iterations 3"));
-    assert!(said.code == 1 && said.err.contains("another run"), "{}", said.err);
+    let whole = place.succeed(&study("whole.csv"));
+    let kept = kill_midway(&place, &study("part.csv"), "part.csv", "part.csv");
+    assert_eq!(place.succeed(&study("part.csv")), whole);
+    let rows = |name: &str| crate::study::rows(&place, name);
+    assert_eq!(
+        crate::study::without_times(rows("part.csv")),
+        crate::study::without_times(rows("whole.csv"))
+    );
+    // Whole rows are kept as they were, run times included.
+    let part = place.read("part.csv");
+    let whole_rows = kept.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+    assert!(whole_rows.clone().count() >= 3);
+    assert!(whole_rows.into_iter().all(|row| part.contains(row)));
+    let said = place.prehend(&study("part.csv").replace("--iterations 2", "--iterations 3"));
+    assert!(
+        said.code == 1 && said.err.contains("another run") && said.err.contains("settings: "),
+        "{}",
+        said.err
+    );
+    assert_eq!(place.read("part.csv"), part);
 }
 
 #[test]
@@ -175,17 +180,14 @@ fn a_killed_search_resumes() {
 }
 
 #[test]
-fn a_damaged_shard_is_to_be_made_again() {
+fn a_damaged_table_is_refused() {
     let place = workplace();
-    for shard in [0, 1] {
-        place.succeed(&format!(
-            "study noise --dataset ds --poses low=init.csv --iterations 2 --shard {shard}/2 --out s{shard}"
-        ));
-    }
-    place.replace("s1/records.jsonl", "\n{\"index\":", "\n{\"index:");
-    let said = place.prehend("study merge s1 s2 --out whole");
-    let expected = "s1/records.jsonl: line 2 is damaged: the run that wrote it must be repeated";
-    assert!(said.code == 1 && said.err.contains(expected), "{}", said.err);
+    let study = "study noise --dataset ds --poses low=init.csv --iterations 2 --out s.csv";
+    place.succeed(study);
+    place.replace("s.csv", "\nnoise,ds,", "\nnoise,ds");
+    let said = place.prehend(study);
+    assert!(said.code == 1 && said.err.contains("s.csv: line 2 is damaged"), "{}", said.err);
+    place.succeed(&format!("{study} --restart"));
 }
 
 #[cfg(unix)]

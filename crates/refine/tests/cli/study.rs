@@ -2,20 +2,44 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use prehend_refine::data::bop::{ResultRow, write_results};
 use serde_json::Value;
 
 use crate::fixture::Workplace;
 
-/// What a study with the level `low` writes that depends on nothing but its design.
-pub(crate) const OUTPUTS: [&str; 7] = [
-    "records.jsonl",
-    "tables.txt",
-    "tables.md",
-    "tables.csv",
-    "tables.json",
-    "means-low.svg",
-    "cumulative-low.svg",
-];
+/// A row of the table of a study, by the names of columns.
+pub(crate) type Row = BTreeMap<String, String>;
+
+/// The rows of a table.
+pub(crate) fn rows(place: &Workplace, file: &str) -> Vec<Row> {
+    csv::Reader::from_path(place.path(file))
+        .unwrap()
+        .into_deserialize()
+        .map(Result::unwrap)
+        .collect()
+}
+
+/// Rows without their run times, which are never the same.
+pub(crate) fn without_times(mut rows: Vec<Row>) -> Vec<Row> {
+    rows.iter_mut().for_each(|row| *row.get_mut("seconds").unwrap() = String::new());
+    rows
+}
+
+/// The row of a method, with its steps or fault, on a frame of the level `low`.
+fn row<'a>(rows: &'a [Row], frame: usize, label: &str) -> &'a Row {
+    let is_it = |row: &&Row| {
+        let name = ["method", "sweep", "amount", "steps"].map(|column| row[column].clone());
+        (&*row["level"], &row["frame"]) == ("low", &frame.to_string())
+            && name.join(" ").trim() == label
+    };
+    rows.iter().find(is_it).unwrap()
+}
+
+/// A number of a row.
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].parse().unwrap()
+}
 
 /// Two scenes of two images, and a third whose depth is missing.
 fn workplace() -> Workplace {
@@ -38,238 +62,207 @@ const STUDY: &str = "study gradients --dataset ds --methods depth,rendering --it
 #[test]
 fn shards_together_are_the_whole_and_failures_are_listed() {
     let place = workplace();
-    let whole = place.prehend(&format!("{STUDY} --out whole"));
+    let whole = place.prehend(&format!("{STUDY} --out whole.csv"));
     assert_eq!(whole.code, 2, "{}", whole.err);
-    let failed = "low: scene 3 image 0 object 5: depth, rendering: ";
+    let failed = "low: scene 3 image 0 object 5: depth: ";
     assert!(whole.err.contains(failed) && whole.err.contains("line 8: R: "), "{}", whole.err);
-    for name in ["tables.txt", "tables.md"] {
-        let text = place.read(&format!("whole/{name}"));
-        assert!(text.contains(failed) && text.contains("depth/000000.png: no such file"), "{text}");
-        assert!(text.contains("5/7") && text.contains("line 8: R: "), "{text}");
-    }
-    for name in ["tables.csv", "tables.json"] {
-        let text = place.read(&format!("whole/{name}"));
-        assert!(text.contains("scene 3 image 0 object 5") && text.contains("line 8"), "{text}");
-    }
-    assert!(place.read("whole/means-low.svg").contains("failed: "));
+    assert!(whole.out.contains("5/7"), "{}", whole.out);
+    let table = rows(&place, "whole.csv");
+    assert_eq!(table.len(), 6 * 4);
+    assert!(row(&table, 4, "depth")["status"].contains("depth/000000.png: no such file"));
 
+    let mut parts = String::new();
     for shard in 0..3 {
-        let said = place.prehend(&format!("{STUDY} --shard {shard}/3 --out part{shard}"));
+        let said = place.prehend(&format!("{STUDY} --shard {shard}/3 --out part{shard}.csv"));
+        // The row that cannot be read is told by every part.
         assert_eq!(said.code, 2, "{}", said.err);
+        let text = place.read(&format!("part{shard}.csv"));
+        assert_eq!(text.lines().count(), 1 + 2 * 4);
+        parts += if shard == 0 { &text } else { text.split_once('\n').unwrap().1 };
     }
-    let said = place.prehend("study merge part2 part0 --out merged");
-    assert!(said.code == 1 && said.err.contains("2 of 6 frames are in none"), "{}", said.err);
-    assert!(!place.path("merged").exists());
-    let merged = place.prehend("study merge part2 part0 part1 --out merged");
-    assert_eq!(merged.code, 2, "{}", merged.err);
-    assert_eq!(merged.err, whole.err);
-    for name in OUTPUTS {
-        assert_eq!(
-            place.read(&format!("merged/{name}")),
-            place.read(&format!("whole/{name}")),
-            "{name}"
-        );
-    }
-    assert_eq!(place.read("merged/times.csv").lines().count(), 11);
+    place.write("merged.csv", &parts);
+    let merged = place.prehend(&format!("{STUDY} --out merged.csv"));
+    assert_eq!((merged.code, &merged.err, &merged.out), (2, &whole.err, &whole.out));
+    assert_eq!(without_times(rows(&place, "merged.csv")), without_times(table.clone()));
+    // What was done was not done again.
+    let times = |name: &str| -> Vec<String> {
+        let done = rows(&place, name).into_iter().filter(|row| row["status"] == "ok");
+        done.map(|mut row| row.remove("seconds").unwrap()).collect()
+    };
+    let before = times("merged.csv");
+    place.write("merged.csv", &parts);
+    place.prehend(&format!("{STUDY} --out merged.csv"));
+    assert_eq!(times("merged.csv"), before);
 
-    place.prehend(&format!("{STUDY} --seed 3 --shard 1/3 --out part1 --restart"));
-    let said = place.prehend("study merge part0 part1 part2 --out merged");
-    assert!(said.code == 1 && said.err.contains("seed: 0 | 3"), "{}", said.err);
+    // A part with another seed is of another study.
+    place.prehend(&format!("{STUDY} --seed 3 --shard 1/3 --out part1.csv --restart"));
+    place.write(
+        "mixed.csv",
+        &(place.read("part0.csv") + place.read("part1.csv").split_once('\n').unwrap().1),
+    );
+    let said = place.prehend(&format!("{STUDY} --out mixed.csv"));
+    assert!(said.code == 1 && said.err.contains("seed: 3 | 0"), "{}", said.err);
 
-    // What failed is tried again, and the rest is kept.
+    // What failed is tried again, and the rest is kept; another study and other methods go into the same table.
     place.copy("ds/test/000002/depth/000000.png", "ds/test/000003/depth/000000.png");
-    let said = place.prehend(&format!("{STUDY} --out whole"));
-    assert!(!said.err.contains("scene 3") && place.read("whole/tables.txt").contains("6/7"));
+    let said = place.prehend(&format!("{STUDY} --out whole.csv"));
+    assert!(!said.err.contains("scene 3") && said.out.contains("6/7"), "{}", said.err);
+    let more = STUDY.replace("gradients", "noise").replace("depth,rendering", "depth");
+    place.prehend(&format!("{more} --scene 2 --out whole.csv"));
+    let all = rows(&place, "whole.csv");
+    assert_eq!(all.len(), 6 * 4 + 2 * 3);
+    assert_eq!(all.iter().filter(|row| row["study"] == "noise").count(), 2 * 3);
 }
 
-/// Means, medians and changes from the poses that the records keep, by other code.
+/// Metrics, means and medians from the poses that the table has, by other code.
 #[test]
 fn tables_say_what_evaluating_the_poses_says() {
     let place = workplace();
-    place.prehend(&format!("{STUDY} --scene 1 --scene 2 --out s"));
-    let mut rows: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for line in place.read("s/records.jsonl").lines().skip(1) {
-        let line: Value = serde_json::from_str(line).unwrap();
-        let record = &line["entry"];
-        for outcome in record["outcomes"].as_array().unwrap() {
-            let list = |field: &str| -> Vec<f64> {
-                outcome["pose"][field]
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .map(|v| v.as_f64().unwrap())
-                    .collect()
-            };
-            let (q, t) = (list("quaternion_wxyz"), list("translation_m"));
-            let [w, x, y, z] = [q[0], q[1], q[2], q[3]];
-            let r = [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
-            ];
-            let text = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-            let t_mm: Vec<f64> = t.iter().map(|v| 1e3 * v).collect();
-            let (scene, image) = (&record["scene_id"], &record["im_id"]);
-            rows.entry(outcome["row"].as_str().unwrap().into()).or_default().push(format!(
-                "{scene},{image},5,1,{},{},-1",
-                text(&r),
-                text(&t_mm)
-            ));
-        }
-    }
-    let tables = place.json("s/tables.json");
-    let block = &tables["blocks"][0];
-    assert!(block["object"].is_null());
-    let mut means: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for line in block["lines"].as_array().unwrap() {
-        let row = line["row"].as_str().unwrap();
-        assert_eq!((line["n"].as_u64(), rows[row].len()), (Some(4), 4));
-        place.write("row.csv", &rows[row].join("\n"));
-        let said = place.succeed("eval --dataset ds --poses row.csv --json");
-        let evaluated: Value = serde_json::from_str(&said).unwrap();
-        for metric in 0..11 {
-            let (ours, theirs) =
-                (&line["metrics"][metric], &evaluated["summary"]["overall"][metric]);
-            for value in ["mean", "median"] {
-                let (a, b) = (ours[value].as_f64().unwrap(), theirs[value].as_f64().unwrap());
-                assert!((a - b).abs() < 1e-5 * (1.0 + b.abs()), "{row} {metric} {value}: {a} {b}");
+    let said = place.prehend(&format!("{STUDY} --scene 1 --scene 2 --out s.csv")).out;
+    let table = rows(&place, "s.csv");
+    for method in ["truth", "initial", "depth", "rendering"] {
+        let own: Vec<&Row> = table.iter().filter(|row| row["method"] == method).collect();
+        let pose = |row: &&Row| {
+            let [w, i, j, k, x, y, z] =
+                ["qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m"].map(|name| number(row, name));
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+            let [scene_id, im_id, obj_id] =
+                ["scene_id", "im_id", "obj_id"].map(|name| row[name].parse().unwrap());
+            let t_cam_model = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+            ResultRow { scene_id, im_id, obj_id, score: 1.0, t_cam_model, time: -1.0 }
+        };
+        write_results(&place.path("poses.csv"), &own.iter().map(pose).collect::<Vec<_>>()).unwrap();
+        let told = place.succeed("eval --dataset ds --poses poses.csv --json");
+        let evaluated: Value = serde_json::from_str(&told).unwrap();
+        let columns = "pe_cm oe_deg oe_symmetric_deg add_mm adi_mm mssd_mm mspd_px ca_cm2 iv_cm3 delta_ca_cm2 delta_iv_cm3 vsd ar";
+        for (metric, column) in columns.split(' ').enumerate() {
+            let mut values: Vec<f64> = own.iter().map(|row| number(row, column)).collect();
+            values.sort_by(f64::total_cmp);
+            let mean = values.iter().sum::<f64>() / 4.0;
+            let theirs = &evaluated["summary"]["overall"][metric];
+            for (ours, name) in [(mean, "mean"), (0.5 * (values[1] + values[2]), "median")] {
+                let theirs = theirs[name].as_f64().unwrap();
+                assert!(
+                    (ours - theirs).abs() < 1e-5 * (1.0 + theirs.abs()),
+                    "{method} {column} {name}"
+                );
             }
-            let mean = ours["mean"].as_f64().unwrap();
-            let [low, high] = [0, 1].map(|k| ours["interval"][k].as_f64().unwrap());
-            assert!(low <= mean + 1e-12 && mean <= high + 1e-12, "{row} {metric}");
-            means.entry(row).or_default().push(mean);
-            if let Some(percent) = ours["change"]["percent"].as_f64() {
-                let expected = 100.0 * (mean / means["initial"][metric] - 1.0);
-                assert!((percent - expected).abs() < 1e-9 * (1.0 + expected.abs()));
+            if column == "pe_cm" && method != "truth" {
+                let line = said.lines().find(|line| line.starts_with(method)).unwrap();
+                assert!(line.contains(&format!("4/5  {mean:.2}")), "{line}");
             }
         }
     }
-    assert!(means["truth"][0] == 0.0 && means["initial"][0] > means["depth"][0]);
-    let published = block["lines"][1]["published"][0].as_f64();
-    assert_eq!(published, Some(0.65));
+    let published = said.split("initial").nth(1).unwrap().lines().nth(1).unwrap();
+    assert!(published.starts_with("· published") && published.contains("0.65"), "{published}");
 }
 
 #[test]
 fn all_steps_are_of_one_run() {
     let place = workplace();
-    let steps = |iterations: usize| {
-        let out = format!("s{iterations}");
+    let steps = |iterations: usize| -> BTreeMap<String, [String; 2]> {
+        let out = format!("s{iterations}.csv");
         place.succeed(&format!(
-            "study steps --dataset ds --poses ds/init.csv --image 0 --iterations {iterations} --out {out}"
+            "study steps --dataset ds --poses low=ds/init.csv --image 0 --iterations {iterations} --out {out}"
         ));
-        let text = place.read(&format!("{out}/records.jsonl"));
-        let record: Value = serde_json::from_str(text.lines().nth(1).unwrap()).unwrap();
-        let outcomes = record["entry"]["outcomes"].as_array().unwrap();
-        outcomes
-            .iter()
-            .map(|o| (o["row"].as_str().unwrap().to_owned(), o["pose"].clone()))
-            .collect::<BTreeMap<_, _>>()
+        let table = rows(&place, &out).into_iter();
+        table.map(|row| (row["steps"].clone(), [row["tx_m"].clone(), row["qw"].clone()])).collect()
     };
     let (ten, four) = (steps(10), steps(4));
     let names: Vec<&str> = ten.keys().map(String::as_str).collect();
-    assert_eq!(names, ["1", "10", "2", "4", "6", "initial", "truth"]);
+    assert_eq!(names, ["", "1", "10", "2", "4", "6"]);
     for step in ["1", "2", "4"] {
         assert_eq!(ten.get(step), four.get(step), "{step}");
     }
     assert_ne!(ten["1"], ten["2"]);
-    assert!(place.path("s10/steps.svg").is_file() && place.path("s10/means-init.svg").is_file());
-    let said =
-        place.prehend("study steps --dataset ds --poses ds/init.csv --methods nothing --out x");
-    assert!(
-        said.code == 1
-            && said.err.contains("'nothing' for '--methods <LIST>': unknown method: one of fused")
-    );
-}
-
-/// Every line of the records but the first, the design.
-fn outcomes(place: &Workplace, folder: &str) -> Vec<BTreeMap<String, Value>> {
-    let text = place.read(&format!("{folder}/records.jsonl"));
-    let record = |line: &str| -> BTreeMap<String, Value> {
-        let record: Value = serde_json::from_str(line).unwrap();
-        let outcomes = record["entry"]["outcomes"].as_array().unwrap().iter();
-        outcomes.map(|o| (o["row"].as_str().unwrap().to_owned(), o.clone())).collect()
-    };
-    text.lines().skip(1).map(record).collect()
+    for (methods, expected) in [
+        ("nothing", "'nothing' for '--methods <LIST>': unknown method: one of fused"),
+        ("fused", "not of fused"),
+        ("icp,icp-best", "of one method"),
+    ] {
+        let said = place.prehend(&format!(
+            "study steps --dataset ds --poses ds/init.csv --methods {methods} --out x.csv"
+        ));
+        assert!(said.code == 1 && said.err.contains(expected), "{}", said.err);
+    }
+    assert!(!place.path("x.csv").exists());
 }
 
 #[test]
-fn evidence_is_compared_with_all_of_it() {
+fn evidence_is_left_out_as_the_methods_say() {
     let place = Workplace::new();
     let said = place.succeed(
-        "study evidence --dataset ds --poses low=ds/init.csv --image 0 --out ev \
+        "study evidence --dataset ds --poses low=ds/init.csv --image 0 --out ev.csv \
          --methods fused,fused-without-depth,fused-only-touch,fused-fixed-joints",
     );
-    assert!(said.contains("mean less that of fused, same frames") && said.contains("Failed\n"));
-    let [record] = outcomes(&place, "ev").try_into().unwrap();
-    let pose = |row: &str| &record[row]["pose"];
+    assert!(said.contains("evidence, noise low: medians"), "{said}");
+    let table = rows(&place, "ev.csv");
     for other in ["fused-without-depth", "fused-only-touch", "fused-fixed-joints"] {
-        assert_ne!(pose("fused"), pose(other), "{other}");
+        assert_ne!(row(&table, 0, "fused")["tx_m"], row(&table, 0, other)["tx_m"], "{other}");
     }
-    let tables: Value = serde_json::from_str(&place.read("ev/tables.json")).unwrap();
-    let comparisons = &tables["blocks"][0]["comparisons"];
-    assert_eq!(comparisons.as_array().unwrap().len(), 3);
-    let pe = |row: &str| record[row]["score"]["pe_cm"].as_f64().unwrap();
-    let difference = comparisons[0]["metrics"][0]["difference"].as_f64().unwrap();
-    assert!((difference - (pe("fused-without-depth") - pe("fused"))).abs() < 1e-12);
 }
 
 #[test]
-fn confidence_is_compared_with_the_truth() {
+fn stated_posteriors_are_compared_with_the_truth() {
     let place = Workplace::new();
-    let study = "study confidence --dataset ds --poses low=ds/init.csv --poses other=ds/init.csv";
-    let said = place.succeed(&format!("{study} --out whole"));
-    assert!(said.contains("all noise, fused: predicted probabilities"), "{said}");
-    for record in outcomes(&place, "whole") {
-        let belief = &record["fused"]["belief"];
-        let squared = |k: usize| belief["squared"][k].as_f64().unwrap();
+    place.succeed("study confidence --dataset ds --poses low=ds/init.csv --poses other=ds/init.csv --out c.csv");
+    let table = rows(&place, "c.csv");
+    assert_eq!(table.len(), 2 * 2 * 3);
+    for row in &table {
+        assert_eq!(row["status"], "ok");
+        if row["method"] != "fused" {
+            assert!(
+                row["d2_pose"].is_empty()
+                    && row["probability"].is_empty()
+                    && row["seconds"].is_empty()
+            );
+            continue;
+        }
+        let [pose, position, orientation] =
+            ["d2_pose", "d2_position", "d2_orientation"].map(|column| number(row, column));
         // Of correlated errors the whole is at least each of its parts.
-        assert!(squared(0) >= squared(1).max(squared(2)) - 1e-9, "{belief}");
-        assert!(belief["within"].as_array().unwrap().len() == 7 && belief["weight"].is_number());
-        assert!(record["initial"]["belief"].is_null());
+        assert!(pose >= position.max(orientation) - 1e-9, "{row:?}");
+        assert!(number(row, "p_5mm_5deg") <= number(row, "p_5mm") && number(row, "weight") > 0.0);
+        assert!(
+            number(row, "sigma_mm") > number(row, "bound_mm") && number(row, "cost").is_finite()
+        );
+        assert!(number(row, "seconds") > 0.0 && !row["termination"].is_empty());
     }
-    for shard in 0..2 {
-        place.succeed(&format!("{study} --shard {shard}/2 --out part{shard}"));
+    for frame in 0..2 {
+        let same = |level: &str| {
+            table.iter().find(|row| {
+                row["level"] == level
+                    && row["method"] == "fused"
+                    && row["frame"] == frame.to_string()
+            })
+        };
+        assert_eq!(same("low").unwrap()["pe_cm"], same("other").unwrap()["pe_cm"]);
     }
-    place.succeed("study merge part0 part1 --out merged");
-    let more = ["calibration.csv", "reliability-low-fused.svg", "reliability-all-fused.svg"];
-    for name in OUTPUTS.iter().chain(&more) {
-        let [merged, whole] = ["merged", "whole"].map(|f| place.read(&format!("{f}/{name}")));
-        assert_eq!(merged, whole, "{name}");
-    }
-    assert!(place.read("whole/calibration.csv").contains("\nlow,fused,2,coverage of 95 %,pose,"));
 }
 
 #[test]
 fn faults_are_swept_and_what_they_make_impossible_is_a_finding() {
     let place = Workplace::new();
     let study = "study robustness --dataset ds --poses low=ds/init.csv --image 0 \
-                 --sweeps missing-touch,missing-depth,hand-position --out rob";
+                 --sweeps missing-touch,missing-depth,hand-position --out rob.csv";
     // No failure, though the ICP fails where all depth is missing.
-    let said = place.succeed(study);
-    let failed = "object 5: robust-icp missing-depth 100: no pixel of the object's mask";
-    assert!(said.contains(failed) && said.contains("mean over that of robust-icp"), "{said}");
-    let [record] = outcomes(&place, "rob").try_into().unwrap();
-    assert_eq!(record.len(), 2 + 2 * (5 + 4 + 2));
-    let pose = |row: &str| &record[row]["pose"];
+    place.succeed(study);
+    let table = rows(&place, "rob.csv");
+    assert_eq!(table.len(), 2 + 2 * (5 + 4 + 2));
+    let failed = row(&table, 0, "robust-icp missing-depth 100");
+    assert!(failed["status"].starts_with("no pixel of the object's mask"), "{failed:?}");
+    let pose = |label: &str| &row(&table, 0, label)["tx_m"];
     assert_eq!(pose("fused missing-depth 0"), pose("fused hand-position 0"));
     for other in ["missing-touch 100", "missing-depth 75", "missing-depth 100", "hand-position 5"] {
-        assert!(record[&format!("fused {other}")]["failed"].is_null(), "{other}");
+        assert_eq!(row(&table, 0, &format!("fused {other}"))["status"], "ok", "{other}");
         assert_ne!(pose("fused missing-touch 0"), pose(&format!("fused {other}")), "{other}");
     }
     assert_eq!(pose("robust-icp hand-position 10"), pose("robust-icp hand-position 0"));
     assert_ne!(pose("robust-icp missing-depth 75"), pose("robust-icp hand-position 0"));
-    assert!(place.read("rob/missing-depth-low.svg").contains("robust-icp failed: 1 at 100"));
-    assert!(place.path("rob/hand-position-low.svg").is_file());
     // Nothing is left to be done.
-    let times = place.read("rob/times.csv");
+    let before = place.read("rob.csv");
     place.succeed(study);
-    assert_eq!(place.read("rob/times.csv"), times);
-    let said = place.prehend("study robustness --dataset ds --sweeps smell --out x");
-    assert!(said.code == 1 && said.err.contains("unknown sweep \"smell\": one of depth-noise"));
+    assert_eq!(place.read("rob.csv"), before);
+    let said = place.prehend("study robustness --dataset ds --sweeps smell --out x.csv");
+    assert!(said.code == 1 && said.err.contains("'smell' for '--sweeps <LIST>'"), "{}", said.err);
 }

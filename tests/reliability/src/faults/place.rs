@@ -58,12 +58,12 @@ pub const COMMANDS: &[LongCommand] = &[
     },
     LongCommand {
         name: "study",
-        words: "study noise --dataset ds --iterations 2 --out st",
+        words: "study noise --dataset ds --iterations 2 --out st.csv --report stpage",
         inputs: &["ds"],
-        outputs: &["st"],
-        blockable: &["st/tables.csv", "st/tables.txt"],
+        outputs: &["st.csv", "stpage"],
+        blockable: &["stpage/index.html"],
         tables: &[],
-        growing: &["st/records.jsonl", "st/times.csv"],
+        growing: &["st.csv"],
     },
     LongCommand {
         name: "calibrate",
@@ -153,6 +153,7 @@ impl Place {
             gather(&self.path(name), Path::new(name), &mut files)?;
         }
         files.retain(|path, _| !path.ends_with("times.csv"));
+        files.values_mut().for_each(without_seconds);
         Ok(files)
     }
 
@@ -163,6 +164,18 @@ impl Place {
         ensure!(ended.code == Some(0), "{}: {}", command.name, ended.error);
         Ok((self.written(command)?, ended))
     }
+}
+
+/// Empties the column `seconds` of a CSV table that has one.
+fn without_seconds(content: &mut Vec<u8>) {
+    let Ok(text) = std::str::from_utf8(content) else { return };
+    let columns: Vec<&str> = text.lines().next().unwrap_or_default().split(',').collect();
+    let Some(column) = columns.iter().position(|name| *name == "seconds") else { return };
+    let line = |line: &str| {
+        let cells = line.split(',').enumerate();
+        cells.map(|(k, cell)| if k == column { "" } else { cell }).collect::<Vec<_>>().join(",")
+    };
+    *content = text.split('\n').map(line).collect::<Vec<_>>().join("\n").into_bytes();
 }
 
 fn gather(path: &Path, name: &Path, files: &mut Files) -> Result<()> {

@@ -27,17 +27,6 @@ impl Table {
     pub(crate) fn into_parts(self) -> (Vec<String>, Vec<Vec<String>>) {
         (self.header, self.rows)
     }
-
-    /// The table in Markdown.
-    #[cfg(feature = "cli")]
-    pub(crate) fn markdown(&self) -> String {
-        let line = |row: &Vec<String>| {
-            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let rule = format!("|---|{}\n", "--:|".repeat(self.header.len().saturating_sub(1)));
-        line(&self.header) + &rule + &self.rows.iter().map(line).collect::<String>()
-    }
 }
 
 impl fmt::Display for Table {
@@ -73,7 +62,6 @@ mod tests {
         assert_eq!(table.to_string(), expected);
         let mut table = Table::new(["object", "|ΔIV|"]);
         table.push(vec!["mug".into(), "1".into()]);
-        assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug | 1 |\n");
         let parts = (vec!["object".into(), "|ΔIV|".into()], vec![vec!["mug".into(), "1".into()]]);
         assert_eq!(table.into_parts(), parts);
     }

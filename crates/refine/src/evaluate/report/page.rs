@@ -101,13 +101,6 @@ impl Report {
         Ok(())
     }
 
-    /// Adds a picture in the form of an SVG document.
-    pub fn add_svg(&mut self, title: &str, svg: &str) {
-        let picture = format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
-        let title = title.to_owned();
-        self.document.blocks.push(Block::Picture { title, remarks: Vec::new(), picture });
-    }
-
     /// Adds curves.
     pub fn add_chart(&mut self, chart: Chart) {
         self.document.blocks.push(Block::Chart(chart));

@@ -1,61 +1,33 @@
 //! The studies: the paper's four, and those that measure the fused estimator.
 
-use std::path::{Path, PathBuf};
-
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use strum::{Display, IntoStaticStr, VariantArray};
+use strum::Display;
 
 use crate::method::NamedMethod;
 
-/// Which study.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Display, IntoStaticStr, VariantArray,
-)]
+/// A study; the documentation of the variants is the command's help.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Display, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Kind {
-    /// Baselines, the combined method and the fused estimator.
+    /// Table 1: baselines, the combined method and the fused estimator
     Main,
-    /// Each gradient alone and all together.
+    /// Table 2: each gradient alone, physics with and without checkpoint, and all together
     Gradients,
-    /// Robust ICP, the combined method and the fused estimator at several levels of noise.
+    /// Table 3: the robust ICP, the combined method and the fused estimator at several levels of noise
     Noise,
-    /// The combined method, free to move, after more and more steps.
+    /// Table 4: the combined method after more and more steps: no regularization, no checkpoint, all iterations
     Steps,
-    /// The fused estimator with less evidence, and with less estimated.
+    /// The fused estimator without each kind of evidence, with one kind alone, and with calibrations believed
     Evidence,
-    /// Whether the fused estimator's posterior is right.
-    #[serde(rename = "confidence", alias = "posterior")]
-    #[strum(serialize = "confidence")]
-    Posterior,
-    /// What faults of the observation do.
+    /// The fused estimator's covariances and probabilities beside its errors
+    Confidence,
+    /// The robust ICP and the fused estimator when more and more is wrong with the sensors
     Robustness,
 }
 
-/// The true pose, as a row of a table.
-pub(super) const TRUTH: &str = "truth";
-/// The initial pose, as a row of a table.
-pub(super) const INITIAL: &str = "initial";
-
 impl Kind {
-    /// Its name in commands and files.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    /// What it shows, as a heading.
-    pub(super) fn title(self) -> &'static str {
-        match self {
-            Self::Main => "Main study: baselines, the combined method and the fused estimator",
-            Self::Gradients => "Gradients study: each kind of evidence alone, and all together",
-            Self::Noise => "Noise study: the same at several levels of noise",
-            Self::Steps => "Steps study: no regularization, no checkpoint, all iterations",
-            Self::Evidence => "Evidence study: fused with less evidence, and with less estimated",
-            Self::Posterior => "Confidence study: the fused estimator's posterior beside the truth",
-            Self::Robustness => "Robustness study: what faults of the observation do",
-        }
-    }
-
     /// The methods compared unless others are asked for, by name and in the order of the paper's table.
     pub fn methods(self) -> Vec<&'static str> {
         match self {
@@ -70,29 +42,18 @@ impl Kind {
                 let ablations = NamedMethod::ablations().iter().map(|m| m.name);
                 ["fused"].into_iter().chain(ablations).collect()
             }
-            Self::Posterior => vec!["fused"],
+            Self::Confidence => vec!["fused"],
             Self::Robustness => vec!["robust-icp", "fused"],
         }
     }
 
-    /// The method that the others are compared with, frame by frame.
-    pub(super) fn reference(self) -> Option<&'static str> {
+    /// The levels of noise whose initial poses a dataset brings (`init_low.csv`, `init_high.csv`): those that the paper has in
+    /// this table, or that the study takes if it is not the paper's.
+    pub fn levels(self) -> &'static [&'static str] {
         match self {
-            Self::Steps => None,
-            Self::Evidence => Some("fused"),
-            _ => Some("robust-icp"),
-        }
-    }
-
-    /// The levels of noise that a dataset brings, with their files, `init_low.csv` and `init_high.csv`: those that the paper
-    /// has in this table, or that the study takes if it is not the paper's.
-    pub fn levels_of(self, dataset: &Path) -> Vec<(String, PathBuf)> {
-        let levels: &[&str] = match self {
             Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
-            Self::Main | Self::Noise | Self::Steps | Self::Posterior => &["low", "high"],
-        };
-        let file = |level: &&str| ((*level).to_owned(), dataset.join(format!("init_{level}.csv")));
-        levels.iter().map(file).filter(|(_, file)| file.is_file()).collect()
+            Self::Main | Self::Noise | Self::Steps | Self::Confidence => &["low", "high"],
+        }
     }
 }
 
@@ -102,8 +63,8 @@ mod tests {
 
     #[test]
     fn all_methods_exist() {
-        for kind in Kind::VARIANTS {
-            for name in kind.methods().into_iter().chain(kind.reference()) {
+        for kind in Kind::value_variants() {
+            for name in kind.methods() {
                 assert!(NamedMethod::find(name).is_some(), "{name}");
             }
         }

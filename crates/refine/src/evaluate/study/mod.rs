@@ -1,21 +1,14 @@
-//! Studies: the paper's tables, regenerated on a dataset, and what measures the fused estimator.
+//! Studies: methods run on a dataset with ground truth from initial poses at several levels of noise.
 //!
-//! A [`Design`] says what is compared on which initial poses; a [`Runner`] takes one frame after another and makes a
-//! [`FrameRecord`] of each; [`write_outputs`] summarizes the records beside the published figures. Everything follows from design and records: they may come from one process or from many.
+//! A [`Design`] says what is compared; a [`Runner`] makes a [`Record`] of each frame and method; a [`StudyFile`] keeps them as
+//! one CSV table, from which an interrupted study resumes. [`tables`] has means and medians beside the published figures;
+//! intervals, contrasts, calibrations and plots are made of the CSV file by `python/studies`.
 
-mod bootstrap;
-mod calibration;
-mod chi_square;
-mod comparison;
-mod csv;
 mod design;
-mod document;
+mod file;
+mod initial_pose;
 mod kind;
-mod merge;
-mod output;
 mod page;
-mod plot;
-mod posterior;
 mod prediction;
 mod published;
 mod record;
@@ -23,11 +16,12 @@ mod runner;
 mod sweep;
 mod tables;
 
-pub use design::{Design, Frame, Level, MethodSettings, Shard};
+pub use design::Design;
+pub use file::StudyFile;
+pub use initial_pose::{InitialPose, Shard};
 pub use kind::Kind;
-pub use merge::merge;
-pub use output::{RECORDS, TIMES, write_outputs};
-pub use record::{FrameRecord, Records};
-pub use runner::{FrameResult, Runner};
+pub use page::write_page;
+pub use record::{COLUMNS, Key, Record};
+pub use runner::Runner;
 pub use sweep::Sweep;
-pub use tables::Failure;
+pub use tables::tables;

@@ -1,191 +1,169 @@
-//! Scores of predicted probabilities against outcomes.
+//! The posterior that a method states for a pose, beside the pose's error.
 
-use prehend_geometry::SplitMix64;
-use serde::Serialize;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
+use prehend_autodiff::lie::so3_log;
+use serde::{Deserialize, Serialize};
 
-/// A predicted probability, and whether the event occurred.
-pub(super) type Prediction = (f64, bool);
+use crate::MM_PER_M;
+use crate::scene::Object;
+use crate::strategy::Posterior;
 
-/// Bins of equal counts that calibration errors are made of.
-pub(super) const BINS: usize = 10;
+/// Events whose predicted probabilities a row has: an error of position \[m\] and of orientation \[°\] at most so large.
+const EVENTS: [(f64, f64); 7] = [
+    (1e-3, f64::INFINITY),
+    (2e-3, f64::INFINITY),
+    (5e-3, f64::INFINITY),
+    (f64::INFINITY, 1.0),
+    (f64::INFINITY, 2.0),
+    (f64::INFINITY, 5.0),
+    (5e-3, 5.0),
+];
 
-/// Seed of simulated outcomes.
-const SEED: u64 = 3;
-
-/// Predictions of similar probability.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Bin {
-    /// Number of predictions.
-    pub(super) n: usize,
-    /// Mean of the predicted probabilities.
-    pub(super) predicted: f64,
-    pub(super) share: f64,
+/// The stated posterior of one pose, and the error of that pose; empty for a method that states none.
+///
+/// Position errors are those of the center of the object's bounding box, the origin of the covariance's twists, not of
+/// the model's origin as in PE. Symmetries are not taken into account.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Prediction {
+    /// Position error \[mm\] and orientation error \[°\].
+    errors: [Option<f64>; 2],
+    /// Standard deviations of the two: roots of the traces of the covariance's blocks \[mm, °\].
+    sigmas: [Option<f64>; 2],
+    /// Cramér–Rao bounds on the root mean squares of the two \[mm, °\].
+    bounds: [Option<f64>; 2],
+    /// Squared Mahalanobis distances of the truth: pose, position and orientation; `None` where the covariance is singular.
+    squared_distances: [Option<f64>; 3],
+    /// Predicted probabilities of [`EVENTS`], if model and data are right.
+    probabilities: [Option<f64>; EVENTS.len()],
+    /// Predicted probability that model, data and pose are right, the last within 5 mm and 5°.
+    probability: Option<f64>,
+    /// Cost of the best hypothesis \[nats\].
+    cost: Option<f64>,
+    /// Number of hypotheses.
+    hypotheses: Option<usize>,
+    /// Posterior probability of the best hypothesis.
+    weight: Option<f64>,
+    /// Number of unobservable directions.
+    unobservable: Option<usize>,
+    /// Factors whose residuals are inconsistent with the pose, with spaces between.
+    inconsistent: String,
+    /// Name of the reason why the solver stopped.
+    termination: String,
 }
 
-/// Predicted probabilities of one event.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct EventCalibration {
-    pub(super) event: &'static str,
-    /// Mean predicted probability.
-    pub(super) predicted: f64,
-    pub(super) share: f64,
-    /// Expected calibration error over ten bins of equal counts.
-    pub(super) calibration_error: f64,
-    /// Mean calibration error of outcomes simulated from the predicted probabilities.
-    pub(super) by_chance: f64,
-    pub(super) brier: f64,
-    pub(super) bins: Vec<Bin>,
-}
+impl Prediction {
+    /// Compares `posterior` in a pose of `object` with the true pose `truth` (object → camera \[m\]); `None` where a number is not finite.
+    pub(super) fn new(
+        posterior: &Posterior,
+        object: &Object,
+        truth: &Isometry3<f64>,
+    ) -> Option<Self> {
+        let best = &posterior.hypotheses[0];
+        let pose = &best.t_cam_object;
+        let off = truth * object.center - pose * object.center;
+        let turn = so3_log(&(truth.rotation * pose.rotation.inverse()));
+        let roots = |covariance: &Matrix6<f64>| {
+            let root = |first| covariance.fixed_view::<3, 3>(first, first).trace().sqrt();
+            [Some(MM_PER_M * root(0)), Some(root(3).to_degrees())]
+        };
+        let within = |(distance, angle): (f64, f64)| {
+            Some(posterior.probability_within(distance, angle.to_radians()))
+        };
+        let inconsistent = posterior.inconsistencies.iter().map(|found| found.factor);
+        let prediction = Self {
+            errors: [Some(MM_PER_M * off.norm()), Some(turn.norm().to_degrees())],
+            sigmas: roots(&posterior.covariance()),
+            bounds: roots(&posterior.cramer_rao_bound),
+            squared_distances: squared_distances(&posterior.covariance(), &off, &turn),
+            probabilities: EVENTS.map(within),
+            probability: Some(posterior.probability()),
+            cost: Some(best.cost),
+            hypotheses: Some(posterior.hypotheses.len()),
+            weight: Some(best.weight),
+            unobservable: Some(posterior.unobservable.len()),
+            inconsistent: inconsistent.collect::<Vec<_>>().join(" "),
+            termination: posterior.termination.name().into(),
+        };
+        prediction.is_finite().then_some(prediction)
+    }
 
-impl EventCalibration {
-    /// Of the predictions of an event; `None` without any.
-    pub(super) fn new(event: &'static str, predictions: &[Prediction]) -> Option<Self> {
-        let n = predictions.len() as f64;
-        Some(Self {
-            event,
-            predicted: predictions.iter().map(|p| p.0).sum::<f64>() / n,
-            share: predictions.iter().filter(|p| p.1).count() as f64 / n,
-            calibration_error: calibration_error(predictions, BINS)?,
-            by_chance: calibration_error_by_chance(predictions, BINS)?,
-            brier: brier_score(predictions)?,
-            bins: equal_count_bins(predictions, BINS),
-        })
+    fn is_finite(&self) -> bool {
+        let arrays = [&self.errors, &self.sigmas, &self.bounds].into_iter().flatten();
+        let others = [self.probability, self.cost, self.weight];
+        arrays
+            .chain(&self.probabilities)
+            .chain(&self.squared_distances)
+            .chain(&others)
+            .flatten()
+            .all(|v| v.is_finite())
     }
 }
 
-/// The predictions in the order of their probabilities, in `bins` bins of equal counts, to within one; fewer where there are
-/// fewer predictions.
-fn equal_count_bins(predictions: &[Prediction], bins: usize) -> Vec<Bin> {
-    let mut sorted = predictions.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (total, bins) = (sorted.len(), bins.min(sorted.len()));
-    (0..bins)
-        .map(|k| {
-            let members = &sorted[k * total / bins..(k + 1) * total / bins];
-            let n = members.len();
-            Bin {
-                n,
-                predicted: members.iter().map(|m| m.0).sum::<f64>() / n as f64,
-                share: members.iter().filter(|m| m.1).count() as f64 / n as f64,
-            }
-        })
-        .collect()
-}
-
-/// Expected calibration error: the mean distance of predicted probability and share over [`equal_count_bins`], weighted by
-/// their counts (Naeini, Cooper and Hauskrecht, AAAI 2015, with bins of equal counts); `None` without predictions.
-fn calibration_error(predictions: &[Prediction], bins: usize) -> Option<f64> {
-    let total = predictions.len();
-    let bins = equal_count_bins(predictions, bins);
-    let off = |b: &Bin| b.n as f64 * (b.predicted - b.share).abs() / total as f64;
-    (total > 0).then(|| bins.iter().map(off).sum())
-}
-
-/// Mean [`calibration_error`] of outcomes drawn from the predicted probabilities: the bias of the estimate for so few predictions.
-fn calibration_error_by_chance(predictions: &[Prediction], bins: usize) -> Option<f64> {
-    const DRAWS: usize = 200;
-    let mut random = SplitMix64::new(SEED);
-    let mut sum = 0.0;
-    for _ in 0..DRAWS {
-        let drawn: Vec<Prediction> =
-            predictions.iter().map(|&(p, _)| (p, random.uniform() < p)).collect();
-        sum += calibration_error(&drawn, bins)?;
-    }
-    Some(sum / DRAWS as f64)
-}
-
-/// Mean squared distance of predicted probability and outcome (Brier, 1950); `None` without predictions.
-fn brier_score(predictions: &[Prediction]) -> Option<f64> {
-    let square = |&(p, came): &Prediction| (p - f64::from(u8::from(came))).powi(2);
-    let total = predictions.len();
-    (total > 0).then(|| predictions.iter().map(square).sum::<f64>() / total as f64)
-}
-
-/// Area under the receiver operating characteristic: the probability that the score of a positive exceeds that of a negative, ties
-/// counting half (Mann and Whitney, 1947). `None` unless there are both.
-pub(super) fn area_under_roc(scores: &[Prediction]) -> Option<f64> {
-    let mut sorted = scores.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let positives = sorted.iter().filter(|s| s.1).count() as f64;
-    let negatives = sorted.len() as f64 - positives;
-    let (mut below, mut wins) = (0.0, 0.0);
-    for tied in sorted.chunk_by(|a, b| a.0 == b.0) {
-        let up = tied.iter().filter(|s| s.1).count() as f64;
-        let down = tied.len() as f64 - up;
-        wins += up * (below + 0.5 * down);
-        below += down;
-    }
-    (positives > 0.0 && negatives > 0.0).then(|| wins / (positives * negatives))
-}
-
-/// Confidence interval, 95 %, of an [`area_under_roc`].
-pub(super) fn area_under_roc_interval(area: f64, positives: usize, negatives: usize) -> [f64; 2] {
-    let half = 1.96 * area_under_roc_error(area, positives, negatives);
-    [(area - half).max(0.0), (area + half).min(1.0)]
-}
-
-/// Standard error of [`area_under_roc`] (Hanley and McNeil, Radiology 1982, with their exponential model of scores).
-fn area_under_roc_error(area: f64, positives: usize, negatives: usize) -> f64 {
-    let (p, n) = (positives as f64, negatives as f64);
-    let square = area * area;
-    let (q1, q2) = (area / (2.0 - area), 2.0 * square / (1.0 + area));
-    let variance = area * (1.0 - area) + (p - 1.0) * (q1 - square) + (n - 1.0) * (q2 - square);
-    (variance / (p * n)).max(0.0).sqrt()
+/// Squared Mahalanobis distances of the twist (`off`, `turn`), of `off` and of `turn`.
+fn squared_distances(
+    covariance: &Matrix6<f64>,
+    off: &Vector3<f64>,
+    turn: &Vector3<f64>,
+) -> [Option<f64>; 3] {
+    let block = |first: usize, error: &Vector3<f64>| {
+        let block: Matrix3<f64> = covariance.fixed_view::<3, 3>(first, first).into();
+        Some(error.dot(&block.cholesky()?.solve(error)))
+    };
+    let twist = Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z);
+    let pose = covariance.cholesky().map(|factor| twist.dot(&factor.solve(&twist)));
+    [pose, block(0, off), block(3, turn)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::method::Method;
+    use crate::refine;
+    use crate::scene::{Frame, default_scene};
 
     #[test]
-    fn bins_hold_equal_counts_in_order() {
-        let predictions = [(0.9, true), (0.1, false), (0.3, true), (0.7, false), (0.2, false)];
-        let bins = equal_count_bins(&predictions, 2);
-        assert_eq!(bins.len(), 2);
-        assert_eq!((bins[0].n, bins[1].n), (2, 3));
-        assert!((bins[0].predicted - 0.15).abs() < 1e-15 && bins[0].share == 0.0);
-        assert!((bins[1].predicted - 1.9 / 3.0).abs() < 1e-15);
-        assert!((bins[1].share - 2.0 / 3.0).abs() < 1e-15);
-        assert_eq!(equal_count_bins(&predictions, 10).len(), 5);
-        assert!(equal_count_bins(&[], 10).is_empty());
+    fn distances_of_known_errors() {
+        // Place and orientation are correlated.
+        let mut covariance =
+            Matrix6::from_diagonal(&Vector6::new(4e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4));
+        let (off, turn) = (Vector3::new(2e-3, 1e-3, 0.0), Vector3::new(0.02, 0.0, 0.0));
+        let [pose, place, orientation] =
+            squared_distances(&covariance, &off, &turn).map(|s| s.unwrap());
+        assert!((place - 2.0).abs() < 1e-12 && (orientation - 4.0).abs() < 1e-12);
+        assert!((pose - 6.0).abs() < 1e-12);
+        let mixed = 0.5 * 2e-3 * 1e-2;
+        (covariance[(0, 3)], covariance[(3, 0)]) = (mixed, mixed);
+        let [pose, place, _] = squared_distances(&covariance, &off, &turn).map(|s| s.unwrap());
+        // Of (1, 2) with a correlation of a half: (1 + 4 − 2) / (1 − 1/4); and 1 of the second axis.
+        assert!((pose - 5.0).abs() < 1e-12 && (place - 2.0).abs() < 1e-12);
+        covariance[(1, 1)] = 0.0;
+        assert_eq!(squared_distances(&covariance, &off, &turn)[..2], [None, None]);
     }
 
     #[test]
-    fn errors_of_known_predictions() {
-        let predictions = [(0.9, true), (0.1, false), (0.3, true), (0.7, false), (0.2, false)];
-        let expected = (2.0 * 0.15 + 3.0 * (2.0 / 3.0 - 1.9 / 3.0)) / 5.0;
-        assert!((calibration_error(&predictions, 2).unwrap() - expected).abs() < 1e-14);
-        let expected = (0.01 + 0.01 + 0.49 + 0.49 + 0.04) / 5.0;
-        assert!((brier_score(&predictions).unwrap() - expected).abs() < 1e-14);
-        assert_eq!(calibration_error(&[(1.0, true), (0.0, false)], 10), Some(0.0));
-        assert_eq!(calibration_error(&[(1.0, false)], 10), Some(1.0));
-        assert_eq!((calibration_error(&[], 10), brier_score(&[])), (None, None));
-    }
-
-    #[test]
-    fn chance_shrinks_with_numbers_and_is_nothing_for_certainty() {
-        let spread = |n: usize| -> Vec<Prediction> {
-            (0..n).map(|k| ((k as f64 + 0.5) / n as f64, false)).collect()
-        };
-        let [few, many] =
-            [100, 10_000].map(|n| calibration_error_by_chance(&spread(n), 10).unwrap());
-        // Of a bin of 10 whose variance is about 1/6 a count, the mean distance is √(2/π/60) = 0.10.
-        assert!((few - 0.10).abs() < 0.015, "{few}");
-        assert!((many - 0.1 * few).abs() < 0.2 * many, "{many}");
-        assert_eq!(calibration_error_by_chance(&[(1.0, true), (0.0, true)], 10), Some(0.0));
-    }
-
-    #[test]
-    fn areas_of_known_scores() {
-        let of = |scores: &[Prediction]| area_under_roc(scores);
-        assert_eq!(of(&[(0.1, false), (0.2, false), (0.8, true)]), Some(1.0));
-        assert_eq!(of(&[(0.8, false), (0.1, true)]), Some(0.0));
-        assert_eq!(of(&[(0.5, false), (0.5, true), (0.5, true)]), Some(0.5));
-        // Of six pairs, four are in order and one is tied.
-        let mixed = [(0.1, false), (0.4, true), (0.5, false), (0.5, true), (0.9, true)];
-        assert_eq!(of(&mixed), Some(4.5 / 6.0));
-        assert_eq!((of(&[(0.1, true)]), of(&[])), (None, None));
-        // Their paper: an area of 0.893 of 51 abnormal and 58 normal images has an error of about 0.032.
-        assert!((area_under_roc_error(0.893, 51, 58) - 0.032).abs() < 1e-3);
+    fn predictions_of_a_made_up_scene_are_those_of_its_posterior() {
+        let scene = default_scene(1).unwrap();
+        let hand = Some(&scene.hand);
+        let frame = Frame::new(&scene.observation, &scene.object, hand).unwrap();
+        let refined = refine(&frame, &scene.initial, &Method::default()).unwrap();
+        let pose = *refined.t_cam_object();
+        let posterior = refined.posterior.unwrap();
+        let stated = Prediction::new(&posterior, &scene.object, &scene.truth).unwrap();
+        // Nothing is as sure as the bound.
+        for (bound, sigma) in stated.bounds.iter().zip(&stated.sigmas) {
+            assert!(bound.unwrap() > 0.0 && bound < sigma, "{stated:?}");
+        }
+        let covariance = posterior.covariance();
+        let sigma = MM_PER_M * covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+        assert_eq!(stated.sigmas[0], Some(sigma));
+        let expected = posterior.mahalanobis(&scene.truth).powi(2);
+        assert!((stated.squared_distances[0].unwrap() / expected - 1.0).abs() < 1e-6);
+        // Nearer is less likely, and there is no error at the pose itself.
+        let p = stated.probabilities.map(|p| p.unwrap());
+        assert!(p.iter().all(|p| (0.0..=1.0).contains(p)));
+        assert!(p[0] <= p[1] && p[1] <= p[2] && p[6] <= p[2].min(p[5]) + 1e-12);
+        let own = Prediction::new(&posterior, &scene.object, &pose).unwrap();
+        assert!(own.errors.iter().all(|error| error.unwrap() < 1e-9));
+        assert!(own.squared_distances.iter().all(|s| s.unwrap() < 1e-12));
     }
 }

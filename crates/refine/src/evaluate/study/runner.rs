@@ -1,20 +1,19 @@
 //! Runs the methods of a study on a frame.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use nalgebra::Isometry3;
 
-use super::design::{Design, Frame, Trial};
-use super::kind::{INITIAL, Kind, TRUTH};
-use super::posterior::PredictedPosterior;
-use super::record::{FrameRecord, RowOutcome};
+use super::design::Design;
+use super::initial_pose::InitialPose;
+use super::prediction::Prediction;
+use super::record::{INITIAL, Record, TRUTH};
 use super::sweep::Sweep;
 use crate::data::bop::{Dataset, ResultRow};
 use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
-use crate::error::guard;
+use crate::error::{RefineError, guard};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
 use crate::problem::State;
@@ -24,134 +23,102 @@ use crate::strategy::{Posterior, Strategy};
 /// Runs the methods of a study frame by frame; several runners may share the assets.
 pub struct Runner<'a> {
     design: &'a Design,
-    methods: &'a [(String, Method)],
     assets: &'a Mutex<Assets<'a>>,
     scorer: Scorer<'a>,
 }
 
-/// A frame's record, and the seconds that each method took.
-pub struct FrameResult {
-    /// The record.
-    pub record: FrameRecord,
-    /// By method.
-    pub seconds: Vec<(String, f64)>,
-}
-
-/// A pose and the iteration it comes from.
-type Pose = (Isometry3<f64>, usize);
+/// A fault of the observation, and its amount.
+type Fault = Option<(Sweep, u32)>;
 
 /// The result of a method on a frame.
 struct Refined {
-    /// The poses that the study compares: one, or one for each number of steps.
-    poses: Vec<Pose>,
-    seconds: f64,
-    object: Arc<Object>,
-    posterior: Option<Posterior>,
+    /// Poses after the numbers of iterations that the study compares.
+    poses: Vec<(usize, Isometry3<f64>)>,
+    /// Pose in the end, and the iteration that it comes from.
+    last: (Option<usize>, Isometry3<f64>),
+    seconds: Option<f64>,
+    /// The posterior, with the object it is of.
+    posterior: Option<(Posterior, Arc<Object>)>,
+}
+
+impl Refined {
+    /// A pose that no method has found.
+    fn given(pose: Isometry3<f64>) -> Self {
+        Self { poses: Vec::new(), last: (None, pose), seconds: None, posterior: None }
+    }
+
+    /// The pose after so many steps, and its iteration; a run that ended early stays where it is.
+    fn pose(&self, steps: Option<usize>) -> (Option<usize>, Isometry3<f64>) {
+        let found = self.poses.iter().find(|(iteration, _)| Some(*iteration) == steps);
+        found.map_or(self.last, |(iteration, pose)| (Some(*iteration), *pose))
+    }
 }
 
 impl<'a> Runner<'a> {
-    /// A runner of `methods`, those of the design, with their settings, on the dataset that `assets` are of.
-    pub fn new(
-        design: &'a Design,
-        methods: &'a [(String, Method)],
-        dataset: &'a Dataset,
-        assets: &'a Mutex<Assets<'a>>,
-    ) -> Self {
-        Self { design, methods, assets, scorer: Scorer::new(dataset) }
+    /// A runner of the methods of `design` on the dataset that `assets` are of.
+    pub fn new(design: &'a Design, dataset: &'a Dataset, assets: &'a Mutex<Assets<'a>>) -> Self {
+        Self { design, assets, scorer: Scorer::new(dataset) }
     }
 
-    /// Runs all methods on a frame. What fails is in the record.
-    pub fn run(&mut self, frame: &Frame) -> FrameResult {
-        let row = &frame.row;
-        let mut seconds = Vec::new();
-        let mut outcomes = Vec::new();
-        outcomes.push(match self.scorer.true_pose(row) {
-            Ok(truth) => self.outcome(TRUTH, row, truth, None),
-            Err(error) => RowOutcome::failed(TRUTH, error.to_string()),
-        });
-        outcomes.push(self.outcome(INITIAL, row, row.t_cam_model, None));
-        // Every sweep begins without a fault: that is run once for all of them.
-        let mut unperturbed: BTreeMap<String, Vec<RowOutcome>> = BTreeMap::new();
-        for trial in self.design.trials() {
-            if trial.fault.is_none()
-                && let Some(known) = unperturbed.get(&trial.method)
-            {
-                let renamed = known.iter().zip(trial.rows);
-                outcomes.extend(renamed.map(|(same, row)| RowOutcome { row, ..same.clone() }));
-                continue;
+    /// Fills in `rows`, which are of this initial pose. What fails is in their status.
+    pub fn run(&mut self, initial: &InitialPose, mut rows: Vec<Record>) -> Vec<Record> {
+        // Rows of one run: several numbers of steps, or sweeps that all begin without a fault.
+        let mut runs: Vec<(String, Fault, Result<Refined, String>)> = Vec::new();
+        for row in &mut rows {
+            let (method, fault) = (row.key.method.clone(), row.key.fault());
+            let known = runs.iter().position(|run| run.0 == method && run.1 == fault);
+            let index = known.unwrap_or_else(|| {
+                let refined = guard(|| self.pose_of(initial, &method, fault));
+                runs.push((method, fault, refined.map_err(|error| error.to_string())));
+                runs.len() - 1
+            });
+            match &runs[index].2 {
+                Ok(refined) => self.fill(row, &initial.row, refined),
+                Err(reason) => row.fail(reason),
             }
-            let (mut found, time) = self.run_trial(frame, &trial);
-            found.iter_mut().for_each(|outcome| outcome.perturbed = trial.fault.is_some());
-            if trial.fault.is_none() {
-                seconds.extend(time.map(|time| (trial.method.clone(), time)));
-                unperturbed.insert(trial.method, found.clone());
-            }
-            outcomes.extend(found);
         }
-        let record = FrameRecord {
-            level: self.design.levels[frame.level].name.clone(),
-            scene_id: row.scene_id,
-            im_id: row.im_id,
-            obj_id: row.obj_id,
-            outcomes,
-        };
-        FrameResult { record, seconds }
+        rows
     }
 
-    /// The outcomes of the rows of a trial, and the seconds that it took.
-    fn run_trial(&mut self, frame: &Frame, trial: &Trial) -> (Vec<RowOutcome>, Option<f64>) {
-        let refined = match self.methods.iter().find(|(name, _)| *name == trial.method) {
-            Some((_, method)) => {
-                let refined = guard(|| self.refine(frame, method, trial.fault));
-                refined.map_err(|error| error.to_string())
-            }
-            None => Err(format!("there is no method {}", trial.method)),
-        };
-        let refined = match refined {
-            Ok(refined) => refined,
-            Err(reason) => {
-                let failed = |row: &String| RowOutcome::failed(row, reason.clone());
-                return (trial.rows.iter().map(failed).collect(), None);
-            }
-        };
-        let posterior = refined.posterior.filter(|_| self.design.study == Kind::Posterior);
-        let mut outcomes = Vec::new();
-        for (name, &(pose, iteration)) in trial.rows.iter().zip(&refined.poses) {
-            let mut outcome = self.outcome(name, &frame.row, pose, Some(iteration));
-            let truth =
-                self.scorer.true_pose(&ResultRow { t_cam_model: pose, ..frame.row.clone() });
-            if let (Some(posterior), Ok(truth)) = (&posterior, truth) {
-                let belief = PredictedPosterior::new(posterior, &refined.object, &truth);
-                if belief.is_finite() {
-                    outcome.belief = Some(belief);
-                } else if outcome.failed.is_none() {
-                    outcome.failed = Some("the posterior is not finite".into());
+    /// What `method` finds, or the pose that is given under that name.
+    fn pose_of(
+        &self,
+        initial: &InitialPose,
+        method: &str,
+        fault: Fault,
+    ) -> Result<Refined, AssetError> {
+        match method {
+            TRUTH => self.scorer.true_pose(&initial.row).map(Refined::given),
+            INITIAL => Ok(Refined::given(initial.row.t_cam_model)),
+            _ => match self.design.methods.iter().find(|(name, _)| name == method) {
+                Some((_, method)) => self.refine(initial, method, fault),
+                None => {
+                    let problem = format!("there is no {method}");
+                    Err(RefineError::Setting { name: "method", problem }.into())
                 }
-            }
-            outcomes.push(outcome);
+            },
         }
-        (outcomes, Some(refined.seconds))
     }
 
     /// Refines a frame, with a fault of the observation if there is one.
     fn refine(
         &self,
-        frame: &Frame,
+        initial: &InitialPose,
         method: &Method,
-        fault: Option<(Sweep, f64)>,
+        fault: Fault,
     ) -> Result<Refined, AssetError> {
-        let row = &frame.row;
+        let row = &initial.row;
         let ResultRow { scene_id, im_id, obj_id, .. } = *row;
-        let target = Target { scene_id, im_id, obj_id, instance: frame.instance };
+        let target = Target { scene_id, im_id, obj_id, instance: initial.instance };
         let mut input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load_at(&target, &frame.row.t_cam_model, &Sensor::required_by(method))?
+            assets.load_at(&target, &row.t_cam_model, &Sensor::required_by(method))?
         };
         if let Some((sweep, amount)) = fault {
             sweep.perturb(&mut input.observation, amount, sweep.seed(row));
         }
         let steps = &self.design.steps;
-        let mut poses: Vec<Pose> = Vec::new();
+        let mut poses = Vec::new();
         let start = Instant::now();
         let input = input.prepared(&row.t_cam_model, method)?.unwrap_or(input);
         let frame = input.frame()?;
@@ -159,39 +126,43 @@ impl<'a> Runner<'a> {
         let refined = method.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {
             // A run of fewer iterations would have come just as far: nothing in it looks ahead.
             if steps.contains(&p.iteration) {
-                poses.push((p.t_cam_object, p.iteration));
+                poses.push((p.iteration, p.t_cam_object));
             }
             ControlFlow::Continue(())
         })?;
         let seconds = start.elapsed().as_secs_f64();
-        // One pose without steps; with them, a run that ended early stays where it is.
-        poses.resize(steps.len().max(1), (*refined.t_cam_object(), refined.iteration));
+        let last = (Some(refined.iteration), *refined.t_cam_object());
         let posterior = refined.posterior;
         drop(frame);
-        Ok(Refined { poses, seconds, object: input.object, posterior })
+        let posterior = posterior.map(|posterior| (posterior, input.object));
+        Ok(Refined { poses, last, seconds: Some(seconds), posterior })
     }
 
-    /// The outcome of a row whose pose is `pose`.
-    fn outcome(
-        &mut self,
-        name: &str,
-        row: &ResultRow,
-        pose: Isometry3<f64>,
-        iteration: Option<usize>,
-    ) -> RowOutcome {
+    /// Fills in a row of the frame whose initial pose is `initial`.
+    fn fill(&mut self, row: &mut Record, initial: &ResultRow, refined: &Refined) {
+        let (iteration, pose) = refined.pose(row.key.steps);
+        (row.iteration, row.seconds) = (iteration, refined.seconds);
         let plain = PlainPose::from(&pose);
         if !plain.is_finite() {
-            return RowOutcome::failed(name, "the pose is not finite".into());
+            return row.fail("the pose is not finite");
         }
-        let scored = self.scorer.score(&ResultRow { t_cam_model: pose, ..row.clone() });
-        let (score, failed) = match scored {
-            Ok(scored) if scored.score.values().iter().flatten().all(|v| v.is_finite()) => {
-                (Some(scored.score), None)
+        row.set_pose(&plain);
+        let found = ResultRow { t_cam_model: pose, ..initial.clone() };
+        let metrics = self.scorer.score(&found).map(|scored| scored.score.values());
+        match metrics {
+            Ok(metrics) if metrics.iter().flatten().all(|value| value.is_finite()) => {
+                row.metrics = metrics;
             }
-            Ok(_) => (None, Some("scoring: a metric is not finite".into())),
-            Err(error) => (None, Some(format!("scoring: {error}"))),
-        };
-        let row = name.into();
-        RowOutcome { row, pose: Some(plain), iteration, score, failed, ..RowOutcome::default() }
+            Ok(_) => return row.fail("scoring: a metric is not finite"),
+            Err(error) => return row.fail(&format!("scoring: {error}")),
+        }
+        if let (Some((posterior, object)), Ok(truth)) =
+            (&refined.posterior, self.scorer.true_pose(&found))
+        {
+            match Prediction::new(posterior, object, &truth) {
+                Some(prediction) => row.prediction = prediction,
+                None => row.fail("the posterior is not finite"),
+            }
+        }
     }
 }

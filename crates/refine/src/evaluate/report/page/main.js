@@ -6,8 +6,7 @@ function drawBlock(block) {
   if (block.kind === "comparison") return el("section.card", {}, heading, drawSlider(block.pictures));
   if (block.kind === "picture") {
     const remarks = block.remarks.length ? el("ul", {}, ...block.remarks.map((r) => el("li", {}, r))) : null;
-    const drawing = block.picture.startsWith("data:image/svg");
-    return el("section.card", {}, heading, remarks, el(drawing ? "img.paper" : "img", { src: block.picture, alt: block.title, loading: "lazy" }));
+    return el("section.card", {}, heading, remarks, el("img", { src: block.picture, alt: block.title, loading: "lazy" }));
   }
   const cells = (row, tag) => el("tr", {}, ...row.map((cell) => el(tag, {}, cell)));
   return el("section.card", {}, heading, el("table", {}, cells(block.headings, "th"), ...block.rows.map((row) => cells(row, "td"))));

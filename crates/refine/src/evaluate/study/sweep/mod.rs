@@ -4,107 +4,68 @@ mod hand;
 mod image;
 mod occlusion;
 
+use clap::ValueEnum;
 use prehend_geometry::SplitMix64;
 use serde::{Deserialize, Serialize};
-use strum::{Display, EnumString, VariantArray, VariantNames};
+use strum::Display;
 
 use crate::data::bop::ResultRow;
 use crate::scene::Observation;
 
-/// A kind of fault that is swept from none to much.
+/// A kind of fault that is swept from none to much; the documentation of the variants is the command's help.
 ///
 /// Faults come on top of what is already wrong with an observation. A frame's fault is the same for every method, and of a
 /// greater amount it is the same one, only more of it.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    Display,
-    EnumString,
-    VariantArray,
-    VariantNames,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Display, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Sweep {
-    /// Depth noise, as a multiple of a realistic sensor's.
+    /// Depth noise, as a multiple of a realistic sensor's
     DepthNoise,
-    /// Color noise, as a multiple of a realistic sensor's.
-    #[serde(alias = "colour-noise")]
-    #[strum(to_string = "color-noise", serialize = "colour-noise")]
+    /// Color noise, as a multiple of a realistic sensor's
     ColorNoise,
-    /// How much of the object is still to be seen beside a block in front of it \[%\].
+    /// Visible share of the object beside a block in front of it, in %
     Visibility,
-    /// The hand is elsewhere than is said \[mm\].
+    /// Position error of the hand, in mm
     HandPosition,
-    /// The hand is turned about its base otherwise than is said \[°\].
+    /// Rotation error of the hand about its base, in °
     HandRotation,
-    /// All joints are off, either way \[°\].
+    /// Error of every joint, either way, in °
     Joints,
-    /// Share of the taxels that feel nothing \[%\].
+    /// Share of taxels that report no force, in %
     DeadTaxels,
-    /// Share of the taxels that feel what is not there \[%\].
+    /// Share of taxels that report random forces, in %
     FalseTaxels,
-    /// Share of the image without depth, in patches \[%\].
+    /// Share of the image without depth, in patches, in %
     MissingDepth,
-    /// Share of the image that is gray, in patches \[%\].
-    #[serde(alias = "missing-colour")]
-    #[strum(to_string = "missing-color", serialize = "missing-colour")]
+    /// Share of the image that is gray, in patches, in %
     MissingColor,
-    /// Whether there is no touch: 100 %, or 0.
+    /// Missing touch: 100 %, or 0
     MissingTouch,
-    /// Whether nothing is known of the hand, touch included: 100 %, or 0.
+    /// Missing hand, touch included: 100 %, or 0
     MissingHand,
 }
 
 impl Sweep {
-    /// All kinds.
-    pub const ALL: &'static [Self] = <Self as VariantArray>::VARIANTS;
-
-    /// What the amounts are, with their unit.
-    pub(super) fn axis(self) -> &'static str {
-        match self {
-            Self::DepthNoise => "depth noise, times a realistic sensor's",
-            Self::ColorNoise => "color noise, times a realistic sensor's",
-            Self::Visibility => "part of the object that is visible, %",
-            Self::HandPosition => "error of the hand's place, mm",
-            Self::HandRotation => "error of the hand's orientation, °",
-            Self::Joints => "error of every joint, °",
-            Self::DeadTaxels => "taxels that feel nothing, %",
-            Self::FalseTaxels => "taxels that feel what is not there, %",
-            Self::MissingDepth => "image without depth, %",
-            Self::MissingColor => "image without color, %",
-            Self::MissingTouch => "touch missing, %",
-            Self::MissingHand => "hand unknown, %",
-        }
-    }
-
     /// The amounts that the study compares; the first one means no fault.
-    pub(super) fn amounts(self) -> &'static [f64] {
+    pub(super) fn amounts(self) -> &'static [u32] {
         match self {
-            Self::DepthNoise | Self::ColorNoise => &[1.0, 2.0, 4.0, 8.0],
-            Self::Visibility => &[100.0, 75.0, 50.0, 25.0, 10.0],
-            Self::HandPosition => &[0.0, 2.0, 5.0, 10.0],
-            Self::HandRotation | Self::Joints => &[0.0, 1.0, 2.0, 5.0],
-            Self::DeadTaxels | Self::FalseTaxels | Self::MissingDepth => {
-                &[0.0, 25.0, 50.0, 75.0, 100.0]
-            }
-            Self::MissingColor => &[0.0, 50.0, 100.0],
-            Self::MissingTouch | Self::MissingHand => &[0.0, 100.0],
+            Self::DepthNoise | Self::ColorNoise => &[1, 2, 4, 8],
+            Self::Visibility => &[100, 75, 50, 25, 10],
+            Self::HandPosition => &[0, 2, 5, 10],
+            Self::HandRotation | Self::Joints => &[0, 1, 2, 5],
+            Self::DeadTaxels | Self::FalseTaxels | Self::MissingDepth => &[0, 25, 50, 75, 100],
+            Self::MissingColor => &[0, 50, 100],
+            Self::MissingTouch | Self::MissingHand => &[0, 100],
         }
     }
 
-    /// Adds `amount` of the fault, in the unit of [`axis`](Self::axis); `seed` seeds its random numbers.
-    pub(super) fn perturb(self, observation: &mut Observation, amount: f64, seed: u64) {
+    /// Adds `amount` of the fault, in the unit that the variant names; `seed` seeds its random numbers.
+    pub(super) fn perturb(self, observation: &mut Observation, amount: u32, seed: u64) {
         if amount == self.amounts()[0] {
             return;
         }
+        let amount = f64::from(amount);
         let mut random = SplitMix64::new(seed);
         let random = &mut random;
         let share = 1e-2 * amount;
@@ -134,11 +95,6 @@ impl Sweep {
             (SplitMix64::new(state ^ word).uniform() * (1_u64 << 53) as f64) as u64
         })
     }
-}
-
-fn unknown(text: &str) -> String {
-    let names = <Sweep as VariantNames>::VARIANTS;
-    format!("unknown sweep {text:?}: one of {}", names.join(", "))
 }
 
 #[cfg(test)]
@@ -174,7 +130,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_first_amount_is_nothing_and_every_other_is_something_that_repeats() {
-        for &sweep in Sweep::ALL {
+        for &sweep in Sweep::value_variants() {
             for (k, &amount) in sweep.amounts().iter().enumerate() {
                 let [mut once, mut again, mut other] = [square(), square(), square()];
                 sweep.perturb(&mut once, amount, 5);
@@ -183,8 +139,9 @@ pub(super) mod tests {
                 assert!(same(&once, &again), "{sweep} {amount}");
                 assert_eq!(same(&once, &square()), k == 0, "{sweep} {amount}");
                 let all = [Sweep::DeadTaxels, Sweep::MissingDepth, Sweep::MissingColor];
-                let whole = amount == 100.0 && all.contains(&sweep);
-                let decided = k == 0 || whole || sweep >= Sweep::MissingTouch;
+                let whole = amount == 100 && all.contains(&sweep);
+                let decided =
+                    k == 0 || whole || [Sweep::MissingTouch, Sweep::MissingHand].contains(&sweep);
                 assert_eq!(same(&once, &other), decided, "{sweep} {amount}");
                 assert!(once.check_sizes().is_ok());
             }
@@ -193,15 +150,13 @@ pub(super) mod tests {
 
     #[test]
     fn names_are_read_back_and_seeds_differ() {
-        for &sweep in Sweep::ALL {
-            assert_eq!(sweep.to_string().parse(), Ok(sweep));
+        for &sweep in Sweep::value_variants() {
+            assert_eq!(Sweep::from_str(&sweep.to_string(), false), Ok(sweep));
             let json = serde_json::to_string(&sweep).unwrap();
             assert_eq!(json, format!("\"{sweep}\""));
         }
-        assert_eq!("missing-colour".parse(), Ok(Sweep::MissingColor));
-        assert!("smell".parse::<Sweep>().unwrap_err().contains("one of depth-noise, "));
         let mut seeds = std::collections::BTreeSet::new();
-        for &sweep in Sweep::ALL {
+        for &sweep in Sweep::value_variants() {
             for (scene_id, im_id, obj_id) in [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)] {
                 let t_cam_model = Isometry3::identity();
                 let row = ResultRow { scene_id, im_id, obj_id, score: 0.0, t_cam_model, time: 0.0 };
