@@ -8,8 +8,6 @@ pub mod bop;
 mod cache;
 mod calibration;
 mod contact;
-mod depth_camera;
-mod depth_values;
 pub mod details;
 mod frame_file;
 pub mod identity;
@@ -27,6 +25,7 @@ mod times;
 mod workers;
 
 pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
+pub use bop::pose_from_matrix;
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
 pub use calibration::{Calibrated, CalibrationFrames, Passes};
@@ -37,7 +36,7 @@ pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;
 pub use noise::NoiseLevel;
-pub use pose::{PlainPose, pose_from_matrix};
+pub use pose::PlainPose;
 pub(crate) use smooth_field::smooth_field;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;

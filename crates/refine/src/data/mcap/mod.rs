@@ -1,7 +1,6 @@
 //! Robots' logs: ROS 2 messages in [MCAP](https://mcap.dev) files, read and written without ROS.
 
 mod camera;
-mod error;
 mod frames;
 mod images;
 mod lengths;
@@ -15,7 +14,6 @@ mod topics;
 mod transforms;
 mod writer;
 
-pub use self::error::RecordingError;
 pub use self::frames::{Frames, RecordedFrame};
 pub use self::recording::Recording;
 pub use self::topics::ImageTopics;

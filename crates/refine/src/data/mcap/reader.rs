@@ -8,13 +8,13 @@ use mcap::records::{Record, op};
 use mcap::{McapError, McapResult, Message, parse_record};
 
 use super::lengths;
-use super::records::Records;
+use super::records::RecordReader;
 
 /// Messages in the order of the file; nothing after the first error. What else there is, attachments and indices, is not looked at.
 pub(super) struct MessageReader<R> {
-    file: Records<R>,
+    file: RecordReader<R>,
     /// The chunk that is being read.
-    chunk: Option<Records<Cursor<Vec<u8>>>>,
+    chunk: Option<RecordReader<Cursor<Vec<u8>>>>,
     channels: ChannelAccumulator<'static>,
     done: bool,
 }
@@ -27,7 +27,7 @@ enum Part {
 
 impl<R: Read> MessageReader<R> {
     pub(super) fn new(source: R) -> Self {
-        let file = Records::of_file(source);
+        let file = RecordReader::of_file(source);
         Self { file, chunk: None, channels: ChannelAccumulator::default(), done: false }
     }
 
@@ -47,7 +47,9 @@ impl<R: Read> MessageReader<R> {
             };
             match self.file.find_map(part)? {
                 Ok(Part::Message(message)) => return Some(Ok(message)),
-                Ok(Part::Chunk(chunk)) => self.chunk = Some(Records::of_chunk(Cursor::new(chunk))),
+                Ok(Part::Chunk(chunk)) => {
+                    self.chunk = Some(RecordReader::of_chunk(Cursor::new(chunk)))
+                }
                 Err(error) => return Some(Err(error)),
             }
         }

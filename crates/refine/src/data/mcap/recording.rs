@@ -11,19 +11,18 @@ use prehend_geometry::open_plain;
 use serde::Deserialize;
 
 use super::camera::Lensed;
-use super::error::RecordingError;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
-    CameraInfo, CompressedImage, Header, Image, JointState, Named, TransformMessage,
+    CameraInfo, CompressedImage, Header, JointState, Named, RosImage, TransformMessage,
     Vector3Stamped, WrenchStamped, decode,
 };
 use super::reader::MessageReader;
-use super::series::Series;
+use super::series::TimeSeries;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
 use super::transforms::{Transforms, plain};
-use crate::scene::RemapCache;
-use crate::scene::{Hand, HandMeasurement, check_gravity};
+use crate::data::bop::DatasetError;
+use crate::scene::{Hand, HandMeasurement, RemapCache, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
 ///
@@ -36,11 +35,11 @@ pub struct Recording {
     pub(super) depth_camera: Option<Lensed>,
     transforms: Transforms,
     world: String,
-    joints: HashMap<String, Series<f64>>,
+    joints: HashMap<String, TimeSeries<f64>>,
     /// By frame \[N\].
-    forces: HashMap<String, Series<Vector3<f64>>>,
+    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
     /// What is said of gravity \[m/s²\], and in which frame.
-    gravity: Option<(String, Series<Vector3<f64>>)>,
+    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
     count: usize,
     faults: Vec<String>,
     pub(super) remaps: RemapCache,
@@ -54,15 +53,15 @@ const GRAVITY: f64 = 9.81;
 
 /// What the first reading finds.
 #[derive(Default)]
-struct Found {
+struct RecordingIndex {
     images: Known,
     counts: HashMap<String, usize>,
     cameras: HashMap<String, CameraInfo>,
     transforms: Transforms,
-    joints: HashMap<String, Series<f64>>,
-    forces: HashMap<String, Series<Vector3<f64>>>,
+    joints: HashMap<String, TimeSeries<f64>>,
+    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
     /// With its frame.
-    gravity: Option<(String, Series<Vector3<f64>>)>,
+    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
     /// Length of the messages of readings \[bytes\].
     kept: u64,
     /// By topic: the first fault, and how many there are.
@@ -75,18 +74,17 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read, or there are no images or no camera of them. Messages that are broken, and a file that is cut off, are
     /// [faults](Self::faults).
-    pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, RecordingError> {
-        let mut found = Found::default();
+    pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, DatasetError> {
+        let mut found = RecordingIndex::default();
         for message in messages(file)? {
             if found.kept > MOST_KEPT {
                 let problem = format!("more than {MOST_KEPT} bytes, which all would be kept");
-                let (file, topic) = (file.to_owned(), "readings".to_owned());
-                return Err(RecordingError::Topic { file, topic, problem });
+                return Err(DatasetError::field(file, "readings", problem));
             }
             match message {
                 Ok(message) => found.take(&message),
                 Err(source) if found.images.is_empty() => {
-                    return Err(RecordingError::Format { file: file.to_owned(), source });
+                    return Err(DatasetError::unusable(file, source));
                 }
                 Err(source) => {
                     let problem = format!("it cannot be read any further: {source}");
@@ -95,8 +93,7 @@ impl Recording {
             }
         }
         found.sort();
-        let fault =
-            |(topic, problem)| RecordingError::Topic { file: file.to_owned(), topic, problem };
+        let fault = |(topic, problem): (String, String)| DatasetError::field(file, &topic, problem);
         let topics = Chosen::new(&found.images, topics).map_err(fault)?;
         let first = &topics.frames;
         let camera = found.camera(first).map_err(fault)?;
@@ -147,7 +144,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the file cannot be opened any more.
-    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, RecordingError> {
+    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, DatasetError> {
         Frames::new(self, hand)
     }
 
@@ -230,20 +227,19 @@ pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
 }
 
 /// The messages of `file`, in its order.
-pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
-    let opened = open_plain(file);
-    let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
+pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, DatasetError> {
+    let opened = open_plain(file).map_err(|e| DatasetError::reading(file, &e))?;
     Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
 }
 
 /// So many bytes of messages of what is kept are read \[bytes\]: chunks of a small file may expand to any number.
 const MOST_KEPT: u64 = 4 << 30;
 
-impl Found {
+impl RecordingIndex {
     /// To be called when all messages have been taken over.
     fn sort(&mut self) {
-        self.joints.values_mut().for_each(Series::sort);
-        self.forces.values_mut().for_each(Series::sort);
+        self.joints.values_mut().for_each(TimeSeries::sort);
+        self.forces.values_mut().for_each(TimeSeries::sort);
         self.gravity.iter_mut().for_each(|(_, series)| series.sort());
         self.transforms.sort();
     }
@@ -265,7 +261,7 @@ impl Found {
         if message.channel.message_encoding != "cdr" {
             return Ok(());
         }
-        if kind == Image::TYPE || kind == CompressedImage::TYPE {
+        if kind == RosImage::TYPE || kind == CompressedImage::TYPE {
             *self.counts.entry(topic.to_owned()).or_default() += 1;
             if !self.images.contains_key(topic) {
                 let (header, content) = describe(kind, data)?;
@@ -291,7 +287,7 @@ impl Found {
             let Vector3Stamped { header, vector } = self.keep(data)?;
             let (at, vector) = (moment(&header, message), Vector3::from(vector));
             check_gravity(&vector).map_err(|e| e.to_string())?;
-            let first = || (header.frame_id.clone(), Series::default());
+            let first = || (header.frame_id.clone(), TimeSeries::default());
             let (frame, series) = self.gravity.get_or_insert_with(first);
             if *frame == header.frame_id {
                 series.push(at, vector);

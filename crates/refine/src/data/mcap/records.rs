@@ -12,12 +12,12 @@ const LONGEST: usize = 1 << 29;
 const BLOCK: usize = 1 << 20;
 
 /// Records in the order of the file.
-pub(super) struct Records<R> {
+pub(super) struct RecordReader<R> {
     source: R,
     reader: LinearReader,
 }
 
-impl<R: Read> Records<R> {
+impl<R: Read> RecordReader<R> {
     /// Those of a file. Chunks are records.
     pub(super) fn of_file(source: R) -> Self {
         Self::new(source, LinearReaderOptions::default().with_emit_chunks(true))

@@ -1,7 +1,7 @@
 //! Recordings of what was sensed and found.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
@@ -10,14 +10,15 @@ use prehend_geometry::{AtomicFile, TriMesh};
 use prehend_render::{Camera, RgbImage};
 use serde::Serialize;
 
-use super::error::RecordingError;
 use super::messages::{
-    CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header, Image,
+    CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header,
     JointState, KeyValue, Marker, MeshFile, Named, PoseWithCovarianceStamped, RegionOfInterest,
-    Texture, Time, TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped, encode,
+    RosImage, Texture, Time, TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped,
+    encode,
 };
 use super::recording::taxel_frame;
 use super::schemas::schema;
+use crate::data::bop::DatasetError;
 use crate::scene::{Hand, HandMeasurement, Observation};
 use crate::strategy::Posterior;
 use crate::tracker::{TrackStatus, Tracked};
@@ -44,13 +45,11 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn create(file: &Path) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { file: file.to_owned(), source };
-        let opened = AtomicFile::create(file).map_err(io)?;
+    pub fn create(file: &Path) -> Result<Self, DatasetError> {
+        let opened = AtomicFile::create(file).map_err(|e| DatasetError::writing(file, e))?;
         let options = mcap::WriteOptions::new().profile("ros2").library("prehend");
         let writer = options.create(BufWriter::new(opened));
-        let writer =
-            writer.map_err(|source| RecordingError::Format { file: file.to_owned(), source })?;
+        let writer = writer.map_err(|e| DatasetError::writing(file, e))?;
         Ok(Self { file: file.to_owned(), writer, channels: HashMap::new() })
     }
 
@@ -58,13 +57,10 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written; then there is none.
-    pub fn finish(mut self) -> Result<(), RecordingError> {
-        let format = |source| RecordingError::Format { file: self.file.clone(), source };
-        self.writer.finish().map_err(format)?;
+    pub fn finish(mut self) -> Result<(), DatasetError> {
+        self.writer.finish().map_err(|e| DatasetError::writing(&self.file, e))?;
         let written = self.writer.into_inner().into_inner().map_err(|e| e.into_error());
-        written
-            .and_then(AtomicFile::commit)
-            .map_err(|source| RecordingError::Io { file: self.file, source })
+        written.and_then(AtomicFile::commit).map_err(|e| DatasetError::writing(&self.file, e))
     }
 
     /// What was sensed at the moment `at` \[ns\]; of which `hand`, if there is one.
@@ -76,7 +72,7 @@ impl RecordingWriter {
         at: i64,
         observation: &Observation,
         hand: Option<&Hand>,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let Observation { camera, color, depth, mask, gravity, .. } = observation;
         let size = [camera.width, camera.height];
         let mut placed = Vec::new();
@@ -114,7 +110,7 @@ impl RecordingWriter {
         at: i64,
         measured: &HandMeasurement,
         hand: &Hand,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let joints = JointState {
             header: header(at, ""),
             name: hand.tree.joint_names().to_vec(),
@@ -137,7 +133,7 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn object(&mut self, at: i64, mesh: &TriMesh) -> Result<(), RecordingError> {
+    pub fn object(&mut self, at: i64, mesh: &TriMesh) -> Result<(), DatasetError> {
         let corner = |face: &[u32; 3], k: usize| mesh.vertices[face[k] as usize].coords.into();
         let corners = mesh.faces.iter().flat_map(|face| (0..3).map(move |k| corner(face, k)));
         let marker = Marker {
@@ -173,7 +169,7 @@ impl RecordingWriter {
         at: i64,
         tracked: &Tracked,
         overlay: &RgbImage,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let Tracked { t_cam_object, status, posterior, rejection, iterations, timing, .. } =
             tracked;
         let probability = posterior.as_ref().map_or(0.0, Posterior::probability);
@@ -213,7 +209,7 @@ impl RecordingWriter {
         };
         let header = header(at, CAMERA);
         self.write("/diagnostics", at, &DiagnosticArray { header, status: vec![status] })?;
-        let jpeg = overlay.to_jpeg(QUALITY).map_err(|e| self.io(io::Error::other(e)))?;
+        let jpeg = overlay.to_jpeg(QUALITY).map_err(|e| DatasetError::writing(&self.file, e))?;
         let header = self::header(at, CAMERA);
         let picture = CompressedImage { header, format: "jpeg", data: &jpeg };
         self.write("/prehend/overlay", at, &picture)
@@ -226,14 +222,14 @@ impl RecordingWriter {
         [width, height]: [usize; 2],
         encoding: &str,
         data: &[u8],
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let step = (data.len() / height.max(1)) as u32;
         let (width, height) = (width as u32, height as u32);
         let header = header(at, CAMERA);
         self.write(
             topic,
             at,
-            &Image { header, height, width, encoding, is_bigendian: 0, step, data },
+            &RosImage { header, height, width, encoding, is_bigendian: 0, step, data },
         )
     }
 
@@ -242,14 +238,14 @@ impl RecordingWriter {
         topic: &str,
         at: i64,
         message: &T,
-    ) -> Result<(), RecordingError> {
-        let data = encode(message).map_err(|e| self.io(e))?;
+    ) -> Result<(), DatasetError> {
+        let data = encode(message).map_err(|e| DatasetError::writing(&self.file, e))?;
         let written = self.channel::<T>(topic).and_then(|(channel_id, sequence)| {
             let time = u64::try_from(at).unwrap_or_default();
             let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
             self.writer.write_to_known_channel(&header, &data)
         });
-        written.map_err(|source| RecordingError::Format { file: self.file.clone(), source })
+        written.map_err(|e| DatasetError::writing(&self.file, e))
     }
 
     /// Number of the channel of `topic`, and of its next message.
@@ -264,10 +260,6 @@ impl RecordingWriter {
         let sequence = *next;
         *next = next.wrapping_add(1);
         Ok((*id, sequence))
-    }
-
-    fn io(&self, source: io::Error) -> RecordingError {
-        RecordingError::Io { file: self.file.clone(), source }
     }
 }
 
