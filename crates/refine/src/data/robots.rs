@@ -94,7 +94,10 @@ impl Robots {
                 let tree = Arc::new(match &body.kind {
                     BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
                     BodyKind::Plane => plane(),
-                    BodyKind::Object { obj_id } => solid(&objects[obj_id].mesh),
+                    BodyKind::Object { obj_id } => match objects.get(obj_id) {
+                        Some(object) => solid(&object.mesh),
+                        None => return Err(stated.body(k, "obj_id", "has no model here").into()),
+                    },
                     BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
                 });
                 self.trees.insert(shape, Arc::clone(&tree));

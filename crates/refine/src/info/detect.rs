@@ -96,7 +96,7 @@ mod tests {
             ("noname", "", "has no extension"),
             ("a.xml", "<html/>", "neither robot nor mujoco"),
             ("a.json", "{\"a\": 1}", "neither a frame nor a rig"),
-            ("a.json", "[", "not valid JSON"),
+            ("a.json", "[", "expected an object"),
             ("a.csv", "a,b\n1,2\n", "are not those of a BOP results file"),
         ] {
             let error = refused(name, text);

@@ -176,7 +176,7 @@ pub(crate) fn read_bodies(
 }
 
 impl SceneBodies {
-    /// Reads the entry of image `im_id`; `root` is the folder that URDF paths are relative to.
+    /// Reads the entry of image `im_id`; `root` is the folder that paths are relative to.
     pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
         let entry: BodiesEntry = file.entry(im_id)?;
         let mut bodies = Vec::with_capacity(entry.bodies.len());

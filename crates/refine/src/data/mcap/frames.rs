@@ -1,8 +1,6 @@
 //! The frames of a recording.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::BufReader;
 
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
@@ -32,7 +30,7 @@ pub struct RecordedFrame {
 pub struct Frames<'a> {
     recording: &'a Recording,
     hand: Option<&'a Hand>,
-    messages: MessageReader<BufReader<File>>,
+    messages: MessageReader<'a>,
     first: Stream,
     depth: Option<Stream>,
     mask: Option<Stream>,

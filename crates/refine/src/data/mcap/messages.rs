@@ -93,7 +93,7 @@ fn as_bytes<S: Serializer>(data: &&[u8], serializer: S) -> Result<S::Ok, S::Erro
 }
 
 /// Intrinsics, lens, and how the image was rectified.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct CameraInfo {
     pub(super) header: Header,
     pub(super) height: u32,
@@ -118,7 +118,7 @@ pub(super) struct RegionOfInterest {
     pub(super) do_rectify: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct JointState {
     pub(super) header: Header,
     pub(super) name: Vec<String>,
@@ -159,7 +159,7 @@ impl From<Vector3> for Vector<f64> {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct RosQuaternion {
     pub(super) x: f64,
     pub(super) y: f64,
@@ -168,7 +168,7 @@ pub(super) struct RosQuaternion {
 }
 
 /// A pose or a transform, which are the same numbers \[m\].
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct RosTransform {
     pub(super) translation: Vector3,
     pub(super) rotation: RosQuaternion,
@@ -256,7 +256,7 @@ pub(super) struct Color {
 }
 
 /// Something to be drawn in a scene.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct Marker {
     pub(super) header: Header,
     pub(super) ns: String,

@@ -7,7 +7,6 @@ mod lengths;
 mod messages;
 mod reader;
 mod recording;
-mod records;
 mod schemas;
 mod series;
 mod topics;

@@ -1,7 +1,6 @@
 //! A recording, opened: all but its images is read.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -33,13 +32,8 @@ pub struct Recording {
     /// Of the images that are the frames, and of depth if that has one of its own.
     pub(super) camera: Lensed,
     pub(super) depth_camera: Option<Lensed>,
-    transforms: Transforms,
+    readings: Readings,
     world: String,
-    joints: HashMap<String, TimeSeries<f64>>,
-    /// By frame \[N\].
-    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
-    /// What is said of gravity \[m/s²\], and in which frame.
-    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
     count: usize,
     faults: Vec<String>,
     pub(super) remaps: RemapCache,
@@ -51,17 +45,24 @@ const FELT: i64 = 50_000_000;
 /// Acceleration of free fall \[m/s²\].
 const GRAVITY: f64 = 9.81;
 
+/// Readings over time.
+#[derive(Default)]
+struct Readings {
+    transforms: Transforms,
+    joints: HashMap<String, TimeSeries<f64>>,
+    /// By frame \[N\].
+    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
+    /// Gravity \[m/s²\], and its frame.
+    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
+}
+
 /// What the first reading finds.
 #[derive(Default)]
 struct RecordingIndex {
     images: Known,
     counts: HashMap<String, usize>,
     cameras: HashMap<String, CameraInfo>,
-    transforms: Transforms,
-    joints: HashMap<String, TimeSeries<f64>>,
-    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
-    /// With its frame.
-    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
+    readings: Readings,
     /// Length of the messages of readings \[bytes\].
     kept: u64,
     /// By topic: the first fault, and how many there are.
@@ -92,7 +93,7 @@ impl Recording {
                 }
             }
         }
-        found.sort();
+        found.readings.sort();
         let fault = |(topic, problem): (String, String)| DatasetError::field(file, &topic, problem);
         let topics = Chosen::new(&found.images, topics).map_err(fault)?;
         let first = &topics.frames;
@@ -121,10 +122,7 @@ impl Recording {
             count: found.counts.get(&first.name).copied().unwrap_or_default(),
             faults: faults.collect(),
             topics,
-            transforms: found.transforms,
-            joints: found.joints,
-            forces: found.forces,
-            gravity: found.gravity,
+            readings: found.readings,
             remaps: RemapCache::default(),
             depth_remaps: RemapCache::default(),
         })
@@ -155,17 +153,19 @@ impl Recording {
 
     /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.
     pub(super) fn gravity(&self, at: i64) -> Option<Vector3<f64>> {
-        if let Some((frame, series)) = &self.gravity {
+        if let Some((frame, series)) = &self.readings.gravity {
             let told = series.nearest(at, i64::MAX)?;
             return match plain(frame) == self.camera_frame() {
                 true => Some(told),
-                false => Some(self.transforms.between(self.camera_frame(), frame, at)? * told),
+                false => {
+                    Some(self.readings.transforms.between(self.camera_frame(), frame, at)? * told)
+                }
             };
         }
-        if !self.transforms.knows(&self.world) {
+        if !self.readings.transforms.knows(&self.world) {
             return None;
         }
-        let t_cam_world = self.transforms.between(self.camera_frame(), &self.world, at)?;
+        let t_cam_world = self.readings.transforms.between(self.camera_frame(), &self.world, at)?;
         Some(t_cam_world * Vector3::new(0.0, 0.0, -GRAVITY))
     }
 
@@ -175,7 +175,7 @@ impl Recording {
     /// That nothing says so.
     pub(super) fn in_camera(&self, from: &str, at: i64) -> Result<Isometry3<f64>, String> {
         let camera = self.camera_frame();
-        let place = self.transforms.between(camera, from, at);
+        let place = self.readings.transforms.between(camera, from, at);
         place.ok_or_else(|| format!("no transform says where {from:?} is in {camera:?} then"))
     }
 
@@ -187,7 +187,7 @@ impl Recording {
         let root = &hand.tree.links()[0].name;
         let t_cam_hand = self.in_camera(root, at)?;
         let position = |name: &String| {
-            let series = self.joints.get(name)?;
+            let series = self.readings.joints.get(name)?;
             let position = series.at(at, |a, b, part| a + (b - a) * part)?;
             Some((name.clone(), position))
         };
@@ -200,9 +200,9 @@ impl Recording {
     fn felt(&self, taxels: &[Taxel], at: i64) -> Vec<Vector3<f64>> {
         let alone = |link: &str| taxels.iter().filter(|taxel| taxel.link == link).count() == 1;
         let force = |taxel: &Taxel| {
-            let own = self.forces.get(&taxel_frame(taxel.index));
-            let series =
-                own.or_else(|| self.forces.get(&taxel.link).filter(|_| alone(&taxel.link)));
+            let own = self.readings.forces.get(&taxel_frame(taxel.index));
+            let series = own
+                .or_else(|| self.readings.forces.get(&taxel.link).filter(|_| alone(&taxel.link)));
             series.and_then(|series| series.nearest(at, FELT))
         };
         let felt: Vec<_> = taxels.iter().map(force).collect();
@@ -227,7 +227,7 @@ pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
 }
 
 /// The messages of `file`, in its order.
-pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, DatasetError> {
+pub(super) fn messages(file: &Path) -> Result<MessageReader<'static>, DatasetError> {
     let opened = open_plain(file).map_err(|e| DatasetError::reading(file, &e))?;
     Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
 }
@@ -235,7 +235,7 @@ pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, Da
 /// So many bytes of messages of what is kept are read \[bytes\]: chunks of a small file may expand to any number.
 const MOST_KEPT: u64 = 4 << 30;
 
-impl RecordingIndex {
+impl Readings {
     /// To be called when all messages have been taken over.
     fn sort(&mut self) {
         self.joints.values_mut().for_each(TimeSeries::sort);
@@ -243,7 +243,9 @@ impl RecordingIndex {
         self.gravity.iter_mut().for_each(|(_, series)| series.sort());
         self.transforms.sort();
     }
+}
 
+impl RecordingIndex {
     /// Takes over what a message says.
     fn take(&mut self, message: &mcap::Message<'_>) {
         let topic = &message.channel.topic;
@@ -274,28 +276,33 @@ impl RecordingIndex {
         } else if kind == JointState::TYPE {
             let JointState { header, name, position, .. } = self.keep(data)?;
             for (name, position) in name.into_iter().zip(position) {
-                let series = self.joints.entry(name).or_default();
+                let series = self.readings.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);
             }
         } else if kind == TransformMessage::TYPE {
             let fixed = topic.ends_with("tf_static");
             let TransformMessage { transforms } = self.keep(data)?;
             for transform in &transforms {
-                self.transforms.add(transform, moment(&transform.header, message), fixed)?;
+                self.readings.transforms.add(
+                    transform,
+                    moment(&transform.header, message),
+                    fixed,
+                )?;
             }
         } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
             let Vector3Stamped { header, vector } = self.keep(data)?;
             let (at, vector) = (moment(&header, message), Vector3::from(vector));
             check_gravity(&vector).map_err(|e| e.to_string())?;
             let first = || (header.frame_id.clone(), TimeSeries::default());
-            let (frame, series) = self.gravity.get_or_insert_with(first);
+            let (frame, series) = self.readings.gravity.get_or_insert_with(first);
             if *frame == header.frame_id {
                 series.push(at, vector);
             }
         } else if kind == WrenchStamped::TYPE {
             let WrenchStamped { header, force, .. } = self.keep(data)?;
             let at = moment(&header, message);
-            let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();
+            let series =
+                self.readings.forces.entry(plain(&header.frame_id).to_owned()).or_default();
             series.push(at, force.into());
         }
         Ok(())

@@ -12,9 +12,8 @@ use serde::Serialize;
 
 use super::messages::{
     CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header,
-    JointState, KeyValue, Marker, MeshFile, Named, PoseWithCovarianceStamped, RegionOfInterest,
-    RosImage, Texture, Time, TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped,
-    encode,
+    JointState, KeyValue, Marker, Named, PoseWithCovarianceStamped, RosImage, Time,
+    TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped, encode,
 };
 use super::recording::taxel_frame;
 use super::schemas::schema;
@@ -115,8 +114,7 @@ impl RecordingWriter {
             header: header(at, ""),
             name: hand.tree.joint_names().to_vec(),
             position: measured.joints.clone(),
-            velocity: Vec::new(),
-            effort: Vec::new(),
+            ..JointState::default()
         };
         self.write("/joint_states", at, &joints)?;
         for (taxel, force) in hand.taxels.iter().zip(&measured.forces) {
@@ -139,23 +137,13 @@ impl RecordingWriter {
         let marker = Marker {
             header: header(at, OBJECT),
             ns: "object".to_owned(),
-            id: 0,
             kind: Marker::TRIANGLES,
-            action: 0,
             pose: (&Isometry3::identity()).into(),
             scale: Vector3::repeat(1.0).into(),
             color: Color { r: 0.35, g: 0.6, b: 0.9, a: 0.9 },
-            lifetime: Time::default(),
             frame_locked: true,
             points: corners.collect(),
-            colors: Vec::new(),
-            texture_resource: String::new(),
-            texture: Texture::default(),
-            uv_coordinates: Vec::new(),
-            text: String::new(),
-            mesh_resource: String::new(),
-            mesh_file: MeshFile::default(),
-            mesh_use_embedded_materials: false,
+            ..Marker::default()
         };
         self.write("/prehend/object", at, &marker)
     }
@@ -288,8 +276,6 @@ fn camera_info(at: i64, camera: &Camera) -> CameraInfo {
         k,
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p: [k[0], k[1], k[2], 0.0, k[3], k[4], k[5], 0.0, k[6], k[7], k[8], 0.0],
-        binning_x: 0,
-        binning_y: 0,
-        roi: RegionOfInterest::default(),
+        ..CameraInfo::default()
     }
 }
