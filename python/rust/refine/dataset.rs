@@ -60,7 +60,7 @@ impl Dataset {
     /// The numbers of its scenes.
     #[getter]
     fn scenes(&self) -> Vec<u32> {
-        self.dataset.scenes().map(bop::Scene::id).collect()
+        self.dataset.scenes().map(bop::DatasetScene::id).collect()
     }
 
     /// The numbers of the images of a scene.

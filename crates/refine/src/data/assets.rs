@@ -9,7 +9,7 @@ use prehend_geometry::{GridCache, TriMesh};
 
 use crate::baselines::GradientKind;
 use crate::data::bop::{
-    Body, BodyKind, Dataset, DatasetError, Frame, Models, ResultRow, SceneBodies,
+    Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, ResultRow, SceneBodies,
 };
 use crate::data::frame_input::FrameInput;
 use crate::data::mask_source::{MaskSource, Sought};
@@ -242,7 +242,7 @@ impl<'a> Assets<'a> {
     /// If a file that is there is broken, or a required one is missing.
     pub fn observation(
         &mut self,
-        frame: &Frame<'_>,
+        frame: &DatasetImage<'_>,
         instance: usize,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
@@ -252,7 +252,7 @@ impl<'a> Assets<'a> {
     /// The frame with a mask, corrected by the rig.
     fn sensed(
         &mut self,
-        frame: &Frame<'_>,
+        frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
@@ -264,7 +264,7 @@ impl<'a> Assets<'a> {
     /// The frame as its files state it.
     fn stated(
         &mut self,
-        frame: &Frame<'_>,
+        frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {

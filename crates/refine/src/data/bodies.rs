@@ -48,17 +48,6 @@ fn plate() -> TriMesh {
     rounded_box(&shape).welded().transformed(&below.into())
 }
 
-/// Refuses a name that would be mixed up with those of links.
-///
-/// # Errors
-/// What is wrong with it.
-pub(crate) fn check_name(name: &str) -> Result<(), String> {
-    match name.is_empty() || name.contains('/') {
-        true => Err(format!("name: {name:?} is empty or has a slash")),
-        false => Ok(()),
-    }
-}
-
 /// Bodies of a frame, the one first that the others are placed beside: the first hand, or else the first body. The others are in the order of their
 /// names, so that frames which list them in another one have the same robot.
 pub(crate) struct Bodies(Vec<PlacedBody>);

@@ -24,7 +24,7 @@ pub struct Journal {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Line<E> {
+struct JournalLine<E> {
     index: usize,
     entry: E,
 }
@@ -97,7 +97,7 @@ impl Journal {
         entry: &E,
     ) -> Result<E, DatasetError> {
         let text = line(&self.path, index, entry)?;
-        let back: Line<E> =
+        let back: JournalLine<E> =
             serde_json::from_str(&text).map_err(|e| unrecorded(&self.path, index, e))?;
         self.write_line(&text)?;
         Ok(back.entry)
@@ -154,7 +154,7 @@ fn header(path: &Path, identity: &Identity) -> Result<String, DatasetError> {
 
 /// The line of a frame.
 fn line<E: Serialize>(path: &Path, index: usize, entry: &E) -> Result<String, DatasetError> {
-    serde_json::to_string(&Line { index, entry }).map_err(|e| unrecorded(path, index, e))
+    serde_json::to_string(&JournalLine { index, entry }).map_err(|e| unrecorded(path, index, e))
 }
 
 fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetError {
@@ -194,7 +194,7 @@ fn parse<E: DeserializeOwned>(
     let header = serde_json::from_slice(first).map_err(|_| foreign(path))?;
     let mut length = first.len();
     for (number, line) in (2..).zip(lines) {
-        let Line { index, entry } = serde_json::from_slice(line).map_err(|_| {
+        let JournalLine { index, entry } = serde_json::from_slice(line).map_err(|_| {
             DatasetError::unusable(path, format!("line {number} is damaged{advice}"))
         })?;
         entries.insert(index, entry);

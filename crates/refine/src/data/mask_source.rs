@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, Mask, depth_map};
 
-use super::bop::{Body, BodyKind, DatasetError, Detections, Frame};
+use super::bop::{Body, BodyKind, DatasetError, DatasetImage, Detections};
 use crate::scene::Target;
 use crate::scene::{Object, Observation};
 
@@ -42,7 +42,7 @@ pub(super) struct Sought<'a> {
 
 impl MaskSource {
     /// Number of an object's mask among the files of the image `frame`, if masks come from these.
-    pub(super) fn number(&self, frame: &Frame<'_>, sought: &Sought<'_>) -> Option<usize> {
+    pub(super) fn number(&self, frame: &DatasetImage<'_>, sought: &Sought<'_>) -> Option<usize> {
         matches!(self, Self::Files).then(|| sought.number(frame))
     }
 
@@ -53,7 +53,7 @@ impl MaskSource {
     pub(super) fn segment(
         &self,
         observation: &mut Observation,
-        frame: &Frame<'_>,
+        frame: &DatasetImage<'_>,
         sought: &Sought<'_>,
         number: Option<usize>,
     ) -> Result<(), DatasetError> {
@@ -94,9 +94,9 @@ impl Sought<'_> {
         }
     }
 
-    /// Number of the mask among the files: that of [`Frame::mask_number`], unless another mask of the image has more than twice its intersection over union
+    /// Number of the mask among the files: that of [`DatasetImage::mask_number`], unless another mask of the image has more than twice its intersection over union
     /// with the object, which is warned of.
-    fn number(&self, frame: &Frame<'_>) -> usize {
+    fn number(&self, frame: &DatasetImage<'_>) -> usize {
         let Self { target, object, t_cam_object } = self;
         let number = frame.mask_number(target.obj_id, target.instance);
         let Some(t_cam_object) = t_cam_object else { return number };

@@ -8,8 +8,6 @@ pub mod bop;
 mod cache;
 mod calibration;
 mod contact;
-mod depth_camera;
-mod depth_values;
 pub mod details;
 mod frame_file;
 mod frame_input;
@@ -28,6 +26,7 @@ mod times;
 mod workers;
 
 pub use assets::{AssetError, Assets, Sensor, load_mesh};
+pub use bop::pose_from_matrix;
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
 pub use calibration::{Calibrated, CalibrationFrames, Passes};
@@ -39,7 +38,7 @@ pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;
 pub use noise::NoiseLevel;
-pub use pose::{PlainPose, pose_from_matrix};
+pub use pose::PlainPose;
 pub(crate) use smooth_field::smooth_field;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;

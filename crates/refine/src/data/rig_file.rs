@@ -5,28 +5,29 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitQuaternion, Vector2, Vector3};
+use prehend_geometry::limits::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use crate::data::bop::{DatasetError, read_json_in_range, write_atomically};
+use crate::data::bop::{DatasetError, read_json, write_atomically};
 use crate::problem::{DepthField, ImageWarp, RADIAL};
 use crate::rig::{Play, Rig};
 use crate::scene::{CameraCalibrationError, ModelErrorSettings, SurfaceDeviation};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Layout {
+struct RigLayout {
     image_size: [usize; 2],
-    camera: CameraLayout,
+    camera: RigCameraLayout,
     hand: HandLayout,
-    play: PlayLayout,
-    /// A row each.
-    covariance: Vec<Vec<f64>>,
+    play: Play,
+    covariance: Covariance,
     objects: BTreeMap<u32, ObjectLayout>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct CameraLayout {
+struct RigCameraLayout {
     depth_scale: f64,
     depth_bias_m: f64,
     principal_point_focal: [f64; 2],
@@ -54,21 +55,40 @@ struct PoseLayout {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct PlayLayout {
-    hand_translation_m: f64,
-    hand_rotation_rad: f64,
-    joints: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct ObjectLayout {
     sigma_m: f64,
     length_scale_m: f64,
-    /// A row each.
-    covariance: Vec<Vec<f64>>,
+    covariance: Covariance,
     nodes_m: Vec<[f64; 3]>,
     coefficients: Vec<[f64; 3]>,
+}
+
+/// A symmetric, positive definite matrix: a list of its rows.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
+struct Covariance(DMatrix<f64>);
+
+impl TryFrom<Vec<Vec<f64>>> for Covariance {
+    type Error = String;
+
+    fn try_from(rows: Vec<Vec<f64>>) -> Result<Self, String> {
+        let n = rows.len();
+        if rows.iter().any(|row| row.len() != n) {
+            return Err(format!("expected {n} rows of {n} numbers"));
+        }
+        let matrix = DMatrix::from_fn(n, n, |r, c| rows[r][c]);
+        let symmetric = n == 0 || (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+        match symmetric && matrix.clone().cholesky().is_some() {
+            true => Ok(Self(matrix)),
+            false => Err("is not symmetric and positive definite".into()),
+        }
+    }
+}
+
+impl From<Covariance> for Vec<Vec<f64>> {
+    fn from(Covariance(matrix): Covariance) -> Self {
+        matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+    }
 }
 
 impl Rig {
@@ -77,11 +97,14 @@ impl Rig {
     /// # Errors
     /// If the file is missing or broken, naming the field.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
-        let layout: Layout = read_json_in_range(file)?;
+        let layout: RigLayout = read_json(file)?;
         let field = |name: &str, problem: &dyn std::fmt::Display| {
             Err(DatasetError::field(file, name, problem))
         };
-        let Layout { image_size: [width, height], camera, hand, play, covariance, objects } =
+        if let Some(name) = out_of_range(&read_json(file)?) {
+            return field(&name, &format!("is beyond ±{MAX_NUMBER:e}"));
+        }
+        let RigLayout { image_size: [width, height], camera, hand, play, covariance, objects } =
             layout;
         if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
             return field("image_size", &"no image is of that size");
@@ -114,21 +137,13 @@ impl Rig {
             in_hand: (&hand.in_hand).into(),
             in_camera: (&hand.in_camera).into(),
             joints: hand.joints,
-            play: Play {
-                hand_translation: play.hand_translation_m,
-                hand_rotation: play.hand_rotation_rad,
-                joints: play.joints,
-            },
-            covariance: DMatrix::zeros(0, 0),
+            play,
+            covariance: covariance.0,
             objects: BTreeMap::new(),
         };
         let n = rig.len();
-        if covariance.len() != n || covariance.iter().any(|row| row.len() != n) {
+        if rig.covariance.nrows() != n {
             return field("covariance", &format!("expected {n} rows of {n} numbers"));
-        }
-        rig.covariance = DMatrix::from_fn(n, n, |r, c| covariance[r][c]);
-        if !is_covariance(&rig.covariance) {
-            return field("covariance", &"is not symmetric and positive definite");
         }
         for (id, object) in objects {
             let ObjectLayout { sigma_m, length_scale_m, covariance, nodes_m, coefficients } =
@@ -138,13 +153,8 @@ impl Rig {
                 let problem = format!("expected up to {MOST_NODES} nodes");
                 return field(&format!("objects.{id}"), &problem);
             }
-            if covariance.len() != count || covariance.iter().any(|row| row.len() != count) {
+            if covariance.0.nrows() != count {
                 let problem = format!("expected {count} rows of {count} numbers");
-                return field(&format!("objects.{id}.covariance"), &problem);
-            }
-            let covariance = DMatrix::from_fn(count, count, |r, c| covariance[r][c]);
-            if !is_covariance(&covariance) {
-                let problem = "is not symmetric and positive definite";
                 return field(&format!("objects.{id}.covariance"), &problem);
             }
             let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
@@ -155,7 +165,7 @@ impl Rig {
                 columns => Matrix3xX::from_columns(columns),
             };
             let Some(deviation) =
-                SurfaceDeviation::from_parts(settings, nodes, coefficients, covariance)
+                SurfaceDeviation::from_parts(settings, nodes, coefficients, covariance.0)
             else {
                 let problem = "expected one coefficient for each node, and positive deviations";
                 return field(&format!("objects.{id}"), &problem);
@@ -183,7 +193,7 @@ impl Rig {
             let layout = ObjectLayout {
                 sigma_m: deviation.settings.gp_sigma,
                 length_scale_m: deviation.settings.length_scale,
-                covariance: rows(&deviation.covariance),
+                covariance: Covariance(deviation.covariance.clone()),
                 nodes_m: deviation.nodes.iter().map(|node| node.coords.into()).collect(),
                 coefficients: deviation
                     .coefficients
@@ -194,9 +204,9 @@ impl Rig {
             (*id, layout)
         };
         let camera = &self.camera;
-        let layout = Layout {
+        let layout = RigLayout {
             image_size: self.warp.depth.size(),
-            camera: CameraLayout {
+            camera: RigCameraLayout {
                 depth_scale: camera.depth_scale,
                 depth_bias_m: camera.depth_bias,
                 principal_point_focal: camera.principal_point.into(),
@@ -211,12 +221,8 @@ impl Rig {
                 in_camera: (&self.in_camera).into(),
                 joints: self.joints.clone(),
             },
-            play: PlayLayout {
-                hand_translation_m: self.play.hand_translation,
-                hand_rotation_rad: self.play.hand_rotation,
-                joints: self.play.joints,
-            },
-            covariance: rows(&self.covariance),
+            play: self.play,
+            covariance: Covariance(self.covariance.clone()),
             objects: self.objects.iter().map(object).collect(),
         };
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
@@ -224,13 +230,23 @@ impl Rig {
     }
 }
 
-fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
-}
-
-fn is_covariance(matrix: &DMatrix<f64>) -> bool {
-    let symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
-    symmetric && matrix.clone().cholesky().is_some()
+/// The name of the first number that is out of range.
+fn out_of_range(value: &Value) -> Option<String> {
+    let below = |name: String, inner: &Value| {
+        let rest = out_of_range(inner)?;
+        let dot = if rest.is_empty() || rest.starts_with('[') { "" } else { "." };
+        Some(name + dot + &rest)
+    };
+    match value {
+        Value::Number(number) => {
+            (number.as_f64().is_none_or(|v| v.abs() > MAX_NUMBER)).then(String::new)
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().find_map(|(k, inner)| below(format!("[{k}]"), inner))
+        }
+        Value::Object(map) => map.iter().find_map(|(key, inner)| below(key.clone(), inner)),
+        Value::Null | Value::Bool(_) | Value::String(_) => None,
+    }
 }
 
 /// Columns or rows of an image, and nodes of an object's surface, at most.

@@ -4,13 +4,13 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use prehend_geometry::GridCache;
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
+use prehend_geometry::{GridCache, TriMesh};
 
 use crate::data::assets::AssetError;
 use crate::data::bodies::{Bodies, PlacedBody, plane, solid};
-use crate::data::bop::{Body, BodyKind, Frame, Tactile, TactileReading};
+use crate::data::bop::{Body, BodyKind, DatasetImage, Stated, Tactile, TactileReading};
 use crate::scene::{Hand, HandMeasurement, Object};
 
 /// Of what shape a body is.
@@ -19,6 +19,8 @@ enum BodyShape {
     Robot(PathBuf),
     Plate,
     Object(u32),
+    /// With its unit's bits.
+    Mesh(PathBuf, u64),
 }
 
 /// Names and shapes of bodies, and the body and the layout of the sensor of forces.
@@ -45,27 +47,42 @@ impl Robots {
     /// All `bodies` of `frame` as one robot, and what that measures; `None` of none. Objects among them are some of `objects`.
     ///
     /// # Errors
-    /// If a file that is named is missing or broken, or what is said does not fit it.
+    /// Those of [`combined`](Self::combined).
     pub(super) fn of(
         &mut self,
-        frame: &Frame<'_>,
+        frame: &DatasetImage<'_>,
+        bodies: &[Body],
+        tactile: &[Tactile],
+        objects: &HashMap<u32, Arc<Object>>,
+    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, AssetError> {
+        let stated = frame.stated(bodies.len(), tactile.len());
+        self.combined(&stated, bodies, tactile, objects)
+    }
+
+    /// All `bodies` as one robot, and what that and its sensors measure; `None` of none.
+    ///
+    /// # Errors
+    /// If a file that is named is missing or broken, or what is `stated` does not fit it.
+    pub(super) fn combined(
+        &mut self,
+        stated: &Stated<'_>,
         bodies: &[Body],
         tactile: &[Tactile],
         objects: &HashMap<u32, Arc<Object>>,
     ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, AssetError> {
         let mut placed = Vec::with_capacity(bodies.len());
         for (k, body) in bodies.iter().enumerate() {
-            placed.push(self.placed(frame, k, body, objects)?);
+            placed.push(self.placed(stated, k, body, objects)?);
         }
         let Some(all) = Bodies::new(placed) else { return Ok(None) };
         let shapes = bodies.iter().map(|body| (body.name.clone(), BodyShape::of(body))).collect();
-        self.felt(frame, &all, shapes, tactile).map(Some)
+        self.felt(stated, &all, shapes, tactile).map(Some)
     }
 
-    /// Body `k` of `frame` with its shape.
+    /// Body `k` with its shape.
     fn placed(
         &mut self,
-        frame: &Frame<'_>,
+        stated: &Stated<'_>,
         k: usize,
         body: &Body,
         objects: &HashMap<u32, Arc<Object>>,
@@ -77,7 +94,11 @@ impl Robots {
                 let tree = Arc::new(match &body.kind {
                     BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
                     BodyKind::Plane => plane(),
-                    BodyKind::Object { obj_id } => solid(&objects[obj_id].mesh),
+                    BodyKind::Object { obj_id } => match objects.get(obj_id) {
+                        Some(object) => solid(&object.mesh),
+                        None => return Err(stated.body(k, "obj_id", "has no model here").into()),
+                    },
+                    BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
                 });
                 self.trees.insert(shape, Arc::clone(&tree));
                 tree
@@ -86,8 +107,7 @@ impl Robots {
         let joints = match body.as_hand() {
             None => Vec::new(),
             Some((_, joints)) => {
-                let field = format!("bodies[{k}].joints");
-                tree.joint_vector(joints).map_err(|e| frame.bodies_fault(&field, e))?
+                tree.joint_vector(joints).map_err(|e| stated.body(k, "joints", e))?
             }
         };
         Ok(PlacedBody {
@@ -103,21 +123,15 @@ impl Robots {
     /// All bodies as one robot with its skin, and what that measures.
     fn felt(
         &mut self,
-        frame: &Frame<'_>,
+        stated: &Stated<'_>,
         all: &Bodies,
         shapes: Vec<(String, BodyShape)>,
         tactile: &[Tactile],
     ) -> Result<(Arc<Hand>, HandMeasurement), AssetError> {
-        // One of several is called by its number.
-        let place = |k: usize| if tactile.len() > 1 { format!("[{k}]") } else { String::new() };
-        let field = |k: usize, name: &str| match place(k) {
-            list if list.is_empty() || name.is_empty() => list + name,
-            list => format!("{list}.{name}"),
-        };
         for (k, Tactile { body, .. }) in tactile.iter().enumerate() {
             if !all.has(body) {
                 let problem = format!("names {body:?}, the bodies are {}", all.names());
-                return Err(frame.tactile_fault(&field(k, "body"), problem).into());
+                return Err(stated.sensor(k, "body", problem).into());
             }
         }
         let mut measured = all.measured();
@@ -133,14 +147,14 @@ impl Robots {
             if known.is_none() {
                 skin = all.skin(body, &layout).map_err(|link| {
                     let problem = format!("{file}: {body:?} has no link {link:?}");
-                    frame.tactile_fault(&field(k, "taxels"), problem)
+                    stated.sensor(k, "taxels", problem)
                 })?;
             }
-            if force.len() != layout.len() {
+            if !force.is_empty() && force.len() != layout.len() {
                 let (expected, found) = (layout.len(), force.len());
                 let problem =
                     format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                return Err(frame.tactile_fault(&field(k, "force"), problem).into());
+                return Err(stated.sensor(k, stated.force, problem).into());
             }
             measured.forces.clone_from(force);
         }
@@ -148,7 +162,7 @@ impl Robots {
             Some(hand) => hand,
             None => {
                 let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
-                let hand = Arc::new(made.map_err(|e| frame.bodies_fault("bodies", e))?);
+                let hand = Arc::new(made.map_err(|e| stated.all(e))?);
                 self.hands.insert(key, Arc::clone(&hand));
                 hand
             }
@@ -159,7 +173,7 @@ impl Robots {
             }
             let layout = sensor.reading.taxels().map(|taxels| self.layout(taxels)).transpose()?;
             let reading = all.reading(&hand.tree, sensor, layout.as_deref().unwrap_or_default());
-            measured.touch.extend(reading.map_err(|e| frame.tactile_fault(&field(k, ""), e))?);
+            measured.touch.extend(reading.map_err(|e| stated.sensor(k, "", e))?);
         }
         Ok((hand, measured))
     }
@@ -181,6 +195,7 @@ impl BodyShape {
             BodyKind::Hand { urdf, .. } => Self::Robot(urdf.clone()),
             BodyKind::Plane => Self::Plate,
             BodyKind::Object { obj_id } => Self::Object(*obj_id),
+            BodyKind::Mesh { file, unit } => Self::Mesh(file.clone(), unit.to_bits()),
         }
     }
 }

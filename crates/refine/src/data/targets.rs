@@ -95,7 +95,7 @@ mod tests {
             fs::write(&file, text).unwrap();
             read(&file).unwrap_err().to_string()
         };
-        assert!(refused("[{\"scene_id\": 1}]").contains("list.json: [0].im_id: is missing"));
+        assert!(refused("[{\"scene_id\": 1}]").contains("list.json: [0]: missing field `im_id`"));
         assert!(refused("{").contains("list.json"));
         let many = r#"[{"scene_id": 1, "im_id": 2, "obj_id": 7, "inst_count": 4000000000}]"#;
         assert!(refused(many).contains("inst_count is 4000000000"));

@@ -11,6 +11,9 @@ use crate::data::bop::{DatasetError, read_text, write_atomically};
 
 const HEADER: &str = "index,frame,method,seconds\n";
 
+/// Index of a frame, its name, method and time \[s\].
+type TimeRow = (usize, String, String, f64);
+
 /// A CSV file of seconds by frame and method, appended to as frames are finished; it appears with the first of them.
 #[derive(Debug)]
 pub struct Times {
@@ -24,33 +27,19 @@ impl Times {
     /// # Errors
     /// If it cannot be read or written.
     pub fn open(path: &Path, keep: bool) -> Result<Self, DatasetError> {
-        let fault = |e: std::io::Error| DatasetError::writing(path, e);
-        let mut times = Self { path: path.into(), seconds: BTreeMap::new() };
-        if !path.exists() {
-            return Ok(times);
+        let rows = if keep { rows(path)? } else { Vec::new() };
+        if !rows.is_empty() {
+            write(path, &rows)?;
+        } else if path.exists() {
+            fs::remove_file(path).map_err(|e| DatasetError::writing(path, e))?;
         }
-        let text = if keep { read_text(path)? } else { String::new() };
-        if !text.starts_with(HEADER) {
-            fs::remove_file(path).map_err(fault)?;
-            return Ok(times);
-        }
-        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
-        let file = OpenOptions::new().write(true).open(path).map_err(fault)?;
-        file.set_len(whole.len() as u64).map_err(fault)?;
-        let rows = csv::Reader::from_reader(whole.as_bytes()).into_deserialize();
-        let entry = |(index, _, method, seconds): (_, String, _, _)| ((index, method), seconds);
-        let is_time = |(_, seconds): &(_, f64)| (0.0..=MAX_NUMBER).contains(seconds);
-        times.seconds = rows.flatten().map(entry).filter(is_time).collect();
-        Ok(times)
+        let entry = |(index, _, method, seconds)| ((index, method), seconds);
+        Ok(Self { path: path.into(), seconds: rows.into_iter().map(entry).collect() })
     }
 
     /// The methods that the file at `path` has times of; none where there is no such file.
-    pub fn methods(path: &Path) -> Vec<String> {
-        let text = read_text(path).unwrap_or_default();
-        let Some(rows) = text.strip_prefix(HEADER) else { return Vec::new() };
-        let method = |row: &str| row.split(',').nth(2).map(str::to_owned);
-        let methods: BTreeSet<String> = rows.lines().filter_map(method).collect();
-        methods.into_iter().collect()
+    pub fn methods(path: &Path) -> BTreeSet<String> {
+        rows(path).into_iter().flatten().map(|(.., method, _)| method).collect()
     }
 
     /// Adds the time of a frame; `frame` and `method` are without commas.
@@ -66,10 +55,9 @@ impl Times {
     ) -> Result<(), DatasetError> {
         self.seconds.insert((index, method.into()), seconds);
         let header = if self.path.exists() { "" } else { HEADER };
-        let line = format!("{header}{index},{frame},{method},{seconds:.4}\n");
-        let mut options = OpenOptions::new();
-        let file = options.append(true).create(true).open(&self.path);
-        file.and_then(|mut file| file.write_all(line.as_bytes()))
+        let text = format!("{header}{index},{frame},{method},{seconds:.4}\n");
+        let file = OpenOptions::new().append(true).create(true).open(&self.path);
+        file.and_then(|mut file| file.write_all(text.as_bytes()))
             .map_err(|e| DatasetError::writing(&self.path, e))
     }
 
@@ -82,12 +70,33 @@ impl Times {
     pub fn means(&self) -> BTreeMap<&str, (f64, usize)> {
         let mut means: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
         for ((_, method), seconds) in &self.seconds {
-            let (sum, count) = means.entry(method).or_default();
-            (*sum, *count) = (*sum + seconds, *count + 1);
+            let (mean, count) = means.entry(method).or_default();
+            *count += 1;
+            *mean += (seconds - *mean) / *count as f64;
         }
-        means.values_mut().for_each(|(sum, count)| *sum /= *count as f64);
         means
     }
+}
+
+/// The rows of a file that are whole and have a time; none of another file, or where there is none.
+fn rows(path: &Path) -> Result<Vec<TimeRow>, DatasetError> {
+    let text = match read_text(path) {
+        Err(DatasetError::Missing { .. }) => String::new(),
+        text => text?,
+    };
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let Some(body) = whole.strip_prefix(HEADER) else { return Ok(Vec::new()) };
+    let reader = csv::ReaderBuilder::new().has_headers(false).from_reader(body.as_bytes());
+    let rows = reader.into_deserialize().flatten();
+    Ok(rows.filter(|(.., seconds): &TimeRow| (0.0..=MAX_NUMBER).contains(seconds)).collect())
+}
+
+fn write(path: &Path, rows: &[TimeRow]) -> Result<(), DatasetError> {
+    let line = |(index, frame, method, seconds): &TimeRow| {
+        format!("{index},{frame},{method},{seconds:.4}\n")
+    };
+    let body: String = rows.iter().map(line).collect();
+    write_atomically(path, format!("{HEADER}{body}").as_bytes())
 }
 
 /// Joins such files into one.
@@ -95,13 +104,9 @@ impl Times {
 /// # Errors
 /// If the new one cannot be written; files that are absent are left out.
 pub fn join_times(files: &[PathBuf], out: &Path) -> Result<(), DatasetError> {
-    let mut lines: Vec<String> = Vec::new();
-    for text in files.iter().filter_map(|file| read_text(file).ok()) {
-        lines.extend(text.lines().skip(1).map(str::to_owned));
-    }
-    lines.sort_by_key(|line| line.split(',').next().and_then(|i| i.parse::<usize>().ok()));
-    let body: String = lines.into_iter().map(|line| line + "\n").collect();
-    write_atomically(out, format!("{HEADER}{body}").as_bytes())
+    let mut all: Vec<TimeRow> = files.iter().flat_map(|file| rows(file)).flatten().collect();
+    all.sort_by_key(|row| row.0);
+    write(out, &all)
 }
 
 #[cfg(test)]
@@ -117,7 +122,7 @@ mod tests {
         times.add(1, "scene 1 image 1 object 5", "depth", 2.0).unwrap();
         times.add(1, "scene 1 image 1 object 5", "physics", 7.0).unwrap();
         assert_eq!(times.means()["depth"], (1.5, 2));
-        assert_eq!(Times::methods(&path), ["depth", "physics"]);
+        assert!(Times::methods(&path).iter().eq(["depth", "physics"]));
         assert!(Times::methods(&dir.path().join("none.csv")).is_empty());
         drop(times);
         let text = fs::read_to_string(&path).unwrap();

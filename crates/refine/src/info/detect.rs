@@ -1,62 +1,57 @@
-//! Which kind a thing is.
+//! Kind of a file or folder.
 
 use std::path::Path;
 
+use serde::de::IgnoredAny;
 use serde_json::Value;
 
-use super::{
-    Content, DatasetInfo, DescribeOptions, FrameInfo, ImageInfo, InfoError, MeshInfo, PosesInfo,
-    RigInfo, RobotInfo,
-};
-use crate::data::bop::{parse_json, read_bytes, read_text};
+use super::{DescribeOptions, InfoError, dataset, frame, image, mesh, poses, rig, robot};
+use crate::data::bop::{DatasetError, UniqueMap, read_json, read_text};
 
-/// A file is known by its extension, and where that leaves it open by its outermost element or its fields.
-pub(super) fn content(
+/// Kind and fields. A file is known by its extension, and where that leaves it open by its outermost element or its fields.
+pub(super) fn read(
     path: &Path,
     options: &DescribeOptions,
     warnings: &mut Vec<String>,
-) -> Result<Content, InfoError> {
+) -> Result<(&'static str, Value), InfoError> {
     if path.is_dir() {
-        return DatasetInfo::read(path, options.split.as_deref(), warnings).map(Content::Dataset);
+        let split = options.split.as_deref();
+        return Ok(("dataset", dataset::read(path, split, warnings)?));
     }
     if !path.exists() {
-        return Err(InfoError::Missing { path: path.into() });
+        return Err(DatasetError::Missing { file: path.into() }.into());
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    match extension.to_ascii_lowercase().as_str() {
-        "ply" | "obj" | "stl" | "gltf" | "glb" => {
-            MeshInfo::read(path, options, warnings).map(Content::Mesh)
-        }
-        "urdf" => RobotInfo::of_urdf(path, warnings).map(Content::Robot),
-        "xml" => match outermost(&text(path)?) {
-            Some("robot") => RobotInfo::of_urdf(path, warnings).map(Content::Robot),
-            Some("mujoco") => RobotInfo::of_mjcf(path, warnings).map(Content::Robot),
-            _ => Err(InfoError::unknown(path, "the outermost element is neither robot nor mujoco")),
+    Ok(match extension.to_ascii_lowercase().as_str() {
+        "ply" | "obj" | "stl" | "gltf" | "glb" => ("mesh", mesh::read(path, options, warnings)?),
+        "urdf" => ("robot", robot::of_urdf(path, warnings)?),
+        "xml" => match outermost(&read_text(path)?) {
+            Some("robot") => ("robot", robot::of_urdf(path, warnings)?),
+            Some("mujoco") => ("robot", robot::of_mjcf(path, warnings)?),
+            _ => return Err(unknown(path, "the outermost element is neither robot nor mujoco")),
         },
         "json" => {
-            let fields = match parse_json(&read_bytes(path)?) {
-                Ok(Value::Object(fields)) => fields,
-                Ok(_) => return Err(InfoError::unknown(path, "is no JSON object")),
-                Err(e) => return Err(InfoError::unknown(path, format!("is no JSON object: {e}"))),
-            };
-            let has = |names: &[&str]| names.iter().all(|name| fields.contains_key(*name));
+            let fields: UniqueMap<IgnoredAny> = read_json(path)?;
+            let has = |names: &[&str]| names.iter().all(|name| fields.0.contains_key(*name));
             if has(&["image_size", "camera", "hand"]) {
-                return RigInfo::read(path).map(Content::Rig);
+                ("rig", rig::read(path)?)
+            } else if has(&["mesh"]) || has(&["rgb", "pose"]) {
+                ("frame", frame::read(path, warnings)?)
+            } else {
+                return Err(unknown(path, "has the fields of neither a frame nor a rig"));
             }
-            if has(&["mesh"]) || has(&["rgb", "pose"]) {
-                return FrameInfo::read(path, warnings).map(Box::new).map(Content::Frame);
-            }
-            Err(InfoError::unknown(path, "has the fields of neither a frame nor a rig"))
         }
-        "csv" => PosesInfo::read(path, warnings).map(Content::Poses),
-        "png" | "jpg" | "jpeg" => ImageInfo::read(path).map(Content::Image),
-        "" => Err(InfoError::unknown(path, "has no extension to tell its format by")),
-        other => Err(InfoError::unknown(path, format!("files .{other} are not known"))),
-    }
+        "csv" => ("poses", poses::read(path, warnings)?),
+        "png" | "jpg" | "jpeg" => ("image", image::read(path)?),
+        "" => return Err(unknown(path, "has no extension to tell its format by")),
+        other => return Err(unknown(path, &format!("files .{other} are not known"))),
+    })
 }
 
-fn text(path: &Path) -> Result<String, InfoError> {
-    Ok(read_text(path)?)
+/// The error of a file that is nothing known.
+pub(super) fn unknown(path: &Path, problem: &str) -> InfoError {
+    let known = "meshes (PLY, OBJ, STL, glTF), URDF, MJCF, BOP datasets, frames and rigs (JSON), poses (CSV) and images (PNG, JPEG)";
+    DatasetError::unusable(path, format!("{problem}; known are {known}")).into()
 }
 
 /// The name of the outermost element of XML.
@@ -96,25 +91,24 @@ mod tests {
             describe(&path, &DescribeOptions::default()).unwrap_err()
         };
         let error = refused("notes.txt", "");
-        assert!(matches!(&error, InfoError::Unknown { path, .. } if path.ends_with("notes.txt")));
         assert!(error.to_string().contains("notes.txt: files .txt are not known"), "{error}");
         for (name, text, problem) in [
             ("noname", "", "has no extension"),
             ("a.xml", "<html/>", "neither robot nor mujoco"),
             ("a.json", "{\"a\": 1}", "neither a frame nor a rig"),
-            ("a.json", "[", "is no JSON object"),
+            ("a.json", "[", "expected an object"),
             ("a.csv", "a,b\n1,2\n", "are not those of a BOP results file"),
         ] {
             let error = refused(name, text);
-            assert!(matches!(&error, InfoError::Unknown { .. }), "{error}");
+            assert!(matches!(&error, InfoError::Data(DatasetError::Unusable { .. })), "{error}");
             assert!(error.to_string().contains(problem), "{error}");
         }
         assert!(matches!(refused("a.ply", "ply"), InfoError::Mesh(_)));
         assert!(matches!(refused("a.urdf", "<robot/>"), InfoError::Robot(_)));
         assert!(matches!(refused("a.xml", "<mujoco><a"), InfoError::Mjcf(_)));
-        assert!(matches!(refused("a.png", "png"), InfoError::Image(_)));
+        assert!(matches!(refused("a.png", "png"), InfoError::Data(_)));
         let none = describe(&dir.path().join("none"), &DescribeOptions::default()).unwrap_err();
-        assert!(matches!(none, InfoError::Missing { .. }));
+        assert!(matches!(none, InfoError::Data(DatasetError::Missing { .. })));
         let empty = describe(dir.path(), &DescribeOptions::default()).unwrap_err();
         assert!(matches!(empty, InfoError::Data(_)) && empty.to_string().contains("no scene"));
     }

@@ -1,32 +1,26 @@
-//! What a file or a folder is, what it holds and what is wrong with it, without using it.
+//! Kind, content and faults of a file or folder, without using it.
 //!
 //! [`describe`] tells meshes, robots, datasets, frame files, rigs, poses and images apart, reads them as everything else here does, and returns
-//! a [`Description`] that prints as a few lines and serializes as a JSON object.
+//! a [`Description`] that prints as aligned lines and serializes as a JSON object.
 
 mod dataset;
 mod detect;
 mod error;
 mod frame;
 mod image;
-mod lines;
 mod mesh;
 mod poses;
 mod rig;
 mod robot;
+mod text;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
-pub use self::dataset::{DatasetInfo, SceneInfo};
 pub use self::error::InfoError;
-pub use self::frame::{FrameInfo, HandInfo};
-pub use self::image::{ImageInfo, ImageKind};
-pub use self::mesh::{MassInfo, MeshInfo};
-pub use self::poses::PosesInfo;
-pub use self::rig::{ParameterInfo, RigInfo};
-pub use self::robot::{JointInfo, RobotInfo};
 
 /// How a thing is read that does not say so itself.
 #[derive(Clone, Debug)]
@@ -45,59 +39,45 @@ impl Default for DescribeOptions {
     }
 }
 
-/// What a path holds.
+/// Content of a path. Prints as a summary, by `{:#}` with all rows of its tables, of which a robot's summary has none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Description {
     /// The path described.
     pub path: PathBuf,
-    /// What is there.
+    /// `mesh`, `robot`, `dataset`, `frame`, `rig`, `poses` or `image`.
+    pub kind: &'static str,
+    /// Fields by name, in SI units unless the name has another.
     #[serde(flatten)]
-    pub content: Content,
-    /// What is wrong with it, or was not read.
+    pub fields: Map<String, Value>,
+    /// Faults, and parts that were not read.
     pub warnings: Vec<String>,
 }
 
-/// What there can be.
-#[derive(Clone, Debug, Serialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Content {
-    /// A triangle mesh.
-    Mesh(MeshInfo),
-    /// A robot or scene in URDF or MJCF.
-    Robot(RobotInfo),
-    /// A dataset in BOP format.
-    Dataset(DatasetInfo),
-    /// A frame in JSON.
-    Frame(Box<FrameInfo>),
-    /// A calibrated rig.
-    Rig(RigInfo),
-    /// Poses: a BOP results file.
-    Poses(PosesInfo),
-    /// A color, depth or gray image.
-    Image(ImageInfo),
-}
-
-/// Says what is at `path`.
+/// Describes what is at `path`.
 ///
 /// # Errors
 /// [`InfoError`], naming the file: if there is nothing, or nothing that is known, or it is broken.
 pub fn describe(path: &Path, options: &DescribeOptions) -> Result<Description, InfoError> {
     let mut warnings = Vec::new();
-    let content = detect::content(path, options, &mut warnings)?;
-    Ok(Description { path: path.into(), content, warnings })
+    let (kind, value) = detect::read(path, options, &mut warnings)?;
+    let fields = match value {
+        Value::Object(fields) => fields,
+        other => Map::from_iter([("content".to_owned(), other)]),
+    };
+    Ok(Description { path: path.into(), kind, fields, warnings })
 }
+
+/// Rows of a table that fit a screen beside the summary.
+const ROWS: usize = 24;
 
 impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let path = self.path.display();
-        match &self.content {
-            Content::Mesh(info) => write!(f, "{path}: mesh\n{info}"),
-            Content::Robot(info) => write!(f, "{path}: robot\n{info}"),
-            Content::Dataset(info) => write!(f, "{path}: dataset in BOP format\n{info}"),
-            Content::Frame(info) => write!(f, "{path}: frame\n{info}"),
-            Content::Rig(info) => write!(f, "{path}: rig\n{info}"),
-            Content::Poses(info) => write!(f, "{path}: poses, a BOP results file\n{info}"),
-            Content::Image(info) => write!(f, "{path}: image\n{info}"),
-        }
+        writeln!(f, "{}: {}", self.path.display(), self.kind)?;
+        let rows = match (f.alternate(), self.kind) {
+            (true, _) => usize::MAX,
+            (false, "robot") => 0,
+            (false, _) => ROWS,
+        };
+        text::write_fields(f, &self.fields, 1, rows)
     }
 }

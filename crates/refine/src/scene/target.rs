@@ -11,7 +11,7 @@ pub struct Target {
     pub im_id: u32,
     /// The object.
     pub obj_id: u32,
-    /// Which of the image's targets it is, from 0: the instance that [`crate::data::bop::Frame::mask`] asks for.
+    /// Which of the image's targets it is, from 0: the instance that [`crate::data::bop::DatasetImage::mask`] asks for.
     pub instance: usize,
 }
 

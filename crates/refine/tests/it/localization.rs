@@ -165,14 +165,14 @@ fn faults_name_file_and_field() {
         (
             &|dir| edit(dir, VISIBILITY, |info| info["0"][0]["visib_fract"] = "much".into()),
             None,
-            "scene_gt_info.json: 0[0].visib_fract: is not a finite number",
+            "scene_gt_info.json: 0[0].visib_fract: invalid type: string \"much\", expected f64",
         ),
         (
             &list(two),
             Some(Path::new("list")),
             "scene_gt.json: 0: instances of object 5: 1 but targets 2",
         ),
-        (&list("[{}]"), Some(Path::new("list")), "list: [0].scene_id: is missing"),
+        (&list("[{}]"), Some(Path::new("list")), "list: [0]: missing field `scene_id`"),
     ];
     for (damage, list, expected) in cases {
         let error = fault(damage, list);

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use prehend_refine::data::mcap::{ImageTopics, Recording, RecordingError, RecordingWriter};
+use prehend_refine::data::bop::DatasetError;
+use prehend_refine::data::mcap::{ImageTopics, Recording, RecordingWriter};
 use prehend_refine::scene::{Observation, Sequence, default_sequence};
 use prehend_refine::tracker::{Tracked, Tracker, TrackerSettings};
 
@@ -102,9 +103,9 @@ fn a_log_that_is_cut_off_gives_what_is_there() {
         }
     }
     fs::write(&file, b"no recording at all, but a text that is long enough").unwrap();
-    assert!(matches!(open(), Err(RecordingError::Format { .. })));
+    assert!(matches!(open(), Err(DatasetError::Unusable { .. })));
     fs::remove_file(&file).unwrap();
-    assert!(matches!(open(), Err(RecordingError::Io { .. })));
+    assert!(matches!(open(), Err(DatasetError::Missing { .. })));
 }
 
 #[test]

@@ -147,7 +147,7 @@ fn values_that_cannot_be_name_the_file_and_the_field() {
         ),
         (
             &|f| f["bodies"] = json!([{ "name": "", "kind": "plane", "pose": plane["pose"] }]),
-            "bodies[0]: name: \"\" is empty or has a slash",
+            "bodies[0].name: \"\" is empty or has a slash",
         ),
         (
             &|f| {
@@ -186,7 +186,7 @@ fn values_that_cannot_be_name_the_file_and_the_field() {
             &with("kind", json!("wall")),
             "bodies[0].kind: unknown variant `wall`, expected one of `hand`, `plane`, `object`",
         ),
-        (&with("sigma_mm", json!(-1.0)), "bodies[0]: sigma_mm is -1, not zero or above"),
+        (&with("sigma_mm", json!(-1.0)), "bodies[0].sigma_mm: -1 is below zero"),
         (&with("kind", json!("object")), "bodies[0].mesh: is missing"),
         (&with("name", json!("robot")), "bodies[0].name: there are two bodies called \"robot\""),
         (
@@ -197,7 +197,7 @@ fn values_that_cannot_be_name_the_file_and_the_field() {
             &touch(
                 json!({ "kind": "patch", "link": "palm", "points": [[0, 0, 0]], "normals": [] }),
             ),
-            "robot.touch[0]: normals: 0, but there are 1 points",
+            "robot.touch[0].normals: 0, but there are 1 points",
         ),
     ];
     for (change, expected) in cases {

@@ -27,6 +27,9 @@ pub(crate) struct Info {
     /// Split of a dataset [default: test, or the only one]
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    /// List all joints of a robot, all scenes of a dataset and all parameters of a rig
+    #[arg(long, help_heading = "Output")]
+    all: bool,
     /// Print JSON, warnings included
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -46,7 +49,8 @@ impl Info {
         if self.json {
             say(format!("{:#}", json!(described)))?;
         } else {
-            say(described.to_string().trim_end())?;
+            let text = if self.all { format!("{described:#}") } else { described.to_string() };
+            say(text.trim_end())?;
             described.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         }
         Ok(ExitCode::SUCCESS)

@@ -8,8 +8,8 @@ use std::time::SystemTime;
 
 use prehend_geometry::open_plain;
 
-use super::dataset::{Dataset, Scene};
-use super::frame::Frame;
+use super::dataset::{Dataset, DatasetScene};
+use super::frame::DatasetImage;
 
 /// What tells a JSON file from what it was before: its size, and when it was written.
 pub type Stamp = Option<(u64, SystemTime)>;
@@ -24,9 +24,9 @@ impl Dataset {
     pub fn has_arrived(&self, scene_id: u32, im_id: u32) -> bool {
         let Ok(scene) = self.scene(scene_id) else { return false };
         let key = im_id.to_string();
-        let told = [&scene.bodies, &scene.tactile]
-            .into_iter()
-            .all(|file| !file.exists() || file.root().is_ok_and(|entries| entries.contains(&key)));
+        let told = [&scene.bodies, &scene.tactile].into_iter().all(|file| {
+            !file.exists() || file.root().is_ok_and(|entries| entries.contains_key(&key))
+        });
         let together = scene.taken_together(im_id);
         let seen = |images: Option<Vec<u32>>| {
             let images = images.unwrap_or_else(|| vec![im_id]);
@@ -36,7 +36,7 @@ impl Dataset {
     }
 
     /// Whether color, depth and masks of one image are there.
-    fn is_seen(&self, scene: &Scene, im_id: u32) -> bool {
+    fn is_seen(&self, scene: &DatasetScene, im_id: u32) -> bool {
         let Ok(frame) = self.frame(scene.id(), im_id) else { return false };
         let color = !frame.has_color() || frame.rgb_path().is_ok_and(|file| is_whole(&file));
         let depth = !frame.has_depth() || is_whole(&frame.depth_path());
@@ -46,12 +46,13 @@ impl Dataset {
 
     /// Whether any of the image is there.
     pub fn has_begun(&self, scene_id: u32, im_id: u32) -> bool {
-        let there = |frame: Frame<'_>| frame.rgb_path().is_ok() || frame.depth_path().exists();
+        let there =
+            |frame: DatasetImage<'_>| frame.rgb_path().is_ok() || frame.depth_path().exists();
         self.frame(scene_id, im_id).is_ok_and(there)
     }
 }
 
-impl Scene {
+impl DatasetScene {
     /// What tells its JSON files, which are read once, from what they become: [`Dataset::reread`] if it changes.
     pub fn stamps(&self) -> [Stamp; 3] {
         [&self.camera, &self.bodies, &self.tactile].map(|file| {
@@ -62,7 +63,7 @@ impl Scene {
 }
 
 /// Whether all masks of the image end as they should; there need not be any.
-fn masks_are_whole(scene: &Scene, im_id: u32) -> bool {
+fn masks_are_whole(scene: &DatasetScene, im_id: u32) -> bool {
     let prefix = format!("{im_id:06}_");
     let Ok(files) = fs::read_dir(scene.dir().join("mask_visib")) else { return true };
     let of_image = |name: &OsStr| name.to_str().is_some_and(|name| name.starts_with(&prefix));

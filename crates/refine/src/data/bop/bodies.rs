@@ -1,4 +1,4 @@
-//! Robots and other bodies beside the object, in `scene_bodies.json`.
+//! Robots and other bodies beside the object, in `scene_bodies.json` and frame files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,16 +7,16 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Real, Rotation};
-use super::pose::translation_from_mm;
-use crate::data::bodies::check_name;
+use super::frame_pose::{FramePose, LengthUnit};
+use super::json::{JsonFile, UniqueMap};
+use super::numbers::{NonNegative, Numbers, Real, Rotation, pose};
 
 /// A body whose shape is known, and its pose as well as is said.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Its name in the dataset.
     pub name: String,
-    /// What it is.
+    /// Its shape.
     pub kind: BodyKind,
     /// Its coordinates (a robot's base link) → camera coordinates \[m\].
     pub t_cam_base: Isometry3<f64>,
@@ -24,7 +24,7 @@ pub struct Body {
     pub sigmas: [Option<f64>; 2],
 }
 
-/// What a body is.
+/// Shape of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BodyKind {
     /// A robot hand, or another articulated body.
@@ -41,6 +41,13 @@ pub enum BodyKind {
         /// Its number in `models/`.
         obj_id: u32,
     },
+    /// A rigid body with a mesh of its own.
+    Mesh {
+        /// Its file.
+        file: PathBuf,
+        /// Meters of one unit of the mesh.
+        unit: f64,
+    },
 }
 
 impl Body {
@@ -48,7 +55,7 @@ impl Body {
     pub fn as_hand(&self) -> Option<(&Path, &BTreeMap<String, f64>)> {
         match &self.kind {
             BodyKind::Hand { urdf, joints } => Some((urdf, joints)),
-            BodyKind::Plane | BodyKind::Object { .. } => None,
+            BodyKind::Plane | BodyKind::Object { .. } | BodyKind::Mesh { .. } => None,
         }
     }
 }
@@ -63,32 +70,37 @@ pub struct SceneBodies {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct BodiesEntry {
     gravity: Option<Numbers<3>>,
     bodies: Vec<BodyEntry>,
 }
 
-/// As the file has it.
+/// A body in a file: of a dataset by `cam_R_b2c` and `cam_t_b2c`, and objects by `obj_id`; of a frame by `pose`, and objects by `mesh`.
 #[derive(Deserialize)]
-struct BodyEntry {
+#[serde(deny_unknown_fields)]
+pub(crate) struct BodyEntry {
     name: String,
     #[serde(default)]
-    kind: KindName,
+    kind: BodyKindName,
     #[serde(rename = "cam_R_b2c")]
-    rotation: Rotation,
+    rotation: Option<Rotation>,
     #[serde(rename = "cam_t_b2c")]
-    translation: Numbers<3>,
-    sigma_mm: Option<Real>,
-    sigma_deg: Option<Real>,
-    urdf: Option<String>,
-    joints: Option<BTreeMap<String, Real>>,
+    translation: Option<Numbers<3>>,
+    pose: Option<FramePose>,
+    sigma_mm: Option<NonNegative>,
+    sigma_deg: Option<NonNegative>,
+    urdf: Option<PathBuf>,
+    joints: Option<UniqueMap<Real>>,
     obj_id: Option<u32>,
+    mesh: Option<PathBuf>,
+    mesh_unit: Option<LengthUnit>,
 }
 
 /// The name of a kind of body.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum KindName {
+enum BodyKindName {
     #[default]
     Hand,
     Plane,
@@ -96,65 +108,82 @@ pub(crate) enum KindName {
 }
 
 /// Standard deviations \[m, rad\] of what is said in millimeters and degrees.
-///
-/// # Errors
-/// If one is negative.
-pub(crate) fn body_sigmas(mm: Option<Real>, deg: Option<Real>) -> Result<[Option<f64>; 2], String> {
-    for (name, sigma) in [("sigma_mm", mm), ("sigma_deg", deg)] {
-        if let Some(Real(sigma)) = sigma.filter(|sigma| sigma.0 < 0.0) {
-            return Err(format!("{name} is {sigma}, not zero or above"));
-        }
+pub(crate) fn sigmas(mm: Option<NonNegative>, deg: Option<NonNegative>) -> [Option<f64>; 2] {
+    [mm.map(|mm| mm.0 * 1e-3), deg.map(|deg| deg.0.to_radians())]
+}
+
+impl UniqueMap<Real> {
+    /// Joint positions by name.
+    pub(crate) fn positions(self) -> BTreeMap<String, f64> {
+        self.0.into_iter().map(|(name, position)| (name, position.0)).collect()
     }
-    Ok([mm.map(|mm| mm.0 * 1e-3), deg.map(|deg| deg.0.to_radians())])
-}
-
-/// Joint positions by name.
-pub(crate) fn positions(joints: &BTreeMap<String, Real>) -> BTreeMap<String, f64> {
-    joints.iter().map(|(name, position)| (name.clone(), position.0)).collect()
-}
-
-/// What is said of a field that is not there, as serde has it.
-pub(crate) fn missing(name: &str) -> String {
-    format!("missing field `{name}`")
 }
 
 impl BodyEntry {
-    fn read(self, root: &Path) -> Result<Body, String> {
-        let kind = match self.kind {
-            KindName::Hand => BodyKind::Hand {
-                urdf: root.join(self.urdf.ok_or_else(|| missing("urdf"))?),
-                joints: positions(&self.joints.ok_or_else(|| missing("joints"))?),
+    /// The body; files are in `folder`.
+    ///
+    /// # Errors
+    /// The field that is missing.
+    fn read(self, folder: &Path) -> Result<Body, &'static str> {
+        let kind = match (self.kind, self.obj_id, self.mesh) {
+            (BodyKindName::Hand, ..) => BodyKind::Hand {
+                urdf: folder.join(self.urdf.ok_or("urdf")?),
+                joints: self.joints.ok_or("joints")?.positions(),
             },
-            KindName::Plane => BodyKind::Plane,
-            KindName::Object => {
-                BodyKind::Object { obj_id: self.obj_id.ok_or_else(|| missing("obj_id"))? }
+            (BodyKindName::Plane, ..) => BodyKind::Plane,
+            (BodyKindName::Object, Some(obj_id), _) => BodyKind::Object { obj_id },
+            (BodyKindName::Object, None, Some(mesh)) => BodyKind::Mesh {
+                file: folder.join(mesh),
+                unit: self.mesh_unit.ok_or("mesh_unit")?.meters(),
+            },
+            (BodyKindName::Object, None, None) => {
+                return Err(if self.pose.is_some() { "mesh" } else { "obj_id" });
             }
         };
-        let translation = translation_from_mm(&self.translation.0);
-        Ok(Body {
-            name: self.name,
-            kind,
-            t_cam_base: Isometry3::from_parts(translation, self.rotation.0),
-            sigmas: body_sigmas(self.sigma_mm, self.sigma_deg)?,
-        })
+        let t_cam_base = match (self.pose, self.rotation, self.translation) {
+            (Some(pose), ..) => pose.0,
+            (None, Some(rotation), Some(mm)) => pose(&rotation, &mm),
+            (None, None, _) => return Err("cam_R_b2c"),
+            (None, Some(_), None) => return Err("cam_t_b2c"),
+        };
+        let sigmas = sigmas(self.sigma_mm, self.sigma_deg);
+        Ok(Body { name: self.name, kind, t_cam_base, sigmas })
     }
 }
 
-impl SceneBodies {
-    /// Reads the entry of image `im_id`; `root` is the folder that URDF paths are relative to.
-    pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
-        let BodiesEntry { gravity, bodies } = file.entry(im_id)?;
-        let mut read: Vec<Body> = Vec::with_capacity(bodies.len());
-        for (k, entry) in bodies.into_iter().enumerate() {
-            let fault = |problem: &str| file.fault(&format!("{im_id}.bodies[{k}]"), problem);
-            check_name(&entry.name).map_err(|problem| fault(&problem))?;
-            let body = entry.read(root).map_err(|problem| fault(&problem))?;
-            if read.iter().any(|other| other.name == body.name) {
-                return Err(fault(&format!("there are two bodies called {:?}", body.name)));
-            }
-            read.push(body);
+/// The bodies of `entries`, beside those that there are; files are in `folder`, and `fault` makes an error of the entry's index, the field in it and the problem.
+///
+/// # Errors
+/// If a field is missing, and of a name that is there twice or would be mixed up with those of links.
+pub(crate) fn read_bodies(
+    bodies: &mut Vec<Body>,
+    entries: Vec<BodyEntry>,
+    folder: &Path,
+    fault: impl Fn(usize, &str, String) -> DatasetError,
+) -> Result<(), DatasetError> {
+    for (k, entry) in entries.into_iter().enumerate() {
+        let name = entry.name.clone();
+        if name.is_empty() || name.contains('/') {
+            return Err(fault(k, ".name", format!("{name:?} is empty or has a slash")));
         }
-        Ok(Self { gravity: gravity.map(|g| g.0.into()), bodies: read })
+        if bodies.iter().any(|other| other.name == name) {
+            return Err(fault(k, ".name", format!("there are two bodies called {name:?}")));
+        }
+        let missing = |field| fault(k, &format!(".{field}"), "is missing".to_owned());
+        bodies.push(entry.read(folder).map_err(missing)?);
+    }
+    Ok(())
+}
+
+impl SceneBodies {
+    /// Reads the entry of image `im_id`; `root` is the folder that paths are relative to.
+    pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
+        let entry: BodiesEntry = file.entry(im_id)?;
+        let mut bodies = Vec::with_capacity(entry.bodies.len());
+        read_bodies(&mut bodies, entry.bodies, root, |k, field, problem| {
+            file.fault(&format!("{im_id}.bodies[{k}]{field}"), problem)
+        })?;
+        Ok(Self { gravity: entry.gravity.map(|g| g.0.into()), bodies })
     }
 
     /// The body called `name`.

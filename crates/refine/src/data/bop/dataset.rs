@@ -21,7 +21,7 @@ use crate::scene::RemapCache;
 pub struct Dataset {
     root: PathBuf,
     split_dir: PathBuf,
-    scenes: BTreeMap<u32, Scene>,
+    scenes: BTreeMap<u32, DatasetScene>,
     models: Models,
     /// What all cameras have in common.
     pub(super) camera: JsonFile,
@@ -29,7 +29,7 @@ pub struct Dataset {
 
 /// One scene of a split; its files are read when first needed.
 #[derive(Debug)]
-pub struct Scene {
+pub struct DatasetScene {
     id: u32,
     dir: PathBuf,
     root: PathBuf,
@@ -38,12 +38,18 @@ pub struct Scene {
     pub(super) tactile: JsonFile,
     /// `scene_gt.json`; estimators may read the masks' objects alone.
     pub(super) objects: JsonFile,
-    pub(super) remaps: Arc<RemapCache>,
-    pub(super) depth_remaps: Arc<RemapCache>,
-    /// Warnings of depth images that were given: of values that are none, and of images that measure nothing.
-    pub(super) told_of_depth: Arc<[AtomicBool; 2]>,
+    pub(super) shared: Arc<SceneCaches>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
+}
+
+/// What all scenes of a dataset have in common, and keep where it is read again.
+#[derive(Debug, Default)]
+pub(super) struct SceneCaches {
+    pub(super) remaps: RemapCache,
+    pub(super) depth_remaps: RemapCache,
+    /// Warnings of depth images that were given: of values that are none, and of images that measure nothing.
+    pub(super) told_of_depth: [AtomicBool; 2],
 }
 
 /// The name of a rig, which may be a number.
@@ -88,43 +94,36 @@ impl Dataset {
     /// When that folder is absent or holds no scenes.
     pub fn open_split(root: &Path, split: &str) -> Result<Self, DatasetError> {
         let split_dir = root.join(split);
-        let told_of_depth = Arc::default();
-        let camera = JsonFile::new(root.join("camera.json"));
-        let scenes: BTreeMap<u32, Scene> = subfolders(&split_dir)?
-            .iter()
-            .filter_map(|name| Some((scene_id(name)?, split_dir.join(name))))
-            .map(|(id, dir)| (id, Scene::new(id, dir, root, &camera)))
-            .map(|(id, scene)| (id, Scene { told_of_depth: Arc::clone(&told_of_depth), ..scene }))
-            .collect();
-        if scenes.is_empty() {
-            return Err(no_scenes(&split_dir));
+        let named = |name: String| Some((scene_id(&name)?, split_dir.join(name)));
+        let scenes: Vec<_> = subfolders(&split_dir)?.into_iter().filter_map(named).collect();
+        match scenes.is_empty() {
+            true => Err(no_scenes(&split_dir)),
+            false => Ok(Self::of(root, &split_dir, scenes, &Arc::default())),
         }
-        Ok(Self {
-            root: root.to_path_buf(),
-            split_dir,
-            scenes,
+    }
+
+    fn of(
+        root: &Path,
+        split_dir: &Path,
+        scenes: Vec<(u32, PathBuf)>,
+        shared: &Arc<SceneCaches>,
+    ) -> Self {
+        let camera = JsonFile::new(root.join("camera.json"));
+        let scene = |(id, dir)| (id, DatasetScene::new(id, dir, root, &camera, shared));
+        Self {
+            root: root.to_owned(),
+            split_dir: split_dir.to_owned(),
+            scenes: scenes.into_iter().map(scene).collect(),
             models: Models::new(root.join("models")),
             camera,
-        })
+        }
     }
 
     /// The same with files that are read anew, for somebody may have gone on writing them.
     pub fn reread(&self) -> Self {
-        let camera = JsonFile::new(self.root.join("camera.json"));
-        let again = |scene: &Scene| {
-            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root, &camera);
-            let (remaps, depth_remaps) =
-                (Arc::clone(&scene.remaps), Arc::clone(&scene.depth_remaps));
-            let told_of_depth = Arc::clone(&scene.told_of_depth);
-            (scene.id, Scene { remaps, depth_remaps, told_of_depth, ..new })
-        };
-        Self {
-            root: self.root.clone(),
-            split_dir: self.split_dir.clone(),
-            scenes: self.scenes.values().map(again).collect(),
-            models: Models::new(self.root.join("models")),
-            camera,
-        }
+        let scenes = self.scenes.values().map(|scene| (scene.id, scene.dir.clone())).collect();
+        let shared = self.scenes.values().next().map(|scene| Arc::clone(&scene.shared));
+        Self::of(&self.root, &self.split_dir, scenes, &shared.unwrap_or_default())
     }
 
     /// The dataset's folder.
@@ -143,7 +142,7 @@ impl Dataset {
     }
 
     /// All scenes in ascending order of their ids.
-    pub fn scenes(&self) -> impl Iterator<Item = &Scene> {
+    pub fn scenes(&self) -> impl Iterator<Item = &DatasetScene> {
         self.scenes.values()
     }
 
@@ -151,15 +150,21 @@ impl Dataset {
     ///
     /// # Errors
     /// When the split holds no folder for it.
-    pub fn scene(&self, scene_id: u32) -> Result<&Scene, DatasetError> {
+    pub fn scene(&self, scene_id: u32) -> Result<&DatasetScene, DatasetError> {
         self.scenes
             .get(&scene_id)
             .ok_or_else(|| DatasetError::unusable(&self.split_dir, format!("no scene {scene_id}")))
     }
 }
 
-impl Scene {
-    fn new(id: u32, dir: PathBuf, root: &Path, camera: &JsonFile) -> Self {
+impl DatasetScene {
+    fn new(
+        id: u32,
+        dir: PathBuf,
+        root: &Path,
+        camera: &JsonFile,
+        shared: &Arc<SceneCaches>,
+    ) -> Self {
         Self {
             id,
             root: root.to_path_buf(),
@@ -167,9 +172,7 @@ impl Scene {
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
             objects: JsonFile::new(dir.join("scene_gt.json")),
-            remaps: Arc::default(),
-            depth_remaps: Arc::default(),
-            told_of_depth: Default::default(),
+            shared: Arc::clone(shared),
             rigs: OnceLock::new(),
             dir,
         }
@@ -237,7 +240,7 @@ impl Scene {
             let fault = |_| DatasetError::unusable(file, format!("{key:?} is not an image id"));
             key.parse().map_err(fault)
         };
-        let mut ids = self.camera.root()?.names().map(id).collect::<Result<Vec<u32>, _>>()?;
+        let mut ids = self.camera.root()?.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
         ids.sort_unstable();
         Ok(ids)
     }

@@ -9,7 +9,8 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::error::DatasetError;
-use super::json::{Numbers, Real, read_json};
+use super::json::read_json;
+use super::numbers::{Numbers, Real};
 
 /// Detections of a results file (`[{"scene_id", "image_id", "category_id", "score", "bbox", "segmentation"}, …]`).
 #[derive(Clone, Debug)]
@@ -25,12 +26,12 @@ pub(crate) struct Detection {
     pub(crate) obj_id: u32,
     /// Confidence; higher is better.
     pub(crate) score: f64,
-    shape: Shape,
+    shape: DetectionShape,
 }
 
 /// Pixels of a detection.
 #[derive(Clone, Debug)]
-enum Shape {
+enum DetectionShape {
     /// Height and width \[px\], and run lengths by columns, of unset and set pixels in turns.
     Mask([usize; 2], Vec<u32>),
     /// Left, top, width and height \[px\].
@@ -93,9 +94,14 @@ impl Detections {
                 (Some(Segmentation::RunLengths(runs)), _) => {
                     let size = runs.size;
                     let lengths = runs.lengths();
-                    Shape::Mask(size, lengths.map_err(|problem| fault("segmentation", &problem))?)
+                    DetectionShape::Mask(
+                        size,
+                        lengths.map_err(|problem| fault("segmentation", &problem))?,
+                    )
                 }
-                (None, Some(bbox)) if bbox.0[2] > 0.0 && bbox.0[3] > 0.0 => Shape::Box(bbox.0),
+                (None, Some(bbox)) if bbox.0[2] > 0.0 && bbox.0[3] > 0.0 => {
+                    DetectionShape::Box(bbox.0)
+                }
                 (None, Some(_)) => {
                     return Err(fault(
                         "bbox",
@@ -132,8 +138,8 @@ impl Detection {
     /// Height and width of its mask, if these are others.
     pub(crate) fn mask(&self, width: usize, height: usize) -> Result<Mask, [usize; 2]> {
         match &self.shape {
-            Shape::Mask(size, _) if *size != [height, width] => Err(*size),
-            Shape::Mask(size, lengths) => {
+            DetectionShape::Mask(size, _) if *size != [height, width] => Err(*size),
+            DetectionShape::Mask(size, lengths) => {
                 let mut pixels = vec![false; width * height];
                 let mut at = 0;
                 for (k, length) in lengths.iter().enumerate() {
@@ -145,7 +151,7 @@ impl Detection {
                 }
                 Mask::new(width, height, pixels).map_err(|_| *size)
             }
-            Shape::Box([left, top, columns, rows]) => {
+            DetectionShape::Box([left, top, columns, rows]) => {
                 let [left, top, right, bottom] =
                     [*left, *top, left + columns, top + rows].map(|v| v.round().max(0.0) as usize);
                 let columns = [left, top, right.saturating_sub(left), bottom.saturating_sub(top)];
@@ -156,7 +162,7 @@ impl Detection {
 
     /// True of a box.
     pub(crate) fn is_box(&self) -> bool {
-        matches!(self.shape, Shape::Box(_))
+        matches!(self.shape, DetectionShape::Box(_))
     }
 }
 

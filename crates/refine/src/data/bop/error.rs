@@ -23,6 +23,9 @@ pub enum DatasetError {
         /// What is wrong, and where the decoder knows it.
         problem: String,
     },
+    /// An image that does not decode; the message names the file.
+    #[error("{0}")]
+    Image(String),
     /// A mask in which nothing is set.
     #[error("{}: the mask is empty", file.display())]
     EmptyMask {
@@ -112,17 +115,7 @@ impl From<ImageError> for DatasetError {
     fn from(error: ImageError) -> Self {
         match &error {
             ImageError::Io { path, source } => Self::reading(path, source),
-            ImageError::Codec { path, source } => Self::unusable(path, source),
-            ImageError::Kind { path, expected, found } => {
-                Self::unusable(path, format!("expected {expected}, found {found}"))
-            }
-            ImageError::Scale { path, scale } => {
-                Self::unusable(path, format!("{scale} m per depth unit: must be above zero"))
-            }
-            ImageError::TooLarge { path, width, height } => {
-                Self::unusable(path, format!("{width} x {height} pixels are too many"))
-            }
-            ImageError::Size { .. } => Self::unusable(Path::new(""), error.to_string()),
+            other => Self::Image(other.to_string()),
         }
     }
 }

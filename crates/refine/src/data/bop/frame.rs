@@ -5,20 +5,18 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use nalgebra::Isometry3;
-use prehend_render::{
-    Camera, CameraError, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage, image_size,
-};
+use prehend_render::{Camera, CameraError, DepthImage, Mask, Remap, RgbImage, image_size};
 use serde::Deserialize;
 
-use super::bodies::{SceneBodies, missing};
-use super::dataset::{Dataset, Scene};
+use super::bodies::SceneBodies;
+use super::dataset::{Dataset, DatasetScene};
+use super::depth_camera::DepthCamera;
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive, Rotation};
-use super::lens::Lens;
-use super::pose::translation_from_mm;
+use super::json::JsonFile;
+use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
+use super::optics::{DepthWarning, Optics, check_size};
+use super::stated::Stated;
 use super::touch::Tactile;
-use crate::data::depth_camera::DepthCamera;
-use crate::data::depth_values::drop_saturated;
 use crate::scene::Observation;
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
@@ -27,14 +25,12 @@ use crate::scene::Observation;
 /// Where the dataset says that images were taken through a lens (`cam_dist` of `scene_camera.json`, or of `camera.json` for all of them),
 /// they are handed out as a pinhole camera of the same matrix and size sees them. Depth of a camera of its own is registered to the color camera.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
-    scene: &'a Scene,
+pub struct DatasetImage<'a> {
+    scene: &'a DatasetScene,
     /// `camera.json`.
     dataset_camera: &'a JsonFile,
     im_id: u32,
-    intrinsics: Intrinsics,
-    lens: Option<Distortion>,
-    depth_camera: Option<DepthCamera>,
+    optics: Optics<'a>,
     /// Millimeters per stored depth value.
     pub depth_scale: f64,
 }
@@ -71,10 +67,10 @@ struct ListedObject {
     obj_id: u32,
 }
 
-/// What `cam_K` says of a camera of unknown size.
+/// Row-major 3×3 intrinsics of a camera of unknown size.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Numbers<9>")]
-struct Intrinsics(Camera);
+pub(crate) struct Intrinsics(pub(crate) Camera);
 
 impl TryFrom<Numbers<9>> for Intrinsics {
     type Error = CameraError;
@@ -90,7 +86,7 @@ impl Dataset {
     /// # Errors
     /// Those of [`Dataset::scene`], and when `scene_camera.json` is absent or broken, or does not describe the image; when
     /// `camera.json` is broken.
-    pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
+    pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<DatasetImage<'_>, DatasetError> {
         let scene = self.scene(scene_id)?;
         let entry: CameraEntry = scene.camera.entry(im_id)?;
         let CameraEntry { intrinsics, depth_scale, mut lens, .. } = entry;
@@ -99,28 +95,28 @@ impl Dataset {
         }
         scene.camera.check_rotations(entry.depth_rotation.iter());
         let depth_camera = DepthCamera::new(
-            entry.depth_intrinsics.map(|k| k.0),
-            entry.depth_lens.map(|lens| lens.0),
-            (entry.depth_rotation.map(|r| r.0), entry.depth_translation.map(|t| t.0)),
+            entry.depth_intrinsics,
+            entry.depth_lens,
+            (entry.depth_rotation, entry.depth_translation),
         );
-        let depth_camera =
-            depth_camera.map_err(|name| scene.camera.fault(&im_id.to_string(), &missing(name)))?;
-        Ok(Frame {
-            scene,
-            dataset_camera: &self.camera,
-            im_id,
-            intrinsics,
-            depth_camera,
+        let lacks = |name| scene.camera.fault(&format!("{im_id}.{name}"), "is missing");
+        let depth_scale = depth_scale.map_or(1.0, |scale| scale.0);
+        let optics = Optics {
+            camera: intrinsics.0,
             lens: lens.map(|lens| lens.0),
-            depth_scale: depth_scale.map_or(1.0, |scale| scale.0),
-        })
+            depth_camera: depth_camera.map_err(lacks)?,
+            depth_unit: depth_scale * 1e-3,
+            remaps: &scene.shared.remaps,
+            depth_remaps: &scene.shared.depth_remaps,
+        };
+        Ok(DatasetImage { scene, dataset_camera: &self.camera, im_id, optics, depth_scale })
     }
 }
 
-impl Frame<'_> {
+impl DatasetImage<'_> {
     /// The camera that the estimator is told, for an image of `width` by `height` pixels: BOP keeps no sizes.
     pub fn camera(&self, width: usize, height: usize) -> Camera {
-        Camera { width, height, ..self.intrinsics.0 }
+        self.optics.camera(width, height)
     }
 
     /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).
@@ -136,7 +132,7 @@ impl Frame<'_> {
         self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
     }
 
-    /// The file of an object's mask; see [`Frame::mask`].
+    /// The file of an object's mask; see [`DatasetImage::mask`].
     fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
         let mut masks = self.mask_files();
         if let (Some(only), None) = (masks.next(), masks.next()) {
@@ -163,10 +159,7 @@ impl Frame<'_> {
     /// # Errors
     /// When it is absent or does not decode.
     pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
-        let file = self.rgb_path()?;
-        let stored = RgbImage::load(&file)?;
-        let size = (stored.width(), stored.height());
-        self.undistorted(&file, stored, size, Remap::rgb)
+        self.optics.color(&self.rgb_path()?)
     }
 
     /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.
@@ -174,45 +167,19 @@ impl Frame<'_> {
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
-        let color = match self.depth_camera {
-            Some(_) if self.has_color() => {
-                let color = self.rgb()?;
-                Some((color.width(), color.height()))
-            }
-            _ => None,
-        };
-        self.depth_of(color)
+        let beside = self.optics.depth_camera.is_some() && self.has_color();
+        let color = if beside { Some(image_size(&self.rgb_path()?)?) } else { None };
+        self.optics.depth(&self.depth_path(), color, &|file, warning| self.warn_once(file, warning))
     }
 
-    /// The same, registered to a color image of that size; of the depth image's without one.
-    fn depth_of(&self, color: Option<(usize, usize)>) -> Result<DepthImage, DatasetError> {
-        let file = self.depth_path();
-        let unit = self.depth_scale * 1e-3;
-        let mut stored = DepthImage::load(&file, unit)?;
-        if let Some(warning) = drop_saturated(&mut stored, unit) {
-            self.warn_once(0, &file, warning);
-        }
-        let size = (stored.width(), stored.height());
-        let depth = match &self.depth_camera {
-            None => self.undistorted(&file, stored, size, Remap::depth)?,
-            Some(own) => {
-                let (width, height) = color.unwrap_or(size);
-                let registered =
-                    own.register(stored, &self.camera(width, height), &self.scene.depth_remaps);
-                registered.map_err(|e| DatasetError::unusable(&file, e))?
-            }
+    /// Warns of the depth image in `file`, once a dataset of each kind.
+    fn warn_once(&self, file: &Path, warning: DepthWarning) {
+        let (kind, text) = match warning {
+            DepthWarning::Saturated(text) => (0, text),
+            DepthWarning::Empty => (1, "every depth is zero: color alone is used".to_owned()),
         };
-        if depth.pixels().iter().all(|&z| z == 0.0) {
-            Err(DatasetError::NoDepth { file })
-        } else {
-            Ok(depth)
-        }
-    }
-
-    /// Warns of the depth image in `file`, once a dataset of each of two kinds.
-    fn warn_once(&self, kind: usize, file: &Path, warning: String) {
-        if !self.scene.told_of_depth[kind].swap(true, Ordering::Relaxed) {
-            log::warn!("{}: {warning} (other images are not named)", file.display());
+        if !self.scene.shared.told_of_depth[kind].swap(true, Ordering::Relaxed) {
+            log::warn!("{}: {text} (other images are not named)", file.display());
         }
     }
 
@@ -246,37 +213,13 @@ impl Frame<'_> {
     /// # Errors
     /// When it is absent, does not decode, or no pixel is set.
     pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
-        self.read_mask(&self.mask_path(instance)?)
-    }
-
-    /// The mask in `file`.
-    fn read_mask(&self, file: &Path) -> Result<Mask, DatasetError> {
-        let stored = Mask::load(file)?;
-        let size = (stored.width(), stored.height());
-        let mask = self.undistorted(file, stored, size, Remap::mask)?;
-        if mask.count() == 0 {
-            return Err(DatasetError::EmptyMask { file: file.to_owned() });
-        }
-        Ok(mask)
-    }
-
-    /// An image that is `stored` with that `size`, as a pinhole camera sees it.
-    fn undistorted<T>(
-        &self,
-        file: &Path,
-        stored: T,
-        (width, height): (usize, usize),
-        apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
-    ) -> Result<T, DatasetError> {
-        let Some(lens) = self.lens else { return Ok(stored) };
-        let remap = self.scene.remaps.get(self.camera(width, height), lens);
-        apply(&remap, &stored).map_err(|e| DatasetError::unusable(file, e))
+        self.optics.mask(&self.mask_path(instance)?)
     }
 
     /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
-    /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
+    /// The first of those of [`DatasetImage::rgb`], [`DatasetImage::depth`] and [`DatasetImage::mask`], and
     /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
         let mut observation = self.unsegmented()?;
@@ -287,7 +230,7 @@ impl Frame<'_> {
     /// Gives `observation`, which is of this image, the mask of an object's visible part.
     ///
     /// # Errors
-    /// Those of [`Frame::mask`], and if it has another size.
+    /// Those of [`DatasetImage::mask`], and if it has another size.
     pub(crate) fn segment(
         &self,
         observation: &mut Observation,
@@ -298,9 +241,8 @@ impl Frame<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Observation, file: &Path) -> Result<(), DatasetError> {
-        let color = &observation.color;
-        self.check_size(file, image_size(file)?, (color.width(), color.height()))?;
-        observation.mask = self.read_mask(file)?;
+        check_size(file, &if self.has_color() { self.rgb_path()? } else { self.depth_path() })?;
+        observation.mask = self.optics.mask(file)?;
         Ok(())
     }
 
@@ -310,7 +252,7 @@ impl Frame<'_> {
     /// If it has another size than the image.
     pub(crate) fn undistorted_mask(&self, stored: Mask) -> Result<Mask, DatasetError> {
         let size = (stored.width(), stored.height());
-        self.undistorted(self.scene.dir(), stored, size, Remap::mask)
+        self.optics.undistorted(self.scene.dir(), stored, size, Remap::mask)
     }
 
     /// Whether the scene has a folder of color images.
@@ -343,44 +285,24 @@ impl Frame<'_> {
     /// color, of which is warned once a dataset.
     ///
     /// # Errors
-    /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
+    /// Those of [`DatasetImage::rgb`] and [`DatasetImage::depth`], and if the images differ in size.
     pub(crate) fn unsegmented(&self) -> Result<Observation, DatasetError> {
-        let color = match self.has_color() || !self.has_depth() {
-            true => Some(self.rgb_path()?),
-            false => None,
-        };
-        // Before anything is decoded.
-        let size = color.as_deref().map(image_size).transpose()?;
-        if let Some(size) = size.filter(|_| self.has_depth() && self.depth_camera.is_none()) {
-            let file = self.depth_path();
-            self.check_size(&file, image_size(&file)?, size)?;
-        }
-        let color = color.map(|_| self.rgb()).transpose()?;
-        if self.depth_camera.is_some() && color.is_none() {
+        let has_color = self.has_color() || !self.has_depth();
+        if self.optics.depth_camera.is_some() && !has_color {
             let problem = "is of a camera beside the color camera, and the scene has no rgb";
-            return Err(self.fault(&self.scene.camera, "depth_K", problem));
+            return Err(self.scene.camera.fault(&format!("{}.depth_K", self.im_id), problem));
         }
-        let depth = (self.has_depth() || color.is_none()).then(|| self.depth_of(size));
-        let depth = match depth.transpose() {
-            Err(DatasetError::NoDepth { file }) if color.is_some() => {
-                self.warn_once(1, &file, "every depth is zero: color alone is used".to_owned());
-                None
-            }
-            read => read?,
-        };
-        let (width, height) = size.unwrap_or_default();
-        let depth = depth.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
-        let (width, height) = (depth.width(), depth.height());
-        let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
-        let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));
-        Ok(Observation::new(camera, color, depth, mask))
+        let color = if has_color { Some(self.rgb_path()?) } else { None };
+        let depth = self.has_depth().then(|| self.depth_path());
+        let warn = |file: &Path, warning| self.warn_once(file, warning);
+        self.optics.observation(color.as_deref(), depth.as_deref(), &warn)
     }
 
     /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
     /// a mask of the object. Nothing for an image without a rig.
     ///
     /// # Errors
-    /// Those of [`Frame::observation`] of each, and if one lacks its place.
+    /// Those of [`DatasetImage::observation`] of each, and if one lacks its place.
     pub(crate) fn taken_together(
         &self,
         dataset: &Dataset,
@@ -427,25 +349,10 @@ impl Frame<'_> {
     fn place(&self) -> Result<Isometry3<f64>, DatasetError> {
         let PlaceEntry { rotation, translation } = self.scene.camera.entry(self.im_id)?;
         self.scene.camera.check_rotations(rotation.iter());
-        let lacks = |name| self.scene.camera.fault(&self.im_id.to_string(), &missing(name));
+        let lacks = |name| self.scene.camera.fault(&format!("{}.{name}", self.im_id), "is missing");
         let rotation = rotation.ok_or_else(|| lacks("cam_R_w2c"))?;
         let translation = translation.ok_or_else(|| lacks("cam_t_w2c"))?;
-        Ok(Isometry3::from_parts(translation_from_mm(&translation.0), rotation.0))
-    }
-
-    /// Refuses an image in `file` of `w` by `h` pixels where the color image, or depth without one, has `width` by `height`.
-    fn check_size(
-        &self,
-        file: &Path,
-        (w, h): (usize, usize),
-        (width, height): (usize, usize),
-    ) -> Result<(), DatasetError> {
-        if (w, h) == (width, height) {
-            return Ok(());
-        }
-        let other = if self.has_color() { self.rgb_path()? } else { self.depth_path() };
-        let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
-        Err(DatasetError::unusable(file, problem))
+        Ok(pose(&rotation, &translation))
     }
 
     /// Gravity, the known robots and other bodies, from `scene_bodies.json`.
@@ -466,17 +373,21 @@ impl Frame<'_> {
 
     /// An error about `field` of this image's entry of `scene_bodies.json`.
     pub(crate) fn bodies_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
-        self.fault(&self.scene.bodies, field, problem)
+        self.scene.bodies.fault(&format!("{}.{field}", self.im_id), problem)
     }
 
-    /// An error about `field` of this image's entry of `scene_tactile.json`.
-    pub(crate) fn tactile_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
-        self.fault(&self.scene.tactile, field, problem)
-    }
-
-    fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
-        let dot = if field.is_empty() || field.starts_with('[') { "" } else { "." };
-        DatasetError::field(file.path(), &format!("{}{dot}{field}", self.im_id), problem)
+    /// Names of this image's bodies and of as many `sensors` in their files.
+    pub(crate) fn stated(&self, bodies: usize, sensors: usize) -> Stated<'_> {
+        let id = self.im_id;
+        // One of several is called by its number.
+        let sensor = |k| if sensors > 1 { format!("{id}[{k}]") } else { id.to_string() };
+        Stated {
+            files: [self.scene.bodies.path(), self.scene.tactile.path()],
+            all: format!("{id}.bodies"),
+            bodies: (0..bodies).map(|k| format!("{id}.bodies[{k}]")).collect(),
+            sensors: (0..sensors).map(sensor).collect(),
+            force: "force",
+        }
     }
 }
 

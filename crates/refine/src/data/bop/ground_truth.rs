@@ -8,9 +8,9 @@ use serde::Deserialize;
 use super::bodies::SceneBodies;
 use super::dataset::Dataset;
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Rotation};
+use super::json::JsonFile;
 use super::models::Models;
-use super::pose::translation_from_mm;
+use super::numbers::{Numbers, Rotation, pose};
 
 /// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
 /// `models_eval/`.
@@ -75,9 +75,9 @@ impl<'a> GroundTruth<'a> {
         let file = self.objects_file(scene_id)?;
         let entries: Vec<ObjectEntry> = file.entry(im_id)?;
         file.check_rotations(entries.iter().map(|entry| &entry.rotation));
-        let object = |ObjectEntry { obj_id, rotation, translation }| {
-            let translation = translation_from_mm(&translation.0);
-            TrueObject { obj_id, t_cam_model: Isometry3::from_parts(translation, rotation.0) }
+        let object = |ObjectEntry { obj_id, rotation, translation }| TrueObject {
+            obj_id,
+            t_cam_model: pose(&rotation, &translation),
         };
         Ok(entries.into_iter().map(object).collect())
     }

@@ -9,49 +9,54 @@
 mod arrival;
 mod bodies;
 mod dataset;
+mod depth_camera;
+mod depth_values;
 mod detections;
-mod entries;
 mod error;
 mod files;
 mod frame;
+mod frame_pose;
 mod ground_truth;
 mod json;
-mod lens;
 mod models;
 mod models_info;
+mod numbers;
 mod one_camera;
+mod optics;
 mod pose;
 mod results;
 mod rivals;
+mod stated;
 mod touch;
-mod unique;
 mod visibility;
 
 pub use arrival::Stamp;
 pub use bodies::{Body, BodyKind, SceneBodies};
-pub(crate) use bodies::{KindName, body_sigmas, positions};
-pub use dataset::{Dataset, Scene};
+pub(crate) use bodies::{BodyEntry, read_bodies, sigmas};
+pub use dataset::{Dataset, DatasetScene};
+pub(crate) use depth_camera::DepthCamera;
+#[cfg(feature = "mcap")]
+pub(crate) use depth_values::drop_saturated;
 pub use detections::Detections;
 pub use error::DatasetError;
 pub use files::{check_writable, create_folder, write_atomically};
 pub(crate) use files::{lock, read_bytes, read_text};
-pub use frame::Frame;
+pub use frame::DatasetImage;
+pub(crate) use frame::Intrinsics;
+pub(crate) use frame_pose::{FramePose, LengthUnit};
 pub use ground_truth::{GroundTruth, TrueObject};
-pub(crate) use json::{
-    Numbers, Positive, Real, Rotation, field_fault, read_json, read_json_in_range,
-};
-pub(crate) use lens::Lens;
+pub(crate) use json::{UniqueMap, read_json};
 pub use models::{ModelInfo, Models};
 pub(crate) use models_info::extent_to_bop;
 pub use models_info::write_symmetries;
-pub(crate) use pose::{
-    require_in_range, rotation_from_row_major, rotation_to_row_major, translation_from_mm,
-    translation_to_mm,
-};
+pub(crate) use numbers::{Lens, NonNegative, Numbers, Positive, Real, Rotation};
+pub(crate) use optics::{DepthWarning, Optics, check_size};
+pub use pose::pose_from_matrix;
+pub(crate) use pose::{rotation_to_row_major, translation_to_mm};
 pub use results::{
     ReadResults, ResultRow, ResultsWriter, read_results, share_image_times, write_results,
 };
 pub use rivals::read_rivals;
+pub(crate) use stated::Stated;
 pub(crate) use touch::TactileEntry;
 pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};
-pub(crate) use unique::parse_json;

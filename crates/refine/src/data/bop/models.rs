@@ -7,7 +7,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive, Real};
+use super::json::JsonFile;
+use super::numbers::{Numbers, Positive, Real};
 use super::pose::pose_from_bop;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
@@ -95,7 +96,7 @@ struct InfoEntry {
     mass_kg: Option<Positive>,
     com_mm: Option<Numbers<3>>,
     inertia_kg_m2: Option<Inertia>,
-    symmetries_discrete: Option<Vec<Motion>>,
+    symmetries_discrete: Option<Vec<SymmetryMotion>>,
     symmetries_continuous: Option<Vec<AxisEntry>>,
 }
 
@@ -165,9 +166,9 @@ impl TryFrom<Numbers<3>> for Direction {
 /// A row-major 4×4 motion with its translation in millimeters.
 #[derive(Deserialize)]
 #[serde(try_from = "Numbers<16>")]
-struct Motion(Isometry3<f64>);
+struct SymmetryMotion(Isometry3<f64>);
 
-impl TryFrom<Numbers<16>> for Motion {
+impl TryFrom<Numbers<16>> for SymmetryMotion {
     type Error = String;
 
     fn try_from(numbers: Numbers<16>) -> Result<Self, String> {
@@ -254,7 +255,7 @@ mod tests {
         );
         for (id, problem) in [
             (1, "1.diameter: must be above zero"),
-            (2, "2.mass_kg: is not a finite number"),
+            (2, "2.mass_kg: invalid type: string \"heavy\", expected f64"),
             (3, "3.inertia_kg_m2: is not positive definite"),
             (4, "4.inertia_kg_m2: is not symmetric"),
             (5, "5.symmetries_continuous[0].axis: has no direction"),

@@ -5,10 +5,10 @@ use prehend_geometry::cloud::diameter;
 use serde_json::{Map, Value, json};
 
 use super::error::DatasetError;
-use super::files::{read_bytes, write_atomically};
+use super::files::write_atomically;
+use super::json::{UniqueMap, read_json};
 use super::models::Models;
 use super::pose::{rotation_to_row_major, translation_to_mm};
-use super::unique::parse_json;
 use crate::MM_PER_M;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
@@ -39,28 +39,17 @@ pub fn write_symmetries(
     symmetries: &Symmetries,
 ) -> Result<(), DatasetError> {
     let file = models.dir().join("models_info.json");
-    let mut list: Map<String, Value> = match read_bytes(&file) {
-        // Strictly: numbers that JSON does not know could not be written back.
-        Ok(bytes) => match parse_json(&bytes) {
-            Ok(Value::Object(list)) => list,
-            Ok(_) => return Err(DatasetError::unusable(&file, "the top level is no JSON object")),
-            Err(e) => {
-                return Err(DatasetError::unusable(&file, format!("not valid JSON: {e}")));
-            }
-        },
-        Err(DatasetError::Missing { .. }) => Map::new(),
-        Err(e) => return Err(e),
+    // Strictly: numbers that JSON does not know could not be written back.
+    let mut list: UniqueMap<Map<String, Value>> = match read_json(&file) {
+        Err(DatasetError::Missing { .. }) => UniqueMap::default(),
+        read => read?,
     };
-    let entry =
-        list.entry(obj_id.to_string()).or_insert_with(|| Value::Object(extent_to_bop(vertices)));
-    let Value::Object(fields) = entry else {
-        return Err(DatasetError::unusable(&file, format!("{obj_id}: is no object")));
-    };
+    let fields = list.0.entry(obj_id.to_string()).or_insert_with(|| extent_to_bop(vertices));
     for name in ["symmetries_discrete", "symmetries_continuous"] {
         fields.remove(name);
     }
     fields.extend(symmetries.to_bop());
-    write_atomically(&file, format!("{:#}\n", Value::Object(list)).as_bytes())
+    write_atomically(&file, format!("{:#}\n", json!(list.0)).as_bytes())
 }
 
 impl Symmetries {

@@ -6,10 +6,12 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::json;
+use serde_json::value::to_raw_value;
 
-use super::json::{JsonFile, Positive, Real};
+use super::json::{JsonFile, UniqueMap, read_json};
+use super::numbers::{Positive, Real};
 
-/// What BOP's `camera.json` says of the camera.
+/// The camera of BOP's `camera.json`.
 #[derive(Deserialize)]
 struct CameraFile {
     fx: Positive,
@@ -23,10 +25,10 @@ struct CameraFile {
 /// in `rgb/`, or else in `depth/`.
 pub(super) fn scene_camera(dir: &Path, camera: &JsonFile) -> JsonFile {
     let path = dir.join("scene_camera.json");
-    if path.exists() || !camera.exists() {
+    if path.exists() {
         return JsonFile::new(path);
     }
-    let Ok(CameraFile { fx, fy, cx, cy, depth_scale }) = camera.whole() else {
+    let Ok(CameraFile { fx, fy, cx, cy, depth_scale }) = read_json(camera.path()) else {
         // What is missing then is scene_camera.json.
         return JsonFile::new(path);
     };
@@ -34,9 +36,8 @@ pub(super) fn scene_camera(dir: &Path, camera: &JsonFile) -> JsonFile {
     let entry = json!({ "cam_K": k, "depth_scale": depth_scale.map_or(1.0, |scale| scale.0) });
     let images = ["rgb", "depth"].map(|folder| image_ids(&dir.join(folder)));
     let images = images.into_iter().find(|ids| !ids.is_empty()).unwrap_or_default();
-    let entries: serde_json::Map<_, _> =
-        images.iter().map(|id| (id.to_string(), entry.clone())).collect();
-    JsonFile::with_text(path, &serde_json::Value::from(entries).to_string())
+    let named = |id: u32| Some((id.to_string(), to_raw_value(&entry).ok()?));
+    JsonFile::with_entries(path, UniqueMap(images.into_iter().filter_map(named).collect()))
 }
 
 /// Numbers that are names of files in `folder`.

@@ -40,7 +40,7 @@ pub struct ReadResults {
     /// The well-formed rows in file order.
     pub rows: Vec<ResultRow>,
     /// For each of `rows`, its index from 0 among all the file's rows of the same image, malformed
-    /// ones included: the instance that [`super::Frame::mask`] asks for.
+    /// ones included: the instance that [`super::DatasetImage::mask`] asks for.
     pub instances: Vec<usize>,
     /// The line of each of `rows`, from 1, the header included.
     pub lines: Vec<u64>,

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
+use serde_json::Value;
 
-use super::bodies::missing;
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Real};
+use super::json::JsonFile;
+use super::numbers::{NonNegative, Numbers};
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
@@ -68,24 +69,25 @@ impl TactileReading {
     }
 }
 
-/// As files have it.
-#[derive(Clone, Deserialize)]
+/// A sensor in a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct TactileEntry {
     body: Option<String>,
     #[serde(default)]
-    kind: KindName,
+    kind: SensorKindName,
     taxels: Option<PathBuf>,
     force: Option<Vec<Numbers<3>>>,
     contact: Option<Vec<Option<Flag>>>,
-    distance: Option<Vec<Option<Real>>>,
+    distance: Option<Vec<Option<NonNegative>>>,
     link: Option<String>,
     points: Option<Vec<Numbers<3>>>,
     normals: Option<Vec<Numbers<3>>>,
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum KindName {
+enum SensorKindName {
     #[default]
     Force,
     Binary,
@@ -95,64 +97,58 @@ enum KindName {
 
 /// Whether something is so.
 #[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "is not true, false, 1, 0 or null")]
-enum Flag {
-    Bool(bool),
-    Number(u8),
-}
+#[serde(try_from = "Value")]
+struct Flag(bool);
 
-impl Flag {
-    fn is_set(self) -> Result<bool, String> {
-        match self {
-            Self::Bool(set) => Ok(set),
-            Self::Number(number @ (0 | 1)) => Ok(number == 1),
-            Self::Number(other) => Err(format!("contact: {other} is neither 0 nor 1")),
-        }
+impl TryFrom<Value> for Flag {
+    type Error = String;
+
+    fn try_from(value: Value) -> Result<Self, String> {
+        let set = value.as_bool().or_else(|| [false, true].get(value.as_u64()? as usize).copied());
+        set.map(Self).ok_or_else(|| format!("{value} is not true, false, 1, 0 or null"))
     }
 }
 
 impl TactileEntry {
-    /// Layouts are in `folder`.
+    /// The sensor, of the body `default` if it does not say which carries it. Layouts are in `folder`.
     ///
     /// # Errors
-    /// If a field is missing or has an impossible value.
-    pub(crate) fn read(self, folder: &Path) -> Result<Tactile, String> {
-        let missing = |name| move || missing(name);
-        let taxels = self.taxels.map(|taxels| folder.join(taxels));
+    /// The field that is missing or has an impossible value, and the problem.
+    pub(crate) fn read(
+        self,
+        folder: &Path,
+        default: Option<&str>,
+    ) -> Result<Tactile, (&'static str, String)> {
+        let missing = |name| move || (name, "is missing".to_owned());
+        let taxels = || self.taxels.map(|taxels| folder.join(taxels)).ok_or_else(missing("taxels"));
         let reading = match self.kind {
-            KindName::Force => {
-                let force = self.force.ok_or_else(missing("force"))?.into_iter();
-                let newtons = force.map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect();
-                let taxels = taxels.ok_or_else(missing("taxels"))?;
-                TactileReading::Force { taxels, force: newtons }
+            SensorKindName::Force => {
+                let force = self.force.filter(|force| !force.is_empty());
+                let force = force.ok_or_else(missing("force"))?.into_iter();
+                let force = force.map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect();
+                TactileReading::Force { taxels: taxels()?, force }
             }
-            KindName::Binary => {
+            SensorKindName::Binary => {
                 let contact = self.contact.ok_or_else(missing("contact"))?.into_iter();
-                let contact = contact.map(|flag| flag.map(Flag::is_set).transpose());
-                TactileReading::Binary {
-                    contact: contact.collect::<Result<_, String>>()?,
-                    taxels: taxels.ok_or_else(missing("taxels"))?,
-                }
+                let contact = contact.map(|flag| flag.map(|flag| flag.0)).collect();
+                TactileReading::Binary { taxels: taxels()?, contact }
             }
-            KindName::Proximity => {
-                let distance = self.distance.ok_or_else(missing("distance"))?;
-                if let Some(wrong) = distance.iter().flatten().find(|mm| mm.0 < 0.0) {
-                    return Err(format!("distance: {} is below zero", wrong.0));
-                }
-                let meters = distance.into_iter().map(|mm| mm.map(|mm| mm.0 * 1e-3)).collect();
-                let taxels = taxels.ok_or_else(missing("taxels"))?;
-                TactileReading::Proximity { taxels, distance: meters }
+            SensorKindName::Proximity => {
+                let distance = self.distance.ok_or_else(missing("distance"))?.into_iter();
+                let distance = distance.map(|mm| mm.map(|mm| mm.0 * 1e-3)).collect();
+                TactileReading::Proximity { taxels: taxels()?, distance }
             }
-            KindName::Patch => {
+            SensorKindName::Patch => {
                 let points = self.points.ok_or_else(missing("points"))?;
                 let normals = self.normals.ok_or_else(missing("normals"))?;
+                let fault = |problem| ("normals", problem);
                 if points.len() != normals.len() {
                     let (points, normals) = (points.len(), normals.len());
-                    return Err(format!("normals: {normals}, but there are {points} points"));
+                    return Err(fault(format!("{normals}, but there are {points} points")));
                 }
                 let unit = |normal: Numbers<3>| {
-                    let normal = Vector3::from(normal.0);
-                    normal.try_normalize(1e-6).ok_or("normals: one is zero")
+                    let normal = Vector3::from(normal.0).try_normalize(1e-6);
+                    normal.ok_or_else(|| fault("one is zero".to_owned()))
                 };
                 TactileReading::Patch {
                     link: self.link.ok_or_else(missing("link"))?,
@@ -161,12 +157,8 @@ impl TactileEntry {
                 }
             }
         };
-        Ok(Tactile { body: self.body.unwrap_or_default(), reading })
-    }
-
-    /// Whether it names the body that carries it.
-    fn has_body(&self) -> bool {
-        self.body.is_some()
+        let body = self.body.or_else(|| default.map(str::to_owned)).ok_or_else(missing("body"))?;
+        Ok(Tactile { body, reading })
     }
 }
 
@@ -179,10 +171,8 @@ impl Tactile {
     ) -> Result<Vec<Self>, DatasetError> {
         let mut read: Vec<Self> = Vec::new();
         for (name, entry) in file.entries::<TactileEntry>(im_id)? {
-            if !entry.has_body() {
-                return Err(file.fault(&name, &missing("body")));
-            }
-            let sensor = entry.read(root).map_err(|problem| file.fault(&name, &problem))?;
+            let fault = |(field, problem)| file.fault(&format!("{name}.{field}"), problem);
+            let sensor = entry.read(root, None).map_err(fault)?;
             let is_force = |sensor: &Self| matches!(sensor.reading, TactileReading::Force { .. });
             if is_force(&sensor) && read.iter().any(is_force) {
                 return Err(file.fault(&name, "there are two sensors of kind force"));

@@ -39,7 +39,7 @@ pub struct Calibrated {
 }
 
 /// Hears how many of the visits that there are at most have been made, or will not have to be.
-type Progress<'a> = dyn FnMut(usize) + 'a;
+type VisitProgress<'a> = dyn FnMut(usize) + 'a;
 
 impl<'a> Passes<'a> {
     /// At most so many passes over each window of so many frames, or over all at once.
@@ -59,7 +59,7 @@ impl<'a> Passes<'a> {
     pub fn run(
         &self,
         calibrator: Calibrator,
-        progress: &mut Progress<'_>,
+        progress: &mut VisitProgress<'_>,
     ) -> Result<Calibrated, AssetError> {
         let (poses, left_out) = (BTreeMap::new(), BTreeMap::new());
         let failed = BTreeMap::new();
@@ -76,7 +76,7 @@ impl<'a> Passes<'a> {
         &self,
         window: Range<usize>,
         done: &mut Calibrated,
-        progress: &mut Progress<'_>,
+        progress: &mut VisitProgress<'_>,
     ) -> Result<(), AssetError> {
         for number in 1..=self.most {
             let mut pass = Pass::default();

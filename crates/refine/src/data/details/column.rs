@@ -7,32 +7,24 @@ pub enum Values {
     Integers(Vec<i64>),
     /// Numbers, NaN where one is not known.
     Numbers(Vec<f64>),
-    /// Whether something is so.
-    Flags(Vec<bool>),
     /// Texts, empty where there is none.
     Texts(Vec<String>),
 }
 
 impl Values {
-    /// How many there are, of all rows together.
-    pub fn len(&self) -> usize {
+    /// Number of values of all rows together.
+    pub(super) fn count(&self) -> usize {
         match self {
             Self::Integers(values) => values.len(),
             Self::Numbers(values) => values.len(),
-            Self::Flags(values) => values.len(),
             Self::Texts(values) => values.len(),
         }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
 /// A named column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub struct TableColumn {
     /// Its name.
     pub name: &'static str,
     /// Shape of what it has in a row: empty for a single value.
@@ -41,7 +33,7 @@ pub struct Column {
     pub values: Values,
 }
 
-impl Column {
+impl TableColumn {
     /// How many values it has in a row.
     pub fn width(&self) -> usize {
         self.shape.iter().product()

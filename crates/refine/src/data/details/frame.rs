@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::column::{Column, Values};
+use super::column::{TableColumn, Values};
 use crate::scene::Target;
 use crate::strategy::PosteriorSummary;
 
@@ -43,44 +43,44 @@ pub struct TrackDetails {
 /// The columns of `frames`, in their order.
 ///
 /// Those of what no frame has, initial poses or how it was followed, are left out; `docs/EXPORT.md` lists them all.
-pub fn details_table(frames: &[FrameDetails]) -> Vec<Column> {
+pub fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter();
     let id = |name, of: fn(&Target) -> i64| {
-        Column::new(name, rows().map(|frame| of(&frame.target)), Values::Integers)
+        TableColumn::new(name, rows().map(|frame| of(&frame.target)), Values::Integers)
     };
     let mut columns = vec![
         id("scene_id", |target| target.scene_id.into()),
         id("im_id", |target| target.im_id.into()),
         id("obj_id", |target| target.obj_id.into()),
         id("instance", |target| target.instance as i64),
-        Column::arrays("t_cam_model", &[4, 4], rows().map(|f| Some(matrix(&f.t_cam_model)))),
+        TableColumn::arrays("t_cam_model", &[4, 4], rows().map(|f| Some(matrix(&f.t_cam_model)))),
     ];
     if rows().any(|frame| frame.initial.is_some()) {
         let initial = rows().map(|frame| frame.initial.as_ref().map(matrix));
-        columns.push(Column::arrays("initial_t_cam_model", &[4, 4], initial));
+        columns.push(TableColumn::arrays("initial_t_cam_model", &[4, 4], initial));
     }
     columns.extend(of_posteriors(frames));
     let iterations = rows().map(|frame| frame.iterations as i64);
-    columns.push(Column::new("iterations", iterations, Values::Integers));
+    columns.push(TableColumn::new("iterations", iterations, Values::Integers));
     let seconds = rows().map(|frame| frame.seconds.unwrap_or(f64::NAN));
-    columns.push(Column::new("seconds", seconds, Values::Numbers));
+    columns.push(TableColumn::new("seconds", seconds, Values::Numbers));
     columns.extend(of_tracks(frames));
     let warnings = rows().map(|frame| frame.warnings.join("\n"));
-    columns.push(Column::new("warnings", warnings, Values::Texts));
+    columns.push(TableColumn::new("warnings", warnings, Values::Texts));
     columns
 }
 
 /// What is known of how uncertain poses are.
-fn of_posteriors(frames: &[FrameDetails]) -> Vec<Column> {
+fn of_posteriors(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter().map(|frame| frame.posterior.as_ref());
     let array = |name, shape: &[usize], of: fn(&PosteriorSummary) -> Vec<f64>| {
-        Column::arrays(name, shape, rows().map(|p| p.map(of)))
+        TableColumn::arrays(name, shape, rows().map(|p| p.map(of)))
     };
     let number = |name, of: fn(&PosteriorSummary) -> Option<f64>| {
-        Column::new(name, rows().map(|p| p.and_then(of).unwrap_or(f64::NAN)), Values::Numbers)
+        TableColumn::new(name, rows().map(|p| p.and_then(of).unwrap_or(f64::NAN)), Values::Numbers)
     };
     let text = |name, of: fn(&PosteriorSummary) -> String| {
-        Column::new(name, rows().map(|p| p.map(of).unwrap_or_default()), Values::Texts)
+        TableColumn::new(name, rows().map(|p| p.map(of).unwrap_or_default()), Values::Texts)
     };
     let most = rows().flatten().map(|p| p.weights.len()).max().unwrap_or(0);
     vec![
@@ -98,22 +98,22 @@ fn of_posteriors(frames: &[FrameDetails]) -> Vec<Column> {
 }
 
 /// What is known of how objects were followed.
-fn of_tracks(frames: &[FrameDetails]) -> Vec<Column> {
+fn of_tracks(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter().map(|frame| frame.track.as_ref());
     if rows().all(|track| track.is_none()) {
         return Vec::new();
     }
     let text = |name, of: fn(&TrackDetails) -> String| {
-        Column::new(name, rows().map(|t| t.map(of).unwrap_or_default()), Values::Texts)
+        TableColumn::new(name, rows().map(|t| t.map(of).unwrap_or_default()), Values::Texts)
     };
     let cost = rows().map(|track| track.map_or(f64::NAN, |t| t.cost));
     let mut columns = vec![
         text("status", |track| track.status.to_owned()),
         text("rejection", |track| track.rejection.clone().unwrap_or_default()),
-        Column::new("cost", cost, Values::Numbers),
+        TableColumn::new("cost", cost, Values::Numbers),
     ];
     let stamps: Option<Vec<i64>> = rows().map(|track| track.and_then(|t| t.stamp)).collect();
-    columns.extend(stamps.map(|stamps| Column::new("stamp_ns", stamps, Values::Integers)));
+    columns.extend(stamps.map(|stamps| TableColumn::new("stamp_ns", stamps, Values::Integers)));
     columns
 }
 

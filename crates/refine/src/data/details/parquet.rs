@@ -2,20 +2,17 @@
 
 use std::sync::Arc;
 
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 
-use super::column::{Column, Values};
-
-/// Why there is none: there is.
-pub(super) const MISSING: Option<&str> = None;
+use super::column::{TableColumn, Values};
 
 /// The content of the file. Arrays of a row are lists, row-major: their lengths are the same in all rows, their shapes are not kept.
-pub(super) fn file(columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
-    let columns: Vec<&Column> = columns.iter().filter(|column| column.width() > 0).collect();
+pub(super) fn file(columns: &[TableColumn]) -> Result<Vec<u8>, ParquetError> {
+    let columns: Vec<&TableColumn> = columns.iter().filter(|column| column.width() > 0).collect();
     let fields: String = columns.iter().map(|column| field(column)).collect();
     let schema = Arc::new(parse_message_type(&format!("message frames {{ {fields} }}"))?);
     let properties = Arc::new(WriterProperties::builder().build());
@@ -32,11 +29,10 @@ pub(super) fn file(columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
 }
 
 /// A column in the words of a schema.
-fn field(Column { name, shape, values }: &Column) -> String {
+fn field(TableColumn { name, shape, values }: &TableColumn) -> String {
     let (kind, meaning) = match values {
         Values::Integers(_) => ("INT64", ""),
         Values::Numbers(_) => ("DOUBLE", ""),
-        Values::Flags(_) => ("BOOLEAN", ""),
         Values::Texts(_) => ("BINARY", " (STRING)"),
     };
     if shape.is_empty() {
@@ -46,10 +42,13 @@ fn field(Column { name, shape, values }: &Column) -> String {
     format!("REQUIRED group {name} (LIST) {{ REPEATED group list {{ {element} }} }} ")
 }
 
-fn write(column: &Column, writer: &mut SerializedColumnWriter<'_>) -> Result<(), ParquetError> {
+fn write(
+    column: &TableColumn,
+    writer: &mut SerializedColumnWriter<'_>,
+) -> Result<(), ParquetError> {
     // Within a list, all but the first element of a row repeat, and none is absent.
     let levels = (!column.shape.is_empty()).then(|| {
-        let count = column.values.len();
+        let count = column.values.count();
         let repeats = |k: usize| i16::from(!k.is_multiple_of(column.width()));
         (vec![1; count], (0..count).map(repeats).collect::<Vec<i16>>())
     });
@@ -63,9 +62,6 @@ fn write(column: &Column, writer: &mut SerializedColumnWriter<'_>) -> Result<(),
         }
         Values::Numbers(values) => {
             writer.typed::<DoubleType>().write_batch(values, definition, repetition)
-        }
-        Values::Flags(values) => {
-            writer.typed::<BoolType>().write_batch(values, definition, repetition)
         }
         Values::Texts(texts) => {
             let texts: Vec<ByteArray> = texts.iter().map(|t| t.as_str().into()).collect();

@@ -1,17 +1,14 @@
 //! The frames of a recording.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::BufReader;
 
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
-use super::error::RecordingError;
 use super::images::{self, describe};
 use super::reader::MessageReader;
 use super::recording::{Recording, messages, moment, type_of};
 use super::topics::ImageTopic;
-use crate::data::depth_camera::DepthCamera;
+use crate::data::bop::{DatasetError, DepthCamera};
 use crate::scene::{Hand, Observation};
 
 /// Images are of the same moment if they are not farther apart \[ns\].
@@ -26,14 +23,14 @@ pub struct RecordedFrame {
     /// When the image was taken, by the clock of the recording \[ns\].
     pub nanoseconds: i64,
     /// What was sensed.
-    pub observation: Result<Observation, RecordingError>,
+    pub observation: Result<Observation, DatasetError>,
 }
 
 /// The frames of a [`Recording`], one after the other. A few images are in memory at a time.
 pub struct Frames<'a> {
     recording: &'a Recording,
     hand: Option<&'a Hand>,
-    messages: MessageReader<BufReader<File>>,
+    messages: MessageReader<'a>,
     first: Stream,
     depth: Option<Stream>,
     mask: Option<Stream>,
@@ -72,7 +69,7 @@ impl<'a> Frames<'a> {
     pub(super) fn new(
         recording: &'a Recording,
         hand: Option<&'a Hand>,
-    ) -> Result<Self, RecordingError> {
+    ) -> Result<Self, DatasetError> {
         let topics = &recording.topics;
         Ok(Self {
             recording,
@@ -114,12 +111,11 @@ impl<'a> Frames<'a> {
         first: &[u8],
         depth: Option<&[u8]>,
         mask: Option<&[u8]>,
-    ) -> Result<Observation, RecordingError> {
+    ) -> Result<Observation, DatasetError> {
         let recording = self.recording;
-        let fault = |topic: &str, problem: String| RecordingError::Topic {
-            file: recording.file.clone(),
-            topic: format!("{topic} at {:.3} s", at as f64 * 1e-9),
-            problem,
+        let fault = |topic: &str, problem: String| {
+            let field = format!("{topic} at {:.3} s", at as f64 * 1e-9);
+            DatasetError::field(&recording.file, &field, problem)
         };
         let of = |stream: &Stream, problem| fault(&stream.topic.name, problem);
         let lens_fault = |e: DistortionError| of(&self.first, e.to_string());

@@ -5,9 +5,9 @@ use std::path::Path;
 use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::{DepthImage, Mask, RgbImage};
 
-use crate::data::depth_values::drop_saturated;
+use crate::data::bop::drop_saturated;
 
-use super::messages::{CompressedImage, Header, Image, Named, decode};
+use super::messages::{CompressedImage, Header, Named, RosImage, decode};
 
 /// What a topic of images shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +20,8 @@ pub(super) enum Content {
 
 /// When and in which frame a message was taken, and what it shows by what it says of itself.
 pub(super) fn describe(kind: &str, data: &[u8]) -> Result<(Header, Content), String> {
-    let (header, encoding) = if kind == Image::TYPE {
-        let image: Image<'_> = decode(data)?;
+    let (header, encoding) = if kind == RosImage::TYPE {
+        let image: RosImage<'_> = decode(data)?;
         (image.header, image.encoding)
     } else {
         let image: CompressedImage<'_> = decode(data)?;
@@ -45,7 +45,7 @@ pub(super) fn color(kind: &str, data: &[u8]) -> Result<RgbImage, String> {
         let image: CompressedImage<'_> = decode(data)?;
         return RgbImage::decode(image.data, Path::new(image.format)).map_err(|e| e.to_string());
     }
-    let image: Image<'_> = decode(data)?;
+    let image: RosImage<'_> = decode(data)?;
     let [r, g, b, channels] = match image.encoding {
         "rgb8" => [0, 1, 2, 3],
         "bgr8" | "8UC3" => [2, 1, 0, 3],
@@ -77,7 +77,7 @@ pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
         drop_saturated(&mut depth, MILLIMETER);
         return Ok(depth);
     }
-    let image: Image<'_> = decode(data)?;
+    let image: RosImage<'_> = decode(data)?;
     let big = image.is_bigendian != 0;
     let pixels: Vec<f32> = match image.encoding {
         "16UC1" | "mono16" => {
@@ -117,7 +117,7 @@ pub(super) fn mask(kind: &str, data: &[u8]) -> Result<Mask, String> {
 }
 
 /// Rows of the pixels of `image`, each of so many bytes.
-fn rows<'a>(image: &Image<'a>, bytes: usize) -> Result<impl Iterator<Item = &'a [u8]>, String> {
+fn rows<'a>(image: &RosImage<'a>, bytes: usize) -> Result<impl Iterator<Item = &'a [u8]>, String> {
     let (width, step) = (image.width as usize * bytes, image.step as usize);
     let needed = (image.height as usize).checked_sub(1).map(|rows| {
         // Of sizes that need not be true.
@@ -140,7 +140,7 @@ fn rows<'a>(image: &Image<'a>, bytes: usize) -> Result<impl Iterator<Item = &'a 
 }
 
 fn sized<T>(
-    image: &Image<'_>,
+    image: &RosImage<'_>,
     make: impl FnOnce(usize, usize) -> Result<T, prehend_render::ImageError>,
 ) -> Result<T, String> {
     make(image.width as usize, image.height as usize).map_err(|e| e.to_string())
@@ -154,29 +154,29 @@ mod tests {
     fn image(encoding: &str, size: [u32; 2], step: u32, data: &[u8]) -> Vec<u8> {
         let [width, height] = size;
         let header = Header::default();
-        encode(&Image { header, height, width, encoding, is_bigendian: 0, step, data }).unwrap()
+        encode(&RosImage { header, height, width, encoding, is_bigendian: 0, step, data }).unwrap()
     }
 
     #[test]
     fn pixels_are_read_by_their_encoding_and_padding_is_left_out() {
         let bytes = [10, 20, 30, 40, 50, 60, 0, 0, 70, 80, 90, 100, 110, 120];
         let level = |bytes: [u8; 3]| bytes.map(|b| f32::from(b) / 255.0);
-        let read = |encoding| color(Image::TYPE, &image(encoding, [2, 2], 8, &bytes)).unwrap();
+        let read = |encoding| color(RosImage::TYPE, &image(encoding, [2, 2], 8, &bytes)).unwrap();
         assert_eq!(read("rgb8").pixels()[1], level([40, 50, 60]));
         assert_eq!(read("bgr8").pixels()[2], level([90, 80, 70]));
         let two = [0x10, 0x27, 0, 0];
-        let read = depth(Image::TYPE, &image("16UC1", [2, 1], 4, &two)).unwrap();
+        let read = depth(RosImage::TYPE, &image("16UC1", [2, 1], 4, &two)).unwrap();
         assert_eq!(read.pixels(), [10.0, 0.0]);
         let floats = [1.5f32, f32::NAN, -1.0].map(f32::to_le_bytes).concat();
-        let read = depth(Image::TYPE, &image("32FC1", [3, 1], 12, &floats)).unwrap();
+        let read = depth(RosImage::TYPE, &image("32FC1", [3, 1], 12, &floats)).unwrap();
         assert_eq!(read.pixels(), [1.5, 0.0, 0.0]);
-        let read = mask(Image::TYPE, &image("mono8", [3, 1], 3, &[0, 1, 255])).unwrap();
+        let read = mask(RosImage::TYPE, &image("mono8", [3, 1], 3, &[0, 1, 255])).unwrap();
         assert_eq!(read.pixels(), [false, true, true]);
     }
 
     #[test]
     fn what_is_no_image_is_told() {
-        let told = |bytes: &[u8]| color(Image::TYPE, bytes).unwrap_err();
+        let told = |bytes: &[u8]| color(RosImage::TYPE, bytes).unwrap_err();
         assert!(told(&image("rgb8", [2, 2], 6, &[0; 11])).contains("11 bytes in rows of 6"));
         assert!(told(&image("rgb8", [u32::MAX, u32::MAX], u32::MAX, &[0; 9])).contains("9 bytes"));
         assert!(told(&image("bayer_rggb8", [1, 1], 1, &[0])).contains("bayer_rggb8"));

@@ -23,7 +23,7 @@ macro_rules! named {
 }
 
 named! {
-    Image<'a> "sensor_msgs/msg/Image"
+    RosImage<'a> "sensor_msgs/msg/Image"
     CompressedImage<'a> "sensor_msgs/msg/CompressedImage"
     CameraInfo "sensor_msgs/msg/CameraInfo"
     JointState "sensor_msgs/msg/JointState"
@@ -66,7 +66,7 @@ pub(super) struct Header {
 
 /// Pixels as they are.
 #[derive(Debug, Deserialize, Serialize)]
-pub(super) struct Image<'a> {
+pub(super) struct RosImage<'a> {
     pub(super) header: Header,
     pub(super) height: u32,
     pub(super) width: u32,
@@ -93,7 +93,7 @@ fn as_bytes<S: Serializer>(data: &&[u8], serializer: S) -> Result<S::Ok, S::Erro
 }
 
 /// Intrinsics, lens, and how the image was rectified.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct CameraInfo {
     pub(super) header: Header,
     pub(super) height: u32,
@@ -118,7 +118,7 @@ pub(super) struct RegionOfInterest {
     pub(super) do_rectify: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct JointState {
     pub(super) header: Header,
     pub(super) name: Vec<String>,
@@ -137,7 +137,7 @@ pub(super) struct TransformMessage {
 pub(super) struct TransformStamped {
     pub(super) header: Header,
     pub(super) child_frame_id: String,
-    pub(super) transform: Pose,
+    pub(super) transform: RosTransform,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -159,8 +159,8 @@ impl From<Vector3> for Vector<f64> {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub(super) struct Rotation {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub(super) struct RosQuaternion {
     pub(super) x: f64,
     pub(super) y: f64,
     pub(super) z: f64,
@@ -168,24 +168,24 @@ pub(super) struct Rotation {
 }
 
 /// A pose or a transform, which are the same numbers \[m\].
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub(super) struct Pose {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub(super) struct RosTransform {
     pub(super) translation: Vector3,
-    pub(super) rotation: Rotation,
+    pub(super) rotation: RosQuaternion,
 }
 
-impl From<&Isometry3<f64>> for Pose {
+impl From<&Isometry3<f64>> for RosTransform {
     fn from(t: &Isometry3<f64>) -> Self {
         let q = t.rotation.coords;
-        let rotation = Rotation { x: q.x, y: q.y, z: q.z, w: q.w };
+        let rotation = RosQuaternion { x: q.x, y: q.y, z: q.z, w: q.w };
         Self { translation: t.translation.vector.into(), rotation }
     }
 }
 
-impl Pose {
+impl RosTransform {
     /// The same for computing; none if the numbers are no pose.
     pub(super) fn isometry(&self) -> Option<Isometry3<f64>> {
-        let Rotation { x, y, z, w } = self.rotation;
+        let RosQuaternion { x, y, z, w } = self.rotation;
         let (q, t) = (Quaternion::new(w, x, y, z), Vector::from(self.translation));
         let off = (q.norm() - 1.0).abs();
         let unit = off < 1e-3;
@@ -215,7 +215,7 @@ pub(super) struct WrenchStamped {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct PoseWithCovarianceStamped {
     pub(super) header: Header,
-    pub(super) pose: Pose,
+    pub(super) pose: RosTransform,
     /// Of x, y, z and the rotations about these axes, row-major.
     pub(super) covariance: [[f64; 6]; 6],
 }
@@ -256,14 +256,14 @@ pub(super) struct Color {
 }
 
 /// Something to be drawn in a scene.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct Marker {
     pub(super) header: Header,
     pub(super) ns: String,
     pub(super) id: i32,
     pub(super) kind: i32,
     pub(super) action: i32,
-    pub(super) pose: Pose,
+    pub(super) pose: RosTransform,
     pub(super) scale: Vector3,
     pub(super) color: Color,
     pub(super) lifetime: Time,

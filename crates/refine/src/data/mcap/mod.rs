@@ -1,21 +1,18 @@
 //! Robots' logs: ROS 2 messages in [MCAP](https://mcap.dev) files, read and written without ROS.
 
 mod camera;
-mod error;
 mod frames;
 mod images;
 mod lengths;
 mod messages;
 mod reader;
 mod recording;
-mod records;
 mod schemas;
 mod series;
 mod topics;
 mod transforms;
 mod writer;
 
-pub use self::error::RecordingError;
 pub use self::frames::{Frames, RecordedFrame};
 pub use self::recording::Recording;
 pub use self::topics::ImageTopics;

@@ -1,90 +1,118 @@
 //! The messages of a log, one after the other.
 
 use std::borrow::Cow;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, ErrorKind, Read};
 
 use mcap::read::ChannelAccumulator;
 use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Message, parse_record};
 
 use super::lengths;
-use super::records::Records;
+
+/// The longest record, compressed or not \[bytes\]: a broken length must not take all memory.
+const LONGEST: usize = 1 << 29;
+
+/// Length of what is read at once \[bytes\], for the same reason.
+const BLOCK: usize = 1 << 20;
 
 /// Messages in the order of the file; nothing after the first error. What else there is, attachments and indices, is not looked at.
-pub(super) struct MessageReader<R> {
-    file: Records<R>,
-    /// The chunk that is being read.
-    chunk: Option<Records<Cursor<Vec<u8>>>>,
+pub(super) struct MessageReader<'a> {
+    /// The file, and the chunk of it that is being read.
+    open: Vec<RecordReader<'a>>,
     channels: ChannelAccumulator<'static>,
-    done: bool,
 }
 
-/// What is in a file.
-enum Part {
-    Message(Message<'static>),
-    Chunk(Vec<u8>),
+/// Records in their order.
+struct RecordReader<'a> {
+    source: Box<dyn Read + 'a>,
+    reader: LinearReader,
 }
 
-impl<R: Read> MessageReader<R> {
-    pub(super) fn new(source: R) -> Self {
-        let file = Records::of_file(source);
-        Self { file, chunk: None, channels: ChannelAccumulator::default(), done: false }
+impl<'a> MessageReader<'a> {
+    pub(super) fn new(source: impl Read + 'a) -> Self {
+        let options = LinearReaderOptions::default().with_emit_chunks(true);
+        let file = RecordReader::new(source, options);
+        Self { open: vec![file], channels: ChannelAccumulator::default() }
     }
 
-    fn read(&mut self) -> Option<McapResult<Message<'static>>> {
-        let channels = &mut self.channels;
-        loop {
-            if let Some(chunk) = &mut self.chunk {
-                let found = chunk.find_map(|opcode, record| message(channels, opcode, record));
-                if found.is_some() {
-                    return found;
-                }
-                self.chunk = None;
-            }
-            let part = |opcode, record: &[u8]| match opcode {
-                op::CHUNK => chunk(record).map(|chunk| Some(Part::Chunk(chunk))),
-                _ => Ok(message(channels, opcode, record)?.map(Part::Message)),
+    fn read(&mut self) -> McapResult<Option<Message<'static>>> {
+        while let Some(source) = self.open.last_mut() {
+            let Some((opcode, record)) = source.next().transpose()? else {
+                self.open.pop();
+                continue;
             };
-            match self.file.find_map(part)? {
-                Ok(Part::Message(message)) => return Some(Ok(message)),
-                Ok(Part::Chunk(chunk)) => self.chunk = Some(Records::of_chunk(Cursor::new(chunk))),
+            if !lengths::fit(opcode, &record) {
+                return Err(McapError::UnexpectedEof);
+            }
+            if opcode == op::CHUNK {
+                // With its kind and length before it, as in a file.
+                let length = (record.len() as u64).to_le_bytes();
+                let chunk = Cursor::new([&[op::CHUNK], &length[..], &record].concat());
+                let options = LinearReaderOptions::default()
+                    .with_skip_start_magic(true)
+                    .with_skip_end_magic(true)
+                    .with_validate_chunk_crcs(true);
+                self.open.push(RecordReader::new(chunk, options));
+            } else if matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+                let message = message(&mut self.channels, parse_record(opcode, &record)?)?;
+                if message.is_some() {
+                    return Ok(message);
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Iterator for MessageReader<'_> {
+    type Item = McapResult<Message<'static>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.read().transpose();
+        if matches!(next, Some(Err(_))) {
+            self.open.clear();
+        }
+        next
+    }
+}
+
+impl<'a> RecordReader<'a> {
+    fn new(source: impl Read + 'a, options: LinearReaderOptions) -> Self {
+        let options = options.with_record_length_limit(LONGEST);
+        Self { source: Box::new(source), reader: LinearReader::new_with_options(options) }
+    }
+}
+
+impl Iterator for RecordReader<'_> {
+    /// Kind and content.
+    type Item = McapResult<(u8, Vec<u8>)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.reader.next_event()? {
+                Ok(LinearReadEvent::ReadRequest(count)) => {
+                    match self.source.read(self.reader.insert(count.min(BLOCK))) {
+                        Ok(read) => self.reader.notify_read(read),
+                        Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                        Err(error) => return Some(Err(error.into())),
+                    }
+                }
+                Ok(LinearReadEvent::Record { opcode, data }) => {
+                    return Some(Ok((opcode, data.to_vec())));
+                }
                 Err(error) => return Some(Err(error)),
             }
         }
     }
 }
 
-impl<R: Read> Iterator for MessageReader<R> {
-    type Item = McapResult<Message<'static>>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let next = if self.done { None } else { self.read() };
-        self.done = !matches!(next, Some(Ok(_)));
-        next
-    }
-}
-
-/// A chunk's record with its kind and length before it.
-fn chunk(record: &[u8]) -> McapResult<Vec<u8>> {
-    match lengths::fit(op::CHUNK, record) {
-        true => Ok([&[op::CHUNK], &(record.len() as u64).to_le_bytes()[..], record].concat()),
-        false => Err(McapError::UnexpectedEoc),
-    }
-}
-
 /// The message that a record is, if it is one; `channels` learn of schemas and channels.
 fn message(
     channels: &mut ChannelAccumulator<'static>,
-    opcode: u8,
-    record: &[u8],
+    record: Record<'_>,
 ) -> McapResult<Option<Message<'static>>> {
-    if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
-        return Ok(None);
-    }
-    if !lengths::fit(opcode, record) {
-        return Err(McapError::UnexpectedEof);
-    }
-    match parse_record(opcode, record)? {
+    match record {
         Record::Schema { header, data } => channels.add_schema_from_slice(header, &data)?,
         Record::Channel(channel) => channels.add_channel(channel)?,
         Record::Message { header, data } => {
@@ -155,6 +183,6 @@ mod tests {
         let at = log.windows(9).rposition(|bytes| bytes == message).unwrap();
         log[at + 2] = 1;
         let read: Vec<_> = MessageReader::new(&log[..]).collect();
-        assert!(matches!(read[..], [Err(McapError::UnexpectedEoc)]), "{read:?}");
+        assert!(matches!(read[..], [Err(McapError::UnexpectedEof)]), "{read:?}");
     }
 }

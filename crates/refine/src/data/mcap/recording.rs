@@ -1,7 +1,6 @@
 //! A recording, opened: all but its images is read.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -11,19 +10,18 @@ use prehend_geometry::open_plain;
 use serde::Deserialize;
 
 use super::camera::Lensed;
-use super::error::RecordingError;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
-    CameraInfo, CompressedImage, Header, Image, JointState, Named, TransformMessage,
+    CameraInfo, CompressedImage, Header, JointState, Named, RosImage, TransformMessage,
     Vector3Stamped, WrenchStamped, decode,
 };
 use super::reader::MessageReader;
-use super::series::Series;
+use super::series::TimeSeries;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
 use super::transforms::{Transforms, plain};
-use crate::scene::RemapCache;
-use crate::scene::{Hand, HandMeasurement, check_gravity};
+use crate::data::bop::DatasetError;
+use crate::scene::{Hand, HandMeasurement, RemapCache, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
 ///
@@ -34,13 +32,8 @@ pub struct Recording {
     /// Of the images that are the frames, and of depth if that has one of its own.
     pub(super) camera: Lensed,
     pub(super) depth_camera: Option<Lensed>,
-    transforms: Transforms,
+    readings: Readings,
     world: String,
-    joints: HashMap<String, Series<f64>>,
-    /// By frame \[N\].
-    forces: HashMap<String, Series<Vector3<f64>>>,
-    /// What is said of gravity \[m/s²\], and in which frame.
-    gravity: Option<(String, Series<Vector3<f64>>)>,
     count: usize,
     faults: Vec<String>,
     pub(super) remaps: RemapCache,
@@ -52,17 +45,24 @@ const FELT: i64 = 50_000_000;
 /// Acceleration of free fall \[m/s²\].
 const GRAVITY: f64 = 9.81;
 
+/// Readings over time.
+#[derive(Default)]
+struct Readings {
+    transforms: Transforms,
+    joints: HashMap<String, TimeSeries<f64>>,
+    /// By frame \[N\].
+    forces: HashMap<String, TimeSeries<Vector3<f64>>>,
+    /// Gravity \[m/s²\], and its frame.
+    gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
+}
+
 /// What the first reading finds.
 #[derive(Default)]
-struct Found {
+struct RecordingIndex {
     images: Known,
     counts: HashMap<String, usize>,
     cameras: HashMap<String, CameraInfo>,
-    transforms: Transforms,
-    joints: HashMap<String, Series<f64>>,
-    forces: HashMap<String, Series<Vector3<f64>>>,
-    /// With its frame.
-    gravity: Option<(String, Series<Vector3<f64>>)>,
+    readings: Readings,
     /// Length of the messages of readings \[bytes\].
     kept: u64,
     /// By topic: the first fault, and how many there are.
@@ -75,18 +75,17 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read, or there are no images or no camera of them. Messages that are broken, and a file that is cut off, are
     /// [faults](Self::faults).
-    pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, RecordingError> {
-        let mut found = Found::default();
+    pub fn open(file: &Path, topics: &ImageTopics, world: &str) -> Result<Self, DatasetError> {
+        let mut found = RecordingIndex::default();
         for message in messages(file)? {
             if found.kept > MOST_KEPT {
                 let problem = format!("more than {MOST_KEPT} bytes, which all would be kept");
-                let (file, topic) = (file.to_owned(), "readings".to_owned());
-                return Err(RecordingError::Topic { file, topic, problem });
+                return Err(DatasetError::field(file, "readings", problem));
             }
             match message {
                 Ok(message) => found.take(&message),
                 Err(source) if found.images.is_empty() => {
-                    return Err(RecordingError::Format { file: file.to_owned(), source });
+                    return Err(DatasetError::unusable(file, source));
                 }
                 Err(source) => {
                     let problem = format!("it cannot be read any further: {source}");
@@ -94,9 +93,8 @@ impl Recording {
                 }
             }
         }
-        found.sort();
-        let fault =
-            |(topic, problem)| RecordingError::Topic { file: file.to_owned(), topic, problem };
+        found.readings.sort();
+        let fault = |(topic, problem): (String, String)| DatasetError::field(file, &topic, problem);
         let topics = Chosen::new(&found.images, topics).map_err(fault)?;
         let first = &topics.frames;
         let camera = found.camera(first).map_err(fault)?;
@@ -124,10 +122,7 @@ impl Recording {
             count: found.counts.get(&first.name).copied().unwrap_or_default(),
             faults: faults.collect(),
             topics,
-            transforms: found.transforms,
-            joints: found.joints,
-            forces: found.forces,
-            gravity: found.gravity,
+            readings: found.readings,
             remaps: RemapCache::default(),
             depth_remaps: RemapCache::default(),
         })
@@ -147,7 +142,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the file cannot be opened any more.
-    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, RecordingError> {
+    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, DatasetError> {
         Frames::new(self, hand)
     }
 
@@ -158,17 +153,19 @@ impl Recording {
 
     /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.
     pub(super) fn gravity(&self, at: i64) -> Option<Vector3<f64>> {
-        if let Some((frame, series)) = &self.gravity {
+        if let Some((frame, series)) = &self.readings.gravity {
             let told = series.nearest(at, i64::MAX)?;
             return match plain(frame) == self.camera_frame() {
                 true => Some(told),
-                false => Some(self.transforms.between(self.camera_frame(), frame, at)? * told),
+                false => {
+                    Some(self.readings.transforms.between(self.camera_frame(), frame, at)? * told)
+                }
             };
         }
-        if !self.transforms.knows(&self.world) {
+        if !self.readings.transforms.knows(&self.world) {
             return None;
         }
-        let t_cam_world = self.transforms.between(self.camera_frame(), &self.world, at)?;
+        let t_cam_world = self.readings.transforms.between(self.camera_frame(), &self.world, at)?;
         Some(t_cam_world * Vector3::new(0.0, 0.0, -GRAVITY))
     }
 
@@ -178,7 +175,7 @@ impl Recording {
     /// That nothing says so.
     pub(super) fn in_camera(&self, from: &str, at: i64) -> Result<Isometry3<f64>, String> {
         let camera = self.camera_frame();
-        let place = self.transforms.between(camera, from, at);
+        let place = self.readings.transforms.between(camera, from, at);
         place.ok_or_else(|| format!("no transform says where {from:?} is in {camera:?} then"))
     }
 
@@ -190,7 +187,7 @@ impl Recording {
         let root = &hand.tree.links()[0].name;
         let t_cam_hand = self.in_camera(root, at)?;
         let position = |name: &String| {
-            let series = self.joints.get(name)?;
+            let series = self.readings.joints.get(name)?;
             let position = series.at(at, |a, b, part| a + (b - a) * part)?;
             Some((name.clone(), position))
         };
@@ -203,9 +200,9 @@ impl Recording {
     fn felt(&self, taxels: &[Taxel], at: i64) -> Vec<Vector3<f64>> {
         let alone = |link: &str| taxels.iter().filter(|taxel| taxel.link == link).count() == 1;
         let force = |taxel: &Taxel| {
-            let own = self.forces.get(&taxel_frame(taxel.index));
-            let series =
-                own.or_else(|| self.forces.get(&taxel.link).filter(|_| alone(&taxel.link)));
+            let own = self.readings.forces.get(&taxel_frame(taxel.index));
+            let series = own
+                .or_else(|| self.readings.forces.get(&taxel.link).filter(|_| alone(&taxel.link)));
             series.and_then(|series| series.nearest(at, FELT))
         };
         let felt: Vec<_> = taxels.iter().map(force).collect();
@@ -230,24 +227,25 @@ pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
 }
 
 /// The messages of `file`, in its order.
-pub(super) fn messages(file: &Path) -> Result<MessageReader<BufReader<File>>, RecordingError> {
-    let opened = open_plain(file);
-    let opened = opened.map_err(|source| RecordingError::Io { file: file.to_owned(), source })?;
+pub(super) fn messages(file: &Path) -> Result<MessageReader<'static>, DatasetError> {
+    let opened = open_plain(file).map_err(|e| DatasetError::reading(file, &e))?;
     Ok(MessageReader::new(BufReader::with_capacity(1 << 20, opened)))
 }
 
 /// So many bytes of messages of what is kept are read \[bytes\]: chunks of a small file may expand to any number.
 const MOST_KEPT: u64 = 4 << 30;
 
-impl Found {
+impl Readings {
     /// To be called when all messages have been taken over.
     fn sort(&mut self) {
-        self.joints.values_mut().for_each(Series::sort);
-        self.forces.values_mut().for_each(Series::sort);
+        self.joints.values_mut().for_each(TimeSeries::sort);
+        self.forces.values_mut().for_each(TimeSeries::sort);
         self.gravity.iter_mut().for_each(|(_, series)| series.sort());
         self.transforms.sort();
     }
+}
 
+impl RecordingIndex {
     /// Takes over what a message says.
     fn take(&mut self, message: &mcap::Message<'_>) {
         let topic = &message.channel.topic;
@@ -265,7 +263,7 @@ impl Found {
         if message.channel.message_encoding != "cdr" {
             return Ok(());
         }
-        if kind == Image::TYPE || kind == CompressedImage::TYPE {
+        if kind == RosImage::TYPE || kind == CompressedImage::TYPE {
             *self.counts.entry(topic.to_owned()).or_default() += 1;
             if !self.images.contains_key(topic) {
                 let (header, content) = describe(kind, data)?;
@@ -278,28 +276,33 @@ impl Found {
         } else if kind == JointState::TYPE {
             let JointState { header, name, position, .. } = self.keep(data)?;
             for (name, position) in name.into_iter().zip(position) {
-                let series = self.joints.entry(name).or_default();
+                let series = self.readings.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);
             }
         } else if kind == TransformMessage::TYPE {
             let fixed = topic.ends_with("tf_static");
             let TransformMessage { transforms } = self.keep(data)?;
             for transform in &transforms {
-                self.transforms.add(transform, moment(&transform.header, message), fixed)?;
+                self.readings.transforms.add(
+                    transform,
+                    moment(&transform.header, message),
+                    fixed,
+                )?;
             }
         } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
             let Vector3Stamped { header, vector } = self.keep(data)?;
             let (at, vector) = (moment(&header, message), Vector3::from(vector));
             check_gravity(&vector).map_err(|e| e.to_string())?;
-            let first = || (header.frame_id.clone(), Series::default());
-            let (frame, series) = self.gravity.get_or_insert_with(first);
+            let first = || (header.frame_id.clone(), TimeSeries::default());
+            let (frame, series) = self.readings.gravity.get_or_insert_with(first);
             if *frame == header.frame_id {
                 series.push(at, vector);
             }
         } else if kind == WrenchStamped::TYPE {
             let WrenchStamped { header, force, .. } = self.keep(data)?;
             let at = moment(&header, message);
-            let series = self.forces.entry(plain(&header.frame_id).to_owned()).or_default();
+            let series =
+                self.readings.forces.entry(plain(&header.frame_id).to_owned()).or_default();
             series.push(at, force.into());
         }
         Ok(())

@@ -2,18 +2,18 @@
 
 /// Values at moments \[ns\], in order.
 #[derive(Clone, Debug)]
-pub(super) struct Series<T>(Vec<(i64, T)>);
+pub(super) struct TimeSeries<T>(Vec<(i64, T)>);
 
 /// A value counts for so long before and after its moment \[ns\].
 const HELD: i64 = 100_000_000;
 
-impl<T> Default for Series<T> {
+impl<T> Default for TimeSeries<T> {
     fn default() -> Self {
         Self(Vec::new())
     }
 }
 
-impl<T: Copy> Series<T> {
+impl<T: Copy> TimeSeries<T> {
     /// Keeps `value`, in whatever order they come: see [`sort`](Self::sort).
     pub(super) fn push(&mut self, at: i64, value: T) {
         self.0.push((at, value));
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn values_are_mixed_between_moments_and_held_for_a_while_beyond() {
-        let mut series = Series::default();
+        let mut series = TimeSeries::default();
         let ms = 1_000_000;
         for (at, value) in [(20, 2.0), (10, 1.0), (430, 7.0), (430, 3.0)] {
             series.push(at * ms, value);
@@ -73,6 +73,6 @@ mod tests {
         assert_eq!([119, 121, 331, 531].map(at), [Some(2.0), None, Some(3.0), None]);
         assert_eq!([14, 26].map(|at| series.nearest(at * ms, 7 * ms)), [Some(1.0), Some(2.0)]);
         assert_eq!(series.nearest(i64::MIN, i64::MAX), Some(1.0));
-        assert_eq!(Series::<f64>::default().nearest(0, i64::MAX), None);
+        assert_eq!(TimeSeries::<f64>::default().nearest(0, i64::MAX), None);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::Isometry3;
 
 use super::messages::TransformStamped;
-use super::series::Series;
+use super::series::TimeSeries;
 
 /// All frames, each in its parent.
 #[derive(Debug, Default)]
@@ -13,18 +13,18 @@ pub(super) struct Transforms {
     /// Numbers of frames by name.
     numbers: HashMap<String, usize>,
     /// By number.
-    frames: Vec<Motion>,
+    frames: Vec<FrameMotion>,
 }
 
 /// A frame in its parent, which may be another one later.
 #[derive(Debug, Default)]
-struct Motion {
-    fixed: Option<Place>,
-    moving: Series<Place>,
+struct FrameMotion {
+    fixed: Option<ParentPose>,
+    moving: TimeSeries<ParentPose>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct ParentPose {
     parent: usize,
     /// The frame's coordinates → those of the parent \[m\].
     pose: Isometry3<f64>,
@@ -50,7 +50,7 @@ impl Transforms {
         let pose = message.transform.isometry().ok_or_else(|| {
             format!("{child:?} in {parent:?}: not finite, or the quaternion is not of length 1")
         })?;
-        let place = Place { parent: self.number(parent), pose };
+        let place = ParentPose { parent: self.number(parent), pose };
         let child = self.number(child);
         let motion = &mut self.frames[child];
         match fixed {
@@ -71,7 +71,7 @@ impl Transforms {
         }
         let number = self.frames.len();
         self.numbers.insert(name.to_owned(), number);
-        self.frames.push(Motion::default());
+        self.frames.push(FrameMotion::default());
         number
     }
 
@@ -107,11 +107,11 @@ impl Transforms {
     }
 }
 
-impl Motion {
-    fn at(&self, at: i64) -> Option<Place> {
+impl FrameMotion {
+    fn at(&self, at: i64) -> Option<ParentPose> {
         self.fixed.or_else(|| {
             self.moving.at(at, |a, b, part| match a.parent == b.parent {
-                true => Place { parent: a.parent, pose: a.pose.lerp_slerp(&b.pose, part) },
+                true => ParentPose { parent: a.parent, pose: a.pose.lerp_slerp(&b.pose, part) },
                 false => *if part < 0.5 { a } else { b },
             })
         })

@@ -1,7 +1,7 @@
 //! Recordings of what was sensed and found.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
@@ -10,14 +10,14 @@ use prehend_geometry::{AtomicFile, TriMesh};
 use prehend_render::{Camera, RgbImage};
 use serde::Serialize;
 
-use super::error::RecordingError;
 use super::messages::{
-    CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header, Image,
-    JointState, KeyValue, Marker, MeshFile, Named, PoseWithCovarianceStamped, RegionOfInterest,
-    Texture, Time, TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped, encode,
+    CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header,
+    JointState, KeyValue, Marker, Named, PoseWithCovarianceStamped, RosImage, Time,
+    TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped, encode,
 };
 use super::recording::taxel_frame;
 use super::schemas::schema;
+use crate::data::bop::DatasetError;
 use crate::scene::{Hand, HandMeasurement, Observation};
 use crate::strategy::Posterior;
 use crate::tracker::{TrackStatus, Tracked};
@@ -44,13 +44,11 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn create(file: &Path) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { file: file.to_owned(), source };
-        let opened = AtomicFile::create(file).map_err(io)?;
+    pub fn create(file: &Path) -> Result<Self, DatasetError> {
+        let opened = AtomicFile::create(file).map_err(|e| DatasetError::writing(file, e))?;
         let options = mcap::WriteOptions::new().profile("ros2").library("prehend");
         let writer = options.create(BufWriter::new(opened));
-        let writer =
-            writer.map_err(|source| RecordingError::Format { file: file.to_owned(), source })?;
+        let writer = writer.map_err(|e| DatasetError::writing(file, e))?;
         Ok(Self { file: file.to_owned(), writer, channels: HashMap::new() })
     }
 
@@ -58,13 +56,10 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written; then there is none.
-    pub fn finish(mut self) -> Result<(), RecordingError> {
-        let format = |source| RecordingError::Format { file: self.file.clone(), source };
-        self.writer.finish().map_err(format)?;
+    pub fn finish(mut self) -> Result<(), DatasetError> {
+        self.writer.finish().map_err(|e| DatasetError::writing(&self.file, e))?;
         let written = self.writer.into_inner().into_inner().map_err(|e| e.into_error());
-        written
-            .and_then(AtomicFile::commit)
-            .map_err(|source| RecordingError::Io { file: self.file, source })
+        written.and_then(AtomicFile::commit).map_err(|e| DatasetError::writing(&self.file, e))
     }
 
     /// What was sensed at the moment `at` \[ns\]; of which `hand`, if there is one.
@@ -76,7 +71,7 @@ impl RecordingWriter {
         at: i64,
         observation: &Observation,
         hand: Option<&Hand>,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let Observation { camera, color, depth, mask, gravity, .. } = observation;
         let size = [camera.width, camera.height];
         let mut placed = Vec::new();
@@ -114,13 +109,12 @@ impl RecordingWriter {
         at: i64,
         measured: &HandMeasurement,
         hand: &Hand,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let joints = JointState {
             header: header(at, ""),
             name: hand.tree.joint_names().to_vec(),
             position: measured.joints.clone(),
-            velocity: Vec::new(),
-            effort: Vec::new(),
+            ..JointState::default()
         };
         self.write("/joint_states", at, &joints)?;
         for (taxel, force) in hand.taxels.iter().zip(&measured.forces) {
@@ -137,29 +131,19 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn object(&mut self, at: i64, mesh: &TriMesh) -> Result<(), RecordingError> {
+    pub fn object(&mut self, at: i64, mesh: &TriMesh) -> Result<(), DatasetError> {
         let corner = |face: &[u32; 3], k: usize| mesh.vertices[face[k] as usize].coords.into();
         let corners = mesh.faces.iter().flat_map(|face| (0..3).map(move |k| corner(face, k)));
         let marker = Marker {
             header: header(at, OBJECT),
             ns: "object".to_owned(),
-            id: 0,
             kind: Marker::TRIANGLES,
-            action: 0,
             pose: (&Isometry3::identity()).into(),
             scale: Vector3::repeat(1.0).into(),
             color: Color { r: 0.35, g: 0.6, b: 0.9, a: 0.9 },
-            lifetime: Time::default(),
             frame_locked: true,
             points: corners.collect(),
-            colors: Vec::new(),
-            texture_resource: String::new(),
-            texture: Texture::default(),
-            uv_coordinates: Vec::new(),
-            text: String::new(),
-            mesh_resource: String::new(),
-            mesh_file: MeshFile::default(),
-            mesh_use_embedded_materials: false,
+            ..Marker::default()
         };
         self.write("/prehend/object", at, &marker)
     }
@@ -173,7 +157,7 @@ impl RecordingWriter {
         at: i64,
         tracked: &Tracked,
         overlay: &RgbImage,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let Tracked { t_cam_object, status, posterior, rejection, iterations, timing, .. } =
             tracked;
         let probability = posterior.as_ref().map_or(0.0, Posterior::probability);
@@ -213,7 +197,7 @@ impl RecordingWriter {
         };
         let header = header(at, CAMERA);
         self.write("/diagnostics", at, &DiagnosticArray { header, status: vec![status] })?;
-        let jpeg = overlay.to_jpeg(QUALITY).map_err(|e| self.io(io::Error::other(e)))?;
+        let jpeg = overlay.to_jpeg(QUALITY).map_err(|e| DatasetError::writing(&self.file, e))?;
         let header = self::header(at, CAMERA);
         let picture = CompressedImage { header, format: "jpeg", data: &jpeg };
         self.write("/prehend/overlay", at, &picture)
@@ -226,14 +210,14 @@ impl RecordingWriter {
         [width, height]: [usize; 2],
         encoding: &str,
         data: &[u8],
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), DatasetError> {
         let step = (data.len() / height.max(1)) as u32;
         let (width, height) = (width as u32, height as u32);
         let header = header(at, CAMERA);
         self.write(
             topic,
             at,
-            &Image { header, height, width, encoding, is_bigendian: 0, step, data },
+            &RosImage { header, height, width, encoding, is_bigendian: 0, step, data },
         )
     }
 
@@ -242,14 +226,14 @@ impl RecordingWriter {
         topic: &str,
         at: i64,
         message: &T,
-    ) -> Result<(), RecordingError> {
-        let data = encode(message).map_err(|e| self.io(e))?;
+    ) -> Result<(), DatasetError> {
+        let data = encode(message).map_err(|e| DatasetError::writing(&self.file, e))?;
         let written = self.channel::<T>(topic).and_then(|(channel_id, sequence)| {
             let time = u64::try_from(at).unwrap_or_default();
             let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
             self.writer.write_to_known_channel(&header, &data)
         });
-        written.map_err(|source| RecordingError::Format { file: self.file.clone(), source })
+        written.map_err(|e| DatasetError::writing(&self.file, e))
     }
 
     /// Number of the channel of `topic`, and of its next message.
@@ -264,10 +248,6 @@ impl RecordingWriter {
         let sequence = *next;
         *next = next.wrapping_add(1);
         Ok((*id, sequence))
-    }
-
-    fn io(&self, source: io::Error) -> RecordingError {
-        RecordingError::Io { file: self.file.clone(), source }
     }
 }
 
@@ -296,8 +276,6 @@ fn camera_info(at: i64, camera: &Camera) -> CameraInfo {
         k,
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p: [k[0], k[1], k[2], 0.0, k[3], k[4], k[5], 0.0, k[6], k[7], k[8], 0.0],
-        binning_x: 0,
-        binning_y: 0,
-        roi: RegionOfInterest::default(),
+        ..CameraInfo::default()
     }
 }

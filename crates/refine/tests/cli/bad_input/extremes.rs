@@ -60,13 +60,13 @@ fn keys_that_are_there_twice() {
     let place = workplace();
     place.replace(&format!("{SCENE}/scene_camera.json"), "{", "{\"0\":{},");
     let said = place.prehend(REFINE);
-    let expected = "scene_camera.json: not valid JSON: the key \"0\" is there twice at line ";
+    let expected = "scene_camera.json: duplicate field `0` at line ";
     assert!(said.code == 2 && said.err.contains(expected), "{}", said.err);
     assert_eq!(place.poses("refined.csv").len(), 1);
     let place = workplace();
     place.replace(&format!("{SCENE}/scene_camera.json"), "\"cam_K\"", "\"cam_K\":[],\"cam_K\"");
     let said = place.prehend(REFINE);
-    let expected = "scene_camera.json: 0: the key \"cam_K\" is there twice";
+    let expected = "scene_camera.json: 0: duplicate field `cam_K`";
     assert!(said.code == 2 && said.err.contains(expected), "{}", said.err);
 }
 

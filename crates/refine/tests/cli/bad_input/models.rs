@@ -76,7 +76,9 @@ fn models_and_hands() {
                         info["6"]["mass_kg"] = json!("heavy")
                     });
                 },
-                &["ds/models/models_info.json: 6.mass_kg: is not a finite number"],
+                &[
+                    "ds/models/models_info.json: 6.mass_kg: invalid type: string \"heavy\", expected f64",
+                ],
             ),
             (
                 "hand absent",

@@ -166,7 +166,7 @@ fn frame_files_name_file_and_field() {
     };
     Mask::filled(3, 2, true).save(&place.path("ds/small.png")).unwrap();
     for (text, expected) in [
-        ("{".to_owned(), "error: ds/f.json: EOF"),
+        ("{".to_owned(), "error: ds/f.json: not valid JSON: EOF"),
         (with("depth_unit", json!(1)), "error: ds/f.json: depth_unit: unknown field `depth_unit`"),
         (with("mesh_unit", json!("inch")), "error: ds/f.json: mesh_unit: unknown variant `inch`"),
         (with("depth_unit_m", json!(0)), "error: ds/f.json: depth_unit_m: must be above zero"),
@@ -176,7 +176,7 @@ fn frame_files_name_file_and_field() {
         (with("mask", json!("init.csv")), "error: ds/f.json: ds/init.csv: "),
         (
             with("mask", json!("small.png")),
-            "error: ds/f.json: mask: the image is 3x2 pixels, rgb is 640x480",
+            "error: ds/f.json: ds/small.png: is 3x2 pixels but ds/test/000001/rgb/000000.png is 640x480",
         ),
         (with("mesh", json!("none.ply")), "error: ds/f.json: ds/none.ply: "),
         (with("mass_kg", json!(-1)), "error: ds/f.json: mass_kg: must be above zero"),
@@ -192,7 +192,7 @@ fn frame_files_name_file_and_field() {
         ),
         (
             robot(&hand["joints"], json!([[0, 0, 1]])),
-            "error: ds/f.json: robot.forces: expected one force for each of 368 taxels, found 1",
+            "error: ds/f.json: robot.forces: expected 368 forces, one a taxel of ds/hand/taxels.csv, found 1",
         ),
     ] {
         place.write("ds/f.json", &text);

@@ -129,11 +129,11 @@ fn bodies_and_sensors_of_every_kind_are_read_or_refused_by_name() {
         (hand.replace("\"joints\": {}, ", ""), "0.bodies[0].joints: is missing"),
         (other.replace("\"obj_id\": 7, ", ""), "0.bodies[0].obj_id: is missing"),
         (table.replace("plane", "wall"), "0.bodies[0].kind: unknown variant `wall`"),
-        (table.replace(": 2,", ": -2,"), "0.bodies[0]: sigma_mm is -2, not zero or above"),
-        (format!("{hand}, {hand}"), "0.bodies[1]: there are two bodies called \"hand\""),
+        (table.replace(": 2,", ": -2,"), "0.bodies[0].sigma_mm: -2 is below zero"),
+        (format!("{hand}, {hand}"), "0.bodies[1].name: there are two bodies called \"hand\""),
         (
             table.replace("\"table\"", "\"a/b\""),
-            "0.bodies[0]: name: \"a/b\" is empty or has a slash",
+            "0.bodies[0].name: \"a/b\" is empty or has a slash",
         ),
     ] {
         let error = bodies(&list).unwrap_err();
@@ -162,12 +162,15 @@ fn bodies_and_sensors_of_every_kind_are_read_or_refused_by_name() {
     let force = r#"{"body": "hand", "taxels": "t.csv", "force": [[0, 0, 0]]}"#;
     for (entry, expected) in [
         (binary.replace("binary", "smell"), "0.kind: unknown variant `smell`"),
-        (binary.replace("[0, true", "[2, true"), "0: contact: 2 is neither 0 nor 1"),
+        (
+            binary.replace("[0, true", "[2, true"),
+            "0.contact[0]: 2 is not true, false, 1, 0 or null",
+        ),
         (binary.replace("\"taxels\": \"t.csv\", ", ""), "0.taxels: is missing"),
         (binary.replace("\"body\": \"hand\", ", ""), "0.body: is missing"),
-        (near.replace("12.5", "-1"), "0: distance: -1 is below zero"),
-        (patch.replace("[[0, 0, 2]]", "[]"), "0: normals: 0, but there are 1 points"),
-        (patch.replace("[0, 0, 2]", "[0, 0, 0]"), "0: normals: one is zero"),
+        (near.replace("12.5", "-1"), "0.distance[0]: -1 is below zero"),
+        (patch.replace("[[0, 0, 2]]", "[]"), "0.normals: 0, but there are 1 points"),
+        (patch.replace("[0, 0, 2]", "[0, 0, 0]"), "0.normals: one is zero"),
         (format!("[{force}, {force}]"), "0[1]: there are two sensors of kind force"),
         (format!("[{near}, {}]", near.replace("null", "\"far\"")), "0[1].distance[1]: "),
     ] {

@@ -9,7 +9,7 @@ use std::vec;
 
 use anyhow::{anyhow, bail};
 use prehend_refine::data::Assets;
-use prehend_refine::data::bop::{Scene, Stamp};
+use prehend_refine::data::bop::{DatasetScene, Stamp};
 
 use crate::options::Selection;
 
@@ -105,14 +105,14 @@ impl Watch {
 
     /// Reads the scene's JSON files if they are not what they were.
     fn reread(&mut self, assets: &mut Assets<'_>) {
-        let stamps = assets.dataset().scene(self.scene_id).map(Scene::stamps).ok();
+        let stamps = assets.dataset().scene(self.scene_id).map(DatasetScene::stamps).ok();
         if stamps == self.stamps {
             return;
         }
         self.stamps = stamps;
         let dataset = assets.dataset().reread();
         // One that is being written is not readable for a moment.
-        let listed = dataset.scene(self.scene_id).and_then(Scene::moments);
+        let listed = dataset.scene(self.scene_id).and_then(DatasetScene::moments);
         self.listed = listed.unwrap_or_default();
         assets.replace_dataset(Arc::new(dataset));
     }

@@ -1,9 +1,10 @@
 //! A depth camera beside the color camera.
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::Isometry3;
 use prehend_render::{Camera, DepthImage, Distortion, DistortionError, register_depth};
 
-use crate::data::bop::translation_from_mm;
+use super::frame::Intrinsics;
+use super::numbers::{Lens, Numbers, Rotation, pose};
 use crate::scene::RemapCache;
 
 /// A camera of its own, that measured depth.
@@ -17,27 +18,27 @@ pub(crate) struct DepthCamera {
 }
 
 impl DepthCamera {
-    /// Of what is said of it: intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is.
+    /// Of intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
     ///
     /// # Errors
     /// The name of what is missing beside what is there.
     pub(crate) fn new(
-        camera: Option<Camera>,
-        lens: Option<Distortion>,
-        place: (Option<UnitQuaternion<f64>>, Option<[f64; 3]>),
+        camera: Option<Intrinsics>,
+        lens: Option<Lens>,
+        place: (Option<Rotation>, Option<Numbers<3>>),
     ) -> Result<Option<Self>, &'static str> {
         let t_color_depth = match place {
             (None, None) => None,
-            (Some(turn), Some(mm)) => Some(Isometry3::from_parts(translation_from_mm(&mm), turn)),
+            (Some(rotation), Some(mm)) => Some(pose(&rotation, &mm)),
             (None, Some(_)) => return Err("cam_R_d2c"),
             (Some(_), None) => return Err("cam_t_d2c"),
         };
-        let Some(camera) = camera else {
+        let Some(Intrinsics(camera)) = camera else {
             let nothing = lens.is_none() && t_color_depth.is_none();
             return if nothing { Ok(None) } else { Err("depth_K") };
         };
         let t_color_depth = t_color_depth.unwrap_or_else(Isometry3::identity);
-        Ok(Some(Self::beside(camera, lens, t_color_depth)))
+        Ok(Some(Self::beside(camera, lens.map(|lens| lens.0), t_color_depth)))
     }
 
     /// Behind `lens`, in that place beside the color camera \[m\].
@@ -70,12 +71,16 @@ impl DepthCamera {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
 
     #[test]
     fn what_is_missing_is_named() {
-        let camera = Camera::from_k([400.0, 0.0, 20.0, 0.0, 400.0, 15.0, 0.0, 0.0, 1.0], 1, 1).ok();
-        let place = (Some(UnitQuaternion::identity()), Some([10.0, 0.0, 0.0]));
+        let camera = Camera::from_k([400.0, 0.0, 20.0, 0.0, 400.0, 15.0, 0.0, 0.0, 1.0], 1, 1);
+        let camera = camera.ok().map(Intrinsics);
+        let place =
+            (Some(Rotation(UnitQuaternion::identity(), None)), Some(Numbers([10.0, 0.0, 0.0])));
         let missing = |camera, place| DepthCamera::new(camera, None, place).err();
         assert_eq!(missing(camera, (None, place.1)), Some("cam_R_d2c"));
         assert_eq!(missing(camera, (place.0, None)), Some("cam_t_d2c"));

@@ -1,0 +1,106 @@
+//! Numbers and lists of numbers, in range where they are read.
+
+use nalgebra::{Isometry3, UnitQuaternion};
+use prehend_render::{Distortion, DistortionError};
+use serde::Deserialize;
+
+use super::pose::{
+    deviation_from_rotation, exactly, require_in_range, rotation_from_row_major,
+    translation_from_mm,
+};
+
+/// `N` numbers; a matrix may also be a list of rows.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "Vec<NumberOrRow>")]
+pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "is not a finite number")]
+enum NumberOrRow {
+    Number(f64),
+    Row(Vec<f64>),
+}
+
+impl<const N: usize> TryFrom<Vec<NumberOrRow>> for Numbers<N> {
+    type Error = String;
+
+    fn try_from(list: Vec<NumberOrRow>) -> Result<Self, String> {
+        let flat = list.into_iter().flat_map(|entry| match entry {
+            NumberOrRow::Number(value) => vec![value],
+            NumberOrRow::Row(values) => values,
+        });
+        let flat: Vec<f64> = flat.map(require_in_range).collect::<Result<_, _>>()?;
+        exactly(flat).map(Self)
+    }
+}
+
+/// A number within range, as large as `LEAST` says.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "f64")]
+pub(crate) struct Bounded<const LEAST: usize>(pub(crate) f64);
+
+/// A number within range.
+pub(crate) type Real = Bounded<ANY>;
+/// A number above zero.
+pub(crate) type Positive = Bounded<POSITIVE>;
+/// A number that is zero or above.
+pub(crate) type NonNegative = Bounded<NON_NEGATIVE>;
+
+const ANY: usize = 0;
+const POSITIVE: usize = 1;
+const NON_NEGATIVE: usize = 2;
+
+impl<const LEAST: usize> TryFrom<f64> for Bounded<LEAST> {
+    type Error = String;
+
+    fn try_from(value: f64) -> Result<Self, String> {
+        match (LEAST, require_in_range(value)?) {
+            (POSITIVE, value) if value <= 0.0 => Err("must be above zero".into()),
+            (NON_NEGATIVE, value) if value < 0.0 => Err(format!("{value} is below zero")),
+            (_, value) => Ok(Self(value)),
+        }
+    }
+}
+
+/// A rotation of nine row-major entries.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "Numbers<9>")]
+pub(crate) struct Rotation(
+    pub(crate) UnitQuaternion<f64>,
+    /// How far the matrix was from orthonormal, where that was more than rounding.
+    pub(crate) Option<f64>,
+);
+
+impl TryFrom<Numbers<9>> for Rotation {
+    type Error = String;
+
+    fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
+        let rotation = rotation_from_row_major(&numbers.0)?;
+        Ok(Self(rotation, deviation_from_rotation(&numbers.0)))
+    }
+}
+
+/// The pose \[m\] of a rotation and a translation \[mm\].
+pub(crate) fn pose(rotation: &Rotation, translation: &Numbers<3>) -> Isometry3<f64> {
+    Isometry3::from_parts(translation_from_mm(&translation.0), rotation.0)
+}
+
+/// A lens: the name of its model, and the coefficients in the order of OpenCV.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "LensEntry")]
+pub(crate) struct Lens(pub(crate) Distortion);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LensEntry {
+    model: String,
+    coefficients: Vec<f64>,
+}
+
+impl TryFrom<LensEntry> for Lens {
+    type Error = DistortionError;
+
+    fn try_from(lens: LensEntry) -> Result<Self, DistortionError> {
+        Distortion::by_name(&lens.model, &lens.coefficients).map(Self)
+    }
+}

@@ -1,0 +1,352 @@
+//! One frame described by a JSON file: images, mesh, pose and, where known, the hand and what is there besides.
+//!
+//! Every length names its unit and every quaternion its order, because guessing them is how poses get
+//! lost. `docs/FRAME.md` describes the format; paths are relative to the file's folder.
+
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::{GridCache, TriMesh};
+use serde::Deserialize;
+
+use crate::data::assets::AssetError;
+use crate::data::frame_input::FrameInput;
+use crate::data::bop::{
+    Body, BodyEntry, BodyKind, DatasetError, DepthCamera, DepthWarning, FramePose, Intrinsics,
+    LengthUnit, Lens, NonNegative, Numbers, Optics, Positive, Real, Rotation, Stated, Tactile,
+    TactileEntry, TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
+};
+use crate::data::robots::Robots;
+use crate::rig::Rig;
+use crate::scene::{Hand, HandMeasurement, Object, Observation, RemapCache, check_gravity};
+
+/// Name of the robot of a frame file beside other bodies.
+const ROBOT: &str = "robot";
+
+/// Layouts with the images of a camera among their fields: unknown fields are refused, so that one layout cannot be a part of another.
+macro_rules! with_images {
+    ($(#[$doc:meta])* $name:ident { $($own:tt)* }) => {
+        $(#[$doc])*
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct $name {
+            /// Row-major 3×3 intrinsics \[px\].
+            #[serde(rename = "K")]
+            intrinsics: Intrinsics,
+            #[serde(rename = "dist")]
+            lens: Option<Lens>,
+            rgb: Option<PathBuf>,
+            depth: Option<PathBuf>,
+            /// Meters of one unit of the depth image.
+            depth_unit_m: Option<Positive>,
+            mask: Option<PathBuf>,
+            #[serde(rename = "depth_K")]
+            depth_intrinsics: Option<Intrinsics>,
+            #[serde(rename = "depth_dist")]
+            depth_lens: Option<Lens>,
+            #[serde(rename = "cam_R_d2c")]
+            depth_rotation: Option<Rotation>,
+            #[serde(rename = "cam_t_d2c")]
+            depth_translation: Option<Numbers<3>>,
+            $($own)*
+        }
+
+        impl $name {
+            fn images(&self) -> CameraImages<'_> {
+                CameraImages {
+                    intrinsics: self.intrinsics,
+                    lens: self.lens,
+                    depth_unit: self.depth_unit_m.map(|unit| unit.0),
+                    files: [&self.rgb, &self.depth, &self.mask].map(Option::as_deref),
+                    depth_camera: DepthCamera::new(
+                        self.depth_intrinsics,
+                        self.depth_lens,
+                        (self.depth_rotation, self.depth_translation),
+                    ),
+                }
+            }
+        }
+    };
+}
+
+with_images! {
+    /// A frame file.
+    FrameLayout {
+        #[serde(default)]
+        cameras: Vec<FurtherCameraLayout>,
+        mesh: PathBuf,
+        mesh_unit: LengthUnit,
+        mass_kg: Option<Positive>,
+        /// The object's number in a rig.
+        obj_id: Option<u32>,
+        pose: FramePose,
+        gravity: Option<Numbers<3>>,
+        robot: Option<RobotLayout>,
+        #[serde(default)]
+        bodies: Vec<BodyEntry>,
+    }
+}
+
+with_images! {
+    /// Another camera.
+    FurtherCameraLayout {
+        /// Its coordinates → those of the first camera.
+        pose: FramePose,
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotLayout {
+    urdf: PathBuf,
+    base_pose: FramePose,
+    joints: UniqueMap<Real>,
+    sigma_mm: Option<NonNegative>,
+    sigma_deg: Option<NonNegative>,
+    taxels: Option<PathBuf>,
+    /// Force of the object on each taxel, in its link's frame \[N\].
+    forces: Option<Vec<Numbers<3>>>,
+    /// Sensors that measure no forces.
+    #[serde(default)]
+    touch: Vec<TactileEntry>,
+}
+
+/// CameraImages of one camera, and how they were taken.
+struct CameraImages<'a> {
+    intrinsics: Intrinsics,
+    lens: Option<Lens>,
+    /// Meters of one unit of the depth image.
+    depth_unit: Option<f64>,
+    /// Color, depth and mask.
+    files: [Option<&'a Path>; 3],
+    /// Depth camera of its own, or the field that is missing.
+    depth_camera: Result<Option<DepthCamera>, &'static str>,
+}
+
+impl CameraImages<'_> {
+    /// Reads them. Fields of `file` are called as they are there, after `prefix`.
+    ///
+    /// # Errors
+    /// If an image is missing or broken, or does not fit the others; an empty mask if it is `required` to show the object.
+    fn read(self, file: &Path, prefix: &str, required: bool) -> Result<Observation, DatasetError> {
+        let field = |name: &str, problem: &str| {
+            DatasetError::field(file, &format!("{prefix}{name}"), problem)
+        };
+        let missing = |name: &'static str| field(name, "is missing");
+        let named = |error: DatasetError| DatasetError::unusable(file, error);
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let [color, depth, mask] = self.files.map(|path| path.map(|path| folder.join(path)));
+        let depth_camera = self.depth_camera.map_err(missing)?;
+        let depth_unit = match (&color, &depth, self.depth_unit) {
+            (None, None, _) => return Err(field("rgb", "is missing, and so is depth")),
+            (_, Some(_), None) => return Err(missing("depth_unit_m")),
+            (None, ..) if depth_camera.is_some() => return Err(missing("rgb")),
+            (_, None, _) if depth_camera.is_some() => return Err(missing("depth")),
+            (.., unit) => unit.unwrap_or(1.0),
+        };
+        let remaps = &RemapCache::default();
+        let optics = Optics {
+            camera: self.intrinsics.0,
+            lens: self.lens.map(|lens| lens.0),
+            depth_camera,
+            depth_unit,
+            remaps,
+            depth_remaps: &RemapCache::default(),
+        };
+        if let (Some(mask), Some(other)) = (&mask, color.as_ref().or(depth.as_ref())) {
+            check_size(mask, other).map_err(named)?;
+        }
+        let warn = |file: &Path, warning| match warning {
+            DepthWarning::Saturated(text) => log::warn!("{}: {text}", file.display()),
+            DepthWarning::Empty => log::warn!("{}: every depth is zero", file.display()),
+        };
+        let observation = optics.observation(color.as_deref(), depth.as_deref(), &warn);
+        let mut observation = observation.map_err(named)?;
+        if depth_camera.is_some() && !observation.has_depth() {
+            let problem = "nothing that depth measured is in the color image";
+            return Err(field("cam_t_d2c", problem));
+        }
+        if let Some(mask) = mask {
+            match optics.mask(&mask) {
+                // Of other cameras those are left out that do not see the object.
+                Err(DatasetError::EmptyMask { .. }) if !required => {}
+                Err(DatasetError::EmptyMask { .. }) => {
+                    return Err(field("mask", "the mask is empty"));
+                }
+                read => observation.mask = read.map_err(named)?,
+            }
+        }
+        Ok(observation)
+    }
+}
+
+/// Reads the frame file `file` and everything it names: the frame, and the initial pose (object → camera \[m\]). `seed` decides
+/// where the object's surface is sampled; distance grids of the hand are kept in `cache`. With a `rig` the frame is corrected by it, and the
+/// object, too, if the file says which of the rig's it is.
+///
+/// # Errors
+/// If the file or one that it names is missing or broken, or does not fit the rig, naming the file and the field.
+pub fn load_frame_file(
+    file: &Path,
+    seed: u64,
+    cache: Option<&GridCache>,
+    rig: Option<Arc<Rig>>,
+) -> Result<(FrameInput, Isometry3<f64>), DatasetError> {
+    let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
+    let parts = FrameParts::read(file)?;
+    let robot = parts.robot(file, cache)?;
+    let FrameParts { mut observation, mesh, mesh_file, layout, .. } = parts;
+    let name = mesh_file.display().to_string();
+    let mass = layout.mass_kg.map(|mass| mass.0);
+    let mut object = Object::with_mass(&name, mesh, mass, seed).map_err(|e| fault(&e))?;
+    if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
+        match rig.corrected_object(id, &object).map_err(|e| fault(&e))? {
+            Some(corrected) => object = corrected,
+            // As of a dataset: other objects are seen by the same rig.
+            None => log::info!("the rig does not know object {id}"),
+        }
+    }
+    let (hand, measured) = robot.unzip();
+    observation.hand = measured;
+    observation.place_views();
+    if let Some(rig) = &rig {
+        observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
+    }
+    Ok((FrameInput::new(observation, Arc::new(object), hand, rig), layout.pose.0))
+}
+
+/// Content of a frame file as it is there: nothing is derived from it yet.
+pub(crate) struct FrameParts {
+    /// CameraImages as pinhole cameras see them, without the hand.
+    pub(crate) observation: Observation,
+    /// The object's mesh \[m\].
+    pub(crate) mesh: TriMesh,
+    pub(crate) mesh_file: PathBuf,
+    /// The robot and other bodies.
+    pub(crate) bodies: Vec<Body>,
+    /// The robot's forces first, empty where they are not said.
+    pub(crate) tactile: Vec<Tactile>,
+    layout: FrameLayout,
+}
+
+impl FrameParts {
+    /// Reads the frame file `file`, its images and its mesh.
+    ///
+    /// # Errors
+    /// If the file or one that it names is missing or broken, naming the file and the field.
+    pub(crate) fn read(file: &Path) -> Result<Self, DatasetError> {
+        let mut layout: FrameLayout = read_json(file)?;
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let mut observation = layout.images().read(file, "", true)?;
+        let mesh_file = folder.join(&layout.mesh);
+        let mesh = TriMesh::load(&mesh_file).map_err(|e| DatasetError::unusable(file, e))?;
+        let mesh = mesh.scaled(layout.mesh_unit.meters());
+        let gravity = layout.gravity.map(|g| Vector3::from(g.0));
+        let checked = gravity.iter().try_for_each(check_gravity);
+        checked.map_err(|e| DatasetError::field(file, "gravity", e))?;
+        observation.gravity = gravity;
+        let (mut bodies, mut tactile) = (Vec::new(), Vec::new());
+        if let Some(robot) = layout.robot.take() {
+            robot.read(file, &mut bodies, &mut tactile)?;
+        }
+        let entries = std::mem::take(&mut layout.bodies);
+        read_bodies(&mut bodies, entries, folder, |k, field, problem| {
+            DatasetError::field(file, &format!("bodies[{k}]{field}"), problem)
+        })?;
+        for (k, camera) in layout.cameras.iter().enumerate() {
+            let view = camera.images().read(file, &format!("cameras[{k}]."), false)?;
+            observation = observation.with_view(view, camera.pose.0);
+        }
+        Ok(Self { observation, mesh, mesh_file, bodies, tactile, layout })
+    }
+
+    /// All bodies as one robot, and what that measures; `None` of none.
+    fn robot(
+        &self,
+        file: &Path,
+        cache: Option<&GridCache>,
+    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, DatasetError> {
+        let Self { bodies, tactile, .. } = self;
+        let has_robot = usize::from(bodies.first().is_some_and(|body| body.name == ROBOT));
+        let is_force = |sensor: &Tactile| matches!(sensor.reading, TactileReading::Force { .. });
+        let has_force = usize::from(tactile.first().is_some_and(is_force));
+        let body = |k: usize| match k.checked_sub(has_robot) {
+            Some(k) => format!("bodies[{k}]"),
+            None => ROBOT.to_owned(),
+        };
+        let sensor = |k: usize| match k.checked_sub(has_force) {
+            Some(k) => format!("{ROBOT}.touch[{k}]"),
+            None => ROBOT.to_owned(),
+        };
+        let stated = Stated {
+            files: [file; 2],
+            all: "bodies".to_owned(),
+            bodies: (0..bodies.len()).map(body).collect(),
+            sensors: (0..tactile.len()).map(sensor).collect(),
+            force: "forces",
+        };
+        let mut robots = Robots::cached(cache.cloned());
+        robots.combined(&stated, bodies, tactile, &HashMap::new()).map_err(|error| match error {
+            AssetError::Dataset(error) => error,
+            other => DatasetError::unusable(file, other),
+        })
+    }
+
+    /// The initial pose, object → camera \[m\].
+    pub(crate) fn t_cam_object(&self) -> &Isometry3<f64> {
+        &self.layout.pose.0
+    }
+
+    /// Mass of the object \[kg\], where the file says it.
+    pub(crate) fn mass(&self) -> Option<f64> {
+        self.layout.mass_kg.map(|mass| mass.0)
+    }
+
+    /// Whether the images were taken through a lens.
+    pub(crate) fn has_lens(&self) -> bool {
+        self.layout.lens.is_some()
+    }
+}
+
+impl RobotLayout {
+    /// The robot as one of `bodies`, and its sensors as some of `tactile`.
+    fn read(
+        self,
+        file: &Path,
+        bodies: &mut Vec<Body>,
+        tactile: &mut Vec<Tactile>,
+    ) -> Result<(), DatasetError> {
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let urdf = folder.join(self.urdf);
+        bodies.push(Body {
+            name: ROBOT.to_owned(),
+            kind: BodyKind::Hand { urdf, joints: self.joints.positions() },
+            t_cam_base: self.base_pose.0,
+            sigmas: sigmas(self.sigma_mm, self.sigma_deg),
+        });
+        let force: Vec<_> = self.forces.into_iter().flatten().map(|f| Vector3::from(f.0)).collect();
+        match self.taxels {
+            Some(taxels) => {
+                let reading = TactileReading::Force { taxels: folder.join(taxels), force };
+                tactile.push(Tactile { body: ROBOT.to_owned(), reading });
+            }
+            None if force.is_empty() => {}
+            None => return Err(DatasetError::field(file, "robot.taxels", "is missing")),
+        }
+        for (k, entry) in self.touch.into_iter().enumerate() {
+            let fault = |(field, problem): (&str, String)| {
+                DatasetError::field(file, &format!("{ROBOT}.touch[{k}].{field}"), problem)
+            };
+            let sensor = entry.read(folder, Some(ROBOT)).map_err(fault)?;
+            if let TactileReading::Force { .. } = &sensor.reading {
+                let problem = "is missing or force, which is what robot.forces are";
+                return Err(fault(("kind", problem.to_owned())));
+            }
+            tactile.push(sensor);
+        }
+        Ok(())
+    }
+}
