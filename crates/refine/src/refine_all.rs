@@ -8,7 +8,7 @@ use crate::data::{FrameInput, Workers};
 use crate::error::{RefineError, guard};
 use crate::method::Method;
 use crate::refine::refine;
-use crate::scene::Warning;
+use crate::check::Warning;
 use crate::strategy::Estimate;
 
 /// A frame, and where to begin.

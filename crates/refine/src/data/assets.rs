@@ -8,6 +8,9 @@ use nalgebra::Isometry3;
 use prehend_geometry::{GridCache, TriMesh};
 
 use crate::baselines::GradientKind;
+use crate::check::{
+    CorrectionSettings, CorrectionTrial, Subject, Warning, check_frame, check_object,
+};
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, Frame, Models, ResultRow, SceneBodies,
 };
@@ -17,8 +20,7 @@ use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{
-    self, CorrectionSettings, CorrectionTrial, Hand, Inertial, Object, Observation, RegionEvidence,
-    StatedSize, Subject, Target, Warning, check_gravity,
+    self, Hand, Inertial, Object, Observation, RegionEvidence, StatedSize, Target, check_gravity,
 };
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
@@ -181,9 +183,9 @@ impl FrameInput {
     /// sensors, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
-        let mut of_frame = scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object);
+        let mut of_frame = check_frame(observation, object, hand.as_deref(), t_cam_object);
         of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
-        [scene::inspect_object(object, hand.is_some()), of_frame]
+        [check_object(object, hand.is_some()), of_frame]
     }
 
     /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.

@@ -12,7 +12,7 @@ use super::InfoError;
 use super::lines::{line, listed};
 use crate::data::bop::{Dataset, DatasetError, Scene};
 use crate::data::load_mesh;
-use crate::scene::likely_unit;
+use crate::check::likely_unit;
 use crate::symmetry::Symmetries;
 
 /// One split of a dataset.

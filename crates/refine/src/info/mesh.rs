@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::lines::{line, spaced};
 use super::{DescribeOptions, InfoError};
-use crate::scene::likely_unit;
+use crate::check::likely_unit;
 
 /// Where units of meshes are said.
 const UNITS: &str = "--mesh-unit, mesh_unit in a frame file, millimeters in BOP's folders";

@@ -16,13 +16,14 @@ use super::files::{
 };
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
+use super::pose_noise::NoiseLevel;
 use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
 use super::sensor::{Lens, Rig};
 use crate::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, write_atomically,
     write_results,
 };
-use crate::data::{Identity, Journal, NoiseLevel};
+use crate::data::{Identity, Journal};
 
 /// What a dataset holds.
 #[derive(Clone, Debug, Default, PartialEq)]

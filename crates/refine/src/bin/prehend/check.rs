@@ -10,7 +10,7 @@ use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, DatasetError};
 use prehend_refine::data::{AssetError, Assets, FrameInput, Target, load_frame_file};
 use prehend_refine::evaluate::report::{Report, outline_picture};
-use prehend_refine::scene::{
+use prehend_refine::check::{
     Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning,
     find_corrections,
 };

@@ -14,9 +14,10 @@ use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint};
-use prehend_refine::data::{AssetError, Assets, Identity, Journal, NoiseLevel, PlainPose, Target};
+use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Target};
 use prehend_refine::guard;
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::synth::NoiseLevel;
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;

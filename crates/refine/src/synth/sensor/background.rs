@@ -4,7 +4,7 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RgbImage};
 
 use super::settings::BackgroundSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl BackgroundSettings {
     /// Color and depth of a random room without the hand.

@@ -4,7 +4,7 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage};
 
 use super::settings::DepthSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl DepthSettings {
     /// What stays the same through a grasp.

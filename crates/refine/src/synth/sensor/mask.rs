@@ -4,7 +4,7 @@ use prehend_geometry::SplitMix64;
 use prehend_render::Mask;
 
 use super::settings::MaskSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl MaskSettings {
     /// What a segmentation makes of an object at `visible` beside a hand at `hand`.

@@ -16,7 +16,7 @@ use prehend_refine::data::{
 };
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
-use prehend_refine::scene::Warning;
+use prehend_refine::check::Warning;
 use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
 use prehend_refine::{Method, State, guard, refine};
 use prehend_render::Backend;

@@ -7,8 +7,7 @@ use super::kind::{Correction, FieldNames, Scope, candidate_count};
 use super::settings::CorrectionSettings;
 use super::size::find_sizes;
 use super::trial::{CorrectionTrial, Tried};
-use crate::scene::Target;
-use crate::scene::view::median;
+use crate::scene::{Target, median};
 
 /// A correction that makes frames agree with what they show.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@ use prehend_render::{DepthImage, OutlinePoint, outline_points};
 use super::evidence::Evidence;
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
-use crate::scene::view::median;
+use crate::scene::median;
 
 /// Pose, logarithm of the scale of depth, logarithm of the focal length.
 pub(super) const UNKNOWNS: usize = 8;

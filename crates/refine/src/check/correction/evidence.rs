@@ -8,9 +8,7 @@ use prehend_render::{DepthImage, Mask, depth_map};
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::frame::hand_depth;
-use crate::scene::view::median;
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
+use crate::scene::{Hand, HandMeasurement, Object, Observation, hand_depth, median};
 
 /// Extents that render without trouble, in units of length.
 const RENDERED: std::ops::Range<f64> = 1e-2..1e2;

@@ -119,7 +119,7 @@ impl CorrectionTrial {
 }
 
 /// The pose that mask and depth have, within what poses to start from are off, if object and `observation` agree there.
-pub(in crate::scene) fn settled_pose(
+pub(in crate::check) fn settled_pose(
     observation: &Observation,
     object: &Object,
     hand: Option<&Hand>,
