@@ -4,11 +4,11 @@ use std::num::NonZeroUsize;
 
 use nalgebra::Isometry3;
 
+use crate::check::Warning;
 use crate::data::{FrameInput, Workers};
 use crate::error::{RefineError, guard};
 use crate::method::Method;
 use crate::refine::refine;
-use crate::check::Warning;
 use crate::strategy::Estimate;
 
 /// A frame, and where to begin.

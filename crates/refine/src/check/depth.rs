@@ -16,7 +16,12 @@ pub(super) fn check(view: &View<'_>, object: &Object) -> Vec<Warning> {
     if let Some(ratio) = ratio.filter(|ratio| !DEPTH_RATIO.contains(ratio)) {
         let finding = format!("sensor depth is {ratio:.3} times the depth at this pose");
         // The hand would only say it again.
-        return vec![Warning::new(Subject::Depth, (ratio, ""), finding, "check depth_scale and units")];
+        return vec![Warning::new(
+            Subject::Depth,
+            (ratio, ""),
+            finding,
+            "check depth_scale and units",
+        )];
     }
     let off = median(view.depths_on_object().map(|(sensor, object)| sensor - object));
     let off = off.filter(|off| off.abs() > object.radius.max(DEPTH_ON_OBJECT));

@@ -1,6 +1,5 @@
-//! What looks wrong with inputs before any refinement, each with a figure and a likely cause: [`Warning`]s of single frames by the [limits](limits) of
-//! units, frames and sensors, and mistakes by [name](correction), by trying over many frames which [`Correction`] makes the inputs agree with what
-//! is seen.
+//! Checks of inputs before any refinement, each with a figure and a likely cause: [`Warning`]s of single frames by limits of units, frames and sensors
+//! (`limits.rs` has them all), and mistakes by name, by trying over many frames which [`Correction`] makes the inputs agree with what is seen.
 //!
 //! One cause should make one warning: what a hand, a mesh or depth is needed for is not judged if that is at fault itself.
 
@@ -63,7 +62,7 @@ pub(crate) fn check_frame(
     if !model::is_plausible(object) {
         return warnings;
     }
-    let images = Images { observation, object, has_hand: held.is_some(), drawn, touch };
+    let images = Comparison { observation, object, has_hand: held.is_some(), drawn, touch };
     let found = images.check(t_cam_object, false);
     let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
     // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
@@ -74,8 +73,8 @@ pub(crate) fn check_frame(
     warnings
 }
 
-/// Images, and what they are compared with.
-struct Images<'a> {
+/// Images of a frame, and what they are compared with.
+struct Comparison<'a> {
     observation: &'a Observation,
     object: &'a Object,
     has_hand: bool,
@@ -85,7 +84,7 @@ struct Images<'a> {
     touch: Option<(&'a Hand, &'a HandMeasurement)>,
 }
 
-impl Images<'_> {
+impl Comparison<'_> {
     /// Warnings with the object at a pose; one that `is_settled` where mask and depth have it fits.
     fn check(&self, t_cam_object: &Isometry3<f64>, is_settled: bool) -> Vec<Warning> {
         let &Self { observation, object, has_hand, ref drawn, touch } = self;

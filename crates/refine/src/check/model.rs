@@ -84,7 +84,8 @@ fn size(vertices: &[Point3<f64>], stated: &StatedSize) -> Option<Warning> {
             let [x, y, z] = (v * MM_PER_M).into();
             format!("({x:.1}, {y:.1}, {z:.1})")
         });
-        let finding = format!("the mesh's bounding box {what} {found} mm, but {said} mm in models_info.json");
+        let finding =
+            format!("the mesh's bounding box {what} {found} mm, but {said} mm in models_info.json");
         let warning = Warning::new(Subject::Model, (by * MM_PER_M, "mm"), finding, hint);
         (by > STATED_SIZE * stated.diameter).then_some(warning)
     };

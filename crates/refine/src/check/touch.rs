@@ -101,9 +101,15 @@ pub(super) fn check_places(
     });
     let (subject, by, finding, hint) = if gap > HAND_FROM_OBJECT {
         let finding = format!("it is {:.1} cm from the hand", gap * 1e2);
-        (Subject::Hand, gap, finding, "are the hand's pose (base to camera), joints and URDF right?")
+        (
+            Subject::Hand,
+            gap,
+            finding,
+            "are the hand's pose (base to camera), joints and URDF right?",
+        )
     } else {
-        let finding = format!("they are {:.1} cm from it (in the median of forces)", distance * 1e2);
+        let finding =
+            format!("they are {:.1} cm from it (in the median of forces)", distance * 1e2);
         let hint = "are forces in the order of the layout, and the hand's pose and joints right?";
         (Subject::Touch, distance, finding, hint)
     };

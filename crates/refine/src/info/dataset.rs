@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use super::InfoError;
 use super::lines::{line, listed};
+use crate::check::likely_unit;
 use crate::data::bop::{Dataset, DatasetError, Scene};
 use crate::data::load_mesh;
-use crate::check::likely_unit;
 use crate::symmetry::Symmetries;
 
 /// One split of a dataset.

@@ -24,16 +24,16 @@ const INITIAL_ROTATION: f64 = 0.26;
 
 /// Time between frames of a film: those of a camera of thirty a second.
 const STEP: Duration = Duration::from_nanos(33_333_333);
-/// How far the hand moves and turns to either side \[m; rad\], and how fast at most, in radians of its phase a second.
+/// Amplitudes of the hand's motion and turns to either side \[m; rad\], and its rate \[rad/s\].
 const SWAY: f64 = 0.04;
 const TURN: f64 = 0.35;
 const RATE: f64 = 1.8;
-/// How far the object slides in the hand, to either side \[m\].
+/// Amplitude of the object's slide in the hand, to either side \[m\].
 const SLIDE: f64 = 2e-3;
 
 /// A frame whose truth is known.
 pub struct Scene {
-    /// What the sensors say.
+    /// Measurements of the sensors.
     pub observation: Observation,
     /// The object.
     pub object: Arc<Object>,
@@ -51,9 +51,9 @@ pub struct Scene {
 
 /// One moment of a [`Sequence`].
 pub struct SequenceFrame {
-    /// When it was taken.
+    /// Time of exposure.
     pub time: Duration,
-    /// What the sensors say.
+    /// Measurements of the sensors.
     pub observation: Observation,
     /// The true pose, object → camera \[m\].
     pub truth: Isometry3<f64>,
@@ -135,7 +135,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError
     Ok(Sequence { object, hand, initial, frames })
 }
 
-/// What a noisy camera and a soft skin measure of an object at `truth` in a hand, under a light that the estimator is not told; `gravity` is that in
+/// Measurements of a noisy camera and a soft skin of an object at `truth` in a hand, under a light that the estimator is not told; `gravity` is that in
 /// the camera frame \[m/s²\].
 fn observe(
     camera: Camera,

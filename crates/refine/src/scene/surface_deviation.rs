@@ -10,7 +10,7 @@ use super::Object;
 use super::gaussian_process::{InducingPoints, farthest_points};
 use crate::error::RefineError;
 
-/// How far the surface of an object is from that of its model.
+/// Deviation of the surface of an object from that of its model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelErrorSettings {
@@ -33,13 +33,13 @@ const SPACING: f64 = 0.8;
 /// Those places, at most.
 const MOST_NODES: usize = 150;
 
-/// What is independent at inducing points however near they are, as a share of the variance; keeps their covariance regular.
+/// Independent part of the variance at inducing points however near they are, as a share; keeps their covariance regular.
 const NUGGET: f64 = 1e-6;
 
-/// What patches are off by themselves, as a share of the deviation: what too few places do not describe, and what looks off in one view.
+/// Independent deviation of patches, as a share of the deviation: what too few places do not describe, and what looks off in one view.
 const OWN: f64 = 0.3;
 
-/// What all of a surface is off by together, as a share of the deviation: a model of a wrong size, or with a wrong origin. Frames cannot tell that from
+/// Deviation that all of a surface has in common, as a share of the deviation: a model of a wrong size, or with a wrong origin. Frames cannot tell that from
 /// the object's place.
 const TOGETHER: f64 = 0.5;
 
@@ -47,7 +47,7 @@ const TOGETHER: f64 = 0.5;
 /// describe all others (Quiñonero-Candela and Rasmussen, 2005).
 #[derive(Clone, Debug)]
 pub struct SurfaceDeviation {
-    /// What was expected beforehand.
+    /// Prior.
     pub(crate) settings: ModelErrorSettings,
     process: InducingPoints,
     /// A column for each inducing point: independent, and of unit variance beforehand.
@@ -68,7 +68,7 @@ impl SurfaceDeviation {
         Self::from_parts(settings.clone(), nodes, coefficients, covariance)
     }
 
-    /// Of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes no field.
+    /// A field of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes none.
     pub(crate) fn from_parts(
         settings: ModelErrorSettings,
         nodes: Vec<Vector3<f64>>,
@@ -101,7 +101,7 @@ impl SurfaceDeviation {
         (OWN * self.settings.gp_sigma).powi(2)
     }
 
-    /// What the coefficients are multiplied by for the displacement at `place` (model coordinates).
+    /// Factors of the coefficients in the displacement at `place` (model coordinates).
     pub(crate) fn features(&self, place: &Point3<f64>) -> DVector<f64> {
         self.process.features(&[place.coords]).column(0).into_owned()
     }
@@ -137,7 +137,7 @@ impl SurfaceDeviation {
         self.left
     }
 
-    /// That, at the nodes.
+    /// Mean of it at the nodes.
     fn mean_left(&self) -> f64 {
         let trace = self.left_covariance(self.nodes()).trace();
         (trace / self.count().max(1) as f64).sqrt()

@@ -1,4 +1,4 @@
-//! What is behind the hand.
+//! The room behind the hand.
 
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RgbImage};

@@ -16,7 +16,7 @@ mod touch;
 mod viewpoint;
 
 pub use film::FilmSettings;
-pub(super) use lens::Lens;
-pub(super) use rig::Rig;
-pub(crate) use smooth_field::smooth_field;
+pub(super) use lens::SimulatedLens;
+pub(super) use rig::SensorRig;
 pub use settings::{SensorSettings, SettingError};
+pub(crate) use smooth_field::smooth_field;
