@@ -78,4 +78,3 @@ fn symmetric_rotations(shape: &SampledSurface) -> Vec<UnitQuaternion<f64>> {
         .collect();
     found.into_iter().filter(|turn| turn.angle() > 0.1).collect()
 }
-
