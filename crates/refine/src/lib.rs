@@ -23,6 +23,7 @@
 //! | [`factor`] | one kind of evidence a file |
 //! | [`strategy`] | ways from an initial pose to a refined one; [`Method`] names them |
 //! | [`baselines`] | methods that the estimator is compared with: the paper's heuristic, ICPs |
+//! | [`check`] | what looks wrong with inputs, and mistakes by name |
 //! | [`search`] | poses to start from, by sensors alone |
 //! | [`tracker`] | an object followed through frames |
 //! | [`data`] | BOP datasets and other files |
@@ -35,6 +36,7 @@
 
 pub mod baselines;
 pub mod calibration;
+pub mod check;
 pub mod data;
 mod error;
 pub mod evaluate;

@@ -8,11 +8,11 @@ use std::time::Instant;
 use nalgebra::Isometry3;
 use prehend_render::Backend;
 
+use crate::check::Warning;
 use crate::data::{FrameInput, Workers};
 use crate::error::{RefineError, guard};
 use crate::method::Method;
 use crate::problem::State;
-use crate::scene::Warning;
 use crate::strategy::{DiagnosisSummary, Estimate, Observer, Strategy};
 
 /// Refinement of a frame from an initial pose.

@@ -37,23 +37,23 @@ pub struct ChamferDepthFactor {
     object: Arc<Object>,
     camera: Camera,
     tree: KdTree,
-    /// What was nearest last, for each depth point a face and for each surface sample a depth point: where a search begins
+    /// Nearest elements of the last search, for each depth point a face and for each surface sample a depth point: where a search begins
     /// changes how long it takes, not what it finds.
     nearest: [Vec<AtomicU32>; 2],
     /// Depth of the hand, where it may hide the object.
     hand: Arc<DepthImage>,
-    /// Of one direction.
+    /// Noise of one direction.
     noise: NoiseModel,
 }
 
 /// A point of the object's surface and the depth point it is matched with, in the camera frame \[m\].
-struct Pair {
+struct PointPair {
     surface: Point3<f64>,
     cloud: Point3<f64>,
 }
 
 impl ChamferDepthFactor {
-    /// Of the masked depth of `frame`.
+    /// The factor of the masked depth of `frame`.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth.
@@ -70,19 +70,19 @@ impl ChamferDepthFactor {
     }
 
     /// Each depth point with the mesh.
-    fn to_mesh(&self, state: &State) -> Vec<Pair> {
+    fn to_mesh(&self, state: &State) -> Vec<PointPair> {
         let t_object_cam = state.t_cam_object.inverse();
         let pair = |(p, nearest): (&Point3<f64>, &AtomicU32)| {
             let (query, face) = (t_object_cam * p, nearest.load(Ordering::Relaxed));
             let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
             nearest.store(closest.face, Ordering::Relaxed);
-            Some(Pair { surface: state.t_cam_object * closest.point, cloud: *p })
+            Some(PointPair { surface: state.t_cam_object * closest.point, cloud: *p })
         };
         self.tree.points().par_iter().zip(&self.nearest[0]).filter_map(pair).collect()
     }
 
     /// Each visible surface sample with the depth points.
-    fn to_cloud(&self, state: &State) -> Vec<Pair> {
+    fn to_cloud(&self, state: &State) -> Vec<PointPair> {
         let samples = self.object.samples.par_iter().zip(&self.nearest[1]);
         samples
             .filter_map(|(sample, nearest)| {
@@ -94,12 +94,12 @@ impl ChamferDepthFactor {
                 let point = nearest.load(Ordering::Relaxed) as usize;
                 let found = self.tree.nearest_with_hint(&surface, f64::INFINITY, point)?.index;
                 nearest.store(found as u32, Ordering::Relaxed);
-                Some(Pair { surface, cloud: self.tree.points()[found] })
+                Some(PointPair { surface, cloud: self.tree.points()[found] })
             })
             .collect()
     }
 
-    /// Whether the camera sees a surface point of the object, as far as facing and the hand decide.
+    /// True of a surface point of the object that the camera sees, as far as facing and the hand decide.
     fn sees(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         // Grazing surface is where depth cameras return nothing.
         if normal.dot(&point.coords) > -0.2 * point.coords.norm() {
@@ -130,7 +130,7 @@ impl Factor for ChamferDepthFactor {
         }
         for pairs in [to_mesh, to_cloud] {
             let weighting = self.noise.weighting(pairs.len());
-            for Pair { surface, cloud } in pairs {
+            for PointPair { surface, cloud } in pairs {
                 let offset = cloud - surface;
                 let distance = offset.norm();
                 rows.add(distance, &weighting, |row| {
@@ -178,7 +178,7 @@ mod tests {
         let factor = factor(&frame);
         let pairs = factor.to_mesh(&state);
         assert!(pairs.len() == factor.tree.points().len() && pairs.len() > 100);
-        for Pair { surface, cloud } in pairs {
+        for PointPair { surface, cloud } in pairs {
             let local = state.t_cam_object.inverse() * cloud;
             let (distance, _) = factor.object.surface.signed_distance(&local);
             assert!(((cloud - surface).norm() - distance.abs()).abs() < 1e-12);

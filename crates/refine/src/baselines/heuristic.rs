@@ -77,13 +77,13 @@ pub struct Heuristic {
     pub step_tolerance: f64,
     /// Always run all the iterations, however small the steps become.
     pub exhaustive: bool,
-    /// Of the physics gradient.
+    /// Settings of the physics gradient.
     pub stability: StabilitySettings,
-    /// Of the rendering gradient, and of the checkpoint.
+    /// Settings of the rendering gradient, and of the checkpoint.
     pub rendering: RenderingSettings,
-    /// Of the depth gradient.
+    /// Settings of the depth gradient.
     pub depth: ChamferDepthSettings,
-    /// Of the tactile gradient.
+    /// Settings of the tactile gradient.
     pub tactile: TactileSettings,
     /// Factors of one's own.
     pub factors: Vec<Arc<dyn Factor>>,
@@ -160,13 +160,13 @@ impl Heuristic {
         let mut length = self.first_step;
         let mut least = f64::INFINITY;
         for index in 0..=self.iterations {
-            let candidates: Vec<Candidate> = factors
+            let candidates: Vec<CandidateStep> = factors
                 .par_iter()
-                .map(|factor| Candidate::of(factor.as_ref(), &state, radius, length))
+                .map(|factor| CandidateStep::of(factor.as_ref(), &state, radius, length))
                 .collect();
             let total: f64 = candidates.iter().map(|c| c.cost).sum();
-            let gain: f64 = candidates.iter().map(Candidate::gain).sum();
-            let weight = |c: &Candidate| if gain > 0.0 { c.gain() / gain } else { 0.0 };
+            let gain: f64 = candidates.iter().map(CandidateStep::gain).sum();
+            let weight = |c: &CandidateStep| if gain > 0.0 { c.gain() / gain } else { 0.0 };
             let weights: Vec<f64> = candidates.iter().map(weight).collect();
             let step: Vector6<f64> =
                 weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
@@ -227,7 +227,7 @@ impl Strategy for Heuristic {
 }
 
 /// A step along one factor's gradient and what it does to that factor.
-struct Candidate {
+struct CandidateStep {
     cost: f64,
     cost_after: f64,
     step: Vector6<f64>,
@@ -235,7 +235,7 @@ struct Candidate {
     length: f64,
 }
 
-impl Candidate {
+impl CandidateStep {
     fn of(factor: &dyn Factor, state: &State, radius: f64, length: f64) -> Self {
         // The step is judged by what it was made for.
         let conditional = factor.conditional_at(state);
@@ -250,7 +250,7 @@ impl Candidate {
         Self { cost, cost_after, step, length }
     }
 
-    /// How much the step improves the factor's own cost; 0 if it does not.
+    /// Decrease of the factor's own cost by the step; 0 if there is none.
     fn gain(&self) -> f64 {
         let gain = self.cost - self.cost_after;
         if gain.is_finite() { gain.max(0.0) } else { 0.0 }

@@ -25,9 +25,9 @@ pub struct RobustIcp {
     pub points: usize,
     /// Distance whose weight is one half, at the first iteration \[m\].
     pub first_scale: f64,
-    /// The same at the end \[m\].
+    /// Distance whose weight is one half, at the end \[m\].
     pub last_scale: f64,
-    /// How strongly a step is held back, as a part of the mean curvature of the loss: what the points leave open must not
+    /// Damping of a step, as a part of the mean curvature of the loss: what the points leave open must not
     /// drift with their noise.
     pub damping: f64,
 }
@@ -48,8 +48,9 @@ impl Strategy for RobustIcp {
     ) -> Result<Estimate, RefineError> {
         let &Self { iterations, points, first_scale, last_scale, damping } = self;
         let object = frame.object();
-        let point = |place| Point { place, face: None };
-        let mut cloud: Vec<Point> = frame.masked_points(points)?.into_iter().map(point).collect();
+        let point = |place| DepthPoint { place, face: None };
+        let mut cloud: Vec<DepthPoint> =
+            frame.masked_points(points)?.into_iter().map(point).collect();
         let shrinking = 0.75 * iterations as f64;
         let names = std::iter::once("robust-icp");
         let mut recorder = Recorder::new(names, initial, iterations, None, observe);
@@ -70,21 +71,21 @@ impl Strategy for RobustIcp {
 }
 
 /// A depth point in the camera frame \[m\], and the face it was matched with last.
-struct Point {
+struct DepthPoint {
     place: Point3<f64>,
     face: Option<u32>,
 }
 
 /// The sum of robust losses of the points' distances to the planes of the faces nearest to them.
 fn match_all(
-    cloud: &mut [Point],
+    cloud: &mut [DepthPoint],
     object: &Object,
     state: &State,
     kernel: RobustKernel,
 ) -> icp::NormalEquations {
     let t_object_cam = state.t_cam_object.inverse();
     let center = state.center().into();
-    let of_point = |point: &mut Point| -> Option<(Point3<f64>, icp::Match)> {
+    let of_point = |point: &mut DepthPoint| -> Option<(Point3<f64>, icp::Match)> {
         let local = t_object_cam * point.place;
         let face = point.face.unwrap_or(u32::MAX);
         let closest = object.surface.closest_with_hint(&local, f64::INFINITY, face)?;

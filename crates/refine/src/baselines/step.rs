@@ -25,7 +25,7 @@ pub(super) fn damped_step(
     (step.component_mul(&units) * (length / norm), length)
 }
 
-/// How a walk of steps that follow each other without any choice among them goes.
+/// Rule of a descent whose steps follow each other without any choice among them.
 pub(super) struct StepRule {
     /// Steps at most.
     pub(super) iterations: usize,

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 
 use crate::baselines::GradientKind;
+use crate::check::{
+    CorrectionSettings, CorrectionTrial, Subject, Warning, check_frame, check_object,
+};
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{
-    CorrectionSettings, CorrectionTrial, Frame, Hand, Object, Observation, RegionEvidence, Subject,
-    Warning, inspect_object, inspect_pose,
-};
+use crate::scene::{Frame, Hand, Object, Observation, RegionEvidence};
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
 
@@ -109,9 +109,9 @@ impl FrameInput {
     /// sensors, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
-        let mut of_frame = inspect_pose(observation, object, hand.as_deref(), t_cam_object);
+        let mut of_frame = check_frame(observation, object, hand.as_deref(), t_cam_object);
         of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
-        [inspect_object(object, hand.is_some()), of_frame]
+        [check_object(object, hand.is_some()), of_frame]
     }
 
     /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.

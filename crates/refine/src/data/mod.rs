@@ -1,5 +1,5 @@
 //! Files: BOP datasets, single frames, what a dataset's objects and hands are loaded into, and what a long run keeps; and
-//! what scores and made-up datasets share: contact, noise.
+//! what scores and made-up datasets share: contact.
 
 mod assets;
 mod bodies;
@@ -16,11 +16,9 @@ mod journal;
 mod mask_source;
 #[cfg(feature = "mcap")]
 pub mod mcap;
-mod noise;
 mod pose;
 mod rig_file;
 mod robots;
-mod smooth_field;
 mod targets;
 mod times;
 mod workers;
@@ -37,9 +35,7 @@ pub use frame_input::FrameInput;
 pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;
-pub use noise::NoiseLevel;
 pub use pose::PlainPose;
-pub(crate) use smooth_field::smooth_field;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
 pub use times::{Times, join_times};

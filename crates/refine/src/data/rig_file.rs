@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3xX, UnitQuaternion, Vector2, Vector3};
 use prehend_geometry::limits::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -158,7 +158,7 @@ impl Rig {
                 return field(&format!("objects.{id}.covariance"), &problem);
             }
             let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
-            let nodes = nodes_m.into_iter().map(Point3::from).collect();
+            let nodes = nodes_m.into_iter().map(Vector3::from).collect();
             let columns: Vec<Vector3<f64>> = coefficients.into_iter().map(Vector3::from).collect();
             let coefficients = match columns.as_slice() {
                 [] => Matrix3xX::zeros(0),
@@ -194,7 +194,7 @@ impl Rig {
                 sigma_m: deviation.settings.gp_sigma,
                 length_scale_m: deviation.settings.length_scale,
                 covariance: Covariance(deviation.covariance.clone()),
-                nodes_m: deviation.nodes.iter().map(|node| node.coords.into()).collect(),
+                nodes_m: deviation.nodes().iter().map(|node| (*node).into()).collect(),
                 coefficients: deviation
                     .coefficients
                     .column_iter()

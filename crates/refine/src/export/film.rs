@@ -29,7 +29,7 @@ pub struct SceneFilm {
     camera: Vec<FilmKey>,
 }
 
-/// What the first image says of all.
+/// Properties that all images have of the first.
 struct First {
     im_id: u32,
     r_gltf_base: UnitQuaternion<f64>,

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// The rotation of a frame into that of glTF, in which `up` becomes y, and `forward`, as far as it is level, −z: what cameras look along there.
 ///
-/// Where `forward` is upright itself or one of them has no direction, any direction is level enough.
+/// Any direction is level enough where `forward` is upright itself, or one of them has no direction.
 pub(super) fn upright(up: &Vector3<f64>, forward: &Vector3<f64>) -> UnitQuaternion<f64> {
     let y = up.try_normalize(0.0).unwrap_or_else(Vector3::y);
     let level = |v: &Vector3<f64>| (v - y * y.dot(v)).try_normalize(1e-6 * v.norm());

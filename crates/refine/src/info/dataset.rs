@@ -8,9 +8,9 @@ use prehend_render::image_size;
 use serde_json::{Value, json};
 
 use super::InfoError;
+use crate::check::likely_unit;
 use crate::data::bop::{Dataset, DatasetError, DatasetScene};
 use crate::data::load_mesh;
-use crate::scene::likely_unit;
 use crate::symmetry::Symmetries;
 
 /// Name of the split; scenes; ids of the objects that there are models of, and how many of them have a known mass, and symmetries; columns and rows of the first image.

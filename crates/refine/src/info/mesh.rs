@@ -7,7 +7,7 @@ use prehend_geometry::{MeshReport, TriMesh};
 use serde_json::{Value, json};
 
 use super::{DescribeOptions, InfoError};
-use crate::scene::likely_unit;
+use crate::check::likely_unit;
 
 /// Where units of meshes are said.
 const UNITS: &str = "--mesh-unit, mesh_unit in a frame file, millimeters in BOP's folders";

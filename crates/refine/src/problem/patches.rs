@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Point3, Vector3};
 
-use crate::scene::{ModelErrorSettings, Observation};
+use crate::scene::{ModelErrorSettings, Observation, squared_exponential};
 
 /// Patches that would cover the mask if all were full, and at most.
 const FULL_PATCHES: f64 = 30.0;
@@ -124,9 +124,9 @@ impl SurfacePatches {
         };
         let numbers = sums.iter().map(number).collect();
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
-            let squared = (places[i] - places[j]).norm_squared();
             let own = if i == j { OWN } else { 0.0 };
-            gp_sigma.powi(2) * ((-0.5 * squared / length_scale.powi(2)).exp() + own)
+            let [a, b] = [i, j].map(|k| &places[k].coords);
+            gp_sigma.powi(2) * (squared_exponential(a, b, length_scale) + own)
         });
         let patches = Self { tiles, numbers, places, precision: DMatrix::zeros(0, 0) };
         patches.with_covariance(covariance)

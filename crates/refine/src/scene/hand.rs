@@ -139,7 +139,8 @@ impl Hand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Frame, default_scene, inspect_pose};
+    use crate::check::check_frame;
+    use crate::scene::{Frame, default_scene};
 
     #[test]
     fn a_wrong_number_of_joints_is_an_error() {
@@ -152,7 +153,7 @@ mod tests {
         assert_eq!(refused.to_string(), expected);
         let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
-        let warnings = inspect_pose(&observation, &scene.object, Some(&scene.hand), &scene.initial);
+        let warnings = check_frame(&observation, &scene.object, Some(&scene.hand), &scene.initial);
         assert!(warnings.iter().any(|w| w.finding.contains("15 joint positions")), "{warnings:?}");
     }
 

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3xX, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, Vector3};
 use prehend_geometry::TriMesh;
 use serde::{Deserialize, Serialize};
 
 use super::Object;
-use super::inducing_points::far_apart;
+use super::gaussian_process::{InducingPoints, farthest_points};
 use crate::error::RefineError;
 
-/// How far the surface of an object is from that of its model.
+/// Deviation of the surface of an object from that of its model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelErrorSettings {
@@ -33,10 +33,13 @@ const SPACING: f64 = 0.8;
 /// Those places, at most.
 const MOST_NODES: usize = 150;
 
-/// What patches are off by themselves, as a share of the deviation: what too few places do not describe, and what looks off in one view.
+/// Independent part of the variance at inducing points however near they are, as a share; keeps their covariance regular.
+const NUGGET: f64 = 1e-6;
+
+/// Independent deviation of patches, as a share of the deviation: what too few places do not describe, and what looks off in one view.
 const OWN: f64 = 0.3;
 
-/// What all of a surface is off by together, as a share of the deviation: a model of a wrong size, or with a wrong origin. Frames cannot tell that from
+/// Deviation that all of a surface has in common, as a share of the deviation: a model of a wrong size, or with a wrong origin. Frames cannot tell that from
 /// the object's place.
 const TOGETHER: f64 = 0.5;
 
@@ -44,12 +47,10 @@ const TOGETHER: f64 = 0.5;
 /// describe all others (Quiñonero-Candela and Rasmussen, 2005).
 #[derive(Clone, Debug)]
 pub struct SurfaceDeviation {
-    /// What was expected beforehand.
+    /// Prior.
     pub(crate) settings: ModelErrorSettings,
-    pub(crate) nodes: Vec<Point3<f64>>,
-    /// Factor of the correlations among the nodes.
-    factor: Cholesky<f64, Dyn>,
-    /// A column for each node: independent, and of unit variance beforehand.
+    process: InducingPoints,
+    /// A column for each inducing point: independent, and of unit variance beforehand.
     pub(crate) coefficients: Matrix3xX<f64>,
     /// Covariance of the coefficients in one direction: what is still not known of them.
     pub(crate) covariance: DMatrix<f64>,
@@ -61,38 +62,38 @@ impl SurfaceDeviation {
     /// None yet, of `object`; `None` if models are exact.
     pub(crate) fn new(object: &Object, settings: &ModelErrorSettings) -> Option<Self> {
         let places: Vec<_> = object.samples.iter().map(|sample| sample.point.coords).collect();
-        let nodes = far_apart(&places, SPACING * settings.length_scale, MOST_NODES);
-        let nodes: Vec<_> = nodes.into_iter().map(Point3::from).collect();
+        let nodes = farthest_points(&places, SPACING * settings.length_scale, MOST_NODES);
         let coefficients = Matrix3xX::zeros(nodes.len());
         let covariance = DMatrix::identity(nodes.len(), nodes.len());
         Self::from_parts(settings.clone(), nodes, coefficients, covariance)
     }
 
-    /// Of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes no field.
+    /// A field of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes none.
     pub(crate) fn from_parts(
         settings: ModelErrorSettings,
-        nodes: Vec<Point3<f64>>,
+        nodes: Vec<Vector3<f64>>,
         coefficients: Matrix3xX<f64>,
         covariance: DMatrix<f64>,
     ) -> Option<Self> {
         let ModelErrorSettings { gp_sigma, length_scale } = settings;
         let sizes = [coefficients.ncols(), covariance.nrows(), covariance.ncols()];
-        if !(gp_sigma > 0.0 && length_scale > 0.0) || sizes != [nodes.len(); 3] {
+        if sizes != [nodes.len(); 3] {
             return None;
         }
-        let among = DMatrix::from_fn(nodes.len(), nodes.len(), |i, j| {
-            // What makes it certainly positive definite.
-            correlation(&nodes[i], &nodes[j], length_scale) + if i == j { 1e-6 } else { 0.0 }
-        });
-        let factor = Cholesky::new(among)?;
-        let mut field = Self { settings, nodes, factor, coefficients, covariance, left: 0.0 };
+        let process = InducingPoints::new(nodes, gp_sigma, length_scale, NUGGET)?;
+        let mut field = Self { settings, process, coefficients, covariance, left: 0.0 };
         field.left = field.mean_left();
         Some(field)
     }
 
-    /// How many coefficients a direction has.
+    /// Number of coefficients of a direction.
     pub(crate) fn count(&self) -> usize {
-        self.nodes.len()
+        self.nodes().len()
+    }
+
+    /// Places of the inducing points (model coordinates) \[m\].
+    pub(crate) fn nodes(&self) -> &[Vector3<f64>] {
+        self.process.points()
     }
 
     /// Variance of what patches of the surface are off by themselves \[m²\].
@@ -100,13 +101,9 @@ impl SurfaceDeviation {
         (OWN * self.settings.gp_sigma).powi(2)
     }
 
-    /// What the coefficients are multiplied by for the displacement at `place` (model coordinates).
+    /// Factors of the coefficients in the displacement at `place` (model coordinates).
     pub(crate) fn features(&self, place: &Point3<f64>) -> DVector<f64> {
-        let ModelErrorSettings { gp_sigma, length_scale } = self.settings;
-        let to = self.nodes.iter().map(|node| gp_sigma * correlation(node, place, length_scale));
-        let mut features = DVector::from_iterator(self.count(), to);
-        self.factor.l_dirty().solve_lower_triangular_mut(&mut features);
-        features
+        self.process.features(&[place.coords]).column(0).into_owned()
     }
 
     /// The displacement at `place` of the model \[m\].
@@ -127,12 +124,8 @@ impl SurfaceDeviation {
 
     /// Covariance of what it leaves at `places` of the model, in each direction \[m²\]: what is not known of the coefficients, and what places are
     /// off by themselves, and all together.
-    pub(crate) fn left_covariance(&self, places: &[Point3<f64>]) -> DMatrix<f64> {
-        let columns: Vec<_> = places.iter().map(|place| self.features(place)).collect();
-        let features = match columns.as_slice() {
-            [] => return DMatrix::zeros(0, 0),
-            columns => DMatrix::from_columns(columns),
-        };
+    pub(crate) fn left_covariance(&self, places: &[Vector3<f64>]) -> DMatrix<f64> {
+        let features = self.process.features(places);
         let mut covariance = features.tr_mul(&(&self.covariance * &features));
         (0..places.len()).for_each(|k| covariance[(k, k)] += self.own_variance());
         covariance.add_scalar_mut((TOGETHER * self.settings.gp_sigma).powi(2));
@@ -144,9 +137,9 @@ impl SurfaceDeviation {
         self.left
     }
 
-    /// That, at the nodes.
+    /// Mean of it at the nodes.
     fn mean_left(&self) -> f64 {
-        let trace = self.left_covariance(&self.nodes).trace();
+        let trace = self.left_covariance(self.nodes()).trace();
         (trace / self.count().max(1) as f64).sqrt()
     }
 
@@ -166,10 +159,6 @@ impl SurfaceDeviation {
     pub fn corrected(&self, object: &Object) -> Result<Object, RefineError> {
         object.with_surface(self.applied(&object.mesh), Some(Arc::new(self.clone())))
     }
-}
-
-fn correlation(a: &Point3<f64>, b: &Point3<f64>, length_scale: f64) -> f64 {
-    (-0.5 * (a - b).norm_squared() / length_scale.powi(2)).exp()
 }
 
 #[cfg(test)]
@@ -195,8 +184,8 @@ mod tests {
         let expected = settings.gp_sigma * (0.01 + OWN * OWN + TOGETHER * TOGETHER).sqrt();
         assert!((field.left() / expected - 1.0).abs() < 0.05, "{}", field.left());
         // Places near each other are off alike, and far ones are not.
-        let near = field.nodes[0] + Vector3::new(2e-3, 0.0, 0.0);
-        let places = [field.nodes[0], near, object.center + Vector3::x()];
+        let near = field.nodes()[0] + Vector3::new(2e-3, 0.0, 0.0);
+        let places = [field.nodes()[0], near, object.center.coords + Vector3::x()];
         let left = field.left_covariance(&places);
         let together = (TOGETHER * settings.gp_sigma).powi(2);
         let alike = |k: usize| left[(0, k)] - together;

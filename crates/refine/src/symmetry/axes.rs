@@ -2,7 +2,7 @@
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-use super::deviation::Shape;
+use super::deviation::SampledSurface;
 
 /// Turns about an axis that all must be symmetries for the axis to be one of revolution: every 10°.
 const TURNS: usize = 36;
@@ -11,7 +11,7 @@ const SAME: f64 = 0.1;
 
 /// The axes of revolution: none, one, or, of a sphere, three at right angles.
 pub(super) fn axes_of_revolution(
-    shape: &Shape,
+    shape: &SampledSurface,
     found: &[UnitQuaternion<f64>],
 ) -> Vec<Unit<Vector3<f64>>> {
     // A finite group has few rotations; a continuum is hit by most of what the search began with near it.
@@ -41,7 +41,7 @@ pub(super) fn axes_of_revolution(
 }
 
 /// The axis \[unit\] of turns near those about `axis` at which the surface lies on itself best.
-fn refined(shape: &Shape, axis: Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
+fn refined(shape: &SampledSurface, axis: Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
     let drawn = [0.25, 0.5, 0.75].map(|part| shape.drawn(turn(&axis, part), 4, 6).0);
     let sum: Vector3<f64> = drawn
         .iter()

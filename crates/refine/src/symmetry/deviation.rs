@@ -1,4 +1,4 @@
-//! How far a rotation is from being a symmetry.
+//! Deviation of a surface from itself, turned.
 
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use prehend_autodiff::Quadratic;
@@ -8,14 +8,14 @@ use prehend_geometry::{SurfaceSample, TriMesh};
 
 use super::paint::Paint;
 
-/// What counts as the same.
+/// Tolerances of symmetries.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SymmetrySettings {
-    /// How far the surface may lie from where the symmetry says, as a fraction of the diameter.
+    /// Largest distance of the surface from where the symmetry has it, as a fraction of the diameter.
     pub tolerance: f64,
     /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
     pub exempt: f64,
-    /// How much the mean color of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
+    /// Largest difference of the surface's mean color (0..=1, each patch blurred to the size of the tolerance), root
     /// mean square; `None` looks at the shape alone.
     pub color_tolerance: Option<f64>,
     /// Points of the surface that are compared.
@@ -29,20 +29,20 @@ impl Default for SymmetrySettings {
 }
 
 /// A surface, prepared for comparing it with itself.
-pub(super) struct Shape {
+pub(super) struct SampledSurface {
     surface: ClosestPoints,
     /// Points of the surface relative to its centroid, each with its unit normal.
     samples: Vec<(Vector3<f64>, Vector3<f64>)>,
     center: Point3<f64>,
     /// Second moments of the surface about its centroid, per area \[m²\].
     moments: Matrix3<f64>,
-    /// How far a point may lie off \[m\], and how many may lie farther.
+    /// Largest distance of a point \[m\], and number of those that may lie farther.
     tolerance: f64,
     exempt: usize,
     paint: Option<Paint>,
 }
 
-impl Shape {
+impl SampledSurface {
     pub(super) fn new(mesh: &TriMesh, settings: &SymmetrySettings) -> Result<Self, ClosestError> {
         let surface = ClosestPoints::new(mesh)?;
         let samples = surface_samples(mesh, settings.samples.max(1), 0);
@@ -67,12 +67,12 @@ impl Shape {
         self.moments.symmetric_eigen().eigenvectors
     }
 
-    /// Whether `turn` is a symmetry.
+    /// True of a `turn` that is a symmetry.
     pub(super) fn is_symmetric(&self, turn: &UnitQuaternion<f64>) -> bool {
         self.fits(turn, 1.0)
     }
 
-    /// Whether the surface is off by no more than `slack` tolerances.
+    /// True if the surface is off by no more than `slack` tolerances.
     pub(super) fn fits(&self, turn: &UnitQuaternion<f64>, slack: f64) -> bool {
         let reach = slack * self.tolerance;
         let matrix = turn.to_rotation_matrix();
@@ -124,14 +124,14 @@ impl Shape {
         (equations, sum, count)
     }
 
-    /// How far `turn` moves the second moments, relative to themselves.
+    /// Change of the second moments by `turn`, relative to themselves.
     pub(super) fn moments_moved(&self, turn: &UnitQuaternion<f64>) -> f64 {
         let turn = turn.to_rotation_matrix();
         let moved = turn.matrix() * self.moments * turn.matrix().transpose();
         (moved - self.moments).norm() / self.moments.norm().max(f64::MIN_POSITIVE)
     }
 
-    /// How far a sample may lie off \[m\].
+    /// Largest distance of a sample \[m\].
     pub(super) fn tolerance(&self) -> f64 {
         self.tolerance
     }

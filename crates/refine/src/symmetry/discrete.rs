@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use super::axes::turn;
-use super::deviation::Shape;
+use super::deviation::SampledSurface;
 
 /// Rotations nearer than this are one \[rad\].
 const SAME: f64 = 0.1;
@@ -13,7 +13,10 @@ const SAME: f64 = 0.1;
 const MOST: usize = 60;
 
 /// The rotations of a finite group among `found`, with what follows from them, in order of angle.
-pub(super) fn finite(shape: &Shape, found: Vec<UnitQuaternion<f64>>) -> Vec<UnitQuaternion<f64>> {
+pub(super) fn finite(
+    shape: &SampledSurface,
+    found: Vec<UnitQuaternion<f64>>,
+) -> Vec<UnitQuaternion<f64>> {
     let mut group: Vec<UnitQuaternion<f64>> = Vec::new();
     for rotation in found {
         add(&mut group, snapped(shape, rotation));
@@ -42,7 +45,7 @@ fn add(group: &mut Vec<UnitQuaternion<f64>>, rotation: UnitQuaternion<f64>) {
 }
 
 /// `rotation` with an angle of a whole fraction of a turn, where that is near and a symmetry as well.
-fn snapped(shape: &Shape, rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+fn snapped(shape: &SampledSurface, rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let Some((axis, angle)) = rotation.axis_angle() else { return rotation };
     let whole = (2..=12)
         .flat_map(|n| (1..n).map(move |k| f64::from(k) / f64::from(n)))
@@ -56,7 +59,10 @@ fn snapped(shape: &Shape, rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> 
 }
 
 /// The half turn across the axis of revolution `axis`, where it is a symmetry.
-pub(super) fn flip(shape: &Shape, axis: &Unit<Vector3<f64>>) -> Option<UnitQuaternion<f64>> {
+pub(super) fn flip(
+    shape: &SampledSurface,
+    axis: &Unit<Vector3<f64>>,
+) -> Option<UnitQuaternion<f64>> {
     let aside = Vector3::ith(axis.iamin(), 1.0);
     let across = Unit::new_normalize(axis.cross(&aside));
     let half = turn(&across, 0.5);

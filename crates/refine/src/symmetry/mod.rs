@@ -11,7 +11,7 @@ mod near;
 mod paint;
 mod symmetries;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 use prehend_geometry::TriMesh;
 use prehend_geometry::closest::ClosestError;
 use prehend_geometry::sample::spread_rotations;
@@ -21,7 +21,8 @@ pub use self::deviation::SymmetrySettings;
 pub(crate) use self::near::{alternatives, near_symmetries};
 pub use self::symmetries::{ContinuousSymmetry, Symmetries};
 
-use self::deviation::Shape;
+use self::deviation::SampledSurface;
+use self::symmetries::about;
 
 /// Rotations that the search begins with: about 15° apart.
 const STARTS: usize = 3000;
@@ -38,11 +39,11 @@ pub fn find_symmetries(
     mesh: &TriMesh,
     settings: &SymmetrySettings,
 ) -> Result<Symmetries, ClosestError> {
-    Ok(symmetries_of(&Shape::new(mesh, settings)?))
+    Ok(symmetries_of(&SampledSurface::new(mesh, settings)?))
 }
 
 /// The symmetries of `shape`, the identity left out.
-fn symmetries_of(shape: &Shape) -> Symmetries {
+fn symmetries_of(shape: &SampledSurface) -> Symmetries {
     let found = symmetric_rotations(shape);
     let axes = axes::axes_of_revolution(shape, &found);
     let discrete = match axes.as_slice() {
@@ -59,7 +60,7 @@ fn symmetries_of(shape: &Shape) -> Symmetries {
 }
 
 /// The symmetries that the search arrives at, the identity left out; where they form a continuum, many of it.
-fn symmetric_rotations(shape: &Shape) -> Vec<UnitQuaternion<f64>> {
+fn symmetric_rotations(shape: &SampledSurface) -> Vec<UnitQuaternion<f64>> {
     let found: Vec<UnitQuaternion<f64>> = spread_rotations(STARTS)
         .into_par_iter()
         .filter_map(|start| {
@@ -76,10 +77,4 @@ fn symmetric_rotations(shape: &Shape) -> Vec<UnitQuaternion<f64>> {
         })
         .collect();
     found.into_iter().filter(|turn| turn.angle() > 0.1).collect()
-}
-
-/// The rotation `turn` about `center`, as a motion.
-fn about(center: &Point3<f64>, turn: &UnitQuaternion<f64>) -> Isometry3<f64> {
-    let shift = center.coords - turn * center.coords;
-    Isometry3::from_parts(shift.into(), *turn)
 }

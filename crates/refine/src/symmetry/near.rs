@@ -7,8 +7,9 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::closest::ClosestError;
 
 use super::axes::turn;
-use super::deviation::Shape;
-use super::{ContinuousSymmetry, Symmetries, SymmetrySettings, about, symmetries_of};
+use super::deviation::SampledSurface;
+use super::symmetries::about;
+use super::{ContinuousSymmetry, Symmetries, SymmetrySettings, symmetries_of};
 
 /// The fraction of the surface that may be off by more than the tolerance: handles and spouts, which a hand may hide.
 const EXEMPT: f64 = 0.05;
@@ -25,7 +26,7 @@ const APART: f64 = 0.2;
 /// If the mesh cannot be searched.
 pub(crate) fn near_symmetries(mesh: &TriMesh) -> Result<Vec<Isometry3<f64>>, ClosestError> {
     let settings = SymmetrySettings { exempt: EXEMPT, ..SymmetrySettings::default() };
-    let shape = Shape::new(mesh, &settings)?;
+    let shape = SampledSurface::new(mesh, &settings)?;
     let mut symmetries = symmetries_of(&shape);
     let axes = shape.principal_axes();
     let half = |k: usize| turn(&Unit::new_normalize(axes.column(k).into_owned()), 0.5);
@@ -47,7 +48,7 @@ fn representatives(symmetries: &Symmetries) -> Vec<Isometry3<f64>> {
     alternatives.into_iter().map(|(_, motion)| motion).collect()
 }
 
-/// What `motions` in object coordinates make of `poses`, each with the place in `poses` of that which it comes from. What is turned hardly
+/// Poses that `motions` in object coordinates make of `poses`, each with the index of that which it comes from. One that is turned hardly
 /// otherwise than one of `poses`, or than an earlier alternative, is left out.
 pub(crate) fn alternatives(
     poses: &[Isometry3<f64>],

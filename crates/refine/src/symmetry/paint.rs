@@ -31,7 +31,7 @@ impl Paint {
         Some(Self { tree, colors, most })
     }
 
-    /// Whether the colors are the same after the rotation `turn` about `center`.
+    /// True if the colors are nearly equal after the rotation `turn` about `center`.
     pub(super) fn fits(&self, center: &Point3<f64>, turn: &Rotation3<f64>) -> bool {
         let points = self.tree.points();
         let difference = |(point, color): (&Point3<f64>, &Vector3<f64>)| {

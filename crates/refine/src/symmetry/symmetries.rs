@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 /// Rotations that stand for a continuous symmetry: ⌈π/0.01⌉, so that no surface point moves by more than 1 %
 /// of the diameter from one to the next (BOP).
@@ -29,10 +29,14 @@ pub struct ContinuousSymmetry {
 impl ContinuousSymmetry {
     /// The turn by `angle` \[rad\] about the axis, as a motion.
     pub(crate) fn turn(&self, angle: f64) -> Isometry3<f64> {
-        let rotation = UnitQuaternion::from_axis_angle(&self.axis, angle);
-        let shift = self.point.coords - rotation * self.point.coords;
-        Isometry3::from_parts(Translation3::from(shift), rotation)
+        about(&self.point, &UnitQuaternion::from_axis_angle(&self.axis, angle))
     }
+}
+
+/// The rotation `turn` about `center` \[m\], as a motion.
+pub(super) fn about(center: &Point3<f64>, turn: &UnitQuaternion<f64>) -> Isometry3<f64> {
+    let shift = center.coords - turn * center.coords;
+    Isometry3::from_parts(shift.into(), *turn)
 }
 
 impl Symmetries {

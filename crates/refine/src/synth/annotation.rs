@@ -1,4 +1,4 @@
-//! What the JSON files of a dataset say. Lengths in millimeters, as BOP has them.
+//! Entries of a dataset's JSON files. Lengths in millimeters, as BOP has them.
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
@@ -94,31 +94,6 @@ pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
     fields.insert("com_mm".into(), json!((inertial.center_of_mass.coords * 1e3).as_slice()));
     fields.insert("inertia_kg_m2".into(), json!(rows.collect::<Vec<Vec<f64>>>()));
     Value::Object(fields)
-}
-
-/// What is wrong with a rig, as changes that bring what is said and measured to what is true: factors of focal lengths, shift of the
-/// principal point, factor of depth, what is to be added then on a grid of the image, the hand's pose in the frame of where it is said to be,
-/// joint positions to be added; what taxels' readings have been multiplied by, and what was added to them then \[N\].
-pub(super) fn rig(
-    focal: [f64; 2],
-    principal_px: [f64; 2],
-    depth_scale: f64,
-    depth_offsets: &[Vec<f64>],
-    hand: &Isometry3<f64>,
-    joints: &Map<String, Value>,
-    (taxel_gains, taxel_offsets): (&[f64], &[[f64; 3]]),
-) -> Value {
-    json!({
-        "focal_scale": focal,
-        "principal_point_px": principal_px,
-        "depth_scale": depth_scale,
-        "depth_offset_mm": depth_offsets,
-        "hand_R": rotation_to_row_major(&hand.rotation),
-        "hand_t": translation_to_mm(&hand.translation),
-        "joints": joints,
-        "taxel_gains": taxel_gains,
-        "taxel_offsets_n": taxel_offsets,
-    })
 }
 
 /// `cam_R_…` and `cam_t_…` of a pose into the camera frame.

@@ -1,4 +1,4 @@
-//! Why a dataset could not be made.
+//! Reason that a dataset could not be made.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use thiserror::Error;
 use crate::data::AssetError;
 use crate::data::bop::DatasetError;
 
-/// Why a dataset could not be made.
+/// Reason that a dataset could not be made.
 #[derive(Debug, Error)]
 pub enum SynthError {
     /// The folder holds a dataset that was begun with other settings.
     #[error("{}: {difference}: give the same settings, or another folder", file.display())]
     OtherSettings {
-        /// Where the dataset's settings are kept.
+        /// File of the dataset's settings.
         file: PathBuf,
         /// The first setting that differs, and both its values.
         difference: String,

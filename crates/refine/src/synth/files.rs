@@ -32,7 +32,7 @@ pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
     Ok(())
 }
 
-/// What a JSON file holds, if it is there.
+/// Content of a JSON file, if it is there.
 pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<Option<T>, DatasetError> {
     match bop::read_json(file) {
         Err(DatasetError::Missing { .. }) => Ok(None),
@@ -74,7 +74,7 @@ impl Shot {
         obj_id: u32,
         hand: &KinematicTree,
         jpeg_quality: u8,
-    ) -> Result<Entries, AssetError> {
+    ) -> Result<ImageEntries, AssetError> {
         let (image, instance) = (format!("{im_id:06}.png"), format!("{im_id:06}_000000.png"));
         let unit = annotation::DEPTH_SCALE * 1e-3;
         let rgb = scene_dir.join("rgb").join(&image);
@@ -93,9 +93,9 @@ impl Shot {
         Ok(self.entries(obj_id, hand.joint_names()))
     }
 
-    fn entries(&self, obj_id: u32, names: &[String]) -> Entries {
+    fn entries(&self, obj_id: u32, names: &[String]) -> ImageEntries {
         let Self { told, visible, whole, .. } = self;
-        let mut entries = Entries::new();
+        let mut entries = ImageEntries::new();
         let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
         add("scene_gt.json", annotation::truth(obj_id, &self.truth));
         add("scene_gt_info.json", annotation::visibility(visible, whole, &told.depth));
@@ -120,8 +120,8 @@ impl Shot {
     }
 }
 
-/// What one image adds to each of its scene's files, by the file's name.
-pub(super) type Entries = Map<String, Value>;
+/// Entries of one image in its scene's files, by the file's name.
+pub(super) type ImageEntries = Map<String, Value>;
 
 /// The files that have an entry for each image. The camera's comes last: a scene that has it has all.
 pub(super) const NAMES: [&str; 6] = [
@@ -140,10 +140,10 @@ pub(super) const NAMES: [&str; 6] = [
 /// When one cannot be written.
 pub(super) fn write_entries(
     scene_dir: &Path,
-    frames: &BTreeMap<usize, Entries>,
+    frames: &BTreeMap<usize, ImageEntries>,
 ) -> Result<(), DatasetError> {
     for name in NAMES {
-        let line = |(im_id, entries): (&usize, &Entries)| {
+        let line = |(im_id, entries): (&usize, &ImageEntries)| {
             entries.get(name).map(|entry| format!("  \"{im_id}\": {entry}"))
         };
         let lines: Vec<String> = frames.iter().filter_map(line).collect();
@@ -191,7 +191,7 @@ mod tests {
     fn files_are_json_with_a_line_an_image() {
         let dir = tempfile::tempdir().unwrap();
         let gt = ("scene_gt.json".to_owned(), serde_json::json!([{ "a": 1 }]));
-        let entries = Entries::from_iter([gt]);
+        let entries = ImageEntries::from_iter([gt]);
         let frames = BTreeMap::from([(9, entries.clone()), (10, entries)]);
         write_entries(dir.path(), &frames).unwrap();
         let text = fs::read_to_string(dir.path().join("scene_gt.json")).unwrap();

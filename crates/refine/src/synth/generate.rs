@@ -11,20 +11,21 @@ use serde_json::json;
 
 use super::error::SynthError;
 use super::files::{
-    Entries, FRAME_FOLDERS, NAMES, initial, read_json, remove_temporary, write_entries,
+    FRAME_FOLDERS, ImageEntries, NAMES, initial, read_json, remove_temporary, write_entries,
     write_models,
 };
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
-use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
-use super::sensor::{Lens, Rig};
+use super::plan::{SynthObject, SynthSettings, Use, check_plan, seed, sequence};
+use super::pose_noise::NoiseLevel;
+use super::sensor::{SensorRig, SimulatedLens};
 use crate::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, write_atomically,
     write_results,
 };
-use crate::data::{Identity, Journal, NoiseLevel};
+use crate::data::{Identity, Journal};
 
-/// What a dataset holds.
+/// Content of a dataset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DatasetSummary {
     /// Frames that are there.
@@ -40,7 +41,7 @@ pub struct GraspFailure {
     pub obj_id: u32,
     /// The images that would show it.
     pub images: Vec<u32>,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
@@ -68,9 +69,9 @@ const FAILURES: &str = "synth_failures.json";
 pub fn generate<'s, G>(
     dir: &Path,
     hand: &HandFiles,
-    subjects: &'s [Subject],
+    subjects: &'s [SynthObject],
     settings: &SynthSettings,
-    prepare: impl Fn(&'s Subject) -> Result<G, String>,
+    prepare: impl Fn(&'s SynthObject) -> Result<G, String>,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<DatasetSummary, SynthError>
 where
@@ -84,29 +85,35 @@ where
     check_plan(dir, hand, subjects, settings)?;
     remove_temporary(dir)?;
     hand.write(dir)?;
-    let told = |s: &Subject| {
+    let told = |s: &SynthObject| {
         let mut noise = sequence(settings.seed, Use::Model, s.obj_id, 0);
         settings.sensor.model.perturb_model(&s.object.mesh, &mut noise)
     };
-    let models = |s: &'s Subject, mesh| (s.obj_id, mesh, &s.object.inertial);
+    let models = |s: &'s SynthObject, mesh| (s.obj_id, mesh, &s.object.inertial);
     write_models(&dir.join("models"), subjects.iter().map(|s| models(s, told(s))))?;
     let exact = subjects.iter().map(|s| models(s, s.object.mesh.clone()));
     write_models(&dir.join("models_eval"), exact)?;
     let size = (settings.width.get(), settings.height.get());
     let lens = settings
         .lens
-        .map(|model| Lens::new(model, !settings.undeclared_lens, &settings.sensor, size));
+        .map(|model| SimulatedLens::new(model, !settings.undeclared_lens, &settings.sensor, size));
     let lens = lens.as_ref();
     if settings.sensor.calibration.shared > 0 {
         let mut noise = sequence(settings.seed, Use::Rig, 0, 0);
-        let rig =
-            Rig::new(&settings.sensor, &subjects[0].object, &hand.robot, size, lens, &mut noise);
+        let rig = SensorRig::new(
+            &settings.sensor,
+            &subjects[0].object,
+            &hand.robot,
+            size,
+            lens,
+            &mut noise,
+        );
         write_atomically(&dir.join("rig_gt.json"), format!("{}\n", rig.faults()).as_bytes())?;
     }
     let mut summary = DatasetSummary::default();
     for subject in subjects {
         let scene_dir = dir.join("test").join(format!("{:06}", subject.obj_id));
-        let scene = Scene { dir: scene_dir, hand, subject, settings, lens, progress };
+        let scene = SceneJob { dir: scene_dir, hand, subject, settings, lens, progress };
         let failures = scene.complete(|| prepare(subject))?;
         let failed: usize = failures.iter().map(|f| f.images.len()).sum();
         summary.frames += u64::from(settings.frames.get()) - failed as u64;
@@ -127,7 +134,7 @@ where
     Ok(summary)
 }
 
-fn check(subjects: &[Subject]) -> Result<(), SynthError> {
+fn check(subjects: &[SynthObject]) -> Result<(), SynthError> {
     let mut ids = BTreeSet::new();
     match subjects.iter().find(|s| !ids.insert(s.obj_id)) {
         Some(s) => Err(SynthError::Argument(format!("two objects have the number {}", s.obj_id))),
@@ -136,20 +143,20 @@ fn check(subjects: &[Subject]) -> Result<(), SynthError> {
     }
 }
 
-/// What is known of a grasp: its moments, or why there are none.
+/// Moments of a grasp, or why there are none.
 type Moments = Result<Vec<GraspSnapshot>, String>;
 
 /// A scene in the making.
-struct Scene<'a> {
+struct SceneJob<'a> {
     dir: PathBuf,
     hand: &'a HandFiles,
-    subject: &'a Subject,
+    subject: &'a SynthObject,
     settings: &'a SynthSettings,
-    lens: Option<&'a Lens>,
+    lens: Option<&'a SimulatedLens>,
     progress: &'a (dyn Fn(u64) + Sync),
 }
 
-impl Scene<'_> {
+impl SceneJob<'_> {
     /// Makes what is missing; returns the grasps that could not be made.
     fn complete<G: Fn(u64) -> Moments + Sync>(
         &self,
@@ -166,7 +173,7 @@ impl Scene<'_> {
         }
         let obj_id = self.subject.obj_id;
         let identity = Identity::of(&json!({ "command": "synth", "object": obj_id }));
-        let (journal, done) = Journal::open::<Entries>(&journal, &identity, false)?;
+        let (journal, done) = Journal::open::<ImageEntries>(&journal, &identity, false)?;
         (self.progress)(done.len() as u64);
         // Images by grasp.
         let mut missing: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -218,15 +225,15 @@ impl Scene<'_> {
         moments: &[GraspSnapshot],
         grasp: u32,
         images: &[u32],
-        state: &Mutex<(Journal, BTreeMap<usize, Entries>)>,
+        state: &Mutex<(Journal, BTreeMap<usize, ImageEntries>)>,
     ) -> Result<(), SynthError> {
         let &SynthSettings { width, height, seed, ref sensor, .. } = self.settings;
-        let &Subject { obj_id, ref object } = self.subject;
+        let &SynthObject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
         let size = (width.get(), height.get());
         let lasting = if sensor.calibration.shared > 0 { (0, 0) } else { (obj_id, grasp) };
         let mut noise = sequence(seed, Use::Rig, lasting.0, lasting.1);
-        let rig = Rig::new(sensor, object, robot, size, self.lens, &mut noise);
+        let rig = SensorRig::new(sensor, object, robot, size, self.lens, &mut noise);
         let film = self
             .settings
             .film

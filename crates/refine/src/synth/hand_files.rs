@@ -39,7 +39,7 @@ impl HandFiles {
 
     /// The hand of a URDF file, with the skin of a taxel table.
     ///
-    /// Of what the URDF names, files within its folder are taken into datasets.
+    /// Files that the URDF names are taken into datasets if they are within its folder.
     ///
     /// # Errors
     /// If a file is missing or broken.
@@ -95,7 +95,7 @@ pub(super) fn write_hand(root: &Path, urdf: &str, skin: &[Taxel]) -> Result<(), 
     write_atomically(&root.join(URDF), urdf.as_bytes())
 }
 
-/// What the `filename` attributes of a URDF say.
+/// Values of the `filename` attributes of a URDF.
 fn named_files(urdf: &str) -> impl Iterator<Item = &str> {
     urdf.split("filename").skip(1).filter_map(|rest| {
         let rest = rest.trim_start().strip_prefix('=')?.trim_start();

@@ -11,12 +11,16 @@ mod generate;
 mod grasp;
 mod hand_files;
 mod plan;
+mod pose_noise;
 mod sensor;
+mod settings;
 
 pub use dataset::write_dataset;
 pub use error::SynthError;
 pub use generate::{DatasetSummary, GraspFailure, generate};
 pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, GraspSnapshot, Grasper, Preshape};
 pub use hand_files::HandFiles;
-pub use plan::{Subject, SynthSettings};
+pub use plan::{SynthObject, SynthSettings};
+pub use pose_noise::NoiseLevel;
+pub(crate) use sensor::smooth_field;
 pub use sensor::{FilmSettings, SensorSettings, SettingError};

@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::num::{NonZeroU32, NonZeroUsize};
+use std::ops::Not;
 use std::path::Path;
 
 use prehend_geometry::{SplitMix64, TriMesh};
 use prehend_render::Distortion;
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::annotation;
@@ -18,15 +20,15 @@ use crate::data::identity::{fingerprint, program};
 use crate::scene::Object;
 
 /// An object of a dataset in the making.
-pub struct Subject {
+pub struct SynthObject {
     /// Its number among the models, and that of its scene.
     pub obj_id: u32,
     /// The object as it truly is.
     pub object: Object,
 }
 
-/// How many frames to make, and with what.
-#[derive(Clone, Debug, PartialEq)]
+/// Settings of a dataset.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SynthSettings {
     /// Frames of each object.
     pub frames: NonZeroU32,
@@ -37,10 +39,13 @@ pub struct SynthSettings {
     /// Rows of the images.
     pub height: NonZeroUsize,
     /// The camera's lens, if it is no pinhole.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lens")]
     pub lens: Option<Distortion>,
-    /// Whether the dataset keeps silent about that lens, as about other faults of a rig.
+    /// True if the dataset keeps silent about that lens, as about other faults of a rig.
+    #[serde(skip_serializing_if = "Not::not")]
     pub undeclared_lens: bool,
-    /// Whether the frames of each grasp are a film: the camera stands still, and the frames follow each other in time.
+    /// A film of each grasp: the camera stands still, and the frames follow each other in time.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmSettings>,
     /// Sensor models.
     pub sensor: SensorSettings,
@@ -57,7 +62,7 @@ pub struct SynthSettings {
 pub(super) fn check_plan(
     dir: &Path,
     hand: &HandFiles,
-    subjects: &[Subject],
+    subjects: &[SynthObject],
     settings: &SynthSettings,
 ) -> Result<(), SynthError> {
     let plan = describe(hand, subjects, settings);
@@ -77,8 +82,8 @@ pub(super) fn check_plan(
     Ok(write_atomically(&file, format!("{plan:#}\n").as_bytes())?)
 }
 
-fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) -> Value {
-    let object = |s: &Subject| {
+fn describe(hand: &HandFiles, subjects: &[SynthObject], settings: &SynthSettings) -> Value {
+    let object = |s: &SynthObject| {
         let told = json!({
             "name": s.object.name,
             "mass_kg": s.object.inertial.mass,
@@ -86,40 +91,16 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         });
         (s.obj_id.to_string(), told)
     };
-    let SynthSettings {
-        frames,
-        frames_per_grasp,
-        width,
-        height,
-        lens,
-        undeclared_lens,
-        film,
-        sensor,
-        seed,
-        grasp,
-    } = settings;
-    let mut plan = json!({
-        "program": program(),
-        "frames": frames,
-        "frames_per_grasp": frames_per_grasp,
-        "width": width,
-        "height": height,
-        "seed": seed,
-        "sensor": sensor.to_json(),
-        "grasp": grasp,
-        "hand": fingerprint(&hand.content().collect::<Vec<u8>>()),
-        "objects": subjects.iter().map(object).collect::<Map<String, Value>>(),
-    });
-    if let Some(FilmSettings { rate, occluders }) = film {
-        plan["film"] = json!({ "rate": rate, "occluders": occluders });
-    }
-    if let Some(lens) = lens {
-        plan["lens"] = annotation::lens(lens);
-        if *undeclared_lens {
-            plan["undeclared_lens"] = true.into();
-        }
-    }
+    let mut plan = json!(settings);
+    plan["program"] = json!(program());
+    plan["hand"] = json!(fingerprint(&hand.content().collect::<Vec<u8>>()));
+    plan["objects"] = subjects.iter().map(object).collect::<Map<String, Value>>().into();
     plan
+}
+
+/// A lens, as `cam_dist` of a camera has it.
+fn lens<S: Serializer>(lens: &Option<Distortion>, serializer: S) -> Result<S::Ok, S::Error> {
+    lens.as_ref().map(annotation::lens).serialize(serializer)
 }
 
 /// The first place where two plans differ, and what they say there.
@@ -156,13 +137,13 @@ pub(super) enum Use {
     Grasp,
     /// Sensor faults that last, by object and grasp, or of all.
     Rig,
-    /// What differs from frame to frame, by object and frame.
+    /// Errors that differ from frame to frame, by object and frame.
     Frame,
     /// Initial poses of the lower level, by object and frame.
     InitialLow,
     /// Initial poses of the higher level, by object and frame.
     InitialHigh,
-    /// Where the camera of a film stands and what passes in front of it, by object and grasp.
+    /// The camera of a film and what passes in front of it, by object and grasp.
     Film,
 }
 

@@ -34,19 +34,6 @@ fn a_scene_is_a_sequence() {
 }
 
 #[test]
-fn a_strip_shows_the_film() {
-    let place = Workplace::new();
-    place.succeed(&format!("{TRACK} --out t.csv --strip strip.png"));
-    let strip = image::open(place.path("strip.png")).unwrap().into_rgb8();
-    // Two frames, side by side.
-    assert_eq!((strip.width(), strip.height()), (644, 240));
-    let green = strip.pixels().filter(|p| p[1] > 150 && p[0] < 120 && p[2] < 120).count();
-    assert!(green > 200, "{green}");
-    let said = place.prehend(&format!("{TRACK} --out t.csv --strip no/strip.png"));
-    assert!(said.code != 0 && said.err.contains("strip.png"), "{}", said.err);
-}
-
-#[test]
 fn json_tells_every_frame() {
     let place = Workplace::new();
     let said = place.succeed(&format!("{TRACK} --budget 0 --time --json --out t.csv"));

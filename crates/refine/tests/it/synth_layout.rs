@@ -11,18 +11,18 @@ use prehend_geometry::objects::YcbObject;
 use prehend_refine::data::bop::Dataset;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{
-    DatasetSummary, FilmSettings, GraspSnapshot, HandFiles, SensorSettings, Subject, SynthError,
-    SynthSettings, generate,
+    DatasetSummary, FilmSettings, GraspSnapshot, HandFiles, SensorSettings, SynthError,
+    SynthObject, SynthSettings, generate,
 };
 use prehend_render::Distortion;
 use serde_json::{Value, json};
 
 const BOTTLE: u32 = 5;
 
-fn subject() -> Subject {
+fn subject() -> SynthObject {
     let object = YcbObject::MustardBottle;
     let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0);
-    Subject { obj_id: BOTTLE, object: prepared.unwrap() }
+    SynthObject { obj_id: BOTTLE, object: prepared.unwrap() }
 }
 
 fn settings(sensor: SensorSettings) -> SynthSettings {
@@ -66,7 +66,7 @@ fn make(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<DatasetSummary, SynthError> {
     let (hand, subjects) = (HandFiles::built_in().unwrap(), [subject()]);
-    let prepare = |_: &Subject| Ok(|_| Ok(moments(&hand.robot)));
+    let prepare = |_: &SynthObject| Ok(|_| Ok(moments(&hand.robot)));
     generate(dir, &hand, &subjects, settings, prepare, progress)
 }
 

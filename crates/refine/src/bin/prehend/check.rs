@@ -7,13 +7,12 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::data::bop::{Dataset, DatasetError};
-use prehend_refine::data::{AssetError, Assets, FrameInput, Target, load_frame_file};
-use prehend_refine::evaluate::report::{Report, outline_picture};
-use prehend_refine::scene::{
-    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning,
-    find_corrections,
+use prehend_refine::check::{
+    CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning, find_corrections,
 };
+use prehend_refine::data::bop::{Dataset, DatasetError};
+use prehend_refine::data::{Assets, FrameInput, Target, load_frame_file};
+use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_render::RgbImage;
 
 use crate::options::{Job, Selection};
@@ -60,7 +59,7 @@ impl Check {
         let mut warnings: Vec<String> =
             findings.iter().map(|found| found.message(&names)).collect();
         let (picture, others) = drawn(&input, &t_cam_object);
-        let told = |warning: &Warning| findings.iter().any(|found| explains(found, warning));
+        let told = |warning: &Warning| findings.iter().any(|found| found.explains(warning));
         warnings.extend(others.iter().filter(|w| !told(w)).map(Warning::to_string));
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         report.add_picture(&file.display().to_string(), &picture, &warnings)?;
@@ -105,7 +104,7 @@ impl Check {
                     let mut remarks: Vec<String> =
                         of_frame().map(|(.., message)| message.clone()).collect();
                     for warning in &warnings {
-                        if of_frame().any(|(found, ..)| explains(found, warning)) {
+                        if of_frame().any(|(found, ..)| found.explains(warning)) {
                             continue;
                         }
                         let text = warning.to_string();
@@ -134,36 +133,15 @@ fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Finding, Vec<Target>)
     let settings = CorrectionSettings::default();
     let stride = jobs.len().div_ceil(settings.frames).max(1);
     let bar = progress(jobs.len() / stride, "comparing");
-    let mut attempt = |job: &Job| -> Result<(Target, CorrectionTrial), AssetError> {
-        let input = assets.load_at(&job.target, &job.row.t_cam_model, &[])?;
-        let trial = input.try_corrections(&job.row.t_cam_model, &settings)?;
-        let (agreement, scale) = (trial.agreement(), trial.model_scale());
-        log::debug!("{}: agreement {agreement:.3}, scale and deviation {scale:?}", job.target);
-        Ok((job.target, trial))
+    let attempt = |Job { target, row, .. }: &Job| {
+        let input = assets.load_at(target, &row.t_cam_model, &[]).ok()?;
+        Some((*target, input.try_corrections(&row.t_cam_model, &settings).ok()?))
     };
-    let trials = bar.wrap_iter(jobs.iter().step_by(stride)).filter_map(|job| attempt(job).ok());
-    let trials: Vec<(Target, CorrectionTrial)> = trials.collect();
+    let trials: Vec<(Target, CorrectionTrial)> =
+        bar.wrap_iter(jobs.iter().step_by(stride)).filter_map(attempt).collect();
+    let found = find_corrections(&trials, &settings).into_iter();
     let targets = |found: &Finding| found.frames.iter().map(|&k| trials[k].0).collect();
-    let found = find_corrections(&trials, &settings);
-    found
-        .into_iter()
-        .map(|found| {
-            let targets = targets(&found);
-            (found, targets)
-        })
-        .collect()
-}
-
-/// Whether a warning tells of what a correction would mend.
-fn explains(found: &Finding, warning: &Warning) -> bool {
-    let unit = matches!(found.correction, Correction::ModelUnit | Correction::ModelAndPoseUnit);
-    match warning.subject {
-        Subject::Model => unit && warning.unit == "m",
-        // Where the object is, not how hard it is felt.
-        Subject::Touch => found.agreement.is_some() && warning.unit == "cm",
-        Subject::Hand => found.correction == Correction::FocalLength || found.agreement.is_some(),
-        Subject::Pose | Subject::Mask | Subject::Depth => true,
-    }
+    found.map(|found| (targets(&found), found)).map(|(targets, found)| (found, targets)).collect()
 }
 
 /// Says what a plain BOP dataset does not have, and which methods need it.

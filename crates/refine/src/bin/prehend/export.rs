@@ -15,7 +15,7 @@ use crate::options::{Input, Job, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
 
 /// Images by scene and id, with the poses in each.
-type Images<'a> = BTreeMap<(u32, u32), Vec<&'a Job>>;
+type JobsByImage<'a> = BTreeMap<(u32, u32), Vec<&'a Job>>;
 
 #[derive(Args)]
 pub(crate) struct Export {
@@ -42,7 +42,7 @@ impl Export {
         let mut film = SceneFilm::new(*rate)?;
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses)?;
-        let mut images = Images::new();
+        let mut images = JobsByImage::new();
         for job in &jobs {
             images.entry((job.row.scene_id, job.row.im_id)).or_default().push(job);
         }
@@ -90,7 +90,7 @@ impl Export {
 /// World → camera of each image that there is, by its id, if that is known of all.
 fn world(
     dataset: &Dataset,
-    images: &Images<'_>,
+    images: &JobsByImage<'_>,
 ) -> Result<Option<BTreeMap<u32, Isometry3<f64>>>, DatasetError> {
     let mut known = BTreeMap::new();
     for &(scene_id, im_id) in images.keys() {

@@ -14,9 +14,10 @@ use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint};
-use prehend_refine::data::{AssetError, Assets, Identity, Journal, NoiseLevel, PlainPose, Target};
+use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Target};
 use prehend_refine::guard;
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::synth::NoiseLevel;
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -75,9 +76,9 @@ pub(crate) struct Initial {
     rendering: Rendering,
 }
 
-/// What there is to be written, and what failed.
+/// Poses to be written, and failures.
 #[derive(Default)]
-struct Found {
+struct PoseRows {
     rows: Vec<ResultRow>,
     /// All poses that searches ended with.
     rivals: Vec<ResultRow>,
@@ -86,13 +87,13 @@ struct Found {
 
 /// A pose that a search ended with, as the journal has it.
 #[derive(Serialize, Deserialize)]
-struct Candidate {
+struct FoundPose {
     pose: PlainPose,
     cost: f64,
     weight: f64,
 }
 
-impl From<&PoseCandidate> for Candidate {
+impl From<&PoseCandidate> for FoundPose {
     fn from(found: &PoseCandidate) -> Self {
         let pose = PlainPose::from(&found.t_cam_object);
         Self { pose, cost: found.cost, weight: found.weight }
@@ -113,7 +114,7 @@ impl Initial {
             Some(level) => (self.perturbed(&dataset, level)?, None),
             None => self.found(&dataset).map(|(found, journal)| (found, Some(journal)))?,
         };
-        let Found { rows, rivals, mut failures } = found;
+        let PoseRows { rows, rivals, mut failures } = found;
         if rows.is_empty() && failures.is_empty() {
             journal.map(Journal::discard).transpose()?;
             bail!("nothing is of the scenes, images and objects asked for");
@@ -134,9 +135,9 @@ impl Initial {
     }
 
     /// The true poses with errors of `level`.
-    fn perturbed(&self, dataset: &Dataset, level: NoiseLevel) -> Result<Found, DatasetError> {
+    fn perturbed(&self, dataset: &Dataset, level: NoiseLevel) -> Result<PoseRows, DatasetError> {
         let truth = GroundTruth::new(dataset);
-        let mut found = Found::default();
+        let mut found = PoseRows::default();
         for scene in dataset.scenes() {
             let scene_id = scene.id();
             let mut images = scene.images()?;
@@ -159,16 +160,16 @@ impl Initial {
     }
 
     /// The poses that the search finds, and the journal that holds them until they are written.
-    fn found(&self, dataset: &Dataset) -> anyhow::Result<(Found, Journal)> {
+    fn found(&self, dataset: &Dataset) -> anyhow::Result<(PoseRows, Journal)> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets =
             Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
         let backend = self.rendering.open()?;
         let identity = self.identity(dataset, &targets, backend.name())?;
-        let (mut journal, mut searched): (_, BTreeMap<usize, Vec<Candidate>>) =
+        let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
         let mut searches = BTreeMap::new();
-        let mut all = Found::default();
+        let mut all = PoseRows::default();
         let bar = progress(targets.len(), "searching");
         for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
             if searched.contains_key(&index) {
@@ -177,7 +178,7 @@ impl Initial {
             let found = guard(|| search_one(&mut assets, &mut searches, target, &backend));
             match found {
                 Ok(found) => {
-                    let found: Vec<Candidate> = found.iter().map(Candidate::from).collect();
+                    let found: Vec<FoundPose> = found.iter().map(FoundPose::from).collect();
                     searched.insert(index, journal.append(index, &found)?);
                 }
                 Err(error) => all.failures.push(format!("{target}: {error}")),
@@ -185,7 +186,7 @@ impl Initial {
         }
         for (index, found) in searched {
             let Some(target) = targets.get(index) else { continue };
-            let pose = |c: &Candidate, score| row(target, (&c.pose).into(), score);
+            let pose = |c: &FoundPose, score| row(target, (&c.pose).into(), score);
             // Of a results file's scores the higher is the better.
             all.rows.extend(found.first().map(|c| pose(c, -c.cost)));
             all.rivals.extend(found.iter().map(|c| pose(c, c.weight)));

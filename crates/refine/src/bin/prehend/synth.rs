@@ -10,7 +10,7 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::scene::Object;
 use prehend_refine::synth::{
-    FilmSettings, GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, Subject,
+    FilmSettings, GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, SynthObject,
     SynthSettings, generate,
 };
 use prehend_render::Distortion;
@@ -120,7 +120,7 @@ pub(crate) struct Synth {
     threads: Option<NonZeroUsize>,
 }
 
-/// How fast the hand of a film turns, root mean square \[rad/s\]: at most 2.5 times as fast.
+/// Angular speed of the hand of a film, root mean square \[rad/s\]; the largest is 2.5 times that.
 const FILM_TURN_RATE: f64 = 0.6;
 
 impl Synth {
@@ -173,7 +173,7 @@ impl Synth {
         };
         let total = settings.frames.get() as usize * subjects.len();
         let bar = progress(total, "frames");
-        let prepare = |subject: &'_ Subject| -> Result<_, String> {
+        let prepare = |subject: &'_ SynthObject| -> Result<_, String> {
             let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
             let grasper = grasper.map_err(|e| e.to_string())?;
             let drops = self.drop;
@@ -224,7 +224,7 @@ impl Synth {
         Ok(settings)
     }
 
-    fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
+    fn subjects(&self) -> anyhow::Result<Vec<SynthObject>> {
         let (meshes, masses) = (self.mesh.len(), self.mass.len());
         if masses != 0 && masses != meshes {
             bail!("--mass is given {masses} times for {meshes} meshes: give one for each, or none");
@@ -240,7 +240,7 @@ impl Synth {
         };
         let subject = |object: YcbObject| {
             let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
-            Ok(Subject { obj_id: object.bop_id(), object: prepared })
+            Ok(SynthObject { obj_id: object.bop_id(), object: prepared })
         };
         chosen.into_iter().map(subject).collect()
     }
@@ -262,7 +262,7 @@ fn built_in(name: &str) -> anyhow::Result<YcbObject> {
     })
 }
 
-fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Result<Subject> {
+fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Result<SynthObject> {
     let mesh = TriMesh::load(file)?.scaled(unit.meters());
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let object =
@@ -271,5 +271,5 @@ fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Resul
     if !(5e-3..1.0).contains(&size) {
         bail!("{}: is {size:.3e} m across: see --mesh-unit", file.display());
     }
-    Ok(Subject { obj_id, object })
+    Ok(SynthObject { obj_id, object })
 }

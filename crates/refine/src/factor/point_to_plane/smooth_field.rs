@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 use crate::problem::RIDGE;
-use crate::scene::far_apart;
+use crate::scene::{InducingPoints, farthest_points};
 
 /// Coefficients that the field is described by, at most.
 const MOST_COEFFICIENTS: usize = 24;
@@ -47,22 +47,9 @@ impl Fit {
 impl SmoothField {
     /// At `places` \[m\], with standard deviation `deviation` \[m\] and length `smoothness` \[m\]; `None` if there is none.
     pub(super) fn new(places: &[Vector3<f64>], deviation: f64, smoothness: f64) -> Option<Self> {
-        if !(deviation > 0.0 && smoothness > 0.0) {
-            return None;
-        }
-        let kernel = |a: &Vector3<f64>, b: &Vector3<f64>| {
-            (-0.5 * (a - b).norm_squared() / smoothness.powi(2)).exp()
-        };
-        let chosen = far_apart(places, SPACING * smoothness, MOST_COEFFICIENTS);
-        let among = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
-            // What makes it certainly positive definite.
-            kernel(&chosen[i], &chosen[j]) + if i == j { RIDGE } else { 0.0 }
-        });
-        let to = DMatrix::from_fn(chosen.len(), places.len(), |i, j| {
-            deviation * kernel(&chosen[i], &places[j])
-        });
-        let features = Cholesky::new(among)?.l().solve_lower_triangular(&to)?;
-        Some(Self { features })
+        let chosen = farthest_points(places, SPACING * smoothness, MOST_COEFFICIENTS);
+        let process = InducingPoints::new(chosen, deviation, smoothness, RIDGE)?;
+        Some(Self { features: process.features(places) })
     }
 
     /// The field that is most likely where `residuals` are seen, of which `weight` says from index and residual how much

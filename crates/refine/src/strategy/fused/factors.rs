@@ -51,7 +51,7 @@ pub(crate) fn surface_patches(
     let unit = settings.rendering.downsample * stage.downsample;
     let patches = SurfacePatches::new(frame.observation(), distance, &settings.model, unit)?;
     let Some(deviation) = &frame.object().deviation else { return Some(Arc::new(patches)) };
-    let on_model = |place: &Point3<f64>| seen.t_cam_object.inverse_transform_point(place);
+    let on_model = |place: &Point3<f64>| seen.t_cam_object.inverse_transform_point(place).coords;
     let places: Vec<_> = patches.places().iter().map(on_model).collect();
     patches.with_covariance(deviation.left_covariance(&places)).map(Arc::new)
 }

@@ -11,14 +11,14 @@ use super::settings::GraspSettings;
 use super::simulation::Simulation;
 use crate::scene::Hand;
 
-/// Which joints close, how fast, and where they stop.
+/// Joints that close, their speeds, and where they stop.
 pub(super) struct Drive<'a> {
     robot: &'a Hand,
     /// For each link the screws of the joints that move it.
     paths: Vec<Vec<usize>>,
     self_collision: SelfCollision,
     limits: Vec<(f64, f64)>,
-    /// Of each joint \[rad/s or m/s\], signed.
+    /// Speed of each joint \[rad/s or m/s\], signed.
     speed: Vec<f64>,
     /// Mean lever of the links that a joint moves \[m\]; 1 for those that slide.
     lever: Vec<f64>,
@@ -31,7 +31,7 @@ const MIN_LEVER: f64 = 5e-3;
 /// Contacts that push with a smaller part of the grip say nothing of where it will act.
 const FELT: f64 = 0.05;
 
-/// How a hand is driven for the moment.
+/// Drive of a hand for the moment.
 #[derive(Clone, Debug)]
 pub(super) struct Effort {
     /// Factors on the speeds.
@@ -146,7 +146,7 @@ impl<'a> Drive<'a> {
         change
     }
 
-    /// Whether a joint can go where it is pushed.
+    /// True of a joint that can go where it is pushed.
     fn has_room(&self, v: usize, position: f64, error: f64) -> bool {
         let (lower, upper) = self.limits[v];
         if self.speed[v] * error > 0.0 { position < upper } else { position > lower }
@@ -168,7 +168,7 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// Whether no joint moves faster than this part of its speed.
+    /// True if no joint moves faster than this part of its speed.
     pub(super) fn is_at_rest(&self, change: &[f64], part: f64) -> bool {
         change.iter().zip(&self.speed).all(|(c, s)| c.abs() <= part * s.abs() * self.dt)
     }

@@ -1,4 +1,4 @@
-//! Why there is no grasper, or no grasp.
+//! Errors of graspers and grasps.
 
 use prehend_geometry::VolumeError;
 use prehend_geometry::closest::ClosestError;
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::error::RefineError;
 
-/// Why no grasps of an object can be looked for.
+/// Reason that no grasps of an object can be looked for.
 #[derive(Debug, Error)]
 pub enum GraspError {
     /// A setting is out of its range, or the pre-shape is not that of the robot.
@@ -28,7 +28,7 @@ pub enum GraspError {
     Skin(#[from] RefineError),
 }
 
-/// Why one attempt at a grasp, or one trajectory, came to nothing. Another seed may do better.
+/// Reason that one attempt at a grasp, or one trajectory, came to nothing. Another seed may do better.
 #[derive(Debug, Error)]
 pub enum GraspFault {
     /// The open hand lets the object nowhere near its palm.
@@ -43,7 +43,7 @@ pub enum GraspFault {
     /// The object moved in the hand.
     #[error("the object slipped by {:.1} mm and {:.1}°", distance * 1e3, angle.to_degrees())]
     Slipped {
-        /// How far \[m\].
+        /// Distance \[m\].
         distance: f64,
         /// By what angle \[rad\].
         angle: f64,

@@ -4,12 +4,13 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
 use super::fault::GraspFault;
-use super::grasper::{Grasper, random_direction};
+use super::grasper::Grasper;
 use super::trajectory::GraspSnapshot;
+use crate::synth::pose_noise::random_direction;
 
 /// The part of a film before the object is dropped.
 const BEFORE: f64 = 0.6;
-/// How long the hand takes to open, to stay so, and to close about the object again \[s\].
+/// Times that the hand takes to open, to stay so, and to close about the object again \[s\].
 const OPENING: f64 = 0.15;
 const EMPTY: f64 = 0.7;
 /// The share of the joints' way to where they were when the hand is open.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
 use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, LawError, RigidBody};
@@ -17,6 +17,7 @@ use super::skin::Skin;
 use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
 use crate::scene::{Hand, Object};
+use crate::synth::pose_noise::random_direction;
 
 /// An object at rest in a hand.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,11 +30,11 @@ pub struct Grasp {
     pub grip: f64,
     /// Links that touch the object, by their number in the robot.
     pub links: Vec<usize>,
-    /// What of the object's surface is within 5 mm of the hand \[cm²\].
+    /// Area of the object's surface within 5 mm of the hand \[cm²\].
     pub contact_area: f64,
     /// Volume that hand and object share \[cm³\].
     pub intersection_volume: f64,
-    /// How far the object moved while gravity pulled in several directions \[m\].
+    /// Distance that the object moved while gravity pulled in several directions \[m\].
     pub drift: f64,
     /// By what angle it turned then \[rad\].
     pub turn: f64,
@@ -54,7 +55,7 @@ pub struct Grasper<'a> {
 const TOUCHING: f64 = 0.05;
 /// Hand and object are at rest below this part of the joints' speeds, and below these speeds of the object \[m/s, rad/s\].
 const STILL: (f64, f64, f64) = (0.03, 2e-3, 0.05);
-/// When time is up the object may be so many times faster.
+/// Factor on these speeds of the object when time is up.
 const CREEPING: f64 = 5.0;
 /// For so long \[s\].
 const STILL_TIME: f64 = 0.1;
@@ -107,7 +108,7 @@ impl<'a> Grasper<'a> {
     /// The grasp that comes of `seed`, the same on every call and whatever the number of threads.
     ///
     /// # Errors
-    /// Why it is none.
+    /// The reason that there is none.
     pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
         let mut random = SplitMix64::new(seed);
         let (robot, settings) = (self.setup.robot, &self.settings);
@@ -152,7 +153,7 @@ impl<'a> Grasper<'a> {
         self.first_that_holds(first_seed, tries, |grasp, seed| self.trajectory(grasp, seed, steps))
     }
 
-    /// What `moments` makes of the first grasp of the seeds from `first_seed` on of which it makes anything.
+    /// Result of `moments` for the first grasp of the seeds from `first_seed` on for which it has one.
     pub(super) fn first_that_holds(
         &self,
         first_seed: u64,
@@ -189,7 +190,7 @@ impl<'a> Grasper<'a> {
         self.check_rest(simulation, CREEPING)
     }
 
-    /// Whether the object moves no faster than this many times what counts as still.
+    /// Refuses an object that moves faster than this many times what counts as still.
     fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspFault> {
         let (speed, spin) = simulation.speed();
         let rests = speed < times * STILL.1 && spin < times * STILL.2;
@@ -219,7 +220,7 @@ impl<'a> Grasper<'a> {
         Ok((drift, turn))
     }
 
-    /// How far the object has moved between two poses, unless it has slipped.
+    /// Distance and angle of the object between two poses, unless it has slipped.
     pub(super) fn moved(
         &self,
         from: &Isometry3<f64>,
@@ -265,9 +266,4 @@ impl<'a> Grasper<'a> {
         }
         Ok((area, volume))
     }
-}
-
-pub(super) fn random_direction(random: &mut SplitMix64) -> Vector3<f64> {
-    let direction = Vector3::from_fn(|_, _| random.normal());
-    direction.try_normalize(1e-9).unwrap_or_else(Vector3::z)
 }

@@ -1,4 +1,4 @@
-//! Where the object is when the hand begins to close.
+//! Poses of the object when the hand begins to close.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;

@@ -1,4 +1,4 @@
-//! How a hand opens before it grasps, and how its joints close.
+//! Pre-shapes: the open hand before it grasps, and speeds of its joints.
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::JOINT_NAMES;
@@ -56,7 +56,7 @@ impl Preshape {
         Some(Self { open: column(0), spread: column(1), speed: column(2), t_hand_palm })
     }
 
-    /// What joint limits and geometry suggest: joints that bring their links nearer to the point between the fingers
+    /// The pre-shape that joint limits and geometry suggest: joints that bring their links nearer to the point between the fingers
     /// close, from the limit where those are farthest; the others stay in the middle. The palm is the part of the root, or
     /// of what is next to it, that is nearest to that point.
     ///

@@ -17,7 +17,7 @@ const APART: f64 = 2e-3;
 /// Pairs of links that should stay apart.
 pub(super) struct SelfCollision {
     links: Vec<Link>,
-    pairs: Vec<Pair>,
+    pairs: Vec<LinkPair>,
 }
 
 struct Link {
@@ -28,7 +28,7 @@ struct Link {
     radius: f64,
 }
 
-struct Pair {
+struct LinkPair {
     /// Samples of the one against the field of the other: places in `links`.
     links: [usize; 2],
     /// Entries of the joint vector that move one relative to the other.
@@ -54,7 +54,7 @@ impl SelfCollision {
                 let of_one = a.iter().filter(|s| !b.contains(s));
                 let of_one = of_one.chain(b.iter().filter(|s| !a.contains(s)));
                 let variables: Vec<usize> = of_one.map(|&s| screws[s].variable).collect();
-                let pair = Pair { links: [i, k], variables };
+                let pair = LinkPair { links: [i, k], variables };
                 if !pair.variables.is_empty() && !pair.meets(&links, open, APART) {
                     pairs.push(pair);
                 }
@@ -70,8 +70,8 @@ impl SelfCollision {
     }
 }
 
-impl Pair {
-    /// Whether a sample of the one is within `reach` of the other.
+impl LinkPair {
+    /// True if a sample of the one is within `reach` of the other.
     fn meets(&self, links: &[Link], poses: &[Isometry3<f64>], reach: f64) -> bool {
         let [a, b] = self.links.map(|l| &links[l]);
         let t_b_a = poses[b.number].inverse() * poses[a.number];

@@ -20,10 +20,10 @@ const NEAR: f64 = 10e-3;
 const MOVED: f64 = 7e-3;
 /// Parts into which a step is divided at most.
 const PARTS: usize = 8;
-/// The same where steps are explicit.
+/// Parts at most where steps are explicit.
 const EXPLICIT_PARTS: usize = 1 << 12;
 
-/// What stays the same for all simulations of an object in a hand.
+/// Setup that all simulations of an object in a hand share.
 pub(super) struct Setup<'a> {
     pub(super) robot: &'a Hand,
     pub(super) body: RigidBody,
@@ -31,7 +31,7 @@ pub(super) struct Setup<'a> {
     pub(super) samples: Vec<Point3<f64>>,
     pub(super) area: f64,
     pub(super) law: Arc<dyn DynContactLaw>,
-    /// The same with softer friction, for steps that cannot be solved otherwise.
+    /// Law with softer friction, for steps that cannot be solved otherwise.
     pub(super) soft_law: Arc<dyn DynContactLaw>,
     pub(super) time_step: f64,
     /// Time in which a floating object loses its speed \[s\].
@@ -52,7 +52,7 @@ pub(super) struct Touch {
     pub(super) stiffness: f64,
 }
 
-/// What holds the object while the simulation advances.
+/// Surroundings of the object while the simulation advances.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Medium {
     /// It floats and loses its speed.
@@ -65,7 +65,7 @@ pub(super) enum Medium {
 pub(super) struct Simulation<'a> {
     setup: &'a Setup<'a>,
     world: World,
-    /// Of the bodies of the world.
+    /// States of the world's bodies.
     states: Vec<State>,
     object: BodyId,
     /// Links with a shape, in the order of their bodies.

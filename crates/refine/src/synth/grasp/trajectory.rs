@@ -5,8 +5,9 @@ use prehend_geometry::SplitMix64;
 
 use super::drive::Effort;
 use super::fault::GraspFault;
-use super::grasper::{Grasp, Grasper, random_direction};
+use super::grasper::{Grasp, Grasper};
 use super::simulation::{Medium, Simulation};
+use crate::synth::pose_noise::random_direction;
 
 /// One moment of an object held in a hand, as it truly is.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +18,7 @@ pub struct GraspSnapshot {
     pub joints: Vec<f64>,
     /// Gravity in hand base coordinates \[m/s²\].
     pub gravity: Vector3<f64>,
-    /// How the hand is turned: hand base axes → axes that stand still.
+    /// Rotation of the hand: hand base axes → axes that stand still.
     pub turn: UnitQuaternion<f64>,
     /// Force of the object on each taxel, in the frame of the taxel's link \[N\].
     pub taxel_forces: Vec<Vector3<f64>>,
@@ -29,9 +30,9 @@ const WAVES: usize = 3;
 const FREQUENCIES: (f64, f64) = (0.1, 0.6);
 /// Time given to a grasp to settle under gravity before the first moment \[s\].
 const SETTLING: f64 = 0.25;
-/// What is left of the grip while the object slips.
+/// Share of the grip that is left while the object slips.
 const LOOSE: f64 = 0.02;
-/// How far it slips, least and most \[m\], unless the hand is loose for so long \[s\] before.
+/// Distance that it slips, least and most \[m\], unless the hand is loose for so long \[s\] before.
 const SLIP: (f64, f64) = (4e-3, 15e-3);
 const LOOSE_TIME: f64 = 0.3;
 
@@ -55,7 +56,7 @@ impl Grasper<'_> {
         self.moments(grasp, &mut random, steps, &UnitQuaternion::identity(), &down)
     }
 
-    /// The same, where the hand begins turned by `turn` under the gravity `down`, both in axes that stand still.
+    /// A [`trajectory`](Self::trajectory) that begins with the hand turned by `turn` under the gravity `down`, both in axes that stand still.
     pub(super) fn moments(
         &self,
         grasp: &Grasp,
@@ -113,16 +114,16 @@ impl Grasper<'_> {
     }
 }
 
-/// When the hand loosens its grip, and by how much the object slips then.
+/// Times at which the hand loosens its grip, and distances that the object slips then.
 struct Slips {
     /// The next moments, the last first, each with a distance \[m\].
     left: Vec<(usize, f64)>,
-    /// Of the one that goes on: where the object was, how far it goes, and the time left \[s\].
+    /// The one that goes on: the object's pose before, its distance, and the time left \[s\].
     now: Option<(Isometry3<f64>, f64, f64)>,
 }
 
 impl Slips {
-    /// So many in `steps` moments.
+    /// `count` slips in `steps` moments.
     fn new(count: u32, steps: usize, random: &mut SplitMix64) -> Self {
         let mut slip = |k: u32| {
             let share = (f64::from(k) + 0.3 + 0.4 * random.uniform()) / f64::from(count);
@@ -134,7 +135,7 @@ impl Slips {
         Self { left, now: None }
     }
 
-    /// Whether the grip is loose at a moment.
+    /// True while the grip is loose.
     fn at(&mut self, moment: usize, simulation: &Simulation<'_>, dt: f64) -> bool {
         let pose = simulation.t_hand_object();
         if let Some((_, distance)) = self.left.pop_if(|(next, _)| moment >= *next) {

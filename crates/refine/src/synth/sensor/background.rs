@@ -1,10 +1,10 @@
-//! What is behind the hand.
+//! The room behind the hand.
 
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RgbImage};
 
 use super::settings::BackgroundSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl BackgroundSettings {
     /// Color and depth of a random room without the hand.

@@ -25,7 +25,7 @@ impl PlaySettings {
     }
 }
 
-/// How far a hand is from where it is said to be.
+/// Error of a hand's stated pose and joints.
 pub(super) struct HandError {
     /// In the hand's base frame.
     pub(super) pose: Isometry3<f64>,
@@ -66,7 +66,7 @@ pub(super) struct Miscalibration {
 }
 
 impl Miscalibration {
-    /// What is said of a camera.
+    /// Stated camera of a true one.
     pub(super) fn camera(&self, camera: &Camera) -> Camera {
         let width = camera.width as f64;
         Camera {

@@ -4,10 +4,10 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage};
 
 use super::settings::DepthSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl DepthSettings {
-    /// What stays the same through a grasp.
+    /// Errors that stay the same through a grasp.
     pub(super) fn bias(&self, camera: &Camera, noise: &mut SplitMix64) -> DepthBias {
         let scale = (1.0 + self.scale * noise.normal()) as f32;
         let cell = camera.width as f64 / 3.0;
@@ -19,7 +19,7 @@ impl DepthSettings {
         DepthBias { scale, warp }
     }
 
-    /// What the camera measures where the depths are `truth`.
+    /// Depth image that the camera measures where the depths are `truth`.
     pub(super) fn measure(
         &self,
         truth: &DepthImage,
@@ -30,28 +30,39 @@ impl DepthSettings {
         let mut depth = self.spread(truth, noise);
         let lost = self.lost(truth, camera, noise);
         self.fly(truth, &mut depth, noise);
-        let (width, height) = (truth.width(), truth.height());
-        let correlated = match self.correlated_noise > 0.0 {
-            true => smooth_field(width, height, self.correlation, noise),
-            false => vec![0.0; width * height],
-        };
+        self.add_noise(&mut depth, |i, z| z * bias.scale + bias.warp[i], noise);
         let steps = self.disparity_step > 0.0 && self.baseline > 0.0;
         let disparity = (camera.fx * self.baseline) as f32;
         let step = self.disparity_step as f32;
-        let near = |fault: f64, z: f32| fault as f32 * (z / 0.5) * (z / 0.5);
-        for (i, z) in depth.pixels_mut().iter_mut().enumerate().filter(|(_, z)| **z > 0.0) {
-            let true_z = *z;
-            *z = *z * bias.scale + bias.warp[i];
-            *z += near(self.correlated_noise, true_z) * correlated[i];
-            if self.noise > 0.0 {
-                *z += near(self.noise, true_z) * noise.normal() as f32;
-            }
+        for (i, z) in depth.pixels_mut().iter_mut().enumerate() {
             if steps && *z > 0.0 {
                 *z = disparity / (step * (disparity / *z / step).round().max(1.0));
             }
             *z = if lost[i] { 0.0 } else { z.max(0.0) };
         }
         depth
+    }
+
+    /// Adds white and correlated noise, which grow with the squared depth, to the pixels that have a depth once these are `biased`, by index and depth \[m\].
+    pub(crate) fn add_noise(
+        &self,
+        depth: &mut DepthImage,
+        biased: impl Fn(usize, f32) -> f32,
+        noise: &mut SplitMix64,
+    ) {
+        let (width, height) = (depth.width(), depth.height());
+        let correlated = match self.correlated_noise > 0.0 {
+            true => smooth_field(width, height, self.correlation, noise),
+            false => vec![0.0; width * height],
+        };
+        let near = |fault: f64, z: f32| fault as f32 * (z / 0.5) * (z / 0.5);
+        for (i, z) in depth.pixels_mut().iter_mut().enumerate().filter(|(_, z)| **z > 0.0) {
+            let true_z = *z;
+            *z = biased(i, true_z) + near(self.correlated_noise, true_z) * correlated[i];
+            if self.noise > 0.0 {
+                *z += near(self.noise, true_z) * noise.normal() as f32;
+            }
+        }
     }
 
     /// Grows what is near over what is behind, more in some places than in others.
@@ -129,7 +140,7 @@ impl DepthSettings {
     }
 }
 
-/// What stays the same through a grasp.
+/// Errors that stay the same through a grasp.
 pub(super) struct DepthBias {
     pub(super) scale: f32,
     /// Added to each pixel \[m\].
@@ -167,7 +178,7 @@ fn sine_to_surface(depth: &DepthImage, camera: &Camera, x: usize, y: usize) -> O
     Some(normal.dot(&here.coords.normalize()).abs().min(1.0))
 }
 
-/// What a standard normal number exceeds with probability `share` (Abramowitz and Stegun, 26.2.23, off by 4.5e-4 at
+/// Upper quantile of the standard normal distribution at probability `share` (Abramowitz and Stegun, 26.2.23, off by 4.5e-4 at
 /// most).
 fn upper_quantile(share: f64) -> f32 {
     let share = share.clamp(1e-9, 1.0 - 1e-9);

@@ -4,11 +4,12 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::shapes::{cuboid, cylinder, sphere};
 use prehend_render::{RenderModel, look_at};
+use serde::Serialize;
 
 use crate::synth::grasp::{GraspSnapshot, Waves};
 
-/// What a film has beside a moving hand.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Settings of a film of a moving hand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FilmSettings {
     /// Frames a second.
     pub rate: f64,
@@ -16,9 +17,9 @@ pub struct FilmSettings {
     pub occluders: u32,
 }
 
-/// How far the hand sways in each direction, root mean square \[m\].
+/// Sway of the hand in each direction, root mean square \[m\].
 const SWAY: f64 = 0.02;
-/// How long something takes to pass, least and most \[s\].
+/// Time that something takes to pass, least and most \[s\].
 const PASSING: (f64, f64) = (1.0, 2.0);
 /// From where to where something passes, to either side of the line to the object \[m\].
 const PATH: f64 = 0.25;
@@ -26,21 +27,21 @@ const PATH: f64 = 0.25;
 const SEGMENTS: usize = 24;
 
 /// The camera and its surroundings through a film.
-pub(in crate::synth) struct Film {
+pub(in crate::synth) struct FilmScene {
     rate: f64,
     /// Axes that stand still → camera.
     rotation: UnitQuaternion<f64>,
-    /// Where the object is when the film begins, in the frames of camera and hand \[m\].
+    /// Center of the object when the film begins, in the frames of camera and hand \[m\].
     in_camera: Point3<f64>,
     in_hand: Point3<f64>,
     sway: [Waves; 3],
-    passes: Vec<Pass>,
-    /// What light and background are drawn from in every frame.
+    passes: Vec<Passage>,
+    /// Random numbers of light and background, the same in every frame.
     pub(super) surroundings: SplitMix64,
 }
 
 /// Something that passes.
-struct Pass {
+struct Passage {
     model: RenderModel,
     paint: [f32; 3],
     /// The frame in the middle, and how many it takes.
@@ -52,8 +53,8 @@ struct Pass {
     axis: Vector3<f64>,
 }
 
-impl Film {
-    /// Of `moments` seen from `t_cam_hand` in the first of them.
+impl FilmScene {
+    /// A film of `moments` seen from `t_cam_hand` in the first of them.
     pub(super) fn new(
         settings: &FilmSettings,
         moments: &[GraspSnapshot],
@@ -69,7 +70,7 @@ impl Film {
         let count = settings.occluders;
         let pass = |k: u32| {
             let share = (f64::from(k) + 0.3 + 0.4 * noise.uniform()) / f64::from(count);
-            Pass::random(settings.rate, share * moments.len() as f64, &in_camera, noise)
+            Passage::random(settings.rate, share * moments.len() as f64, &in_camera, noise)
         };
         let passes = (0..count).map(pass).collect();
         Self {
@@ -94,7 +95,7 @@ impl Film {
         Translation3::from(center) * turn * Translation3::from(-self.in_hand.coords)
     }
 
-    /// What passes in a frame, where it is in the camera frame, and its color.
+    /// Things that pass in a frame, each with its pose in the camera frame and its color.
     pub(super) fn passing(
         &self,
         frame: usize,
@@ -109,7 +110,7 @@ impl Film {
     }
 }
 
-impl Pass {
+impl Passage {
     /// Across the line to an object at `center`, at its middle in frame `middle`.
     fn random(rate: f64, middle: f64, center: &Point3<f64>, noise: &mut SplitMix64) -> Self {
         let mut between = |(low, high): (f64, f64)| low + (high - low) * noise.uniform();

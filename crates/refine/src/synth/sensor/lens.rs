@@ -2,29 +2,29 @@
 
 use prehend_render::{Camera, Distortion, DistortionError, Remap};
 
-use super::rig::View;
+use super::rig::TrueView;
 use super::settings::SensorSettings;
 
-/// What a pinhole sees is rendered with this many pixels for one of the lens along each axis, and averaged: a lens may
+/// Pixels of the pinhole's image for one of the lens along each axis, which are averaged: a lens may
 /// show things smaller than a pinhole does.
 const FINE: usize = 3;
 /// The pinhole sees at most so much more than the image at its center would.
 const WIDEST: f64 = 3.0;
 
 /// A camera's lens, and the pinhole camera whose images become its own.
-pub(in crate::synth) struct Lens {
+pub(in crate::synth) struct SimulatedLens {
     model: Distortion,
     is_declared: bool,
     /// Sees what the lens shows, `FINE` times finer.
     pub(super) pinhole: Camera,
-    /// The same at the resolution of the images, for what is behind all.
+    /// Pinhole at the resolution of the images, for the background.
     pub(super) background: Camera,
     color: Remap,
     centers: Remap,
 }
 
-impl Lens {
-    /// Of the camera of `settings` with images of `width` by `height` pixels; datasets tell of it if it `is_declared`.
+impl SimulatedLens {
+    /// Lens of the camera of `settings` with images of `width` by `height` pixels; datasets tell of it if it `is_declared`.
     pub(in crate::synth) fn new(
         model: Distortion,
         is_declared: bool,
@@ -39,19 +39,19 @@ impl Lens {
         Self { model, is_declared, pinhole, background, color, centers }
     }
 
-    /// What is said of it.
+    /// Model that the dataset states.
     pub(super) fn declared(&self) -> Option<Distortion> {
         self.is_declared.then_some(self.model)
     }
 
-    /// What is not said of it.
+    /// Model that the dataset does not state.
     pub(super) fn undeclared(&self) -> Option<Distortion> {
         (!self.is_declared).then_some(self.model)
     }
 
-    /// How the lens shows what its pinhole sees.
-    pub(super) fn photograph(&self, seen: &View) -> Result<View, DistortionError> {
-        Ok(View {
+    /// Images through the lens of what its pinhole sees.
+    pub(super) fn photograph(&self, seen: &TrueView) -> Result<TrueView, DistortionError> {
+        Ok(TrueView {
             color: self.color.rgb(&seen.color)?.downsampled(FINE),
             depth: self.centers.depth(&seen.depth)?,
             visible: self.centers.mask(&seen.visible)?,

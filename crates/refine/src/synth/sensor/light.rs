@@ -92,7 +92,7 @@ impl Lights {
     }
 }
 
-/// What a lamp sees of the scene: all else is in shadow.
+/// Depth that a lamp sees of the scene: all else is in shadow.
 struct Shadow {
     t_lamp_cam: Isometry3<f32>,
     camera: Camera,
@@ -121,7 +121,7 @@ impl Shadow {
         Self { seen: depth_map(&camera, &posed), t_lamp_cam: t_lamp_cam.cast(), camera }
     }
 
-    /// How much of a small disc about the point lies in shadow, 0..=1.
+    /// Share of a small disc about the point that lies in shadow, 0..=1.
     fn depth_of(&self, point: &Vector3<f32>) -> f32 {
         let p = self.t_lamp_cam * Point3::from(*point);
         let (fx, cx) = (self.camera.fx as f32, self.camera.cx as f32);

@@ -4,10 +4,10 @@ use prehend_geometry::SplitMix64;
 use prehend_render::Mask;
 
 use super::settings::MaskSettings;
-use crate::data::smooth_field;
+use super::smooth_field::smooth_field;
 
 impl MaskSettings {
-    /// What a segmentation makes of an object at `visible` beside a hand at `hand`.
+    /// Segmentation of an object that is `visible` beside a hand at `hand`.
     pub(super) fn segment(&self, visible: &Mask, hand: &Mask, noise: &mut SplitMix64) -> Mask {
         let mut mask = visible.clone();
         if self.wobble <= 0.0 && self.leak <= 0.0 {

@@ -11,10 +11,12 @@ mod light;
 mod mask;
 mod rig;
 mod settings;
+mod smooth_field;
 mod touch;
 mod viewpoint;
 
 pub use film::FilmSettings;
-pub(super) use lens::Lens;
-pub(super) use rig::Rig;
+pub(super) use lens::SimulatedLens;
+pub(super) use rig::SensorRig;
 pub use settings::{SensorSettings, SettingError};
+pub(crate) use smooth_field::smooth_field;

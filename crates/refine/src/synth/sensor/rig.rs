@@ -7,28 +7,27 @@ use prehend_render::{
     Camera, DepthImage, DistortionError, Mask, RenderModel, RgbImage, SurfacePoint, depth_map,
     render_scene,
 };
-
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
-use super::film::{Film, FilmSettings};
-use super::lens::Lens;
+use super::film::{FilmScene, FilmSettings};
+use super::lens::SimulatedLens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
-use crate::data::bop::UNITS_PER_NEWTON;
+use crate::data::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
 
 /// Sensors with the faults that stay the same through a grasp.
-pub(in crate::synth) struct Rig<'a> {
+pub(in crate::synth) struct SensorRig<'a> {
     settings: &'a SensorSettings,
     object: &'a Object,
     robot: &'a Hand,
     camera: Camera,
-    lens: Option<&'a Lens>,
+    lens: Option<&'a SimulatedLens>,
     errors: Miscalibration,
     depth: DepthBias,
     taxels: Vec<TaxelCondition>,
@@ -36,14 +35,14 @@ pub(in crate::synth) struct Rig<'a> {
     paint: [[f32; 3]; 3],
 }
 
-/// What there is to be seen, without the sensors' faults.
-pub(super) struct View {
+/// Images of the scene, without the sensors' faults.
+pub(super) struct TrueView {
     pub(super) color: RgbImage,
     pub(super) depth: DepthImage,
-    /// Where the object is seen, and where the hand.
+    /// Visible parts of object and hand.
     pub(super) visible: Mask,
     pub(super) hand: Mask,
-    /// Where the object would be seen without the hand.
+    /// The object's silhouette without the hand.
     pub(super) whole: Mask,
 }
 
@@ -53,14 +52,14 @@ const GRID: usize = 20;
 /// Rays a pixel, along each axis.
 const SAMPLES: usize = 3;
 
-impl<'a> Rig<'a> {
+impl<'a> SensorRig<'a> {
     /// Sensors of `width` by `height` pixels, the camera behind a lens if there is one; `noise` decides their faults.
     pub(in crate::synth) fn new(
         settings: &'a SensorSettings,
         object: &'a Object,
         robot: &'a Hand,
         (width, height): (usize, usize),
-        lens: Option<&'a Lens>,
+        lens: Option<&'a SimulatedLens>,
         noise: &mut SplitMix64,
     ) -> Self {
         let camera = settings.viewpoint.camera(width, height);
@@ -77,30 +76,32 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// What is wrong with it: the content of `rig_gt.json`.
+    /// Content of `rig_gt.json`: changes that bring what is said and measured to what is true. They are factors of focal lengths, shift of the principal
+    /// point, factor of depth, what is to be added then on a grid of the image, the hand's pose in the frame of where it is said to be and joint positions to
+    /// be added; and factors that taxels' readings have, with what was added to them then \[N\].
     pub(in crate::synth) fn faults(&self) -> Value {
         let Miscalibration { focal, principal, hand } = &self.errors;
         let (camera, scale) = (&self.camera, f64::from(self.depth.scale));
         let offset =
             |x: usize, y: usize| -1e3 * f64::from(self.depth.warp[y * camera.width + x]) / scale;
         let across = (0..camera.width).step_by(GRID);
-        let row = |y: usize| across.clone().map(|x| offset(x, y)).collect();
-        let offsets: Vec<Vec<f64>> = (0..camera.height).step_by(GRID).map(row).collect();
+        let row = |y: usize| across.clone().map(|x| offset(x, y)).collect::<Vec<f64>>();
         let names = self.robot.tree.joint_names().iter().cloned();
-        let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
-        let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
-        let felt = |taxel: &TaxelCondition| (taxel.phantom / UNITS_PER_NEWTON).into();
-        let added: Vec<[f64; 3]> = self.taxels.iter().map(felt).collect();
-        let mut faults = annotation::rig(
-            focal.map(|scale| 1.0 / scale),
-            principal.map(|shift| -shift * camera.width as f64),
-            1.0 / scale,
-            &offsets,
-            &hand.pose.inverse(),
-            &joints,
-            (&gains, &added),
-        );
-        if let Some(lens) = self.lens.and_then(Lens::undeclared) {
+        let joints = names.zip(hand.joints.iter().map(|error| json!(-error)));
+        let t_said_true = hand.pose.inverse();
+        let felt = |taxel: &TaxelCondition| <[f64; 3]>::from(taxel.phantom / UNITS_PER_NEWTON);
+        let mut faults = json!({
+            "focal_scale": focal.map(|scale| 1.0 / scale),
+            "principal_point_px": principal.map(|shift| -shift * camera.width as f64),
+            "depth_scale": 1.0 / scale,
+            "depth_offset_mm": (0..camera.height).step_by(GRID).map(row).collect::<Vec<_>>(),
+            "hand_R": rotation_to_row_major(&t_said_true.rotation),
+            "hand_t": translation_to_mm(&t_said_true.translation),
+            "joints": joints.collect::<Map<_, _>>(),
+            "taxel_gains": self.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(),
+            "taxel_offsets_n": self.taxels.iter().map(felt).collect::<Vec<_>>(),
+        });
+        if let Some(lens) = self.lens.and_then(SimulatedLens::undeclared) {
             faults["cam_dist"] = annotation::lens(&lens);
         }
         faults
@@ -112,10 +113,10 @@ impl<'a> Rig<'a> {
         settings: &FilmSettings,
         moments: &[GraspSnapshot],
         noise: &mut SplitMix64,
-    ) -> Film {
+    ) -> FilmScene {
         let first = |moment| self.viewpoint(&self.bodies(moment), moment, noise);
         let t_cam_hand = moments.first().map_or_else(Isometry3::identity, first);
-        Film::new(settings, moments, &t_cam_hand, &self.object.center, noise)
+        FilmScene::new(settings, moments, &t_cam_hand, &self.object.center, noise)
     }
 
     /// Object and hand in hand base coordinates.
@@ -141,7 +142,7 @@ impl<'a> Rig<'a> {
     pub(in crate::synth) fn capture(
         &self,
         moment: &GraspSnapshot,
-        film: Option<(&Film, usize)>,
+        film: Option<(&FilmScene, usize)>,
         noise: &mut SplitMix64,
     ) -> Result<Shot, DistortionError> {
         let mut bodies = self.bodies(moment);
@@ -185,12 +186,12 @@ impl<'a> Rig<'a> {
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));
-        let lens = self.lens.and_then(Lens::declared);
-        let View { whole, visible, .. } = seen;
+        let lens = self.lens.and_then(SimulatedLens::declared);
+        let TrueView { whole, visible, .. } = seen;
         Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }
 
-    /// What is there to be seen by the pinhole camera, or by that of the lens; the first of `bodies` is the object, and the last ones have `paints`
+    /// Images of the pinhole camera, or of that of the lens; the first of `bodies` is the object, and the last ones have `paints`
     /// of their own.
     fn render(
         &self,
@@ -198,7 +199,7 @@ impl<'a> Rig<'a> {
         paints: &[[f32; 3]],
         gravity: &Vector3<f64>,
         noise: &mut SplitMix64,
-    ) -> View {
+    ) -> TrueView {
         let lights = self.settings.light.draw(bodies, &-gravity, noise);
         let background = &self.settings.background;
         // Of the lens's own size, but from as many random numbers: what follows is the same with any lens.
@@ -235,7 +236,7 @@ impl<'a> Rig<'a> {
         for (set, z) in whole.pixels_mut().iter_mut().zip(alone.pixels()) {
             *set |= *z > 0.0;
         }
-        View { color: picture.color, depth, visible, hand, whole }
+        TrueView { color: picture.color, depth, visible, hand, whole }
     }
 }
 
@@ -247,7 +248,7 @@ fn random_paint(noise: &mut SplitMix64) -> [[f32; 3]; 3] {
     })
 }
 
-/// Whether each of the robot's joints is prismatic.
+/// True of each of the robot's joints that is prismatic.
 fn slides(robot: &Hand) -> Vec<bool> {
     let mut slides = vec![false; robot.tree.joint_names().len()];
     for joint in robot.tree.joints() {

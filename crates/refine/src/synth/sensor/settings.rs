@@ -1,261 +1,270 @@
-//! All settings of all sensors, by name, with their values in all presets.
+//! Settings of all sensors, and presets of them.
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use thiserror::Error;
+use toml::Table;
 
-/// Makes a structure of each group of settings, and [`SensorSettings`] of the groups.
-macro_rules! sensor_settings {
-    ($($(#[$about:meta])* $group:ident: $Group:ident {
-        $($(#[$what:meta])* $name:ident: $number:ty { clean: $clean:expr, realistic: $real:expr $(, rig: $rig:expr)? },)*
-    })*) => {
-        $(
-            $(#[$about])*
-            #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-            #[serde(deny_unknown_fields)]
-            pub(in crate::synth) struct $Group {
-                $($(#[$what])* pub(in crate::synth) $name: $number,)*
-            }
-        )*
+use crate::synth::settings::{merge, numbers, preset};
 
-        /// Settings of all sensor models.
-        ///
-        /// ```
-        /// use prehend_refine::synth::SensorSettings;
-        ///
-        /// let mut sensors = SensorSettings::realistic();
-        /// sensors.set("depth.scale", "0")?;
-        /// assert!(sensors.names().contains(&("depth.scale".to_owned(), 0.0)));
-        /// let unknown = sensors.set("depth.scael", "0").unwrap_err();
-        /// assert!(unknown.to_string().contains("depth.scale"));
-        /// # Ok::<(), Box<dyn std::error::Error>>(())
-        /// ```
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub struct SensorSettings {
-            $($(#[$about])* pub(in crate::synth) $group: $Group,)*
-        }
-
-        impl SensorSettings {
-            /// Little noise in color and depth; exact calibration and model.
-            pub fn clean() -> Self {
-                Self { $($group: $Group { $($name: $clean),* }),* }
-            }
-
-            /// A stereo camera and tactile sensors with realistic faults.
-            pub fn realistic() -> Self {
-                Self { $($group: $Group { $($name: $real),* }),* }
-            }
-
-            /// The same of one rig: what is wrong with cameras, hand and skin is so in every frame.
-            pub fn rig() -> Self {
-                let mut settings = Self::realistic();
-                $($($(settings.$group.$name = $rig;)?)*)*
-                settings
-            }
-        }
-    };
-}
-
-sensor_settings! {
-    /// Where cameras stand about the hand.
-    viewpoint: ViewpointSettings {
-        /// Nearest distance from the object's center \[m\].
-        nearest: f64 { clean: 0.4, realistic: 0.4 },
-        /// Farthest distance \[m\].
-        farthest: f64 { clean: 0.6, realistic: 0.6 },
-        /// Focal length, as a share of the image's width.
-        focal_width_ratio: f64 { clean: 0.906, realistic: 0.906 },
-        /// Standard deviation of where the camera aims, per axis \[m\].
-        aim: f64 { clean: 0.015, realistic: 0.015 },
-        /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
-        roll_deg: f64 { clean: 8.0, realistic: 8.0 },
-        /// Largest share of the object that the hand may hide, where a view with less can be found.
-        hidden_share: f64 { clean: 0.55, realistic: 0.55 },
-    }
-    /// What lights the scene.
-    light: LightSettings {
-        /// Lamps beside the light from everywhere; the first is the strongest.
-        lamps: u32 { clean: 2, realistic: 3 },
-        /// Share of the light that comes from everywhere.
-        ambient_share: f64 { clean: 0.5, realistic: 0.4 },
-        /// Standard deviation of a lamp's color per channel.
-        tint: f64 { clean: 0.03, realistic: 0.08 },
-        /// Strength of the highlights.
-        gloss: f64 { clean: 0.0, realistic: 0.12 },
-        /// Share of the first lamp's light that its shadow takes away.
-        shadow_share: f64 { clean: 0.0, realistic: 0.7 },
-    }
+/// Settings of all sensor models.
+///
+/// ```
+/// use prehend_refine::synth::SensorSettings;
+///
+/// let mut sensors = SensorSettings::realistic();
+/// sensors.set("depth.scale", "0")?;
+/// assert!(sensors.names().contains(&("depth.scale".to_owned(), 0.0)));
+/// let unknown = sensors.set("depth.scael", "0").unwrap_err();
+/// assert!(unknown.to_string().contains("`scale`"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSettings {
+    /// Places of cameras about the hand.
+    pub(crate) viewpoint: ViewpointSettings,
+    /// Lamps, highlights and shadows.
+    pub(crate) light: LightSettings,
     /// The room behind the hand.
-    background: BackgroundSettings {
-        /// Mean distance of the wall \[m\].
-        distance: f64 { clean: 1.4, realistic: 1.4 },
-        /// Standard deviation of the wall's slopes.
-        slope: f64 { clean: 0.1, realistic: 0.3 },
-        /// Things in front of the wall, at most.
-        things: u32 { clean: 0, realistic: 14 },
-        /// Standard deviation of the wall's pattern per channel.
-        pattern: f64 { clean: 0.0, realistic: 0.04 },
-    }
+    pub(crate) background: BackgroundSettings,
     /// Faults of the color images. Zero takes any of them away.
-    color: ColorSettings {
-        /// Standard deviation of the exposure \[stops\].
-        exposure: f64 { clean: 0.0, realistic: 0.35 },
-        /// Standard deviation of the gain of each channel.
-        white_balance: f64 { clean: 0.0, realistic: 0.06 },
-        /// Standard deviation of the blur \[px\], at most.
-        blur: f64 { clean: 0.0, realistic: 1.0 },
-        /// Standard deviation of the noise of each channel in the dark.
-        noise: f64 { clean: 0.01, realistic: 0.01 },
-        /// Variance that noise gains with brightness, up to white.
-        shot_noise: f64 { clean: 0.0, realistic: 2e-4 },
-        /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
-        jpeg_quality: u8 { clean: 0, realistic: 88 },
-    }
+    pub(crate) color: ColorSettings,
     /// Faults of the depth images. Zero takes any of them away.
-    depth: DepthSettings {
-        /// Standard deviation of the scale error, the same through a grasp.
-        scale: f64 { clean: 0.0, realistic: 4e-3, rig: 6e-3 },
-        /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
-        warp: f64 { clean: 0.0, realistic: 1.5e-3 },
-        /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
-        noise: f64 { clean: 7e-4, realistic: 3e-4 },
-        /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
-        correlated_noise: f64 { clean: 0.0, realistic: 8e-4 },
-        /// Reach of the correlated noise \[px\].
-        correlation: f64 { clean: 3.0, realistic: 3.0 },
-        /// Steps of the disparity \[px\].
-        disparity_step: f64 { clean: 0.0, realistic: 0.1 },
-        /// Distance of the two eyes \[m\]: with the focal length it makes disparity of depth, and what only one of them sees has
-        /// none.
-        baseline: f64 { clean: 0.0, realistic: 0.05 },
-        /// How far what is near spreads over what is behind it \[px\], at most.
-        fattening: f64 { clean: 0.0, realistic: 2.0 },
-        /// Share of the pixels at edges whose depth lies between that of both sides.
-        flying_share: f64 { clean: 0.0, realistic: 0.35 },
-        /// Share of the pixels that are lost in patches.
-        hole_share: f64 { clean: 0.0, realistic: 0.02 },
-        /// Angle of sight to surface below which half of the pixels are lost \[deg\].
-        grazing_deg: f64 { clean: 0.0, realistic: 12.0 },
-    }
+    pub(crate) depth: DepthSettings,
     /// Faults of the masks. Zero takes any of them away.
-    mask: MaskSettings {
-        /// Standard deviation of the outline's place \[px\].
-        wobble: f64 { clean: 0.0, realistic: 1.2 },
-        /// Length along the outline over which it wobbles \[px\].
-        wobble_length: f64 { clean: 12.0, realistic: 12.0 },
-        /// How far the mask leaks onto the hand where it does \[px\].
-        leak: f64 { clean: 0.0, realistic: 5.0 },
-        /// Share of the border with the hand where it leaks.
-        leak_share: f64 { clean: 0.0, realistic: 0.25 },
-    }
+    pub(crate) mask: MaskSettings,
     /// Faults of the taxels. Forces are in sensor units, 1000 a newton.
-    touch: TouchSettings {
-        /// Share of the taxels that say nothing, the same ones through a grasp.
-        dead_share: f64 { clean: 0.0, realistic: 0.1 },
-        /// Share of the taxels that feel what is not there, the same ones through a grasp.
-        false_share: f64 { clean: 0.0, realistic: 0.03 },
-        /// Mean size of what those feel \[units\].
-        false_force: f64 { clean: 0.0, realistic: 250.0 },
-        /// Largest error of a taxel's gain, uniform, the same through a grasp.
-        gain: f64 { clean: 0.0, realistic: 0.25 },
-        /// Standard deviation of the noise of each axis \[units\].
-        noise: f64 { clean: 0.0, realistic: 8.0 },
-        /// Forces smaller than this read as none \[units\].
-        threshold: f64 { clean: 0.0, realistic: 30.0 },
-        /// Step of the readings \[units\].
-        quantum: f64 { clean: 1.0, realistic: 10.0 },
-        /// Largest reading of an axis \[units\].
-        limit: f64 { clean: 10_000.0, realistic: 10_000.0 },
-    }
+    pub(crate) touch: TouchSettings,
     /// Standard deviations of the calibration's errors, which stay the same through a grasp.
-    calibration: CalibrationSettings {
-        /// 1 if all that stays the same through a grasp does so through the whole dataset, else 0.
-        shared: u32 { clean: 0, realistic: 0, rig: 1 },
-        /// Focal lengths, relative.
-        focal: f64 { clean: 0.0, realistic: 3e-3, rig: 2e-3 },
-        /// Principal point, each coordinate \[px\] of an image 640 px wide.
-        principal_px: f64 { clean: 0.0, realistic: 1.0, rig: 1.5 },
-        /// Place of the hand in the camera frame, each axis \[m\].
-        hand_translation: f64 { clean: 0.0, realistic: 2e-3, rig: 3e-3 },
-        /// Turn of the hand in the camera frame, each axis \[deg\].
-        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.4, rig: 0.6 },
-        /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
-        joint_deg: f64 { clean: 0.0, realistic: 0.8 },
-    }
+    pub(crate) calibration: CalibrationSettings,
     /// Standard deviations of what changes from frame to frame, beside the calibration's errors.
-    play: PlaySettings {
-        /// Place of the hand, each axis \[m\].
-        hand_translation: f64 { clean: 0.0, realistic: 0.0, rig: 2e-4 },
-        /// Turn of the hand, each axis \[deg\].
-        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.0, rig: 0.05 },
-        /// Joint positions, as in `calibration`.
-        joint_deg: f64 { clean: 0.0, realistic: 0.0, rig: 0.15 },
-    }
-    /// How the model that the estimator is given differs from the object.
-    model: ModelSettings {
-        /// Root mean square of the smooth displacement of the surface along its normal \[m\].
-        deviation: f64 { clean: 0.0, realistic: 7e-4 },
-        /// Wavelength of that displacement \[m\].
-        wavelength: f64 { clean: 0.08, realistic: 0.08 },
-        /// Standard deviation of the scale.
-        scale: f64 { clean: 0.0, realistic: 3e-3 },
-    }
+    pub(crate) play: PlaySettings,
+    /// Differences of the model that the estimator is given from the object.
+    pub(crate) model: ModelSettings,
 }
 
-/// Why a setting could not be set: there is none of that name, or the value is not of its kind.
+/// Places of cameras about the hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ViewpointSettings {
+    /// Nearest distance from the object's center \[m\].
+    pub(crate) nearest: f64,
+    /// Farthest distance \[m\].
+    pub(crate) farthest: f64,
+    /// Focal length, as a share of the image's width.
+    pub(crate) focal_width_ratio: f64,
+    /// Standard deviation of where the camera aims, per axis \[m\].
+    pub(crate) aim: f64,
+    /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
+    pub(crate) roll_deg: f64,
+    /// Largest share of the object that the hand may hide, where a view with less can be found.
+    pub(crate) hidden_share: f64,
+}
+
+/// Lamps, highlights and shadows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LightSettings {
+    /// Lamps beside the light from everywhere; the first is the strongest.
+    pub(crate) lamps: u32,
+    /// Share of the light that comes from everywhere.
+    pub(crate) ambient_share: f64,
+    /// Standard deviation of a lamp's color per channel.
+    pub(crate) tint: f64,
+    /// Strength of the highlights.
+    pub(crate) gloss: f64,
+    /// Share of the first lamp's light that its shadow takes away.
+    pub(crate) shadow_share: f64,
+}
+
+/// The room behind the hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BackgroundSettings {
+    /// Mean distance of the wall \[m\].
+    pub(crate) distance: f64,
+    /// Standard deviation of the wall's slopes.
+    pub(crate) slope: f64,
+    /// Things in front of the wall, at most.
+    pub(crate) things: u32,
+    /// Standard deviation of the wall's pattern per channel.
+    pub(crate) pattern: f64,
+}
+
+/// Faults of the color images. Zero takes any of them away.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ColorSettings {
+    /// Standard deviation of the exposure \[stops\].
+    pub(crate) exposure: f64,
+    /// Standard deviation of the gain of each channel.
+    pub(crate) white_balance: f64,
+    /// Standard deviation of the blur \[px\], at most.
+    pub(crate) blur: f64,
+    /// Standard deviation of the noise of each channel in the dark.
+    pub(crate) noise: f64,
+    /// Variance that noise gains with brightness, up to white.
+    pub(crate) shot_noise: f64,
+    /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
+    pub(crate) jpeg_quality: u8,
+}
+
+/// Faults of the depth images. Zero takes any of them away.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DepthSettings {
+    /// Standard deviation of the scale error, the same through a grasp.
+    pub(crate) scale: f64,
+    /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
+    pub(crate) warp: f64,
+    /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
+    pub(crate) noise: f64,
+    /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
+    pub(crate) correlated_noise: f64,
+    /// Reach of the correlated noise \[px\].
+    pub(crate) correlation: f64,
+    /// Steps of the disparity \[px\].
+    pub(crate) disparity_step: f64,
+    /// Distance of the two eyes \[m\]: with the focal length it makes disparity of depth, and what only one of them sees has
+    /// none.
+    pub(crate) baseline: f64,
+    /// Spread of near surfaces over what is behind them \[px\], at most.
+    pub(crate) fattening: f64,
+    /// Share of the pixels at edges whose depth lies between that of both sides.
+    pub(crate) flying_share: f64,
+    /// Share of the pixels that are lost in patches.
+    pub(crate) hole_share: f64,
+    /// Angle of sight to surface below which half of the pixels are lost \[deg\].
+    pub(crate) grazing_deg: f64,
+}
+
+/// Faults of the masks. Zero takes any of them away.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MaskSettings {
+    /// Standard deviation of the outline's place \[px\].
+    pub(crate) wobble: f64,
+    /// Length along the outline over which it wobbles \[px\].
+    pub(crate) wobble_length: f64,
+    /// Reach of leaks of the mask onto the hand \[px\].
+    pub(crate) leak: f64,
+    /// Share of the border with the hand where it leaks.
+    pub(crate) leak_share: f64,
+}
+
+/// Faults of the taxels. Forces are in sensor units, 1000 a newton.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TouchSettings {
+    /// Share of the taxels that say nothing, the same ones through a grasp.
+    pub(crate) dead_share: f64,
+    /// Share of the taxels that feel what is not there, the same ones through a grasp.
+    pub(crate) false_share: f64,
+    /// Mean size of what those feel \[units\].
+    pub(crate) false_force: f64,
+    /// Largest error of a taxel's gain, uniform, the same through a grasp.
+    pub(crate) gain: f64,
+    /// Standard deviation of the noise of each axis \[units\].
+    pub(crate) noise: f64,
+    /// Forces smaller than this read as none \[units\].
+    pub(crate) threshold: f64,
+    /// Step of the readings \[units\].
+    pub(crate) quantum: f64,
+    /// Largest reading of an axis \[units\].
+    pub(crate) limit: f64,
+}
+
+/// Standard deviations of the calibration's errors, which stay the same through a grasp.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CalibrationSettings {
+    /// 1 if all that stays the same through a grasp does so through the whole dataset, else 0.
+    pub(crate) shared: u32,
+    /// Focal lengths, relative.
+    pub(crate) focal: f64,
+    /// Principal point, each coordinate \[px\] of an image 640 px wide.
+    pub(crate) principal_px: f64,
+    /// Place of the hand in the camera frame, each axis \[m\].
+    pub(crate) hand_translation: f64,
+    /// Turn of the hand in the camera frame, each axis \[deg\].
+    pub(crate) hand_rotation_deg: f64,
+    /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
+    pub(crate) joint_deg: f64,
+}
+
+/// Standard deviations of what changes from frame to frame, beside the calibration's errors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PlaySettings {
+    /// Place of the hand, each axis \[m\].
+    pub(crate) hand_translation: f64,
+    /// Turn of the hand, each axis \[deg\].
+    pub(crate) hand_rotation_deg: f64,
+    /// Joint positions, as in `calibration`.
+    pub(crate) joint_deg: f64,
+}
+
+/// Differences of the model that the estimator is given from the object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ModelSettings {
+    /// Root mean square of the smooth displacement of the surface along its normal \[m\].
+    pub(crate) deviation: f64,
+    /// Wavelength of that displacement \[m\].
+    pub(crate) wavelength: f64,
+    /// Standard deviation of the scale.
+    pub(crate) scale: f64,
+}
+
+/// Reason that a setting could not be set: there is none of that name, or the value is not of its kind.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{0}")]
 pub struct SettingError(String);
 
 impl SensorSettings {
+    /// Little noise in color and depth; exact calibration and model.
+    pub fn clean() -> Self {
+        preset(&[include_str!("clean.toml")])
+    }
+
+    /// A stereo camera and tactile sensors with realistic faults.
+    pub fn realistic() -> Self {
+        preset(&[include_str!("clean.toml"), include_str!("realistic.toml")])
+    }
+
+    /// Those of one rig: faults of cameras, hand and skin are the same in every frame.
+    pub fn rig() -> Self {
+        let files =
+            [include_str!("clean.toml"), include_str!("realistic.toml"), include_str!("rig.toml")];
+        preset(&files)
+    }
+
     /// Sets the setting `key`, such as `depth.noise`, to the number `value`.
     ///
     /// # Errors
     /// [`SettingError`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
-        let mut all = self.to_json();
-        let unknown = || {
-            let known: Vec<String> = self.names().into_iter().map(|(name, _)| name).collect();
-            let known = known.join(", ");
-            SettingError(format!("there is no sensor setting {key:?}; there are {known}"))
-        };
-        let (group, name) = key.split_once('.').ok_or_else(unknown)?;
-        let group = if group == "colour" { "color" } else { group };
-        let slot = all.get_mut(group).and_then(|g| g.get_mut(name)).ok_or_else(unknown)?;
-        let wrong = |expected| SettingError(format!("{key}: {value:?} is not {expected}"));
-        if slot.is_u64() {
-            let number: u32 = value.parse().map_err(|_| wrong("a whole number of at least 0"))?;
-            *slot = Value::from(number);
-        } else {
-            let number: f64 = value.parse().map_err(|_| wrong("a number"))?;
+        let wrong =
+            |problem: &dyn std::fmt::Display| SettingError(format!("{key}={value}: {problem}"));
+        let changes: Table = format!("{key} = {value}").parse().map_err(|_| wrong(&"no number"))?;
+        let mut all = Table::try_from(&*self).map_err(|error| wrong(&error))?;
+        merge(&mut all, changes);
+        let changed: Self = all.try_into().map_err(|error| wrong(&error))?;
+        for (name, number) in changed.names() {
             if !(number.is_finite() && number >= 0.0) {
-                return Err(wrong("a finite number of at least 0"));
+                return Err(wrong(&"not a finite number of at least 0"));
             }
             if name.ends_with("_share") && number > 1.0 {
-                return Err(wrong("a share between 0 and 1"));
+                return Err(wrong(&"not a share between 0 and 1"));
             }
-            *slot = Value::from(number);
         }
-        *self = serde_json::from_value(all).map_err(|_| wrong("within the setting's range"))?;
+        *self = changed;
         Ok(())
     }
 
     /// Every setting's name, such as `depth.noise`, with its value.
     pub fn names(&self) -> Vec<(String, f64)> {
-        let mut names = Vec::new();
-        for (group, settings) in self.to_json().as_object().into_iter().flatten() {
-            for (name, value) in settings.as_object().into_iter().flatten() {
-                names.push((format!("{group}.{name}"), value.as_f64().unwrap_or(f64::NAN)));
-            }
-        }
-        names
-    }
-
-    /// The settings as JSON, one object a group.
-    pub(in crate::synth) fn to_json(&self) -> Value {
-        // Numbers under names: nothing that JSON lacks.
-        serde_json::to_value(self).unwrap_or_default()
+        numbers(self)
     }
 }
 
@@ -265,29 +274,36 @@ mod tests {
 
     #[test]
     fn every_setting_can_be_set_by_its_name() {
-        let mut settings = SensorSettings::realistic();
+        let mut settings = SensorSettings::rig();
         let names = settings.names();
         assert!(names.len() > 40 && names.iter().all(|(_, v)| v.is_finite()));
         for (name, _) in &names {
             settings.set(name, "1").unwrap();
         }
         assert!(settings.names().iter().all(|(_, v)| *v == 1.0));
-        settings.set("colour.blur", "2").unwrap();
-        assert_eq!(settings.color.blur, 2.0);
+    }
+
+    #[test]
+    fn presets_differ_from_each_other() {
+        let [clean, realistic, rig] =
+            [SensorSettings::clean(), SensorSettings::realistic(), SensorSettings::rig()];
+        assert_eq!((clean.depth.scale, realistic.depth.scale, rig.depth.scale), (0.0, 4e-3, 6e-3));
+        assert_eq!((clean.light.lamps, realistic.light.lamps, rig.light.lamps), (2, 3, 3));
+        assert_eq!((realistic.calibration.shared, rig.calibration.shared), (0, 1));
     }
 
     #[test]
     fn wrong_names_and_values_are_refused_and_change_nothing() {
         let mut settings = SensorSettings::clean();
         for (key, value, said) in [
-            ("noise", "1", "no sensor setting \"noise\"; there are background."),
-            ("depth.nose", "1", "depth.noise"),
-            ("depth.noise", "little", "depth.noise: \"little\" is not a number"),
+            ("noise", "1", "unknown field `noise`"),
+            ("depth.nose", "1", "`noise`"),
+            ("depth.noise", "little", "depth.noise=little: no number"),
             ("depth.noise", "-1", "at least 0"),
             ("depth.noise", "nan", "finite"),
             ("depth.hole_share", "1.5", "a share between 0 and 1"),
-            ("light.lamps", "1.5", "a whole number"),
-            ("color.jpeg_quality", "300", "within the setting's range"),
+            ("light.lamps", "1.5", "light.lamps=1.5"),
+            ("color.jpeg_quality", "300", "color.jpeg_quality=300"),
         ] {
             let error = settings.set(key, value).unwrap_err().to_string();
             assert!(error.contains(said), "{key}={value}: {error}");

@@ -7,7 +7,7 @@ use super::settings::TouchSettings;
 use crate::data::bop::UNITS_PER_NEWTON;
 
 impl TouchSettings {
-    /// How each of `count` taxels is disposed through a grasp.
+    /// Conditions of `count` taxels through a grasp.
     pub(super) fn condition(&self, count: usize, noise: &mut SplitMix64) -> Vec<TaxelCondition> {
         let one = |_| {
             let (fate, gain) = (noise.uniform(), 1.0 + self.gain * (2.0 * noise.uniform() - 1.0));
@@ -52,7 +52,7 @@ impl TouchSettings {
     }
 }
 
-/// What stays the same about one taxel through a grasp.
+/// Errors of one taxel that stay the same through a grasp.
 #[derive(Clone, Debug)]
 pub(super) struct TaxelCondition {
     /// Zero for a dead one.

@@ -1,4 +1,4 @@
-//! Where the camera stands.
+//! Poses of the camera.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::SplitMix64;
@@ -59,7 +59,7 @@ impl ViewpointSettings {
 const TRIES: usize = 24;
 const COARSE_WIDTH: f64 = 120.0;
 
-/// How much of the first body's silhouette is seen past the others, as a share of what an unbounded image would show if
+/// Visible part of the first body's silhouette past the others, as a share of what an unbounded image would show if
 /// nothing hid it (to the border's coarseness).
 fn visible_share(
     coarse: &Camera,

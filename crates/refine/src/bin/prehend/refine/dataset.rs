@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Isometry3;
+use prehend_refine::check::Warning;
 use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
@@ -15,7 +16,6 @@ use prehend_refine::data::{
 };
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
-use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
 use prehend_refine::{Method, RefineJob, guard};
 use prehend_render::Backend;

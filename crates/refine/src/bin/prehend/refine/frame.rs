@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use prehend_refine::check::Warning;
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
-use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Method, RefineJob, Refined};
 use prehend_render::Backend;

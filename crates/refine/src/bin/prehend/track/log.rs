@@ -12,16 +12,28 @@ use prehend_refine::data::mcap::{Frames, ImageTopics, Recording, RecordingWriter
 use prehend_refine::data::{FrameInput, Target};
 use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object, Observation};
-use prehend_refine::tracker::Tracked;
+use prehend_refine::tracker::{TrackStatus, Tracked};
 use prehend_render::{RenderModel, draw_outline};
 
 use super::film::{Film, Moment};
 use super::log_options::LogOptions;
-use super::strip::{LINE, color_of};
 use crate::terminal::cache;
 
 /// Logs of datasets begin so late, since `tf` takes the moment zero for any moment.
 const START: Duration = Duration::from_secs(1);
+
+/// Width of outlines \[px\], their color where the object was seen, and where it was only expected.
+const LINE: f64 = 2.0;
+const SEEN: [f32; 3] = [0.2, 0.9, 0.3];
+const EXPECTED: [f32; 3] = [0.95, 0.2, 0.15];
+
+/// Color of the outline where the object is followed so.
+fn color_of(status: TrackStatus) -> [f32; 3] {
+    match status {
+        TrackStatus::Tracked | TrackStatus::Relocalized => SEEN,
+        TrackStatus::Predicted | TrackStatus::Lost => EXPECTED,
+    }
+}
 
 /// A recording, with what is tracked in it.
 pub(super) struct Log {
@@ -151,7 +163,7 @@ impl LogWriter {
         };
         let mut overlay = observation.color.clone();
         let (camera, pose) = (&observation.camera, &tracked.t_cam_object);
-        draw_outline(&mut overlay, camera, model, pose, color_of(tracked.status), LINE / 2.0);
+        draw_outline(&mut overlay, camera, model, pose, color_of(tracked.status), LINE);
         Ok(self.writer.tracked(at, tracked, &overlay)?)
     }
 

@@ -11,7 +11,7 @@ use crate::options::Unit;
 #[command(next_help_heading = "Robot's log")]
 pub(crate) struct LogOptions {
     /// Instead of a dataset, follow one object through the images of this recording: an MCAP file of ROS 2 messages (docs/LOGS.md lists the topics that are read)
-    #[arg(long, value_name = "LOG", conflicts_with_all = ["dataset", "watch", "strip", "targets"])]
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["dataset", "watch", "targets"])]
     pub(super) mcap: Option<PathBuf>,
     /// The object's mesh (PLY, OBJ, STL, glTF)
     #[arg(long, value_name = "FILE", requires = "mcap")]

@@ -7,7 +7,6 @@ mod images;
 mod log;
 mod log_options;
 mod report;
-mod strip;
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -100,9 +99,6 @@ pub(crate) struct Track {
     /// pose is where it should be.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
-    /// Write a picture of eight frames here (PNG), with the object's outline, of the first object that is followed: green where it was seen, red where it was only expected
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    strip: Option<PathBuf>,
     /// Write a web page here: frames in a table, outlines, hand and object in three dimensions, and curves over time
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     report: Option<PathBuf>,
@@ -169,11 +165,11 @@ impl Following {
 
 impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
-        let outputs = [Some(&self.out), self.strip.as_ref(), self.log.mcap_out.as_ref()];
+        let outputs = [Some(&self.out), self.log.mcap_out.as_ref()];
         outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
         let log = &self.log;
         if let Some(written) = log.mcap_out.as_deref().map(canonical)
-            && [&self.strip, &self.details, &log.mcap, &self.poses]
+            && [&self.details, &log.mcap, &self.poses]
                 .into_iter()
                 .flatten()
                 .chain([&self.out])
@@ -296,15 +292,6 @@ impl Track {
             if let Err(error) = followed() {
                 let Target { scene_id, obj_id, .. } = start;
                 outcome.failures.push(format!("scene {scene_id} object {obj_id}: {error:#}"));
-            }
-        }
-        if let Some((file, (target, _))) = self.strip.as_ref().zip(starts.first()) {
-            let first = |frame: &&Done| {
-                (frame.row.scene_id, frame.row.obj_id) == (target.scene_id, target.obj_id)
-            };
-            let followed: Vec<&Done> = outcome.frames.iter().filter(first).collect();
-            if let Err(error) = strip::write(file, &followed, target.instance, &mut assets) {
-                outcome.failures.push(format!("--strip: {error}"));
             }
         }
         Ok(())

@@ -3,7 +3,7 @@
 use prehend_geometry::SplitMix64;
 use prehend_render::{DepthImage, RgbImage};
 
-use crate::data::smooth_field;
+use crate::synth::smooth_field;
 
 /// Standard deviations of a realistic depth camera's noise at half a meter, of single pixels and with a correlation \[m\]; both
 /// grow with the square of the depth.

@@ -1,4 +1,4 @@
-//! What a correction may change of a frame's inputs.
+//! Inputs of a frame that a correction may change.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 use prehend_render::Camera;
@@ -13,7 +13,7 @@ pub(super) struct Inputs {
     pub(super) t_cam_object: Isometry3<f64>,
     /// Depth over that of the image.
     pub(super) depth_scale: f64,
-    /// What is not masked is the object's.
+    /// True if pixels that are not masked are the object's.
     pub(super) mask_inverted: bool,
     /// Meters of a unit of length.
     pub(super) meters: f64,

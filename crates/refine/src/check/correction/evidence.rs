@@ -1,6 +1,4 @@
-//! What a frame shows of an object, made small, in units of the model.
-
-use std::ops::Deref;
+//! Images of a frame, made small, with the object in units of the model.
 
 use nalgebra::{Isometry3, Point3, Vector2};
 use prehend_render::{DepthImage, Mask, depth_map};
@@ -8,34 +6,16 @@ use prehend_render::{DepthImage, Mask, depth_map};
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::frame::hand_depth;
-use crate::scene::view::median;
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
+use crate::scene::{Hand, HandMeasurement, Object, Observation, hand_depth, median};
 
 /// Extents that render without trouble, in units of length.
 const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
 
-/// The object, or the same at another scale.
-pub(super) enum Model<'a> {
-    Given(&'a Object),
-    Scaled(Box<Object>),
-}
-
-impl Deref for Model<'_> {
-    type Target = Object;
-
-    fn deref(&self) -> &Object {
-        match self {
-            Self::Given(object) => object,
-            Self::Scaled(object) => object,
-        }
-    }
-}
-
 /// A frame's images and its object.
-pub(super) struct Evidence<'a> {
-    /// With a radius that renders: its unit is [`Inputs::meters`] of [`given`](Self::given).
-    pub(super) object: Model<'a>,
+pub(super) struct FrameImages<'a> {
+    read: &'a Object,
+    /// The object at another scale, where its own does not render.
+    scaled: Option<Box<Object>>,
     /// The inputs as they are.
     pub(super) given: Inputs,
     pub(super) hand: Option<(&'a Hand, &'a HandMeasurement)>,
@@ -47,7 +27,7 @@ pub(super) struct Evidence<'a> {
     points: [Vec<(Vector2<f64>, f64)>; 2],
 }
 
-impl<'a> Evidence<'a> {
+impl<'a> FrameImages<'a> {
     /// # Errors
     /// If images have not the camera's size, or a model that has to be made larger cannot be used.
     pub(super) fn new(
@@ -66,18 +46,14 @@ impl<'a> Evidence<'a> {
         };
         let camera = camera.scaled((factor as f64).recip());
         let mut given = Inputs::new(camera, *t_cam_object);
-        let mut object = Model::Given(object);
+        let mut scaled = None;
         let extent = 2.0 * object.radius;
         if !RENDERED.contains(&extent) {
             // Nothing but lengths changes: what is measured stays what it is.
             let factor = 10_f64.powf(-(extent / settings.extent).log10().round());
             let inertial = Some(object.inertial.clone());
-            object = Model::Scaled(Box::new(Object::new(
-                &object.name,
-                object.mesh.clone().scaled(factor),
-                inertial,
-                object.seed,
-            )?));
+            let mesh = object.mesh.clone().scaled(factor);
+            scaled = Some(Box::new(Object::new(&object.name, mesh, inertial, object.seed)?));
             given.t_cam_object.translation.vector *= factor;
             given.depth_scale *= factor;
             given.meters /= factor;
@@ -90,10 +66,15 @@ impl<'a> Evidence<'a> {
         });
         let points = [true, false].map(|masked| points(&mask, &depth, masked, settings.points));
         let has_depth = !points[0].is_empty() || !points[1].is_empty();
-        Ok(Self { object, given, hand, mask, depth, has_depth, points })
+        Ok(Self { read: object, scaled, given, hand, mask, depth, has_depth, points })
     }
 
-    /// Whether the mask, as `inputs` have it, is set at a pixel.
+    /// The object with a radius that renders: its unit of length is [`Inputs::meters`] of [`given`](Self::given).
+    pub(super) fn object(&self) -> &Object {
+        self.scaled.as_deref().unwrap_or(self.read)
+    }
+
+    /// True of a pixel that the mask, as `inputs` have it, covers.
     pub(super) fn is_masked(&self, inputs: &Inputs, index: usize) -> bool {
         self.mask.pixels()[index] != inputs.mask_inverted
     }
@@ -115,7 +96,7 @@ impl<'a> Evidence<'a> {
 
     /// Depth of the object as `inputs` have it, 0 where it is not.
     pub(super) fn drawn(&self, inputs: &Inputs) -> DepthImage {
-        depth_map(&inputs.camera, &[(&self.object.model, inputs.t_cam_object)])
+        depth_map(&inputs.camera, &[(&self.object().model, inputs.t_cam_object)])
     }
 
     /// Depth of the hand \[m\] before the camera of `inputs`, where the hand is known.
@@ -133,7 +114,7 @@ impl<'a> Evidence<'a> {
 
     /// The point that poses turn about, in the camera frame.
     pub(super) fn center(&self, inputs: &Inputs) -> Point3<f64> {
-        inputs.t_cam_object * self.object.center
+        inputs.t_cam_object * self.object().center
     }
 }
 

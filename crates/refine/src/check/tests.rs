@@ -9,8 +9,8 @@ use super::*;
 use crate::scene::{HandMeasurement, Scene, StatedSize, default_scene};
 
 fn found(scene: &Scene, t_cam_object: &Isometry3<f64>) -> Vec<Warning> {
-    let mut all = inspect_object(&scene.object, true);
-    all.extend(inspect_pose(&scene.observation, &scene.object, Some(&scene.hand), t_cam_object));
+    let mut all = check_object(&scene.object, true);
+    all.extend(check_frame(&scene.observation, &scene.object, Some(&scene.hand), t_cam_object));
     all
 }
 
@@ -57,7 +57,7 @@ fn a_right_scene_is_silent_at_the_truth_and_at_poses_to_start_from() {
         assert_eq!(found(&scene, &scene.truth), []);
         assert_eq!(found(&scene, &scene.initial), []);
         let Scene { observation, object, .. } = &scene;
-        assert_eq!(inspect_pose(observation, object, None, &scene.initial), []);
+        assert_eq!(check_frame(observation, object, None, &scene.initial), []);
     }
 }
 
@@ -212,7 +212,7 @@ fn models_that_are_not_of_their_size() {
         change(&mut stated);
         let mut object = Arc::into_inner(scene.object).unwrap();
         object.stated_size = Some(stated);
-        inspect_object(&object, true)
+        check_object(&object, true)
     };
     assert_eq!(changed(&|_| ()), []);
     for (factor, words) in [

@@ -4,27 +4,18 @@ use nalgebra::Isometry3;
 use prehend_geometry::robot::{KinematicTree, Motion};
 use prehend_render::{Camera, DepthImage};
 
+use super::limits::{BASE_DISTANCE, JOINT_EXCESS, JOINT_RATIO};
 use super::warning::{Subject, Warning};
-use crate::scene::frame::hand_depth;
-use crate::scene::{Hand, HandMeasurement};
+use crate::scene::{Hand, HandMeasurement, hand_depth};
 
-/// How far joints may be beyond their limits: encoders have errors, and limits are soft \[rad; m\].
-const SLACK: [f64; 2] = [0.1, 5e-3];
-
-/// Positions that are so many times their limit are in another unit.
-const OTHER_UNIT: f64 = 3.0;
-
-/// Distances of the base from the camera \[m\] that are believed to be in meters.
-const PLAUSIBLE_DISTANCE: std::ops::Range<f64> = 0.01..5.0;
-
-/// What looks wrong with pose and joints of `hand`, and its depth image \[m\] if it makes sense to compare anything with that.
-pub(super) fn inspect(
+/// Warnings of pose and joints of `hand`, and its depth image \[m\] if it makes sense to compare anything with that.
+pub(super) fn check(
     hand: &Hand,
     measured: &HandMeasurement,
     camera: &Camera,
 ) -> (Vec<Warning>, Option<DepthImage>) {
-    let broken = |value: usize, finding: String| {
-        (vec![Warning::new(Subject::Hand, value as f64, "").found(finding)], None)
+    let broken = |count: usize, finding: String| {
+        (vec![Warning::new(Subject::Hand, (count as f64, ""), finding, "")], None)
     };
     if let Err(error) = hand.check_joints(&measured.joints) {
         return broken(measured.joints.len(), error.to_string());
@@ -53,61 +44,47 @@ fn joints(tree: &KinematicTree, joints: &[f64]) -> Option<(Warning, bool)> {
     };
     let slides: Vec<bool> = tree.joint_names().iter().map(slides).collect();
     // Relative to what is allowed, so that radians and meters compare.
-    let beyond = |j: usize, q: f64| excess(q, limits[j]) / SLACK[usize::from(slides[j])];
-    let outside: Vec<usize> = (0..joints.len()).filter(|&j| beyond(j, joints[j]) > 1.0).collect();
-    let worst = outside
-        .iter()
-        .copied()
-        .max_by(|&a, &b| beyond(a, joints[a]).total_cmp(&beyond(b, joints[b])))?;
+    let beyond = |j: usize, q: f64| excess(q, limits[j]) / JOINT_EXCESS[usize::from(slides[j])];
+    let outside = || (0..joints.len()).filter(|&j| beyond(j, joints[j]) > 1.0);
+    let worst = outside().max_by(|&a, &b| beyond(a, joints[a]).total_cmp(&beyond(b, joints[b])))?;
     let (q, (low, high)) = (joints[worst], limits[worst]);
-    let far = q.abs() > OTHER_UNIT * low.abs().max(high.abs());
-    let converted = |factor: f64| {
-        let alike = |&j: &usize| slides[j] == slides[worst];
-        far && (0..joints.len()).filter(alike).all(|j| beyond(j, joints[j] * factor) <= 1.0)
+    let (unit, factor, question) = match slides[worst] {
+        true => ("m", 1e-3, "are positions of sliding joints in millimeters?"),
+        false => ("rad", 1_f64.to_radians(), "are joints in degrees?"),
     };
-    let (unit, factor, question) = if slides[worst] {
-        ("m", 1e-3, "are positions of sliding joints in millimeters?")
-    } else {
-        ("rad", 1_f64.to_radians(), "are joints in degrees?")
-    };
-    let other_unit = converted(factor);
+    let mut alike = (0..joints.len()).filter(|&j| slides[j] == slides[worst]);
+    let other_unit = q.abs() > JOINT_RATIO * low.abs().max(high.abs())
+        && alike.all(|j| beyond(j, joints[j] * factor) <= 1.0);
     let hint = if other_unit { question } else { "are its name, sign and zero those of the URDF?" };
     let (name, by) = (&tree.joint_names()[worst], excess(q, limits[worst]));
-    let (count, of) = (outside.len(), joints.len());
-    let warning = Warning::new(Subject::Hand, by, unit).hint(hint).found(format!(
+    let (count, of) = (outside().count(), joints.len());
+    let finding = format!(
         "joint {name} is at {q:.3} {unit}, {by:.3} {unit} outside its limits {low:.3} to {high:.3} \
          ({count} of {of} joints are outside)"
-    ));
-    Some((warning, other_unit))
+    );
+    Some((Warning::new(Subject::Hand, (by, unit), finding, hint), other_unit))
 }
 
 /// A pose of the base (base → camera) at which no camera sees the hand; `seen` says whether it is in the image.
 fn base(t_cam_hand: &Isometry3<f64>, seen: bool) -> Option<Warning> {
     let place = t_cam_hand.translation.vector;
     let distance = place.norm();
-    let at = format!("({:.3}, {:.3}, {:.3}) m", place.x, place.y, place.z);
-    let warn = |value, unit| Warning::new(Subject::Hand, value, unit);
-    if !PLAUSIBLE_DISTANCE.contains(&distance) {
-        return Some(
-            warn(distance, "m")
-                .found(format!("the hand's base is {distance:.4} m from the camera"))
-                .hint("is its position in the unit of the format (cam_t_b2c: millimeters)?"),
-        );
-    }
-    if seen {
+    let at = format!("(its base is at ({:.3}, {:.3}, {:.3}) m)", place.x, place.y, place.z);
+    let (value, finding, hint) = if !BASE_DISTANCE.contains(&distance) {
+        let finding = format!("the hand's base is {distance:.4} m from the camera");
+        let hint = "is its position in the unit of the format (cam_t_b2c: millimeters)?";
+        ((distance, "m"), finding, hint)
+    } else if seen {
         return None;
-    }
-    Some(if place.z <= 0.0 {
-        warn(place.z, "m")
-            .found(format!("the hand is behind the camera (its base is at {at})"))
-            .hint(
-                "does its pose map the base into the camera frame, z forward, and not the reverse?",
-            )
+    } else if place.z <= 0.0 {
+        let hint =
+            "does its pose map the base into the camera frame, z forward, and not the reverse?";
+        ((place.z, "m"), format!("the hand is behind the camera {at}"), hint)
     } else {
-        warn(0.0, "px")
-            .found(format!("no pixel of the hand is in the image (its base is at {at})"))
-            .hint("is its pose in the camera frame, and cam_K that of this image?")
-    })
+        let hint = "is its pose in the camera frame, and cam_K that of this image?";
+        ((0.0, "px"), format!("no pixel of the hand is in the image {at}"), hint)
+    };
+    Some(Warning::new(Subject::Hand, value, finding, hint))
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ const SIZES: [f64; 2] = [0.5, 2.0];
 /// Logarithm of a factor between sizes that is none.
 const NEARLY: f64 = 0.1;
 
-/// What has a mistake in common.
+/// Inputs that have a mistake in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scope {
     Poses,
@@ -109,7 +109,7 @@ pub struct FieldNames {
 }
 
 impl Correction {
-    /// What has the mistake in common.
+    /// Inputs that have the mistake in common.
     pub(super) fn scope(self) -> Scope {
         match self {
             Self::ModelUnit | Self::ModelScale => Scope::Object,
@@ -139,7 +139,7 @@ impl Correction {
         matches!(self, Self::DepthScale | Self::Translation)
     }
 
-    /// What is wrong, with file and field, and what to do about it.
+    /// Message: the mistake with file and field, and what to do about it.
     pub(super) fn message(self, names: &FieldNames, factor: f64) -> String {
         let FieldNames {
             poses,
@@ -151,7 +151,7 @@ impl Correction {
             depth_scale,
             masks,
         } = names;
-        let times = Factor(factor);
+        let times = digits(factor);
         match self {
             Self::PoseUnit => {
                 format!("{poses}: {t}: translations are in another unit; multiply {t} by {times}")
@@ -221,16 +221,11 @@ fn size(factor: f64) -> &'static str {
 }
 
 /// A factor with three digits.
-struct Factor(f64);
-
-impl std::fmt::Display for Factor {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self(factor) = self;
-        let digits = (2.0 - factor.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-        let text = format!("{factor:.digits$}");
-        match text.contains('.') {
-            true => f.write_str(text.trim_end_matches('0').trim_end_matches('.')),
-            false => f.write_str(&text),
-        }
+fn digits(factor: f64) -> String {
+    let count = (2.0 - factor.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{factor:.count$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
     }
 }

@@ -6,8 +6,7 @@ use super::finding::{Finding, groups};
 use super::kind::Correction;
 use super::settings::CorrectionSettings;
 use super::trial::{CorrectionTrial, Size};
-use crate::scene::Target;
-use crate::scene::view::median;
+use crate::scene::{Target, median};
 
 /// Standard deviations of a normal distribution in the median of absolute deviations.
 const TO_SIGMA: f64 = 1.4826;

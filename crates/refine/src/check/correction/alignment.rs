@@ -6,10 +6,10 @@ use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
 use prehend_render::{DepthImage, OutlinePoint, outline_points};
 
-use super::evidence::Evidence;
+use super::evidence::FrameImages;
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
-use crate::scene::view::median;
+use crate::scene::median;
 
 /// Pose, logarithm of the scale of depth, logarithm of the focal length.
 pub(super) const UNKNOWNS: usize = 8;
@@ -20,7 +20,7 @@ const DAMPING: f64 = 1e-3;
 /// Pixels beyond a mask's border at which depth tells what the border is of \[px\].
 const BEYOND: f64 = 3.0;
 
-/// Where mask and depth have the object.
+/// The object where mask and depth have it.
 pub(super) struct Aligned {
     pub(super) inputs: Inputs,
     /// Sum of squares of outline, depth and pose by the unknowns, there.
@@ -28,17 +28,17 @@ pub(super) struct Aligned {
 }
 
 /// A fit of inputs to what a frame shows.
-pub(super) struct Alignment<'a> {
-    pub(super) evidence: &'a Evidence<'a>,
+pub(super) struct PoseFit<'a> {
+    pub(super) evidence: &'a FrameImages<'a>,
     pub(super) settings: &'a CorrectionSettings,
     pub(super) hand: Option<&'a DepthImage>,
 }
 
-impl Alignment<'_> {
+impl PoseFit<'_> {
     /// With `start` moved and turned to where mask and depth have the object, and, if `sized`, with depth scaled; none where the object is not in view.
     pub(super) fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
         let start = self.placed(start)?;
-        let radius = self.evidence.object.radius;
+        let radius = self.evidence.object().radius;
         let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
         // Steps in units of the radius.
         let units = SVector::from([radius, radius, radius, 1.0, 1.0, 1.0, size, 0.0]);
@@ -77,8 +77,10 @@ impl Alignment<'_> {
             return None;
         }
         if !inputs.is_placed {
-            let z = measured.unwrap_or(center.z.abs().max(2.0 * self.evidence.object.radius));
-            center = move_to(&mut inputs, &center, &camera.unproject(masked.x, masked.y, z));
+            let z = measured.unwrap_or(center.z.abs().max(2.0 * self.evidence.object().radius));
+            let sought = camera.unproject(masked.x, masked.y, z);
+            inputs.t_cam_object.translation.vector += sought - center;
+            center = sought;
         }
         for _ in 0..3 {
             let drawn = self.evidence.drawn(&inputs);
@@ -104,7 +106,8 @@ impl Alignment<'_> {
             }
             let shift = camera.unproject(masked.x, masked.y, z) - camera.unproject(at.x, at.y, z);
             let to = Point3::new(center.x * z / center.z, center.y * z / center.z, z) + shift;
-            center = move_to(&mut inputs, &center, &to);
+            inputs.t_cam_object.translation.vector += to - center;
+            center = to;
         }
         inputs.t_cam_object.translation.vector.iter().all(|v| v.is_finite()).then_some(inputs)
     }
@@ -139,7 +142,7 @@ impl Alignment<'_> {
         sum: &mut Quadratic<UNKNOWNS>,
     ) {
         let Self { evidence, settings, .. } = self;
-        let object = &evidence.object;
+        let object = evidence.object();
         let inverse = inputs.t_cam_object.inverse();
         let sigma = settings.depth * object.radius;
         let kernel = RobustKernel::Cauchy { scale: width };
@@ -170,12 +173,12 @@ impl Alignment<'_> {
     ) -> Option<()> {
         let Self { evidence, settings, .. } = self;
         let camera = &inputs.camera;
-        let outline = outline_points(camera, &evidence.object.model, &inputs.t_cam_object);
+        let outline = outline_points(camera, &evidence.object().model, &inputs.t_cam_object);
         if outline.is_empty() {
             return None;
         }
         let kernel = RobustKernel::Cauchy { scale: width };
-        let reach = settings.reach * evidence.object.radius * camera.fx / center.z * width / 5.0;
+        let reach = settings.reach * evidence.object().radius * camera.fx / center.z * width / 5.0;
         let reach = reach.clamp(6.0, camera.width as f64 / 4.0);
         let length: f64 = outline.iter().map(|point| point.length).sum();
         for at in &outline {
@@ -197,7 +200,7 @@ impl Alignment<'_> {
         Some(())
     }
 
-    /// How far outward of a point of the outline the mask's border is \[px\]; none where there is none within `reach`, or it is that of
+    /// Distance of the mask's border outward of a point of the outline \[px\]; none where there is none within `reach`, or it is that of
     /// something in front.
     fn border(&self, inputs: &Inputs, at: &OutlinePoint, reach: f64) -> Option<f64> {
         let (width, height) = (inputs.camera.width, inputs.camera.height);
@@ -220,13 +223,13 @@ impl Alignment<'_> {
         }
         let border = along - 0.5 * side;
         let beyond = index(border + BEYOND)?;
-        let tolerance = self.settings.elsewhere * self.evidence.object.radius;
+        let tolerance = self.settings.elsewhere * self.evidence.object().radius;
         let hides = |depth: f64| depth > 0.0 && depth < at.point.z - tolerance;
         let hand = self.hand.map_or(0.0, |hand| f64::from(hand.pixels()[beyond]) / inputs.meters);
         (!hides(self.evidence.sensor(inputs, beyond)) && !hides(hand)).then_some(border)
     }
 
-    /// That poses are about where they are said to be.
+    /// Adds the prior of poses: they are about where they are stated.
     fn add_prior(
         &self,
         inputs: &Inputs,
@@ -251,15 +254,16 @@ impl Alignment<'_> {
     /// Standard deviation of the translation.
     fn shift_sigma(&self, inputs: &Inputs) -> f64 {
         let [of_distance, of_radius] = self.settings.shift;
-        of_distance * self.evidence.center(inputs).z.abs() + of_radius * self.evidence.object.radius
+        of_distance * self.evidence.center(inputs).z.abs()
+            + of_radius * self.evidence.object().radius
     }
 
-    /// How plausible it is that `start` is in truth at `to`, 0 to 1.
+    /// Plausibility that `start` is in truth at `to`, 0 to 1.
     pub(super) fn plausibility(&self, start: &Inputs, to: &Isometry3<f64>) -> f64 {
         let turned = start.t_cam_object.rotation.angle_to(&to.rotation) / self.settings.turn;
         let moved = match start.is_placed {
             true => {
-                let moved = to * self.evidence.object.center - self.evidence.center(start);
+                let moved = to * self.evidence.object().center - self.evidence.center(start);
                 moved.norm() / self.shift_sigma(start)
             }
             false => 0.0,
@@ -268,12 +272,6 @@ impl Alignment<'_> {
         let excess = |squares: f64| (squares - 3.0).max(0.0);
         (-0.5 * (excess(turned * turned) + excess(moved * moved))).exp()
     }
-}
-
-/// Moves what is at `from` to `to`, which it returns.
-fn move_to(inputs: &mut Inputs, from: &Point3<f64>, to: &Point3<f64>) -> Point3<f64> {
-    inputs.t_cam_object.translation.vector += to - from;
-    *to
 }
 
 fn joined(twist: &nalgebra::Vector6<f64>, by_depth: f64, by_focal: f64) -> SVector<f64, UNKNOWNS> {

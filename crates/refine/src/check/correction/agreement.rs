@@ -1,26 +1,21 @@
-//! How well inputs agree with what a frame shows.
+//! Agreement of inputs with what a frame shows.
 
 use prehend_render::DepthImage;
 
-use super::evidence::Evidence;
+use super::evidence::FrameImages;
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
-
-/// Depth that is farther from the hand's is of something else \[m\].
-const HAND_REACH: f64 = 15e-3;
-
-/// Fewest pixels of the hand that tell anything.
-const LEAST_OF_HAND: usize = 300;
+use crate::check::limits::{HAND_PIXELS, HAND_REACH};
 
 /// Mean of intersection over union of mask and visible object, of the part of the mask whose depth is the object's, and of the part
 /// of the hand whose depth is the hand's, of those that are known: 0 to 1.
 pub(super) fn agreement(
-    evidence: &Evidence<'_>,
+    evidence: &FrameImages<'_>,
     inputs: &Inputs,
     hand: Option<&DepthImage>,
     settings: &CorrectionSettings,
 ) -> f64 {
-    let tolerance = settings.elsewhere * evidence.object.radius;
+    let tolerance = settings.elsewhere * evidence.object().radius;
     let drawn = evidence.drawn(inputs);
     let (mut both, mut masked_only, mut visible_only, mut known, mut near) =
         (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -55,7 +50,7 @@ pub(super) fn agreement(
 
 /// Part of the hand, beside the mask, whose depth is the hand's; none where too little of it is seen.
 pub(super) fn hand_share(
-    evidence: &Evidence<'_>,
+    evidence: &FrameImages<'_>,
     inputs: &Inputs,
     hand: &DepthImage,
 ) -> Option<f64> {
@@ -67,5 +62,5 @@ pub(super) fn hand_share(
             near += usize::from((sensor - f64::from(*hand)).abs() < HAND_REACH);
         }
     }
-    (count >= LEAST_OF_HAND).then(|| near as f64 / count as f64)
+    (count >= HAND_PIXELS).then(|| near as f64 / count as f64)
 }

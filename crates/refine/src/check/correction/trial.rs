@@ -2,25 +2,26 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Matrix6x2, Vector2};
 use prehend_autodiff::Quadratic;
+use prehend_render::DepthImage;
 use rayon::prelude::*;
 
 use super::agreement::{agreement, hand_share};
-use super::alignment::{Aligned, Alignment};
-use super::evidence::Evidence;
+use super::alignment::{Aligned, PoseFit};
+use super::evidence::FrameImages;
 use super::inputs::Inputs;
 use super::kind::{Correction, candidates};
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
 use crate::scene::{Hand, Object, Observation};
 
-/// What becomes of a frame by each correction.
+/// A frame with each correction tried.
 #[derive(Clone, Debug)]
 pub struct CorrectionTrial {
     /// Agreement of the inputs as they are with what the frame shows, 0 to 1.
     pub(super) given: f64,
     /// The candidates; none of those that the frame needs not.
     pub(super) tried: Vec<Option<Tried>>,
-    /// What it says of the model's scale and the focal length.
+    /// Information about the model's scale and the focal length.
     pub(super) size: Option<Size>,
 }
 
@@ -34,7 +35,7 @@ pub(super) struct Tried {
     pub(super) oddness: f64,
 }
 
-/// What a frame says of the logarithms x of the model's scale and of the focal length, each over what is said: its cost is ½ xᵀ`information` x − `vector`ᵀx,
+/// Information of a frame about the logarithms x of the model's scale and of the focal length, each over its stated value: the cost is ½ xᵀ`information` x − `vector`ᵀx,
 /// the pose being eliminated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size {
@@ -47,17 +48,6 @@ pub(super) struct Size {
 }
 
 impl CorrectionTrial {
-    /// Agreement of mask, depth and hand with the object about where it is said to be, 0 to 1.
-    pub fn agreement(&self) -> f64 {
-        self.given
-    }
-
-    /// Factor of the model that outline and depth fit best with, and its standard deviation; nothing where they do not tell.
-    pub fn model_scale(&self) -> Option<[f64; 2]> {
-        let Size { scale, information, .. } = self.size?;
-        Some([scale.exp(), information[(0, 0)].sqrt().recip()])
-    }
-
     /// Tries what would make `observation` show `object` about at `t_cam_object` \[m\].
     ///
     /// # Errors
@@ -69,19 +59,14 @@ impl CorrectionTrial {
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
-        let evidence = Evidence::new(observation, object, hand, t_cam_object, settings)?;
+        let evidence = FrameImages::new(observation, object, hand, t_cam_object, settings)?;
         let given = evidence.given;
         let hand_drawn = evidence.hand_drawn(&given);
         let fit = |inputs: &Inputs, sized: bool| {
             // The hand is seen by another camera elsewhere.
             let own =
                 (inputs.camera != given.camera).then(|| evidence.hand_drawn(inputs)).flatten();
-            let hand = own.as_ref().or(hand_drawn.as_ref());
-            let alignment = Alignment { evidence: &evidence, settings, hand };
-            let aligned = alignment.align(inputs, sized)?;
-            let fits = agreement(&evidence, &aligned.inputs, hand, settings);
-            let plausible = alignment.plausibility(inputs, &aligned.inputs.t_cam_object);
-            Some((fits * plausible, aligned))
+            fit(&evidence, own.as_ref().or(hand_drawn.as_ref()), inputs, sized, settings)
         };
         let agreement = fit(&given, false).map_or(0.0, |(agreement, _)| agreement);
         let sized = fit(&given, true);
@@ -109,7 +94,7 @@ impl CorrectionTrial {
                 None => (0.0, inputs.meters),
             };
             // How far the object's size is from what is common.
-            let extent = 2.0 * evidence.object.radius * meters;
+            let extent = 2.0 * evidence.object().radius * meters;
             let oddness = (extent / settings.extent).ln().abs();
             Some(Tried { correction, value, agreement, oddness })
         };
@@ -119,25 +104,36 @@ impl CorrectionTrial {
 }
 
 /// The pose that mask and depth have, within what poses to start from are off, if object and `observation` agree there.
-pub(in crate::scene) fn settled_pose(
+pub(in crate::check) fn settled_pose(
     observation: &Observation,
     object: &Object,
     hand: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
     settings: &CorrectionSettings,
 ) -> Option<Isometry3<f64>> {
-    let evidence = Evidence::new(observation, object, hand, t_cam_object, settings).ok()?;
-    let given = evidence.given;
-    let hand = evidence.hand_drawn(&given);
-    let alignment = Alignment { evidence: &evidence, settings, hand: hand.as_ref() };
-    let settled = alignment.align(&given, false)?.inputs;
-    let plausible = alignment.plausibility(&given, &settled.t_cam_object);
-    let agreement = plausible * agreement(&evidence, &settled, hand.as_ref(), settings);
-    (agreement >= settings.fair && settled.meters == 1.0).then_some(settled.t_cam_object)
+    let evidence = FrameImages::new(observation, object, hand, t_cam_object, settings).ok()?;
+    let hand = evidence.hand_drawn(&evidence.given);
+    let (agreement, aligned) = fit(&evidence, hand.as_ref(), &evidence.given, false, settings)?;
+    let Inputs { meters, t_cam_object, .. } = aligned.inputs;
+    (agreement >= settings.fair && meters == 1.0).then_some(t_cam_object)
+}
+
+/// Inputs with the object moved to where mask and depth have it, and their agreement with the frame there times the plausibility of the move, 0 to 1.
+fn fit(
+    evidence: &FrameImages<'_>,
+    hand: Option<&DepthImage>,
+    inputs: &Inputs,
+    sized: bool,
+    settings: &CorrectionSettings,
+) -> Option<(f64, Aligned)> {
+    let pose_fit = PoseFit { evidence, settings, hand };
+    let aligned = pose_fit.align(inputs, sized)?;
+    let plausible = pose_fit.plausibility(inputs, &aligned.inputs.t_cam_object);
+    Some((plausible * agreement(evidence, &aligned.inputs, hand, settings), aligned))
 }
 
 impl Size {
-    /// What remains once the pose is eliminated from the sum of squares (Schur's complement); none where outline and depth leave the pose open.
+    /// Schur complement of the sum of squares once the pose is eliminated; none where outline and depth leave the pose open.
     fn of(aligned: &Aligned, given: &Inputs) -> Option<Self> {
         let Quadratic { hessian, gradient, .. } = &aligned.sum;
         let pose: Matrix6<f64> = hessian.fixed_view::<6, 6>(0, 0).into_owned();

@@ -82,15 +82,15 @@ fn along_ray(place: &Vector3<f64>, random: &mut SplitMix64) -> (Vector3<f64>, Ve
     let share = between(RAY_SHARE, 1.0);
     let side = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
     let angle = between(2.5, 6.6).to_radians();
-    let across = direction(random);
+    let across = random_direction(random);
     let across =
         (across - ray * ray.dot(&across)).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
     let offset = ray * (side * share) + across * (1.0 - share * share).sqrt();
-    (offset * length, direction(random) * angle)
+    (offset * length, random_direction(random) * angle)
 }
 
-/// Uniform on the unit sphere.
-fn direction(random: &mut SplitMix64) -> Vector3<f64> {
+/// A direction, uniform on the unit sphere.
+pub(super) fn random_direction(random: &mut SplitMix64) -> Vector3<f64> {
     let normal = Vector3::from_fn(|_, _| random.normal());
     normal.try_normalize(0.0).unwrap_or_else(Vector3::x)
 }

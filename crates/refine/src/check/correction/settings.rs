@@ -19,7 +19,7 @@ pub struct CorrectionSettings {
     pub measurements: f64,
     /// Weight of what is of the projected object but not of the mask, where no depth tells what hides it.
     pub hidden: f64,
-    /// How far from the outline a mask's border is looked for at first, as a part of the object's radius in the image.
+    /// Distance from the outline within which a mask's border is looked for at first, as a part of the object's radius in the image.
     pub reach: f64,
     /// Depth that is farther from the object's counts as of something else, as a part of its radius.
     pub elsewhere: f64,
@@ -37,13 +37,13 @@ pub struct CorrectionSettings {
     pub least: f64,
     /// Agreement that a correction must gain on average over many frames, and besides over the square root of their number.
     pub gain: [f64; 2],
-    /// The same of a correction by a value that nothing is known of beforehand: it fits itself to what hides the object.
+    /// Agreement that a correction by a value of which nothing is known beforehand must gain: it fits itself to what hides the object.
     pub unnamed_gain: f64,
     /// Corrections whose agreements differ by less are told apart by what is common: sizes and distances, then their order.
     pub tie: f64,
     /// Extent of objects that are held in hands \[m\].
     pub extent: f64,
-    /// What differs less in how uncommon the object's size would be, as a logarithm, is named beside what fits as well.
+    /// Difference in how uncommon the object's size would be, as a logarithm, below which a correction is named beside one that fits as well.
     pub oddness: f64,
     /// The scale of a model, or the focal length, that is told: rigs and scans are off by 2 % and more, and masks by a pixel.
     pub size: f64,

@@ -1,23 +1,22 @@
 //! Corrections that explain many frames.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use super::kind::{Correction, FieldNames, Scope, candidate_count};
 use super::settings::CorrectionSettings;
 use super::size::find_sizes;
 use super::trial::{CorrectionTrial, Tried};
-use crate::scene::Target;
-use crate::scene::view::median;
+use crate::check::warning::{Subject, Warning};
+use crate::scene::{Target, median};
 
 /// A correction that makes frames agree with what they show.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// What would correct them.
+    /// Correction of the mistake.
     pub correction: Correction,
     /// Its factor.
     pub factor: f64,
-    /// What would do so as well, with its factor.
+    /// Correction that would do as well, with its factor.
     pub alternative: Option<(Correction, f64)>,
     /// Indices of the frames.
     pub frames: Vec<usize>,
@@ -153,37 +152,35 @@ fn attempt(trials: &[(Target, CorrectionTrial)], group: &[usize], c: usize) -> O
 }
 
 impl Finding {
-    /// What is wrong, with file and field, what to do next, and what tells so.
+    /// Mistake with file and field, what to do about it, and what tells so.
     pub fn message(&self, names: &FieldNames) -> String {
-        Message { finding: self, names }.to_string()
-    }
-}
-
-struct Message<'a> {
-    finding: &'a Finding,
-    names: &'a FieldNames,
-}
-
-impl fmt::Display for Message<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { finding, names } = self;
-        f.write_str(&finding.correction.message(names, finding.factor))?;
-        if let Some((correction, factor)) = finding.alternative {
-            write!(f, "; or {}", correction.message(names, factor))?;
+        let mut text = self.correction.message(names, self.factor);
+        if let Some((correction, factor)) = self.alternative {
+            text += &format!("; or {}", correction.message(names, factor));
         }
-        let count = finding.frames.len();
+        let count = self.frames.len();
         let frames = if count == 1 { "frame" } else { "frames" };
-        if let Some([given, corrected]) = finding.agreement {
-            write!(
-                f,
-                " (object, mask and depth of {count} {frames} then agree by {:.0} %, as they are by {:.0} %)",
-                1e2 * corrected,
-                1e2 * given
-            )?;
+        if let Some([given, corrected]) = self.agreement.map(|shares| shares.map(|s| 1e2 * s)) {
+            text += &format!(
+                " (object, mask and depth of {count} {frames} then agree by {corrected:.0} %, as they are by {given:.0} %)"
+            );
         }
-        if let Some(sigma) = finding.sigma {
-            write!(f, " (from outlines and depth of {count} {frames}, ± {sigma:.3})")?;
+        if let Some(sigma) = self.sigma {
+            text += &format!(" (from outlines and depth of {count} {frames}, ± {sigma:.3})");
         }
-        Ok(())
+        text
+    }
+
+    /// True of a warning about what the correction would mend.
+    pub fn explains(&self, warning: &Warning) -> bool {
+        let (kind, by_agreement) = (self.correction, self.agreement.is_some());
+        let is_unit = matches!(kind, Correction::ModelUnit | Correction::ModelAndPoseUnit);
+        match warning.subject {
+            Subject::Model => is_unit && warning.unit == "m",
+            // Where the object is, not how hard it is felt.
+            Subject::Touch => by_agreement && warning.unit == "cm",
+            Subject::Hand => kind == Correction::FocalLength || by_agreement,
+            Subject::Pose | Subject::Mask | Subject::Depth => true,
+        }
     }
 }

@@ -1,0 +1,81 @@
+//! The mask against the object at the pose, and against what depth shows under it.
+
+use super::limits::{
+    HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_ON_HAND, MASK_OVERLAP, MASK_SHIFT,
+};
+use super::warning::{Subject, Warning};
+use crate::scene::{Object, View, median};
+
+/// Warning of a mask that is not that of the visible part of the object, whose center has depth `z` \[m\]. The pose is blamed if `mask_fits` what
+/// depth shows; what hides the object is not known if `hand_wrong`.
+pub(super) fn at_pose(
+    view: &View<'_>,
+    z: f64,
+    mask_fits: bool,
+    hand_wrong: bool,
+) -> Option<Warning> {
+    let [of_mask, of_model] = view.sums();
+    let (mask, model) = (of_mask.z, of_model.z);
+    let both = view.pixels().filter(|(_, pixel)| pixel.masked && pixel.shows_object());
+    let overlap = both.count() as f64;
+    let area = mask / model;
+    // An inverted mask has the border of a right one.
+    let (subject, hint) = if mask_fits && MASK_AREA.contains(&area) {
+        (Subject::Pose, "the mask fits depth: is the pose right, and the mesh of this object?")
+    } else {
+        let hint = "wrong pose, another mesh, or a mask that is inverted or of something else?";
+        (Subject::Mask, hint)
+    };
+    if overlap == 0.0 {
+        let finding = "the object at this pose does not touch its mask";
+        return Some(Warning::new(subject, (0.0, ""), finding, "wrong frame or pose?"));
+    }
+    let share = overlap / (mask + model - overlap);
+    let pixels = (of_mask.xy() / mask - of_model.xy() / model).norm();
+    let shift = pixels * z / view.observation.camera.fx;
+    let value = if hand_wrong {
+        return None;
+    } else if !MASK_AREA.contains(&area) {
+        (area, "")
+    } else if shift > MASK_SHIFT {
+        (pixels, "px")
+    } else if share < MASK_OVERLAP {
+        (share, "")
+    } else {
+        return None;
+    };
+    let finding = format!(
+        "the object at this pose overlaps its mask by {:.0} %: the mask's center is {pixels:.0} px ({:.1} cm) \
+         beside that of what should be seen, its area {area:.2} times",
+        share * 1e2,
+        shift * 1e2
+    );
+    Some(Warning::new(subject, value, finding, hint))
+}
+
+/// Warning of what depth shows under the mask that is not the object; and whether all of this was asked and nothing found. The hand is not asked
+/// unless `hand_fits`.
+pub(super) fn off_object(
+    view: &View<'_>,
+    object: &Object,
+    hand_fits: bool,
+) -> (Option<Warning>, bool) {
+    let masked = || view.pixels().map(|(_, p)| p).filter(|p| p.masked && p.sensor > 0.0);
+    let count = masked().count() as f64;
+    let Some(middle) = median(masked().map(|p| f64::from(p.sensor))) else { return (None, false) };
+    let beyond = middle + 2.0 * object.radius;
+    let share = |count_of: usize| count_of as f64 / count;
+    let behind = share(masked().filter(|p| f64::from(p.sensor) > beyond).count());
+    let of_hand = || masked().filter(|p| p.is_on_hand(HAND_REACH_AT_OBJECT) && !p.shows_object());
+    let on_hand = if hand_fits { share(of_hand().count()) } else { 0.0 };
+    if behind <= MASK_BEHIND && on_hand <= MASK_ON_HAND {
+        return (None, hand_fits);
+    }
+    let finding = format!(
+        "{:.0} % of the mask's pixels are on the hand and {:.0} % on what is behind the object",
+        on_hand * 1e2,
+        behind * 1e2
+    );
+    let hint = "does it leak, is it shifted, or of the whole object (mask, not mask_visib)?";
+    (Some(Warning::new(Subject::Mask, (on_hand + behind, ""), finding, hint)), false)
+}

@@ -1,0 +1,111 @@
+//! Checks of inputs before any refinement, each with a figure and a likely cause: [`Warning`]s of single frames by limits of units, frames and sensors
+//! (`limits.rs` has them all), and mistakes by name, by trying over many frames which [`Correction`] makes the inputs agree with what is seen.
+//!
+//! One cause should make one warning: what a hand, a mesh or depth is needed for is not judged if that is at fault itself.
+
+mod correction;
+mod depth;
+mod hand;
+mod limits;
+mod mask;
+mod model;
+#[cfg(test)]
+mod tests;
+mod touch;
+mod warning;
+
+use nalgebra::{Isometry3, Translation3};
+use prehend_render::DepthImage;
+
+pub use self::correction::{
+    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
+};
+pub(crate) use self::model::likely_unit;
+pub use self::warning::{Subject, Warning};
+use crate::scene::{Hand, HandMeasurement, Object, Observation, View};
+
+use self::correction::settled_pose;
+
+/// Warnings of an object's model; none if all looks well. What was assumed of its mass and its inside matters if it is `held`.
+pub(crate) fn check_object(object: &Object, held: bool) -> Vec<Warning> {
+    model::check(object, held)
+}
+
+/// Warnings of an observation, and of the object at a pose (object → camera) in it; none if all looks well. Those of the object alone are
+/// [`check_object`]'s.
+pub(crate) fn check_frame(
+    observation: &Observation,
+    object: &Object,
+    hand: Option<&Hand>,
+    t_cam_object: &Isometry3<f64>,
+) -> Vec<Warning> {
+    if let Err((image, problem)) = observation.check_sizes() {
+        let subject = if image == "mask" { Subject::Mask } else { Subject::Depth };
+        return vec![Warning::new(subject, (0.0, ""), format!("the {image} has {problem}"), "")];
+    }
+    let mut warnings = Vec::new();
+    let held = hand.zip(observation.hand.as_ref());
+    let (mut drawn, mut touch) = (None, None);
+    if let Some((hand, measured)) = held {
+        let (of_hand, image) = hand::check(hand, measured, &observation.camera);
+        let (of_forces, readable) = touch::check(hand, measured);
+        warnings.extend(of_hand.into_iter().chain(of_forces));
+        (drawn, touch) = (image, readable.then_some((hand, measured)));
+    }
+    let z = (t_cam_object * object.center).z;
+    if z.is_nan() || z <= 0.0 {
+        let finding = format!("the object is behind the camera (z = {z:.3} m)");
+        let hint = "does the pose map the object into the camera frame, z forward?";
+        warnings.push(Warning::new(Subject::Pose, (z, "m"), finding, hint));
+        return warnings;
+    }
+    if !model::is_plausible(object) {
+        return warnings;
+    }
+    let images = Comparison { observation, object, has_hand: held.is_some(), drawn, touch };
+    let found = images.check(t_cam_object, false);
+    let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
+    // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
+    let settled = found.iter().any(of_pose).then(|| {
+        settled_pose(observation, object, hand, t_cam_object, &CorrectionSettings::default())
+    });
+    warnings.extend(settled.flatten().map_or(found, |pose| images.check(&pose, true)));
+    warnings
+}
+
+/// Images of a frame, and what they are compared with.
+struct Comparison<'a> {
+    observation: &'a Observation,
+    object: &'a Object,
+    has_hand: bool,
+    /// Depth of the hand \[m\], unless that is at fault.
+    drawn: Option<DepthImage>,
+    /// The hand whose forces have places.
+    touch: Option<(&'a Hand, &'a HandMeasurement)>,
+}
+
+impl Comparison<'_> {
+    /// Warnings with the object at a pose; one that `is_settled` where mask and depth have it fits.
+    fn check(&self, t_cam_object: &Isometry3<f64>, is_settled: bool) -> Vec<Warning> {
+        let &Self { observation, object, has_hand, ref drawn, touch } = self;
+        let z = (t_cam_object * object.center).z;
+        let view = View::new(observation, &observation.camera, object, drawn.clone(), t_cam_object);
+        let mut warnings = depth::check(&view, object);
+        let blamed = |subject| warnings.iter().any(|warning| warning.subject == subject);
+        let hand_fits = drawn.is_some() && warnings.is_empty();
+        let hand_wrong = has_hand && drawn.is_none() || blamed(Subject::Hand);
+        let (off_object, mask_fits) = match blamed(Subject::Depth) {
+            true => (None, false),
+            false => mask::off_object(&view, object, hand_fits),
+        };
+        let at_pose =
+            if is_settled { None } else { mask::at_pose(&view, z, mask_fits, hand_wrong) };
+        let pose_fits = at_pose.is_none();
+        warnings.extend(at_pose.into_iter().chain(off_object));
+        if let Some((hand, measured)) = touch.filter(|_| hand_fits && pose_fits) {
+            let seen = Translation3::from(view.toward_seen(z).unwrap_or_default()) * t_cam_object;
+            warnings.extend(touch::check_places(hand, measured, object, &seen));
+        }
+        warnings
+    }
+}
