@@ -1,17 +1,17 @@
-//! Reverse mode through rollouts: one node a step, or one for the whole.
+//! Reverse mode through rollouts: one node a step.
 
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::sync::Arc;
 
-use prehend_autodiff::{Recompute, Scalar, Var, checkpoint};
+#[cfg(doc)]
+use prehend_autodiff::Var;
+use prehend_autodiff::{Recompute, Scalar};
 
 use crate::articulated::Link;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::state::State;
 use crate::state_coordinates::{STATE, coordinates_of, states_of};
-use crate::time::{Step, TimeSteps};
+use crate::time::Step;
 use crate::world::World;
 use crate::world::articulated_body::ArticulatedBody;
 use crate::world::body::{Body, Motion};
@@ -261,96 +261,4 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
         && a.contact_groups.iter().zip(&b.contact_groups).all(group)
         && a.bodies.iter().zip(&b.bodies).all(body)
         && a.contacts.iter().zip(&b.contacts).all(pair)
-}
-
-impl World<Var> {
-    /// The last states of a rollout from `initial`, as one node that holds no more than `snapshots` states: for rollouts
-    /// too long even for [`StepCheckpointed`]. The sweep simulates again between them, see [`checkpoint::rollout`]; the
-    /// gradient does not depend on `snapshots`, to the last bit.
-    ///
-    /// ```
-    /// # use std::sync::Arc;
-    /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-    /// # use prehend_autodiff::{Recording, Var, checkpoint};
-    /// # use prehend_sim::*;
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # let mut world = World::new(Vector3::zeros());
-    /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-    /// # let ball = world.add(Body::free("ball", rigid));
-    /// let recording = Recording::start();
-    /// let mut start = [State::at_rest(Isometry3::identity()).lift()];
-    /// start[ball].linear.x = recording.variable(2.0);
-    /// let time_steps = TimeSteps { dt: 1e-3, steps: 2000 };
-    /// let snapshots = checkpoint::snapshots_for(time_steps.steps, 2);
-    /// let lifted = world.lift::<Var>();
-    /// let end = lifted.simulate_checkpointed(SemiImplicitEuler, &start, time_steps, snapshots)?;
-    /// let by_speed = recording.gradient(end[ball].pose.translation.x).wrt(start[ball].linear.x);
-    /// assert!((by_speed - 2.0).abs() < 1e-12);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// See [`World::rollout`]; if a trajectory carries derivatives.
-    pub fn simulate_checkpointed(
-        &self,
-        integrator: impl Integrator + 'static,
-        initial: &[State<Var>],
-        time_steps: TimeSteps,
-        snapshots: usize,
-    ) -> Result<Vec<State<Var>>, SimulationError> {
-        let initial = self.begin(initial, time_steps)?;
-        let TimeSteps { dt, steps } = time_steps;
-        integrator.check_differentiable(self)?;
-        let scene = Scene::new(integrator, self)?;
-        let Changes { places, values } = scene.changes(self);
-        let failure = Rc::new(RefCell::new(None));
-        let step = Steps { scene, places, dt, failure: Rc::clone(&failure) };
-        let initial: Vec<Var> = coordinates_of(&initial).collect();
-        let end = checkpoint::rollout(step, steps, snapshots, &initial, &values);
-        match failure.take() {
-            Some(error) => Err(error),
-            None => Ok(states_of(&end).collect()),
-        }
-    }
-}
-
-/// Steps as functions of the states' coordinates and of the world's parameters at `places`.
-struct Steps<I> {
-    scene: Arc<Scene<I>>,
-    places: Box<[u32]>,
-    dt: f64,
-    /// What went wrong first.
-    failure: Rc<RefCell<Option<SimulationError>>>,
-}
-
-impl<I: Integrator + 'static> Steps<I> {
-    fn step<S: Scalar>(
-        &self,
-        index: usize,
-        coordinates: &[S],
-        parameters: &[S],
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let world = self.scene.world(&self.places, parameters)?;
-        let states: Vec<State<S>> = states_of(coordinates).collect();
-        world.advance(&self.scene.integrator, &states, Step::new(index, self.dt))
-    }
-}
-
-impl<I: Integrator + 'static> checkpoint::Step for Steps<I> {
-    fn advance<S: Scalar>(&self, index: usize, coordinates: &mut [S], parameters: &[S]) {
-        if self.failure.borrow().is_some() {
-            return;
-        }
-        match self.step(index, coordinates, parameters) {
-            Ok(states) => {
-                coordinates.iter_mut().zip(coordinates_of(&states)).for_each(|(x, y)| *x = y)
-            }
-            Err(error) => {
-                *self.failure.borrow_mut() = Some(error);
-                // Should it fail in the sweep only, derivatives are NaN.
-                coordinates.iter_mut().for_each(|x| *x = x.times(f64::NAN));
-            }
-        }
-    }
 }

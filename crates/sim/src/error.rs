@@ -49,12 +49,6 @@ pub enum SimulationError {
     /// A parameter of a contact is out of its range.
     #[error(transparent)]
     Law(#[from] LawError),
-    /// A body that forces should move is kinematic or driven.
-    #[error("body '{body}' is not free to move")]
-    NotFree {
-        /// Its name.
-        body: String,
-    },
     /// Links are no articulation.
     #[error(transparent)]
     Articulation(#[from] ArticulationError),
@@ -126,9 +120,6 @@ pub enum SimulationError {
         /// Its name.
         integrator: &'static str,
     },
-    /// A stability loss without a start to measure from.
-    #[error("no perturbation to measure stability with: rest is one")]
-    NoPerturbations,
     /// States and bodies differ in number.
     #[error(
         "{states} states for {bodies} bodies, {joints} joints and {sticking} contacts that stick"

@@ -213,40 +213,6 @@
 //! # }
 //! ```
 //!
-//! # Could it rest?
-//! [`World::equilibrium`] asks whether forces within friction cones could hold a body where it is, whatever the laws
-//! say, and how much friction that takes.
-//!
-//! ```
-//! # use std::sync::Arc;
-//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
-//! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
-//! # let surface = Surface::uniform(&feet, 4e-4)?;
-//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
-//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-//! # let bodies = ContactBodies { samples: stool, field: floor };
-//! # world.add_contact(bodies, law, GapSmoothing::Hard)?;
-//! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
-//! # let states = [State::at_rest(Isometry3::identity()), stands];
-//! // Friction coefficient 0.5; samples within 0.1 mm are in contact.
-//! assert!(world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
-//! // Or one for each body that it touches.
-//! let friction = |other: BodyId| if other == floor { 0.5 } else { 1.0 };
-//! assert!(world.equilibrium(stool, &states, friction, 1e-4)?.is_possible());
-//! world.bodies[stool].external_wrench.x = 2.0; // More than μ m g.
-//! assert!(!world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
-//! # Ok(())
-//! # }
-//! ```
-//!
 //! # A law of your own
 //! One function over the scalar, from gap and velocity to force ([`ContactLaw`](crate::ContactLaw)), along the axes of
 //! the body with the field. What it calls its parameters can carry derivatives:
@@ -344,8 +310,7 @@
 //!
 //! A rollout over [`Var`](prehend_autodiff::Var) records every operation. [`StepCheckpointed`](crate::StepCheckpointed),
 //! around any integrator, keeps a few hundred bytes a step instead; steps of [`Adaptive`](crate::Adaptive) are those of the
-//! rollout, not its parts, so give it many. For rollouts too long even for that, [`World::simulate_checkpointed`] is one
-//! node that holds as many states as you allow.
+//! rollout, not its parts, so give it many. For rollouts too long even for that, [`RolloutFunction`](crate::RolloutFunction) keeps the states alone.
 //!
 //! # Identification
 //! What a world is made of, from what was seen of it: parameters have names, and least squares take residuals over the scalar as they

@@ -5,7 +5,6 @@ pub(crate) mod backward_euler;
 pub(crate) mod runge_kutta;
 pub(crate) mod semi_implicit;
 pub(crate) mod sub_stepped;
-pub(crate) mod velocity_verlet;
 
 use prehend_autodiff::Scalar;
 

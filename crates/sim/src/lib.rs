@@ -5,7 +5,6 @@
 //! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`] and a
 //! [`FrictionLaw`]. Forces and their derivatives are gathered into one wrench a step ([`contact::wrench`]), so that a
 //! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
-//! [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
 //! Links that joints hold together are [`articulated`]: they are bodies of a world like others, with laws along their joints
 //! ([`JointLaw`]), contacts, loops ([`Weld`]) and sensors, from code, URDF or MJCF.
@@ -26,14 +25,12 @@ mod broad_phase;
 pub mod contact;
 mod contact_frequency;
 mod diagnosis;
-mod equilibrium;
 mod error;
 pub mod fields;
 mod first_order;
 pub mod guide;
 mod integrator;
 mod joint_law;
-mod law_report;
 mod linear_step;
 mod parameter_names;
 mod parameters;
@@ -43,8 +40,6 @@ mod rollout_function;
 #[cfg(test)]
 mod scenes;
 mod shape;
-mod smoothing;
-mod stability;
 mod state;
 mod state_coordinates;
 mod surface;
@@ -81,10 +76,6 @@ pub use contact::registry::{LawEntry, LawRegistry};
 pub use contact::static_target::StaticContactTarget;
 pub use contact::wrench::WrenchJacobian;
 pub use contact_frequency::StepError;
-pub use equilibrium::Equilibrium;
-pub use equilibrium::balance::{Support, WrenchBalance, friction_factor};
-pub use equilibrium::compliant::{CompliantBalance, CompliantSupport};
-pub use equilibrium::pair_friction::PairFriction;
 pub use error::SimulationError;
 pub use fields::{Cuboid, HalfSpace, Placed, Sphere, SphereCavity};
 pub use integrator::Integrator;
@@ -93,7 +84,6 @@ pub use integrator::backward_euler::BackwardEuler;
 pub use integrator::runge_kutta::classic::RungeKutta4;
 pub use integrator::semi_implicit::SemiImplicitEuler;
 pub use integrator::sub_stepped::SubStepped;
-pub use integrator::velocity_verlet::VelocityVerlet;
 pub use joint_law::JointLaw;
 pub use joint_law::activation::Activation;
 pub use joint_law::affine_actuator::AffineActuator;
@@ -108,7 +98,6 @@ pub use joint_law::registry::{JointLawEntry, joint_laws};
 pub use joint_law::slack_spring::SlackSpring;
 pub use joint_law::spring::JointSpring;
 pub use joint_law::velocity_servo::VelocityServo;
-pub use law_report::{Curve, Finding, LawReport, Verdict, law_report};
 pub use linear_step::LinearStep;
 pub use robot::driven::JointState;
 pub use robot::mjcf::{MjcfError, MjcfOptions, MjcfRobot};
@@ -118,8 +107,6 @@ pub use rollout_function::{RolloutFunction, RolloutGradient, RolloutInputs};
 pub use shape::Shape;
 pub use shape::error::ShapeError;
 pub use shape::options::ShapeOptions;
-pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
-pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};
 pub use time::{Step, TimeSteps};

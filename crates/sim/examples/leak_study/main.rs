@@ -8,6 +8,7 @@
 //! `cargo run --release -p prehend-sim --example leak_study`
 
 mod scene;
+mod smoothing;
 
 use std::error::Error;
 use std::sync::Arc;
@@ -15,10 +16,11 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::{
-    Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, SemiImplicitEuler, SimulationError,
-    SmoothedGradient, Smoothing, State, TimeSteps, World,
+    Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, SemiImplicitEuler, SimulationError, State,
+    TimeSteps, World,
 };
 use scene::OBJECT;
+use smoothing::{SmoothedGradient, Smoothing};
 
 /// Standard deviation of the perturbations \[m\].
 const SIGMA: f64 = 1e-3;

@@ -52,7 +52,7 @@
 //! them hands value and gradient to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
 //!
 //! Reverse mode keeps kinematics and dynamics of an articulation as one node each, whose adjoint is in closed form.
-//! [`VelocityVerlet`](crate::VelocityVerlet) and [`BackwardEuler`](crate::BackwardEuler) move no joints;
+//! [`BackwardEuler`](crate::BackwardEuler) moves no joints;
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with steps of 0.1 ms some ten times faster than the default. But
 //! [`World::simulate_controlled`] says nothing of steps that are too long: ask [`World::check_time_step`]. What presses should hold with
 //! [`Sticking`](crate::Sticking), as the guide's [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) and a slip scale of 1 cm/s a gripped box slides by 5 mm in two

@@ -218,7 +218,6 @@ fn forces_that_jump_are_refused_before_anything_is_recorded() {
     let refused = [
         world.simulate(&lifted, 0.2).unwrap_err(),
         world.simulate_with(&compact, &lifted, once, |_, _| ()).unwrap_err(),
-        world.simulate_checkpointed(adaptive, &lifted, once, 2).unwrap_err(),
     ];
     assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
 }

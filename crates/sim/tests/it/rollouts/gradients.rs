@@ -240,16 +240,6 @@ impl Scene {
         }
         sum
     }
-
-    /// Reverse mode, the whole rollout as one node.
-    fn checkpointed(&self, integrator: impl Integrator + 'static, snapshots: usize) -> Vec<f64> {
-        let loss = |x: &[Var]| {
-            let (world, states) = self.set_up(x);
-            let end = world.simulate_checkpointed(integrator, &states, TIME_STEPS, snapshots);
-            self.measure(&end.unwrap())
-        };
-        gradient(loss, &vec![0.0; self.inputs()]).1
-    }
 }
 
 /// Forward mode, eight inputs at a time.
@@ -307,9 +297,6 @@ fn check(
 
     let exact = forward(|x| scene.last(&integrator, x), inputs);
     compare("compact", &gradient(|x| scene.last(&compact, x), &zeros).1, &exact, 1e-10);
-    let whole = scene.checkpointed(integrator, usize::MAX);
-    compare("checkpointed", &whole, &exact, 1e-10);
-    assert_eq!(scene.checkpointed(integrator, 3), whole);
 }
 
 fn kinds() -> impl Strategy<Value = [usize; 3]> {
@@ -411,8 +398,6 @@ fn singular_points_are_finite_all_the_way() {
             assert!(exact.iter().all(|x| x.is_finite()), "{smoothing:?}");
             let zeros = vec![0.0; scene.inputs()];
             assert_close("compact", &gradient(|x| scene.all(&compact, x), &zeros).1, &exact, 1e-10);
-            let whole = scene.checkpointed(SemiImplicitEuler, 4);
-            assert!(whole.iter().all(|x| x.is_finite()));
         }
     }
 }
@@ -464,8 +449,6 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let world = world.lift::<Var>();
     let blown_up = world.simulate_with(&compact, &wild, long, |_, _| ()).unwrap_err();
     assert!(matches!(blown_up, SimulationError::NotFinite { .. }));
-    let whole = world.simulate_checkpointed(SemiImplicitEuler, &wild, long, 3);
-    assert_eq!(whole.unwrap_err(), blown_up);
 }
 
 #[test]
@@ -481,5 +464,4 @@ fn driven_bodies_keep_to_their_trajectory_in_every_mode() {
     let exact = forward(|x| scene.last(&SemiImplicitEuler, x), scene.inputs());
     let zeros = vec![0.0; scene.inputs()];
     assert_close("compact", &gradient(|x| scene.last(&compact, x), &zeros).1, &exact, 1e-10);
-    assert_close("checkpointed", &scene.checkpointed(SemiImplicitEuler, 2), &exact, 1e-10);
 }

@@ -1,23 +1,21 @@
 //! A law at one contact.
 
-use nalgebra::Vector3;
-
-use crate::contact::dynamic::DynContactLaw;
-use crate::contact::point::{Contact, Response};
+use prehend::nalgebra::Vector3;
+use prehend::sim::{Contact, DynContactLaw, Response};
 
 /// Depth at which laws are tried \[m\].
-pub(super) const DEPTH: f64 = 5e-4;
+pub(crate) const DEPTH: f64 = 5e-4;
 /// Area of the contact at which they are \[m²\].
-pub(super) const AREA: f64 = 4e-4;
+pub(crate) const AREA: f64 = 4e-4;
 
 /// A law at one contact.
-pub(super) struct PointContact<'a> {
-    pub(super) law: &'a dyn DynContactLaw,
+pub(crate) struct PointContact<'a> {
+    pub(crate) law: &'a dyn DynContactLaw,
 }
 
 impl PointContact<'_> {
     /// The force `depth` \[m\] deep, at a normal speed and a slip \[m/s\].
-    pub(super) fn response(
+    pub(crate) fn response(
         &self,
         depth: f64,
         normal_speed: f64,

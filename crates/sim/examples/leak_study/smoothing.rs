@@ -7,7 +7,7 @@ use thiserror::Error;
 
 /// What a [`Smoothing`] cannot do.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum SmoothingError {
+pub(crate) enum SmoothingError {
     /// A variance needs two pairs of samples.
     #[error("at least two pairs of perturbations are needed, {0} asked for")]
     Pairs(usize),
@@ -36,20 +36,8 @@ pub enum SmoothingError {
 ///
 /// Perturbations come in antithetic pairs ±δ and are the same at every call (common random numbers), so that
 /// differences of estimates are differences of f. Results are the same to the last bit on any number of threads.
-///
-/// ```
-/// use nalgebra::Vector1;
-/// use prehend_sim::Smoothing;
-///
-/// // |x|, smoothed, has slope erf(x/√2σ) where its own jumps from −1 to 1.
-/// let smoothing = Smoothing::new(Vector1::new(0.1), 4000, 7)?;
-/// let f = |x: &Vector1<f64>| Ok::<_, std::convert::Infallible>(x.x.abs());
-/// let estimate = smoothing.zeroth_order(&Vector1::new(0.0), f).unwrap();
-/// assert!(estimate.gradient.x.abs() < 0.05);
-/// # Ok::<(), prehend_sim::SmoothingError>(())
-/// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Smoothing<const N: usize> {
+pub(crate) struct Smoothing<const N: usize> {
     deviations: SVector<f64, N>,
     /// One of each pair.
     perturbations: Vec<SVector<f64, N>>,
@@ -57,15 +45,15 @@ pub struct Smoothing<const N: usize> {
 
 /// A smoothed value and gradient, with what is left to chance in them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SmoothedGradient<const N: usize> {
+pub(crate) struct SmoothedGradient<const N: usize> {
     /// Estimate of F.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Variance of `value`.
-    pub value_variance: f64,
+    pub(crate) value_variance: f64,
     /// Estimate of ∇F.
-    pub gradient: SVector<f64, N>,
+    pub(crate) gradient: SVector<f64, N>,
     /// Variance of each component of `gradient`: the square of its standard error.
-    pub variance: SVector<f64, N>,
+    pub(crate) variance: SVector<f64, N>,
 }
 
 impl<const N: usize> Smoothing<N> {
@@ -74,7 +62,7 @@ impl<const N: usize> Smoothing<N> {
     ///
     /// # Errors
     /// For fewer than two pairs, or deviations that are negative, not finite or all zero.
-    pub fn new(
+    pub(crate) fn new(
         deviations: SVector<f64, N>,
         pairs: usize,
         seed: u64,
@@ -98,7 +86,7 @@ impl<const N: usize> Smoothing<N> {
     ///
     /// # Errors
     /// The first error of `f`, in the order of the perturbations.
-    pub fn zeroth_order<E: Send>(
+    pub(crate) fn zeroth_order<E: Send>(
         &self,
         x: &SVector<f64, N>,
         f: impl Fn(&SVector<f64, N>) -> Result<f64, E> + Sync,
@@ -125,7 +113,7 @@ impl<const N: usize> Smoothing<N> {
     ///
     /// # Errors
     /// The first error of `f`, in the order of the perturbations.
-    pub fn first_order<E: Send>(
+    pub(crate) fn first_order<E: Send>(
         &self,
         x: &SVector<f64, N>,
         f: impl Fn(&SVector<f64, N>) -> Result<(f64, SVector<f64, N>), E> + Sync,

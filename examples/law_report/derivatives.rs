@@ -1,13 +1,13 @@
 //! Derivatives of a law, against differences.
 
-use nalgebra::Vector3;
-use prehend_autodiff::check::finite_difference_jacobian;
-use prehend_autodiff::{Fwd, Scalar};
-use prehend_geometry::SplitMix64;
+use prehend::autodiff::check::finite_difference_jacobian;
+use prehend::autodiff::{Fwd, Scalar};
+use prehend::geometry::SplitMix64;
+use prehend::nalgebra::Vector3;
+use prehend::sim::{Contact, Response};
 
-use super::finding::{Finding, Verdict};
-use super::point_contact::{AREA, DEPTH, PointContact};
-use crate::contact::point::{Contact, Response};
+use crate::finding::{Finding, Verdict};
+use crate::point_contact::{AREA, DEPTH, PointContact};
 
 /// Contacts that are tried.
 const CONTACTS: usize = 200;
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-14;
 const AT_KINKS: f64 = 0.02;
 
 /// The derivatives by gap, normal speed and slip; then by the parameters.
-pub(super) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
+pub(crate) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
     let mut random = SplitMix64::new(1);
     let (mut by_inputs, mut by_parameters, mut finite) = (Vec::new(), Vec::new(), true);
     for _ in 0..CONTACTS {

@@ -1,13 +1,24 @@
 //! Tries a contact law and draws its forces: `cargo run --release --example law_report -- NAME [PARAMETERS…]`.
 //!
-//! Without parameters the law carries 300 g half a millimeter deep. A law of your own: `prehend::sim::law_report`.
+//! Without parameters the law carries 300 g half a millimeter deep. A law of your own: give it to [`report::law_report`] in `main`.
+
+mod curves;
+mod derivatives;
+mod finding;
+mod motion;
+mod passivity;
+mod point_contact;
+mod report;
 
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Context;
 use plotters::prelude::*;
-use prehend::sim::{Curve, DynContactLaw, LawRegistry, LawReport, StaticContactTarget, law_report};
+use prehend::sim::{DynContactLaw, LawRegistry, StaticContactTarget};
+
+use crate::curves::Curve;
+use crate::report::{LawReport, law_report};
 
 /// 300 g on 4 cm², half a millimeter deep.
 const TARGET: StaticContactTarget =

@@ -1,25 +1,25 @@
 //! Forces as functions of depth and slip.
 
-use nalgebra::Vector3;
+use prehend::nalgebra::Vector3;
 
-use super::point_contact::{DEPTH, PointContact};
+use crate::point_contact::{DEPTH, PointContact};
 
 /// Something to be drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// What it is.
-    pub name: String,
+    pub(crate) name: String,
     /// What the axes are, with units.
-    pub axes: [&'static str; 2],
+    pub(crate) axes: [&'static str; 2],
     /// The points.
-    pub points: Vec<[f64; 2]>,
+    pub(crate) points: Vec<[f64; 2]>,
 }
 
 /// Points of a curve.
 const POINTS: usize = 200;
 
 /// Normal force by depth at some speeds, friction by slip.
-pub(super) fn of_forces(contact_point: &PointContact<'_>) -> Vec<Curve> {
+pub(crate) fn of_forces(contact_point: &PointContact<'_>) -> Vec<Curve> {
     let by_depth = |speed: f64| {
         let point = |i: usize| {
             let depth = 2.0 * DEPTH * i as f64 / POINTS as f64;

@@ -2,20 +2,20 @@
 
 /// One thing that was tried.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// What was measured, with its unit.
-    pub what: String,
+    pub(crate) what: String,
     /// The figure.
-    pub measured: f64,
+    pub(crate) measured: f64,
     /// What to think of it.
-    pub verdict: Verdict,
+    pub(crate) verdict: Verdict,
     /// What was expected, or what it means.
-    pub remark: String,
+    pub(crate) remark: String,
 }
 
 /// What to think of a finding.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub enum Verdict {
+pub(crate) enum Verdict {
     /// As it should be.
     Sound,
     /// A property of the law, neither good nor bad.
@@ -26,7 +26,7 @@ pub enum Verdict {
 
 impl Verdict {
     /// A word for it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Sound => "sound",
             Self::Note => "note",
@@ -34,7 +34,7 @@ impl Verdict {
         }
     }
 
-    pub(super) fn when(sound: bool) -> Self {
+    pub(crate) fn when(sound: bool) -> Self {
         if sound { Self::Sound } else { Self::Wrong }
     }
 }

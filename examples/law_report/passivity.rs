@@ -1,9 +1,9 @@
 //! Whether a law makes energy.
 
-use nalgebra::Vector3;
+use prehend::nalgebra::Vector3;
 
-use super::finding::{Finding, Verdict};
-use super::point_contact::{DEPTH, PointContact};
+use crate::finding::{Finding, Verdict};
+use crate::point_contact::{DEPTH, PointContact};
 
 /// Steps of a cycle.
 const STEPS: usize = 4000;
@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// The work of a law's force over closed cycles: in and out of contact, and in circles across it while pressing harder and less.
 /// `weight` is the force \[N\] at rest.
-pub(super) fn findings(contact_point: &PointContact<'_>, weight: f64) -> Vec<Finding> {
+pub(crate) fn findings(contact_point: &PointContact<'_>, weight: f64) -> Vec<Finding> {
     let cycle = |what: &str, rate: f64, slip: f64, deep: f64| {
         let work = work(contact_point, rate, slip, deep);
         Finding {
@@ -52,15 +52,17 @@ fn work(contact_point: &PointContact<'_>, rate: f64, slip: f64, swing: f64) -> f
 
 #[cfg(test)]
 mod tests {
-    use super::super::point_contact::AREA;
+    use prehend::sim::{Coulomb, KelvinVoigt, Law};
+
     use super::*;
-    use crate::scenes::penalty;
+    use crate::point_contact::AREA;
 
     #[test]
     fn a_spring_gives_back_what_it_took_and_a_damper_nothing() {
         // A damping c over an area A takes π c A ω a² from an oscillation of amplitude a.
         for (damping, rate) in [(0.0, 1.0), (1e4, 1.0), (1e4, 30.0)] {
-            let law = penalty(1e7, damping, 0.0, 1e-3);
+            let spring = KelvinVoigt { stiffness: 1e7, damping };
+            let law = Law::new(spring, Coulomb { friction: 0.0, slip_scale: 1e-3 }).unwrap();
             let work = work(&PointContact { law: &law }, rate, 0.0, 0.1);
             let amplitude = 0.1 * (1.0 + 1e-3) * DEPTH;
             let (pi, turn) = (std::f64::consts::PI, std::f64::consts::TAU * rate);

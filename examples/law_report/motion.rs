@@ -2,44 +2,33 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend::sim::{
+    Adaptive, Body, ContactBodies, DynContactLaw, GapSmoothing, HalfSpace, Integrator, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
+};
 
-use super::curves::Curve;
-use super::finding::{Finding, Verdict};
-use super::point_contact::{AREA, DEPTH, PointContact};
-use crate::body::RigidBody;
-use crate::contact::dynamic::DynContactLaw;
-use crate::contact::gap_smoothing::GapSmoothing;
-use crate::error::SimulationError;
-use crate::fields::HalfSpace;
-use crate::integrator::Integrator;
-use crate::integrator::adaptive::Adaptive;
-use crate::integrator::semi_implicit::SemiImplicitEuler;
-use crate::state::State;
-use crate::surface::Surface;
-use crate::time::{Step, TimeSteps};
-use crate::world::World;
-use crate::world::body::Body;
-use crate::world::body_id::BodyId;
-use crate::world::contact_pair::ContactBodies;
+use crate::curves::Curve;
+use crate::finding::{Finding, Verdict};
+use crate::point_contact::{AREA, DEPTH, PointContact};
 
 /// Gravity \[m/s²\].
-pub(super) const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 
 /// A body that does not turn, of one sample, and rests half a millimeter deep.
-pub(super) struct Specimen<'a> {
-    pub(super) law: &'a Arc<dyn DynContactLaw>,
+pub(crate) struct Specimen<'a> {
+    pub(crate) law: &'a Arc<dyn DynContactLaw>,
     /// Mass \[kg\].
-    pub(super) mass: f64,
+    pub(crate) mass: f64,
 }
 
-/// The body, on a plane at whose distance the law begins.
-const BODY: BodyId = BodyId(1);
+/// Index of the body, on a plane at whose distance the law begins.
+const BODY: usize = 1;
 /// Speed of slides \[m/s\].
 const SLIDE: f64 = 0.5;
 
 impl Specimen<'_> {
-    pub(super) fn findings(
+    pub(crate) fn findings(
         &self,
         contact_point: &PointContact<'_>,
     ) -> Result<Vec<Finding>, SimulationError> {
@@ -64,7 +53,7 @@ impl Specimen<'_> {
     }
 
     /// Height over time of a bounce at 0.5 m/s.
-    pub(super) fn bounce_curve(&self) -> Result<Curve, SimulationError> {
+    pub(crate) fn bounce_curve(&self) -> Result<Curve, SimulationError> {
         let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
         let dt = 2.0 * duration() / 200.0;
         let mut points = Vec::new();
