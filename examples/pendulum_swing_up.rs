@@ -56,7 +56,7 @@ impl Pendulum {
         efforts: &[S],
         parts: usize,
     ) -> Result<Vec<[S; 2]>, SimulationError> {
-        let world = self.world.lift::<S>();
+        let world = self.world.cast::<S>();
         let start = world.neutral_states();
         let control = |step: Step, world: &mut World<S>, _: &mut [State<S>]| {
             world.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])

@@ -23,7 +23,7 @@ pub(crate) fn of_forces(contact_point: &PointContact<'_>) -> Vec<Curve> {
     let by_depth = |speed: f64| {
         let point = |i: usize| {
             let depth = 2.0 * DEPTH * i as f64 / POINTS as f64;
-            [depth * 1e3, contact_point.response(depth, speed, Vector3::zeros()).normal]
+            [depth * 1e3, contact_point.force(depth, speed, Vector3::zeros()).normal]
         };
         let name = format!("normal force, {speed} m/s");
         Curve { name, axes: ["depth [mm]", "N"], points: (0..=POINTS).map(point).collect() }
@@ -31,7 +31,7 @@ pub(crate) fn of_forces(contact_point: &PointContact<'_>) -> Vec<Curve> {
     let by_slip = || {
         let point = |i: usize| {
             let slip = (i as f64 / POINTS as f64 - 0.5) * 0.2;
-            [slip, contact_point.response(DEPTH, 0.0, Vector3::x() * slip).tangential.x]
+            [slip, contact_point.force(DEPTH, 0.0, Vector3::x() * slip).tangential.x]
         };
         let name = "friction 0.5 mm deep".to_owned();
         Curve { name, axes: ["slip [m/s]", "N"], points: (0..=POINTS).map(point).collect() }

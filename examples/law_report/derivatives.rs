@@ -4,7 +4,7 @@ use prehend::autodiff::check::finite_difference_jacobian;
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
 use prehend::nalgebra::Vector3;
-use prehend::sim::{Contact, Response};
+use prehend::sim::{ContactForce, ContactKinematics};
 
 use crate::finding::{Finding, Verdict};
 use crate::point_contact::{AREA, DEPTH, PointContact};
@@ -75,14 +75,14 @@ pub(crate) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
     all
 }
 
-fn contact<S: Scalar>([gap, normal_speed, x, y]: [S; 4]) -> Contact<S> {
+fn contact<S: Scalar>([gap, normal_speed, x, y]: [S; 4]) -> ContactKinematics<S> {
     let slip = Vector3::new(x, y, S::zero());
     let normal = Vector3::z().map(S::constant);
-    Contact { gap, normal_speed, slip, normal, area: AREA }
+    ContactKinematics { gap, normal_speed, slip, normal, area: AREA }
 }
 
 fn force(contact_point: &PointContact<'_>, at: &[f64; 4], p: &[f64]) -> [f64; 3] {
-    let Response { normal, tangential } = contact_point.law.response(p, &contact(*at));
+    let ContactForce { normal, tangential } = contact_point.law.force(p, &contact(*at));
     [normal, tangential.x, tangential.y]
 }
 
@@ -102,8 +102,8 @@ fn lifted(
         Some(_) => Fwd::constant(at[i]),
         None => Fwd::variable(at[i], i),
     });
-    let Response { normal, tangential } =
-        contact_point.law.response_with_derivative(&params, &contact(inputs));
+    let ContactForce { normal, tangential } =
+        contact_point.law.force_with_derivative(&params, &contact(inputs));
     let force = [normal, tangential.x, tangential.y];
     std::array::from_fn(|i| force.map(|f| f.derivative[i]))
 }

@@ -15,14 +15,14 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use plotters::prelude::*;
-use prehend::sim::{DynContactLaw, LawRegistry, StaticContactTarget};
+use prehend::sim::{ContactCalibration, DynContactLaw, LawRegistry};
 
 use crate::curves::Curve;
 use crate::report::{LawReport, law_report};
 
 /// 300 g on 4 cm², half a millimeter deep.
-const TARGET: StaticContactTarget =
-    StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+const TARGET: ContactCalibration =
+    ContactCalibration { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 
 fn main() -> anyhow::Result<()> {
     let registry = LawRegistry::default();

@@ -36,7 +36,7 @@ impl Specimen<'_> {
         for speed in [0.1, 0.5, 1.0] {
             findings.push(self.restitution(speed)?);
         }
-        let friction = contact_point.response(DEPTH, 0.0, Vector3::x() * 1e3).tangential.x.abs()
+        let friction = contact_point.force(DEPTH, 0.0, Vector3::x() * 1e3).tangential.x.abs()
             / (self.mass * GRAVITY);
         if friction > 0.0 {
             findings.push(Finding {
@@ -81,8 +81,8 @@ impl Specimen<'_> {
         let surface = Surface::uniform(&[Point3::origin()], AREA).map_err(failed)?;
         let mut world = World::new(gravity);
         let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.reach() };
-        let field = world.add(Body::kinematic("plane").with_field(Arc::new(plane)));
-        let samples = world.add(Body::free("specimen", rigid).with_surface(surface));
+        let field = world.add(Body::fixed("plane").with_field(Arc::new(plane)));
+        let samples = world.add(Body::dynamic("specimen", rigid).with_surface(surface));
         let bodies = ContactBodies { samples, field };
         world.add_contact(bodies, Arc::clone(self.law), GapSmoothing::Hard)?;
         let mut state = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -depth));

@@ -44,7 +44,7 @@ fn work(contact_point: &PointContact<'_>, rate: f64, slip: f64, swing: f64) -> f
         // Sinking in is approach: negative.
         let normal_speed = -DEPTH * swing * turn * sin;
         let velocity = Vector3::new(-sin, cos, 0.0) * (slip * turn);
-        let force = contact_point.response(depth, normal_speed, velocity);
+        let force = contact_point.force(depth, normal_speed, velocity);
         force.normal * normal_speed + force.tangential.dot(&velocity)
     };
     (0..STEPS).map(power).sum::<f64>() * dt

@@ -1,7 +1,7 @@
 //! A law at one contact.
 
 use prehend::nalgebra::Vector3;
-use prehend::sim::{Contact, DynContactLaw, Response};
+use prehend::sim::{ContactForce, ContactKinematics, DynContactLaw};
 
 /// Depth at which laws are tried \[m\].
 pub(crate) const DEPTH: f64 = 5e-4;
@@ -15,17 +15,17 @@ pub(crate) struct PointContact<'a> {
 
 impl PointContact<'_> {
     /// The force `depth` \[m\] deep, at a normal speed and a slip \[m/s\].
-    pub(crate) fn response(
+    pub(crate) fn force(
         &self,
         depth: f64,
         normal_speed: f64,
         slip: Vector3<f64>,
-    ) -> Response<f64> {
+    ) -> ContactForce<f64> {
         let (gap, normal) = (self.law.reach() - depth, Vector3::z());
-        let contact = Contact { gap, normal_speed, slip, normal, area: AREA };
+        let contact = ContactKinematics { gap, normal_speed, slip, normal, area: AREA };
         match depth > 0.0 {
-            true => self.law.response(self.law.params(), &contact),
-            false => Response::zero(),
+            true => self.law.force(self.law.params(), &contact),
+            false => ContactForce::zero(),
         }
     }
 }

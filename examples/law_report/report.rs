@@ -47,7 +47,7 @@ impl fmt::Display for LawReport {
 pub(crate) fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, SimulationError> {
     law.check(law.params())?;
     let contact_point = PointContact { law: law.as_ref() };
-    let weight = contact_point.response(DEPTH, 0.0, Vector3::zeros()).normal;
+    let weight = contact_point.force(DEPTH, 0.0, Vector3::zeros()).normal;
     let mut findings = vec![Finding {
         what: "weight carried 0.5 mm deep on 4 cm² [N]".to_owned(),
         measured: weight,
@@ -68,12 +68,12 @@ pub(crate) fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, Simu
 
 fn onset(contact_point: &PointContact<'_>) -> Finding {
     let [touch, pressed] = [1e-12, 1e-4].map(|depth| {
-        let response = contact_point.response(depth, -1.0, Vector3::x());
+        let response = contact_point.force(depth, -1.0, Vector3::x());
         response.normal.abs() + response.tangential.norm()
     });
     // Even the root of the depth grows by more.
     let jump = touch > 1e-3 * pressed;
-    let force = contact_point.response(1e-12, -1.0, Vector3::zeros()).normal;
+    let force = contact_point.force(1e-12, -1.0, Vector3::zeros()).normal;
     Finding {
         what: "force at first touch, 1 m/s [N]".to_owned(),
         measured: force,
@@ -88,7 +88,7 @@ fn onset(contact_point: &PointContact<'_>) -> Finding {
 #[cfg(test)]
 mod tests {
     use prehend::autodiff::Scalar;
-    use prehend::sim::{Contact, ContactLaw, Coulomb, KelvinVoigt, Law, Response};
+    use prehend::sim::{ContactForce, ContactKinematics, ContactLaw, Coulomb, KelvinVoigt, Law};
 
     use super::*;
     use crate::point_contact::AREA;
@@ -100,9 +100,9 @@ mod tests {
         fn params(&self) -> &[f64] {
             &self.0
         }
-        fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
             let normal = (-p[0] * contact.gap).times(contact.area);
-            Response { normal, tangential: contact.slip * (p[1] * normal) }
+            ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
         }
         fn reach(&self) -> f64 {
             0.0
@@ -130,12 +130,12 @@ mod tests {
         fn params(&self) -> &[f64] {
             &self.stiffness
         }
-        fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
             let [mut stiffness, mut gap] = [p[0], contact.gap];
             let lost = if self.gap { &mut gap } else { &mut stiffness };
             *lost = S::constant(lost.value());
             let normal = (-stiffness * gap).times(contact.area);
-            Response { normal, tangential: contact.slip.map(|_| S::zero()) }
+            ContactForce { normal, tangential: contact.slip.map(|_| S::zero()) }
         }
         fn reach(&self) -> f64 {
             0.0

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
-use prehend_sim::{Contact, ContactLaw, Response};
+use prehend_sim::{ContactForce, ContactKinematics, ContactLaw};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -97,7 +97,7 @@ impl ContactLaw for PythonLaw {
         self.names.clone()
     }
 
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let mut inputs: Vec<S> = Vec::with_capacity(MOTION + p.len());
         inputs.extend([contact.gap, contact.normal_speed]);
         inputs.extend(contact.slip.iter().chain(contact.normal.iter()));
@@ -109,11 +109,11 @@ impl ContactLaw for PythonLaw {
                 LawFailure::keep(wrong(
                     "a contact law returns the force along the normal, and three components of that across it",
                 ));
-                return Response::nan();
+                return ContactForce::nan();
             }
             Err(error) => {
                 LawFailure::keep(error);
-                return Response::nan();
+                return ContactForce::nan();
             }
         };
         let [normal, x, y, z] = std::array::from_fn(|k| {
@@ -123,7 +123,7 @@ impl ContactLaw for PythonLaw {
                 sum + (*input - S::constant(input.value())).times(*slope)
             })
         });
-        Response { normal, tangential: Vector3::new(x, y, z) }
+        ContactForce { normal, tangential: Vector3::new(x, y, z) }
     }
 
     fn reach(&self) -> f64 {

@@ -90,7 +90,7 @@ def test_tendons_couple_joints_and_welds_close_loops():
     end = world.rollout(2.0, 1)(world.neutral_states(), end=True)
     angles = [world.joint(end, link)[0][0] for link in (left, right)]
     assert sum(angles) == pytest.approx(0.4, abs=1e-3) and angles[0] == pytest.approx(angles[1], abs=1e-6)
-    names = world.add_weld(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
+    names = world.add_bushing(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
     assert names["linear_stiffness"] == "left-right.linear_stiffness"
 
 

@@ -63,7 +63,7 @@ fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, 
         world.bodies[bodies[end]].surface = Some(Arc::new(Surface::ball(0.03)?));
         let height = states[bodies[end]].pose.translation.z - 0.029;
         let field = HalfSpace { height, ..HalfSpace::floor() };
-        let floor = world.add(Body::kinematic("floor").with_field(Arc::new(field)));
+        let floor = world.add(Body::fixed("floor").with_field(Arc::new(field)));
         let bodies = ContactBodies { samples: bodies[end], field: floor };
         world.add_contact(bodies, law.clone(), GapSmoothing::Softplus { width: 1e-4 })?;
     }
@@ -120,7 +120,7 @@ fn main() -> anyhow::Result<()> {
             black_box(world.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
         });
         time(&of("step with contacts and its Jacobian"), || {
-            black_box(world.linear_step(black_box(&states), step).is_ok());
+            black_box(world.linearize_step(black_box(&states), step).is_ok());
         });
     }
     Ok(())

@@ -35,11 +35,11 @@ use crate::world::trajectory::plain;
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-/// # let ball = world.add(Body::free("ball", rigid));
+/// # let ball = world.add(Body::dynamic("ball", rigid));
 /// let recording = Recording::start();
-/// let mut lifted = world.lift::<Var>();
+/// let mut lifted = world.cast::<Var>();
 /// lifted.gravity.z = recording.variable(-9.81);
-/// let start = [State::at_rest(Isometry3::identity()).lift()];
+/// let start = [State::at_rest(Isometry3::identity()).cast()];
 /// let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
 /// let end = lifted.simulate_with(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 }, |_, _| ())?.states;
 /// let by_gravity = recording.gradient(end[ball].linear.z).wrt(lifted.gravity.z);
@@ -100,7 +100,7 @@ impl<I: Integrator> Scene<I> {
         values: &[S],
     ) -> Result<World<S>, SimulationError> {
         if places.is_empty() {
-            return Ok(self.world.lift());
+            return Ok(self.world.cast());
         }
         let mut all: Vec<S> = self.parameters.iter().map(|&x| S::constant(x)).collect();
         for (&place, &value) in places.iter().zip(values) {
@@ -225,10 +225,12 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     }
     let body = |(a, b): (&Body<S>, &Body)| {
         let motion = match (&a.motion, &b.motion) {
-            (Motion::Free(_), Motion::Free(_))
-            | (Motion::Kinematic, Motion::Kinematic)
+            (Motion::Dynamic(_), Motion::Dynamic(_))
+            | (Motion::Fixed, Motion::Fixed)
             | (Motion::Link, Motion::Link) => true,
-            (Motion::Driven(a), Motion::Driven(b)) => same(plain(a).as_ref(), plain(b).as_ref()),
+            (Motion::Kinematic(a), Motion::Kinematic(b)) => {
+                same(plain(a).as_ref(), plain(b).as_ref())
+            }
             _ => false,
         };
         motion
@@ -254,8 +256,11 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
         && a.joint_forces.len() == b.joint_forces.len()
         && a.articulations.iter().zip(&b.articulations).all(articulation)
         && a.joint_forces.iter().zip(&b.joint_forces).all(force)
-        && a.welds.len() == b.welds.len()
-        && a.welds.iter().zip(&b.welds).all(|(a, b)| (a.bodies, a.frames) == (b.bodies, b.frames))
+        && a.bushings.len() == b.bushings.len()
+        && a.bushings
+            .iter()
+            .zip(&b.bushings)
+            .all(|(a, b)| (a.bodies, a.frames) == (b.bodies, b.frames))
         && a.contacts.len() == b.contacts.len()
         && a.contact_groups.len() == b.contact_groups.len()
         && a.contact_groups.iter().zip(&b.contact_groups).all(group)

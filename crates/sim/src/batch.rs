@@ -29,16 +29,16 @@ use crate::world::World;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// let id = world.add(Body::free("stone", stone));
+/// let id = world.add(Body::dynamic("stone", stone));
 /// let batch = Batch::new(&world)?;
 ///
 /// // By how much does the mean height of 100 throws change with gravity?
 /// let recording = Recording::start();
 /// let gravity = recording.variable(-9.81);
 /// let throws = (0..100).map(|i| {
-///     let mut lifted = world.lift();
+///     let mut lifted = world.cast();
 ///     lifted.gravity.z = gravity;
-///     let mut start = stone.at_rest(&Isometry3::identity()).lift();
+///     let mut start = stone.at_rest(&Isometry3::identity()).cast();
 ///     start.linear.z = Scalar::constant(0.1 * f64::from(i));
 ///     (lifted, vec![start])
 /// });

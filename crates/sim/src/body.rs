@@ -206,7 +206,7 @@ impl<S: Scalar> RigidBody<S> {
 
 impl RigidBody {
     /// The same body in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
+    pub fn cast<S: Scalar>(&self) -> RigidBody<S> {
         self.map(S::constant)
     }
 }
@@ -266,7 +266,7 @@ mod tests {
     fn a_heavier_body_turns_as_slowly() {
         let body = RigidBody::new(2.0, Matrix3::identity() * 0.4, Point3::origin()).unwrap();
         let [mass] = Fwd::<1>::variables([3.0]);
-        let heavier = body.lift().with_mass(mass).unwrap();
+        let heavier = body.cast().with_mass(mass).unwrap();
         assert!((heavier.inertia()[(0, 0)].value - 0.6).abs() < 1e-15);
         assert!((heavier.inertia()[(0, 0)].derivative[0] - 0.2).abs() < 1e-15);
         assert_eq!(body.with_mass(0.0), Err(BodyError::Mass(0.0)));

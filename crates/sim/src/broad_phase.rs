@@ -130,7 +130,7 @@ mod tests {
         for egg_too in [false, true] {
             let (mut world, mut states) = egg_on(floor(), GapSmoothing::Softplus { width: 1e-5 });
             let law = Arc::clone(world.contacts[0].law());
-            let id = world.add(Body::free("ball", ball).with_surface(Arc::clone(&surface)));
+            let id = world.add(Body::dynamic("ball", ball).with_surface(Arc::clone(&surface)));
             let mut contacts = std::mem::take(&mut world.contacts);
             let field = contacts[0].bodies.field;
             let bodies = ContactBodies { samples: id, field };

@@ -3,6 +3,7 @@
 pub(crate) mod bristle_function;
 pub(crate) mod bristle_law;
 pub mod bristles;
+pub mod calibration;
 pub mod composite;
 pub(crate) mod dimensions;
 pub mod dynamic;
@@ -23,6 +24,5 @@ pub mod point;
 pub mod range;
 pub mod registry;
 pub mod restitution;
-pub mod static_target;
 pub mod wrench;
 pub(crate) mod wrench_function;

@@ -45,8 +45,8 @@ impl World {
     /// # Panics
     /// If there are fewer states than bodies and joints.
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
-        let lifted = self.with_touching(states, 0.0).plain().lift::<Fwd<12>>();
-        let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+        let lifted = self.with_touching(states, 0.0).plain().cast::<Fwd<12>>();
+        let constants: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
         let UnitMotions { motions, roots, size } = self.unit_motions(states);
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         for Motions { body, first, by } in &motions {
@@ -176,7 +176,7 @@ mod tests {
     fn frequency_of_a_point_mass_on_a_spring() {
         let rigid = RigidBody::new(0.5, Matrix3::identity(), Point3::origin()).unwrap();
         let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
-        let mass = Body::free("mass", rigid).with_surface(surface);
+        let mass = Body::dynamic("mass", rigid).with_surface(surface);
         let law = Arc::new(penalty(2e8, 1e3, 0.0, 1e-3));
         let world = on_ground(Vector3::zeros(), floor(), mass, law, GapSmoothing::Hard);
         let at_rest = |z| State::at_rest(Isometry3::translation(0.0, 0.0, z));

@@ -53,15 +53,15 @@ impl<S: Scalar> World<S> {
         SimulationError::Stalled { body, contact, time, dt }
     }
 
-    /// The error of more than `max_parts` parts from `states` at `time` \[s\].
-    pub(crate) fn too_many_parts(
+    /// The error of more than `max_substeps` parts from `states` at `time` \[s\].
+    pub(crate) fn too_many_substeps(
         &self,
         states: &[State<S>],
         time: f64,
-        max_parts: usize,
+        max_substeps: usize,
     ) -> SimulationError {
         let (body, contact) = self.most_accelerated(states);
-        SimulationError::TooManyParts { body, contact, max_parts, time }
+        SimulationError::TooManySubsteps { body, contact, max_substeps, time }
     }
 
     /// The name of the free body that contacts accelerate most, and of what presses hardest on it.

@@ -114,9 +114,9 @@ pub enum SimulationError {
         /// Its name.
         integrator: &'static str,
     },
-    /// An integrator that knows no welds.
-    #[error("{integrator} knows nothing of welds")]
-    Welds {
+    /// An integrator that knows no bushings.
+    #[error("{integrator} knows nothing of bushings")]
+    Bushings {
         /// Its name.
         integrator: &'static str,
     },
@@ -272,7 +272,7 @@ pub enum SimulationError {
     /// A body was pressed past the middle of another, which would push it out on the other side.
     #[error(
         "body '{body}' passes through '{contact}' at {time} s: contacts too soft for such an impact or load (see \
-         StaticContactTarget::impact_depth)"
+         ContactCalibration::impact_depth)"
     )]
     PassedThrough {
         /// The body with the samples.
@@ -284,17 +284,17 @@ pub enum SimulationError {
     },
     /// A step had to be divided into too many parts.
     #[error(
-        "a step took more than {max_parts} parts by {time} s, body '{body}' accelerated most{}: contacts too stiff for so long a \
-         time, or `Adaptive::max_parts` too small",
+        "a step took more than {max_substeps} parts by {time} s, body '{body}' accelerated most{}: contacts too stiff for so long a \
+         time, or `Adaptive::max_substeps` too small",
         touching(contact)
     )]
-    TooManyParts {
+    TooManySubsteps {
         /// The body that is accelerated most.
         body: String,
         /// The body that presses hardest on it.
         contact: Option<String>,
         /// Parts that are allowed.
-        max_parts: usize,
+        max_substeps: usize,
         /// Time that they have led to \[s\].
         time: f64,
     },

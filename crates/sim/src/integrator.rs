@@ -40,7 +40,7 @@ use crate::world::World;
 /// ```
 pub trait Integrator: Sync {
     /// The states of all bodies one time step later. Bodies that forces do not move are left to
-    /// [`World::drive`], which follows every step.
+    /// [`World::update_kinematics`], which follows every step.
     ///
     /// # Errors
     /// If the scheme solves equations and they were not solved.

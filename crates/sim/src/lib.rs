@@ -7,7 +7,7 @@
 //! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
 //!
 //! Links that joints hold together are [`articulated`]: they are bodies of a world like others, with laws along their joints
-//! ([`JointLaw`]), contacts, loops ([`Weld`]) and sensors, from code, URDF or MJCF.
+//! ([`JointLaw`]), contacts, loops ([`Bushing`]) and sensors, from code, URDF or MJCF.
 //!
 //! The [`guide`] goes from a world in twenty lines to gradients of long rollouts.
 //!
@@ -31,7 +31,7 @@ mod first_order;
 pub mod guide;
 mod integrator;
 mod joint_law;
-mod linear_step;
+mod linearize_step;
 mod parameter_names;
 mod parameters;
 mod robot;
@@ -52,12 +52,13 @@ pub use batch::Batch;
 pub use body::RigidBody;
 pub use body::error::BodyError;
 pub use contact::bristles::Bristles;
+pub use contact::calibration::ContactCalibration;
 pub use contact::composite::Law;
 pub use contact::dynamic::DynContactLaw;
 pub use contact::error::LawError;
 pub use contact::friction::anisotropic::AnisotropicFriction;
+pub use contact::friction::bristle::BristleFriction;
 pub use contact::friction::coulomb::Coulomb;
-pub use contact::friction::sticking::Sticking;
 pub use contact::friction::stribeck::Stribeck;
 pub use contact::friction::{FrictionCoefficient, FrictionLaw, regularized_coulomb};
 pub use contact::gap_smoothing::{GapSmoothing, LeakSteps, SmoothedGap};
@@ -70,10 +71,9 @@ pub use contact::normal::hunt_crossley::{Bounce, HuntCrossley};
 pub use contact::normal::kelvin_voigt::KelvinVoigt;
 pub use contact::parameters::{LawParameter, ParameterArray, Parameters};
 pub use contact::patch::Patch;
-pub use contact::point::{Contact, Response};
+pub use contact::point::{ContactForce, ContactKinematics};
 pub use contact::range::ParameterRange;
 pub use contact::registry::{LawEntry, LawRegistry};
-pub use contact::static_target::StaticContactTarget;
 pub use contact::wrench::WrenchJacobian;
 pub use contact_frequency::StepError;
 pub use error::SimulationError;
@@ -98,7 +98,7 @@ pub use joint_law::registry::{JointLawEntry, joint_laws};
 pub use joint_law::slack_spring::SlackSpring;
 pub use joint_law::spring::JointSpring;
 pub use joint_law::velocity_servo::VelocityServo;
-pub use linear_step::LinearStep;
+pub use linearize_step::LinearizedStep;
 pub use robot::driven::JointState;
 pub use robot::mjcf::{MjcfError, MjcfOptions, MjcfRobot};
 pub use robot::urdf::UrdfOptions;
@@ -114,9 +114,9 @@ pub use world::World;
 pub use world::articulated_body::ArticulatedBody;
 pub use world::body::{Body, Motion};
 pub use world::body_id::BodyId;
+pub use world::bushing::{Bushing, BushingStiffness};
 pub use world::contact_group::ContactGroup;
 pub use world::contact_pair::{ContactBodies, ContactPair};
 pub use world::joint_force::{JointAxis, JointForce, JointForceId};
 pub use world::trajectory::Trajectory;
 pub use world::transmission::Transmissions;
-pub use world::weld::{Weld, WeldStiffness};

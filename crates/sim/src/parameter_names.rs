@@ -10,7 +10,7 @@ use crate::world::body_id::BodyId;
 
 const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 const WRENCH: [&str; 6] = ["force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"];
-const WELD: [&str; 4] =
+const BUSHING: [&str; 4] =
     ["linear_stiffness", "linear_damping", "angular_stiffness", "angular_damping"];
 
 impl<S: Scalar> World<S> {
@@ -24,7 +24,7 @@ impl<S: Scalar> World<S> {
     /// | of a contact | samples and field, as `ball/floor.friction` |
     /// | of a group of contacts | `group 0.friction`, by its place in [`World::contact_groups`] |
     /// | of a force along a joint | the first link, as `elbow.joint.target` |
-    /// | of a weld | both bodies, as `finger-rod.linear_stiffness` |
+    /// | of a bushing | both bodies, as `finger-rod.linear_stiffness` |
     ///
     /// The second of a name is `ball/floor.friction#2`, and so on. A parameter of a law that has no name is called by its number.
     pub fn parameter_names(&self) -> Vec<String> {
@@ -63,8 +63,11 @@ impl<S: Scalar> World<S> {
             let link = force.axes.first().map(|(axis, _)| name(axis.link).as_str());
             of_law(format!("{}.joint", link.unwrap_or_default()), force.law().param_names());
         }
-        for weld in &self.welds {
-            of_law(format!("{}-{}", name(weld.bodies[0]), name(weld.bodies[1])), WELD.to_vec());
+        for bushing in &self.bushings {
+            of_law(
+                format!("{}-{}", name(bushing.bodies[0]), name(bushing.bodies[1])),
+                BUSHING.to_vec(),
+            );
         }
         numbered(names)
     }
@@ -92,7 +95,7 @@ mod tests {
     use crate::articulated::{Joint, Link};
     use crate::scenes::{egg_on, floor, penalty};
     use crate::{
-        Body, ContactBodies, GapSmoothing, JointSpring, RigidBody, Shape, Weld, WeldStiffness,
+        Body, Bushing, BushingStiffness, ContactBodies, GapSmoothing, JointSpring, RigidBody, Shape,
     };
 
     #[test]
@@ -107,8 +110,8 @@ mod tests {
         world.add_joint_force(door, JointSpring { stiffness: 8.0, rest: 0.1 }).unwrap();
         let [ground, egg] = ["ground", "egg"].map(|name| world.body_named(name).unwrap());
         let frames = [Isometry3::identity(); 2];
-        let stiffness = WeldStiffness::critical(1.0, 0.1, 0.1);
-        world.add_weld(Weld { bodies: [door, egg], frames, stiffness }).unwrap();
+        let stiffness = BushingStiffness::critical(1.0, 0.1, 0.1);
+        world.add_bushing(Bushing { bodies: [door, egg], frames, stiffness }).unwrap();
         let bodies = ContactBodies { samples: egg, field: ground };
         world
             .add_contact(bodies, Arc::new(penalty(5e6, 2e4, 0.6, 2e-2)), GapSmoothing::Hard)

@@ -8,7 +8,7 @@ use crate::body::RigidBody;
 use crate::error::SimulationError;
 use crate::world::World;
 use crate::world::body::Motion;
-use crate::world::weld::WeldStiffness;
+use crate::world::bushing::BushingStiffness;
 
 impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, but for trajectories, in a row.
@@ -17,7 +17,7 @@ impl<S: Scalar> World<S> {
     /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\], and the dimensions of its shape, if it is made of one, which
     /// change its contacts only \[m\]. For each link of an articulation, where its joint is in the frame of its parent, place \[m\] and
     /// quaternion (i, j, k, w), its mass, center of mass, inertia in the same order, and armature. Then gravity \[m/s²\]; then the law's parameters
-    /// of each contact, those of each group of contacts, those of each force along joints, and stiffness and damping of each weld.
+    /// of each contact, those of each group of contacts, those of each force along joints, and stiffness and damping of each bushing.
     ///
     /// States are those of centers of mass: with the states as they are, a body whose center of mass moves in its model frame is
     /// a body whose shape moves the other way. Where the model's pose is given instead, the state follows from
@@ -40,7 +40,7 @@ impl<S: Scalar> World<S> {
         parameters.extend(self.gravity.iter());
         parameters.extend(self.contact_params().copied());
         parameters.extend(self.joint_forces.iter().flat_map(|force| force.params()));
-        parameters.extend(self.welds.iter().flat_map(|weld| weld.stiffness.numbers()));
+        parameters.extend(self.bushings.iter().flat_map(|bushing| bushing.stiffness.numbers()));
         parameters
     }
 
@@ -57,7 +57,7 @@ impl<S: Scalar> World<S> {
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
         let params = self.contact_params().count()
             + self.joint_forces.iter().map(|force| force.params().len()).sum::<usize>()
-            + 4 * self.welds.len();
+            + 4 * self.bushings.len();
         let links = NUMBERS * self.joint_count();
         let dimensions: usize = self.bodies.iter().map(|body| body.dimensions().len()).sum();
         let expected = 10 * free + 6 * self.bodies.len() + dimensions + links + 3 + params;
@@ -69,7 +69,7 @@ impl<S: Scalar> World<S> {
         // There are as many as were counted.
         let mut next = || rest.next().unwrap_or_default();
         for body in &mut world.bodies {
-            if let Motion::Free(rigid) = &mut body.motion {
+            if let Motion::Dynamic(rigid) = &mut body.motion {
                 let mass = next();
                 let [xx, yy, zz, xy, xz, yz] = std::array::from_fn(|_| next());
                 let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -93,8 +93,8 @@ impl<S: Scalar> World<S> {
         pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
         let forces = world.joint_forces.iter_mut();
         forces.flat_map(|force| force.params_mut()).for_each(|p| *p = next());
-        for weld in &mut world.welds {
-            weld.stiffness = WeldStiffness::of(std::array::from_fn(|_| next()));
+        for bushing in &mut world.bushings {
+            bushing.stiffness = BushingStiffness::of(std::array::from_fn(|_| next()));
         }
         Ok(world)
     }

@@ -156,15 +156,15 @@ impl<S: Scalar> World<S> {
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::zeros());
     /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-    /// # let ball = world.add(Body::free("ball", rigid));
-    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+    /// # let ball = world.add(Body::dynamic("ball", rigid));
+    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).cast()];
     /// // A spring of 2 N/m pulls the ball back; how far, by its stiffness?
     /// let stiffness = Fwd::<1>::variable(2.0, 0);
     /// let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
     /// let control = |_, world: &mut World<_>, states: &mut [State<_>]| {
     ///     world.bodies[ball].external_wrench.x = -stiffness * states[ball].pose.translation.x;
     /// };
-    /// let lifted = world.lift();
+    /// let lifted = world.cast();
     /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
     /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
     /// # Ok(())
@@ -254,7 +254,7 @@ impl<S: Scalar> World<S> {
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut states = self.with_deflections(states);
         self.check(&states, step)?;
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         self.advance(integrator, &states, step)
     }
 
@@ -279,7 +279,7 @@ impl<S: Scalar> World<S> {
         mut next: Vec<State<S>>,
         time: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.drive(&mut next, time);
+        self.update_kinematics(&mut next, time);
         match next.iter().all(State::is_finite) {
             true => Ok(next),
             false => Err(self.not_finite(states, &next, time)),
@@ -312,7 +312,7 @@ impl<S: Scalar> World<S> {
         let mut states = self.with_deflections(initial);
         self.check(&states, Step::new(0, dt))?;
         self.check_velocities(dt * steps as f64)?;
-        self.drive(&mut states, 0.0);
+        self.update_kinematics(&mut states, 0.0);
         Ok(states)
     }
 
@@ -327,7 +327,7 @@ impl<S: Scalar> World<S> {
         }
         self.kinds_of_contact().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
-        self.check_welds()?;
+        self.check_bushings()?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),
@@ -398,9 +398,9 @@ mod tests {
                 assert!(
                     matches!(&refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
                 );
-                let mut lifted = world.lift::<Fwd<1>>();
+                let mut lifted = world.cast::<Fwd<1>>();
                 lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);
-                let states: Vec<_> = states.iter().map(State::lift).collect();
+                let states: Vec<_> = states.iter().map(State::cast).collect();
                 assert_eq!(lifted.step(&SemiImplicitEuler, &states, step).unwrap_err(), refused);
             }
         }
@@ -413,7 +413,7 @@ mod tests {
             linear: Vector3::z(),
             ..State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
         };
-        world.bodies[0].motion = Motion::Driven(Arc::new(rising));
+        world.bodies[0].motion = Motion::Kinematic(Arc::new(rising));
         let run = world
             .rollout_with(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 })
             .unwrap()

@@ -28,7 +28,7 @@ use crate::world::World;
 /// use prehend_sim::{Body, RigidBody, RolloutFunction, RolloutInputs, TimeSteps, World};
 ///
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", RigidBody::ball(1.0, 0.05)?));
+/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
 /// let time_steps = TimeSteps { dt: 0.1, steps: 5 };
 /// // By gravity, and by a push that changes from step to step.
 /// let throw = RolloutFunction::new(&world, time_steps, &["gravity.z"], &["stone.force_x"])?;

@@ -60,7 +60,7 @@ use solid::Sample;
 /// let brick = Body::from_shape("brick", &shape, 1e3)?;
 /// assert!((brick.rigid().map_or(0.0, |rigid| rigid.mass()) - 0.24).abs() < 1e-12);
 /// // Mass by half an edge.
-/// let mut lifted = shape.lift::<Fwd<1>>();
+/// let mut lifted = shape.cast::<Fwd<1>>();
 /// lifted.set_dimension("half_extent_x", Fwd::variable(0.02, 0))?;
 /// let volume = lifted.moments().map_or(0.0, |moments| moments.volume.derivative[0]);
 /// assert!((volume - 8.0 * 0.03 * 0.05).abs() < 1e-15);
@@ -122,7 +122,7 @@ impl Shape {
     }
 
     /// The same shape in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> Shape<S> {
+    pub fn cast<S: Scalar>(&self) -> Shape<S> {
         self.map(S::constant)
     }
 }

@@ -116,7 +116,7 @@ impl State {
     /// The state `tangent` away (the retraction of the manifold of states), in the order of [`State::tangent`].
     pub fn retract<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;
-        let State { pose, linear, angular } = self.lift::<S>();
+        let State { pose, linear, angular } = self.cast::<S>();
         let center = pose.translation.vector;
         State {
             pose: perturb_about(&pose, &center, &Vector6::new(x, y, z, rx, ry, rz)),
@@ -126,7 +126,7 @@ impl State {
     }
 
     /// Constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> State<S> {
+    pub fn cast<S: Scalar>(&self) -> State<S> {
         State {
             pose: lift(&self.pose),
             linear: self.linear.map(S::constant),
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn derivatives_of_the_view_match_differences() {
         let (body, frame) = (state(0.7), state(-0.4));
-        let seen = body.variables().seen_from(&frame.lift()).sensitivity();
+        let seen = body.variables().seen_from(&frame.cast()).sensitivity();
         let value = body.seen_from(&frame);
         let differences = finite_difference_jacobian(
             |x| {

@@ -3,6 +3,7 @@
 pub(crate) mod articulated_body;
 pub(crate) mod body;
 pub(crate) mod body_id;
+pub(crate) mod bushing;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 mod contacts_between;
@@ -19,7 +20,6 @@ mod sensors;
 pub(crate) mod trajectory;
 mod trajectory_checks;
 pub(crate) mod transmission;
-pub(crate) mod weld;
 
 use std::fmt;
 use std::sync::Arc;
@@ -34,15 +34,15 @@ use crate::state::State;
 use articulated_body::ArticulatedBody;
 use body::{Body, Motion};
 use body_id::BodyId;
+use bushing::Bushing;
 use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
 use joint_force::JointForce;
 use transmission::Transmissions;
-use weld::Weld;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
-/// To differentiate by a mass, a friction coefficient or gravity, [`lift`](World::lift) the world to the scalar and put
+/// To differentiate by a mass, a friction coefficient or gravity, [`cast`](World::cast) the world to the scalar and put
 /// the variable in its place. States come in the order of the bodies; then those of the joints of [articulations](World::add_articulation).
 #[derive(Clone)]
 pub struct World<S: Scalar = f64> {
@@ -57,7 +57,7 @@ pub struct World<S: Scalar = f64> {
     /// What acts along joints.
     pub joint_forces: Vec<JointForce<S>>,
     /// Which frames springs hold together.
-    pub welds: Vec<Weld<S>>,
+    pub bushings: Vec<Bushing<S>>,
     /// What transmissions of robots do beyond forces along joints.
     pub transmissions: Transmissions,
     /// Gravity, world frame \[m/s²\].
@@ -73,7 +73,7 @@ impl World {
             contact_groups: Vec::new(),
             articulations: Vec::new(),
             joint_forces: Vec::new(),
-            welds: Vec::new(),
+            bushings: Vec::new(),
             transmissions: Transmissions::default(),
             gravity,
         }
@@ -144,7 +144,7 @@ impl World {
     }
 
     /// The same world in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> World<S> {
+    pub fn cast<S: Scalar>(&self) -> World<S> {
         self.map(S::constant)
     }
 }
@@ -189,13 +189,13 @@ impl<S: Scalar> World<S> {
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    /// # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    /// # let ball = Body::free("ball", RigidBody::ball(0.1, 0.03)?);
+    /// # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    /// # let ball = Body::dynamic("ball", RigidBody::ball(0.1, 0.03)?);
     /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
     /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
     /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
     /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
-    /// let mut lifted = world.lift::<Fwd<1>>();
+    /// let mut lifted = world.cast::<Fwd<1>>();
     /// lifted.set_contact_param(ball, floor, "friction", Fwd::variable(0.4, 0))?;
     /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
     /// # Ok(())
@@ -242,7 +242,7 @@ impl<S: Scalar> World<S> {
             contact_groups: self.contact_groups.iter().map(|group| group.map(&f)).collect(),
             articulations: self.articulations.iter().map(|own| own.map(&f)).collect(),
             joint_forces: self.joint_forces.iter().map(|force| force.map(&f)).collect(),
-            welds: self.welds.iter().map(|weld| weld.map(&f)).collect(),
+            bushings: self.bushings.iter().map(|bushing| bushing.map(&f)).collect(),
             transmissions: self.transmissions.clone(),
             gravity: self.gravity.map(&f),
         }
@@ -263,13 +263,13 @@ impl<S: Scalar> World<S> {
     ///
     /// # Panics
     /// If there are fewer states than bodies and joints, where there are joints.
-    pub fn drive(&self, states: &mut [State<S>], time: f64) {
+    pub fn update_kinematics(&self, states: &mut [State<S>], time: f64) {
         for (body, state) in self.bodies.iter().zip(states.iter_mut()) {
-            if let Motion::Driven(trajectory) = &body.motion {
+            if let Motion::Kinematic(trajectory) = &body.motion {
                 *state = trajectory.state(time);
             }
         }
-        self.place_links(states);
+        self.forward_kinematics(states);
     }
 }
 
@@ -312,10 +312,10 @@ mod tests {
             .filter(|p| p.z < 0.02)
             .collect();
         let surface = |points: &[Point3<f64>]| Surface::uniform(points, 5e-3).unwrap();
-        let cup = Body::free("cup", rigid(Point3::new(0.01, 0.0, -0.02)))
+        let cup = Body::dynamic("cup", rigid(Point3::new(0.01, 0.0, -0.02)))
             .with_field(cavity)
             .with_surface(surface(&cup_points));
-        let pebble = Body::free("pebble", rigid(Point3::new(1e-3, -2e-3, 3e-3)))
+        let pebble = Body::dynamic("pebble", rigid(Point3::new(1e-3, -2e-3, 3e-3)))
             .with_field(ball)
             .with_surface(surface(&pebble_points));
         let (cup, pebble) = (world.add(cup), world.add(pebble));
@@ -340,9 +340,9 @@ mod tests {
     fn both_bodies_feel_derivatives_of_both() {
         let (world, states) = pebble_in_cup();
         for moving in 0..2 {
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
             lifted[moving] = states[moving].variables();
-            let exact = world.lift().wrenches(&lifted, 0);
+            let exact = world.cast().wrenches(&lifted, 0);
             let differences = finite_difference_jacobian(
                 |x| {
                     let mut states = states.clone();
@@ -389,11 +389,11 @@ mod tests {
             world.wrenches(&states, 0)[1].iter().copied().collect::<Vec<f64>>()
         };
         let at = [5e6, 2e4, 0.6, 0.3];
-        let mut lifted = world.lift::<Fwd<4>>();
+        let mut lifted = world.cast::<Fwd<4>>();
         let variables = Fwd::variables(at);
         lifted.contacts[0].set_params(&variables[..3]).unwrap();
         lifted.bodies[1].external_wrench = Vector6::repeat(variables[3]);
-        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::lift).collect();
+        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::cast).collect();
         let exact = lifted.wrenches(&constants, 0)[1];
         // Scaled, so that one step suits all.
         let differences = finite_difference_jacobian(
@@ -411,14 +411,14 @@ mod tests {
 
     /// The wrenches and rates of [`pebble_in_cup`] with the centers of mass moved by `change`.
     fn with_centers_moved<S: Scalar>(world: &World, states: &[State], change: &[S]) -> Vec<S> {
-        let mut world = world.lift::<S>();
+        let mut world = world.cast::<S>();
         for (body, change) in world.bodies.iter_mut().zip(change.as_chunks::<3>().0) {
             let rigid = *body.rigid().unwrap();
             let com = rigid.com() + Vector3::from(*change);
             body.motion =
-                Motion::Free(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
+                Motion::Dynamic(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
         }
-        let states: Vec<State<S>> = states.iter().map(State::lift).collect();
+        let states: Vec<State<S>> = states.iter().map(State::cast).collect();
         world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
     }
 

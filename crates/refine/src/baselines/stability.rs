@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, RigidBody,
-    StaticContactTarget, StepError, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps,
+    RigidBody, StepError, Surface, TimeSteps, World,
 };
 
 use super::stability_loss::{StabilityJacobian, StabilityLoss, StabilityWeights};
@@ -96,7 +96,7 @@ impl StabilityFactor {
         let positions: Vec<Point3<f64>> = object.samples.iter().map(|s| s.point).collect();
         let surface = Surface::uniform(&positions, object.area).map_err(|e| fail(e.to_string()))?;
         let g = gravity.norm();
-        let target = StaticContactTarget {
+        let target = ContactCalibration {
             mass: inertial.mass,
             gravity: g,
             penetration: settings.penetration,
@@ -111,8 +111,8 @@ impl StabilityFactor {
         let mut world = World::new(gravity);
         let field = Arc::new(robot.posed(&hand.t_cam_hand, &hand.joints)?);
         // Its field is in the camera's frame already.
-        let field = world.add(Body::kinematic("hand").with_field(field));
-        let samples = world.add(Body::free(&object.name, rigid).with_surface(surface));
+        let field = world.add(Body::fixed("hand").with_field(field));
+        let samples = world.add(Body::dynamic(&object.name, rigid).with_surface(surface));
         world
             .add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)
             .map_err(|e| fail(e.to_string()))?;

@@ -107,7 +107,7 @@ impl StabilityLoss {
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
     ) -> Result<StabilityJacobian, SimulationError> {
-        let world = self.world.lift::<Fwd<6>>();
+        let world = self.world.cast::<Fwd<6>>();
         let rollouts: Vec<SVector<Fwd<6>, 12>> = self
             .starts(pose)
             .par_iter()
@@ -218,8 +218,8 @@ mod tests {
         let rigid = RigidBody::new(0.2, inertia, Point3::new(0.001, -0.002, 0.003)).unwrap();
         let surface = Surface::uniform(&ellipsoid(200, [0.03, 0.025, 0.02]), 6e-3).unwrap();
         let mut world = World::new(Vector3::z() * -9.81);
-        let field = world.add(Body::kinematic("ground").with_field(field));
-        let object = world.add(Body::free("object", rigid).with_surface(surface));
+        let field = world.add(Body::fixed("ground").with_field(field));
+        let object = world.add(Body::dynamic("object", rigid).with_surface(surface));
         let spring = KelvinVoigt { stiffness: 2e7, damping: 5e4 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
         let bodies = ContactBodies { samples: object, field };

@@ -99,7 +99,7 @@ impl Kinematics<'_> {
     /// [`inverse_dynamics_derivatives`](Self::inverse_dynamics_derivatives) at coordinates `q` and velocities `v`, direction by direction.
     fn by_forward_mode(&self, q: &[f64], v: &[f64], accelerations: &[f64]) -> DynamicsDerivatives {
         let n = v.len();
-        let lifted = self.tree.lift::<Fwd<1>>();
+        let lifted = self.tree.cast::<Fwd<1>>();
         let constants = |x: &[f64]| x.iter().map(|x| Fwd::constant(*x)).collect::<Vec<Fwd<1>>>();
         let [q, v, accelerations] = [q, v, accelerations].map(constants);
         let effort = |q: &[Fwd<1>], v: &[Fwd<1>]| {

@@ -362,7 +362,7 @@ impl<S: Scalar> Articulation<S> {
 
 impl Articulation {
     /// The same in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> Articulation<S> {
+    pub fn cast<S: Scalar>(&self) -> Articulation<S> {
         self.map(S::constant)
     }
 }

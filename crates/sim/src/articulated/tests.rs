@@ -162,7 +162,7 @@ fn derivatives_are_those_of_forward_mode() {
         let inverse = at.inverse_dynamics_derivatives(&a);
         assert_near(inverse.by_acceleration.as_slice(), at.mass_matrix().as_slice(), 1e-13, "mass");
         let forward = at.forward_dynamics_derivatives(&DVector::from_column_slice(&a)).unwrap();
-        let lifted = tree.lift::<Fwd<1>>();
+        let lifted = tree.cast::<Fwd<1>>();
         let constants = |x: &[f64]| x.iter().map(|x| Fwd::<1>::constant(*x)).collect::<Vec<_>>();
         for k in 0..n {
             let along = |x: &[f64]| {

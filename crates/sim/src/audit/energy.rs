@@ -5,7 +5,7 @@ use prehend_autodiff::Scalar;
 
 use crate::articulated::{Articulation, Energy};
 use crate::contact::bristles::Bristles;
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::wrench::stack;
 use crate::error::SimulationError;
 use crate::state::State;
@@ -62,11 +62,9 @@ impl EnergyBalance {
     ) -> Self {
         let initial: Vec<State> = initial.iter().map(State::value).collect();
         let moves = |(motion, state): (&Motion<S>, &State)| match motion {
-            Motion::Free(_) | Motion::Link => false,
-            Motion::Kinematic => {
-                state.linear != Vector3::zeros() || state.angular != Vector3::zeros()
-            }
-            Motion::Driven(_) => true,
+            Motion::Dynamic(_) | Motion::Link => false,
+            Motion::Fixed => state.linear != Vector3::zeros() || state.angular != Vector3::zeros(),
+            Motion::Kinematic(_) => true,
         };
         let moved = world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
         let torques = world.bodies.iter().any(|body| torque(body) != Vector3::zeros());
@@ -185,7 +183,7 @@ fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f
 
 /// What springs along joints, and all else that acts there, have done while nothing moved fast \[J\].
 fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
-    let lifted: Vec<State<S>> = before.iter().map(State::lift).collect();
+    let lifted: Vec<State<S>> = before.iter().map(State::cast).collect();
     let work = |force: &JointForce<S>| {
         let position = |states: &[State<S>]| Some(world.along(force, states)?.position.value());
         let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
@@ -211,9 +209,9 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 }
 
 /// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
-/// there is none, and that of bristles and welds as they return.
+/// there is none, and that of bristles and bushings as they return.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
-    let mut energy = energy_of_bristles(world, states) + world.energy_of_welds(states);
+    let mut energy = energy_of_bristles(world, states) + world.energy_of_bushings(states);
     for pair in &world.contacts {
         let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { continue };
         let (reach, smoothing) = (pair.law().reach(), pair.smoothing);
@@ -221,8 +219,8 @@ fn stored_energy(world: &World, states: &[State]) -> f64 {
             let force = |x: f64| {
                 let (slip, normal) = (Vector3::zeros(), Vector3::z());
                 let gap = reach + smoothing.at(x).map_or(0.0, |smoothed| smoothed.gap);
-                let contact = Contact { gap, normal_speed: 0.0, slip, normal, area };
-                pair.law().response(pair.params(), &contact).normal
+                let contact = ContactKinematics { gap, normal_speed: 0.0, slip, normal, area };
+                pair.law().force(pair.params(), &contact).normal
             };
             // The force fades exponentially beyond the reach, if it does.
             let (from, band) = (gap - reach, smoothing.force_band());

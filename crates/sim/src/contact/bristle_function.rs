@@ -67,23 +67,23 @@ impl LocalFunction<21, 12> for BristleFunction<'_> {
 // Not generic: compiled here.
 impl BristleFunction<'_> {
     fn value(&self, change: &[f64]) -> [f64; 12] {
-        self.response(self.p, change, about(change).as_ref())
+        self.wrench(self.p, change, about(change).as_ref())
     }
 
     fn derivatives(&self, change: [f64; 18]) -> Linearized<18, 12> {
-        linearized(self.response(&self.constants(), &Fwd::variables(change), None))
+        linearized(self.wrench(&self.constants(), &Fwd::variables(change), None))
     }
 
     fn derivatives_about(&self, change: [f64; 21]) -> Linearized<21, 12> {
         let change = Fwd::variables(change);
-        linearized(self.response(&self.constants(), &change, about(&change).as_ref()))
+        linearized(self.wrench(&self.constants(), &change, about(&change).as_ref()))
     }
 
     fn directional(&self, x: &[f64], along: &[f64]) -> ([f64; 12], [f64; 12]) {
         let pairs = x.iter().zip(along);
         let change: Vec<Fwd<1>> =
             pairs.map(|(&value, &slope)| Fwd { value, derivative: [slope] }).collect();
-        let results = self.response(&self.constants(), &change, about(&change).as_ref());
+        let results = self.wrench(&self.constants(), &change, about(&change).as_ref());
         (results.map(|y| y.value), results.map(|y| y.derivative[0]))
     }
 
@@ -97,7 +97,7 @@ impl BristleFunction<'_> {
                 _ => Fwd::constant(p),
             };
             let p: Vec<_> = self.p.iter().enumerate().map(seeded).collect();
-            let results = self.response(&p, &[Fwd::constant(0.0); 18], None);
+            let results = self.wrench(&p, &[Fwd::constant(0.0); 18], None);
             let lanes = LANES.min(self.p.len() - from);
             columns.extend((0..lanes).map(|lane| results.map(|y| y.derivative[lane])));
         }
@@ -116,21 +116,21 @@ impl BristleFunction<'_> {
     }
 
     /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
-    fn response<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
+    fn wrench<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
         let moved = MovedPatch::new(self.patch, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
-        self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
+        self.wrench_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
     }
 
     /// The function of dimensions of the shapes, with which `lift` gives a contact.
-    pub(crate) fn response_by_dimensions<T: Scalar>(
+    pub(crate) fn wrench_by_dimensions<T: Scalar>(
         &self,
         lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
-        self.response_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
+        self.wrench_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
     }
 
-    fn response_of<T: Scalar>(
+    fn wrench_of<T: Scalar>(
         &self,
         p: &[T],
         deflection: &Vector6<T>,
@@ -147,7 +147,7 @@ impl BristleFunction<'_> {
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
             contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
-            let response = law.response(&contact);
+            let response = law.force(&contact);
             let force = contact.normal * response.normal + response.tangential;
             let force = stretch.map_or(force, |stretch| force * stretch);
             let torque = lever.cross(&force);

@@ -8,7 +8,7 @@ use super::friction::FrictionLaw;
 use super::law::ContactLaw;
 use super::normal::NormalLaw;
 use super::parameters::{ParameterArray, Parameters};
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 /// A normal law N × a friction law F.
 ///
@@ -57,12 +57,12 @@ impl<N: NormalLaw, F: FrictionLaw> ContactLaw for Law<N, F> {
     }
 
     #[inline]
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let Some(((p_normal, p_friction), [])) = Params::<N, F, S>::split(p) else {
-            return Response::nan();
+            return ContactForce::nan();
         };
         let normal = self.normal.force(p_normal, contact);
-        Response { normal, tangential: self.friction.force(p_friction, normal, contact) }
+        ContactForce { normal, tangential: self.friction.force(p_friction, normal, contact) }
     }
 
     #[inline]
@@ -95,11 +95,11 @@ mod tests {
         let spring = KelvinVoigt { stiffness: 1e6, damping: 1e3 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-3 }).unwrap();
         let (slip, normal) = (Vector3::x(), Vector3::z());
-        let contact = Contact { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 };
+        let contact = ContactKinematics { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 };
         for given in [0, 1, 2, 4] {
             let p = vec![1.0; given];
             assert_eq!(law.check(&p), Err(LawError::Count { given, expected: 3 }));
-            let Response { normal, tangential } = law.law(&p, &contact);
+            let ContactForce { normal, tangential } = law.law(&p, &contact);
             assert!(normal.is_nan() && tangential.iter().all(|f| f.is_nan()));
         }
         assert_eq!(law.check(law.params()), Ok(()));

@@ -7,7 +7,7 @@ use super::bristle_function::BristleFunction;
 use super::dynamic::DynContactLaw;
 use super::moved::LiftedContact;
 use super::patch::{Patch, Touch};
-use super::point::Contact;
+use super::point::ContactKinematics;
 use crate::shape::lifted::LiftedField;
 use crate::shape::solid::Sample;
 
@@ -34,7 +34,7 @@ impl VariableShapes<'_> {
         let (mut force, mut torque) = (Vector3::<Lane>::zeros(), Vector3::<Lane>::zeros());
         self.patch.for_each_touch(law.reach(), false, |touch| {
             let LiftedContact { contact, lever, stretch } = self.lift(touch, law.reach());
-            let response = law.response_with_derivative(&p, &contact);
+            let response = law.force_with_derivative(&p, &contact);
             let own = contact.normal * response.normal + response.tangential;
             let own = stretch.map_or(own, |stretch| own * stretch);
             force += own;
@@ -45,7 +45,7 @@ impl VariableShapes<'_> {
 
     /// The same of a contact that sticks, then the rate of its deflection.
     pub(crate) fn bristles(&self, function: &BristleFunction<'_>) -> [Lane; 12] {
-        function.response_by_dimensions(|touch, cutoff| self.lift(touch, cutoff))
+        function.wrench_by_dimensions(|touch, cutoff| self.lift(touch, cutoff))
     }
 
     fn lift(&self, touch: &Touch, cutoff: f64) -> LiftedContact<Lane> {
@@ -72,7 +72,7 @@ impl VariableShapes<'_> {
             constant(&self.patch.state.linear) + constant(&self.patch.state.angular).cross(&lever);
         let speed = velocity.dot(&normal);
         let s = &touch.smoothing;
-        let contact = Contact {
+        let contact = ContactKinematics {
             gap: smoothed(cutoff + s.gap, s.slope),
             normal_speed: smoothed(s.activation, s.activation_slope) * speed,
             slip: velocity - normal * speed,

@@ -6,7 +6,7 @@ use prehend_autodiff::Fwd;
 use super::error::LawError;
 use super::law::ContactLaw;
 use super::patch::Patch;
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 use super::wrench::{self, WrenchJacobian};
 
 mod sealed {
@@ -18,11 +18,14 @@ mod sealed {
 /// derivatives by forward mode. Implemented for every law. Loops over contacts are inside, where the law is known.
 pub trait DynContactLaw: ContactLaw + sealed::Sealed {
     /// Force at one contact, with parameters `p`.
-    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64>;
+    fn force(&self, p: &[f64], contact: &ContactKinematics<f64>) -> ContactForce<f64>;
 
     /// Force at one contact with its derivatives along the directions that `contact` and `p` carry.
-    fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
-    -> Response<Fwd<6>>;
+    fn force_with_derivative(
+        &self,
+        p: &[Fwd<6>],
+        contact: &ContactKinematics<Fwd<6>>,
+    ) -> ContactForce<Fwd<6>>;
 
     /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `patch`, in the field's frame.
     fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
@@ -44,16 +47,16 @@ impl dyn DynContactLaw {
 
 impl<L: ContactLaw> DynContactLaw for L {
     #[inline]
-    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
+    fn force(&self, p: &[f64], contact: &ContactKinematics<f64>) -> ContactForce<f64> {
         self.law(p, contact)
     }
 
     #[inline]
-    fn response_with_derivative(
+    fn force_with_derivative(
         &self,
         p: &[Fwd<6>],
-        contact: &Contact<Fwd<6>>,
-    ) -> Response<Fwd<6>> {
+        contact: &ContactKinematics<Fwd<6>>,
+    ) -> ContactForce<Fwd<6>> {
         self.law(p, contact)
     }
 
@@ -84,10 +87,15 @@ mod tests {
         let boxed: Box<dyn DynContactLaw> = Box::new(law.clone());
         let [gap, normal_speed, x, y, z, k] = Fwd::variables([-1e-3, -0.1, 0.02, 0.01, 0.0, 3e7]);
         let normal = Vector3::z().map(Fwd::constant);
-        let contact =
-            Contact { gap, normal_speed, slip: Vector3::new(x, y, z), normal, area: 2e-5 };
+        let contact = ContactKinematics {
+            gap,
+            normal_speed,
+            slip: Vector3::new(x, y, z),
+            normal,
+            area: 2e-5,
+        };
         let p = [k, Fwd::constant(2e5), Fwd::constant(0.7)];
-        let (own, twin) = (law.law(&p, &contact), boxed.response_with_derivative(&p, &contact));
+        let (own, twin) = (law.law(&p, &contact), boxed.force_with_derivative(&p, &contact));
         assert_eq!(own.normal.derivative, twin.normal.derivative);
         assert_eq!(own.tangential.x.derivative, twin.tangential.x.derivative);
         // With both traits in scope.

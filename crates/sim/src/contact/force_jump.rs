@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::dynamic::DynContactLaw;
 use super::gap_smoothing::GapSmoothing;
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// Depths \[m\] just after touch, and where a force is to be compared with.
 const DEPTHS: [f64; 2] = [1e-12, 1e-4];
@@ -21,8 +21,9 @@ pub(crate) fn jumps(law: &dyn DynContactLaw, p: &[f64], smoothing: &GapSmoothing
         };
         let gap = law.reach() - depth;
         let (slip, normal) = (Vector3::x(), Vector3::z());
-        let contact = Contact { gap, normal_speed: -activation, slip, normal, area: 1e-4 };
-        let response = law.response(p, &contact);
+        let contact =
+            ContactKinematics { gap, normal_speed: -activation, slip, normal, area: 1e-4 };
+        let response = law.force(p, &contact);
         response.normal.abs() + response.tangential.norm()
     });
     touch > JUMP * pressed

@@ -1,8 +1,8 @@
 //! Friction laws: the force across the normal.
 
 pub mod anisotropic;
+pub mod bristle;
 pub mod coulomb;
-pub mod sticking;
 pub mod stribeck;
 
 use nalgebra::Vector3;
@@ -10,7 +10,7 @@ use prehend_autodiff::Scalar;
 
 use super::bristles::Bristles;
 use super::parameters::Parameters;
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// Force across the normal: the other factor of a [`Law`](super::composite::Law).
 pub trait FrictionLaw: Parameters {
@@ -19,7 +19,7 @@ pub trait FrictionLaw: Parameters {
         &self,
         p: Self::Params<S>,
         normal_force: S,
-        contact: &Contact<S>,
+        contact: &ContactKinematics<S>,
     ) -> Vector3<S>;
 
     /// See [`ContactLaw::bristles`](super::law::ContactLaw::bristles).

@@ -4,7 +4,7 @@ use prehend_autodiff::Scalar;
 
 use super::bristles::Bristles;
 use super::error::LawError;
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 /// A contact law: one function, generic over the scalar, from which come forces and derivatives.
 ///
@@ -14,7 +14,7 @@ use super::point::{Contact, Response};
 /// ```
 /// use nalgebra::Vector3;
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{Contact, ContactLaw, Response};
+/// use prehend_sim::{ContactKinematics, ContactLaw, ContactForce};
 ///
 /// struct Quadratic([f64; 1]);
 ///
@@ -22,9 +22,9 @@ use super::point::{Contact, Response};
 ///     fn params(&self) -> &[f64] {
 ///         &self.0
 ///     }
-///     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+///     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
 ///         let normal = p[0] * contact.gap * contact.gap * S::constant(contact.area);
-///         Response { normal, tangential: Vector3::zeros() }
+///         ContactForce { normal, tangential: Vector3::zeros() }
 ///     }
 ///     fn reach(&self) -> f64 {
 ///         0.0
@@ -33,7 +33,7 @@ use super::point::{Contact, Response};
 ///
 /// let (gap, area) = (-1e-3, 1e-4);
 /// let contact =
-///     Contact { gap, normal_speed: 0.0, slip: Vector3::zeros(), normal: Vector3::z(), area };
+///     ContactKinematics { gap, normal_speed: 0.0, slip: Vector3::zeros(), normal: Vector3::z(), area };
 /// let law = Quadratic([1e10]);
 /// assert!((law.law(law.params(), &contact).normal - 1.0).abs() < 1e-12);
 /// ```
@@ -50,7 +50,7 @@ pub trait ContactLaw: Send + Sync {
 
     /// Force of one contact. `p` are the parameters, as many as [`params`](Self::params), with their derivatives; the laws
     /// of this crate answer NaN to any other number of them.
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S>
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S>
     where
         Self: Sized;
 

@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::patch::{Patch, Touch};
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// A contact, and where it is from the center of mass.
 pub(crate) struct LiftedContact<T: Scalar> {
-    pub(super) contact: Contact<T>,
+    pub(super) contact: ContactKinematics<T>,
     pub(super) lever: Vector3<T>,
     /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
     pub(super) stretch: Option<T>,
@@ -52,7 +52,7 @@ impl<T: Scalar> MovedPatch<T> {
         let depth = along(normal).times(*length);
         let smoothed = |value: f64, slope: f64| depth.times(slope).plus(value);
         let speed = velocity.dot(&normal_now);
-        let contact = Contact {
+        let contact = ContactKinematics {
             gap: smoothed(cutoff + smoothing.gap, smoothing.slope),
             normal_speed: smoothed(smoothing.activation, smoothing.activation_slope) * speed,
             slip: velocity - normal_now * speed,

@@ -8,7 +8,7 @@ pub mod kelvin_voigt;
 use prehend_autodiff::Scalar;
 
 use super::parameters::Parameters;
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// Force along the normal: one factor of a [`Law`](super::composite::Law).
 ///
@@ -16,7 +16,7 @@ use super::point::Contact;
 ///
 /// ```
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{Contact, Law, NormalLaw, Parameters, Stribeck};
+/// use prehend_sim::{ContactKinematics, Law, NormalLaw, Parameters, Stribeck};
 ///
 /// struct Exponential {
 ///     pressure: f64,
@@ -30,7 +30,7 @@ use super::point::Contact;
 /// }
 ///
 /// impl NormalLaw for Exponential {
-///     fn force<S: Scalar>(&self, [pressure]: [S; 1], contact: &Contact<S>) -> S {
+///     fn force<S: Scalar>(&self, [pressure]: [S; 1], contact: &ContactKinematics<S>) -> S {
 ///         pressure * (-contact.gap.times(1e3)).exp_m1().times(contact.area)
 ///     }
 /// }
@@ -42,7 +42,7 @@ use super::point::Contact;
 /// ```
 pub trait NormalLaw: Parameters {
     /// Force along the normal \[N\], never negative, with parameters `p`.
-    fn force<S: Scalar>(&self, p: Self::Params<S>, contact: &Contact<S>) -> S;
+    fn force<S: Scalar>(&self, p: Self::Params<S>, contact: &ContactKinematics<S>) -> S;
 
     /// Beyond this gap value and derivative are zero \[m\].
     fn reach(&self) -> f64 {

@@ -5,7 +5,7 @@ use prehend_autodiff::Fwd;
 use prehend_geometry::{DistanceField, FieldSample};
 
 use super::gap_smoothing::{GapSmoothing, SmoothedGap};
-use super::point::Contact;
+use super::point::ContactKinematics;
 use crate::state::State;
 use crate::surface::{Block, Surface, SurfacePoint};
 
@@ -190,9 +190,9 @@ impl Patch<'_> {
 impl Touch {
     /// What the law sees.
     #[inline(always)]
-    pub(super) fn contact(&self, cutoff: f64) -> Contact<f64> {
+    pub(super) fn contact(&self, cutoff: f64) -> ContactKinematics<f64> {
         let speed = self.velocity.dot(&self.normal);
-        Contact {
+        ContactKinematics {
             gap: cutoff + self.smoothing.gap,
             normal_speed: self.smoothing.activation * speed,
             slip: self.velocity - self.normal * speed,
@@ -203,7 +203,7 @@ impl Touch {
 
     /// What the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
     #[inline(always)]
-    pub(super) fn lifted(&self, cutoff: f64) -> Contact<Fwd<6>> {
+    pub(super) fn lifted(&self, cutoff: f64) -> ContactKinematics<Fwd<6>> {
         let gradient = self.normal * self.length;
         let along_gradient = |value: f64, slope: f64| {
             let g = gradient * slope;
@@ -213,7 +213,7 @@ impl Touch {
         let u: Vector3<Fwd<6>> = Vector3::from_fn(|i, _| Fwd::variable(self.velocity[i], 3 + i));
         let speed = u.x * normal.x + u.y * normal.y + u.z * normal.z;
         let activation = along_gradient(self.smoothing.activation, self.smoothing.activation_slope);
-        Contact {
+        ContactKinematics {
             gap: along_gradient(cutoff + self.smoothing.gap, self.smoothing.slope),
             normal_speed: activation * speed,
             slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),

@@ -8,7 +8,7 @@ use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedPatch};
 use super::param_values::ParamValues;
 use super::patch::{Patch, Touch};
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// A wrench about the center of mass with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ pub(crate) fn wrench_along<L: ContactLaw>(
 #[inline(never)]
 fn roll(
     touch: &Touch,
-    contact: &Contact<Fwd<6>>,
+    contact: &ContactKinematics<Fwd<6>>,
     force: &Vector3<f64>,
     spin: &Vector3<f64>,
     by_velocity: &Matrix3<f64>,
@@ -165,10 +165,10 @@ fn add_param_slopes<L: ContactLaw>(
             _ => Fwd::constant(p),
         };
         let params: ParamValues<Fwd<6>> = p.iter().enumerate().map(seeded).collect();
-        let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
+        let ContactKinematics { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
         let response = law.law(
             &params,
-            &Contact {
+            &ContactKinematics {
                 gap: Fwd::constant(gap),
                 normal_speed: Fwd::constant(normal_speed),
                 slip: slip.map(Fwd::constant),
@@ -237,9 +237,9 @@ mod tests {
     /// The wrench on body 1 presses it up, the same with derivatives as without, and those match differences.
     fn assert_derivatives(world: &World, states: &[State], what: &str) {
         let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
-        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
         lifted[1] = states[1].variables();
-        let exact = world.lift().wrenches(&lifted, 0)[1];
+        let exact = world.cast().wrenches(&lifted, 0)[1];
         let value = wrench(states[1]);
         assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
         assert!(value.z > 0.0);

@@ -32,7 +32,7 @@
 //!     world.joint_force_mut(motor).set_param("effort", effort)?;
 //!     Ok::<_, prehend_sim::SimulationError>(())
 //! };
-//! let lifted = world.lift();
+//! let lifted = world.cast();
 //! let start = lifted.neutral_states();
 //! let time_steps = TimeSteps { dt: 0.02, steps: 20 };
 //! let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
@@ -42,11 +42,11 @@
 //! # }
 //! ```
 //!
-//! Trees have no loops: [`World::add_weld`] closes them by springs. Robots of MJCF come by [`World::add_mjcf`], with joints, actuators, tendons and loops; those of
+//! Trees have no loops: [`World::add_bushing`] closes them by springs. Robots of MJCF come by [`World::add_mjcf`], with joints, actuators, tendons and loops; those of
 //! URDF ([`KinematicTree::from_urdf_file`](prehend_geometry::robot::KinematicTree::from_urdf_file)) by [`World::add_articulated_robot`], which names joints by the
 //! links that they move, or by [`World::add_robot`] if their joints simply go where they are told. Sensors:
 //! [`World::contact_wrench`], [`World::accelerometer`]. A joint type of your own is a function from coordinates to a pose
-//! ([`JointModel`](crate::articulated::JointModel)). [`World::linear_step`] gives a step with its Jacobian in closed form.
+//! ([`JointModel`](crate::articulated::JointModel)). [`World::linearize_step`] gives a step with its Jacobian in closed form.
 //!
 //! For many inputs, such as a push per step, write the same over [`Var`](prehend_autodiff::Var): [`gradient`](prehend_autodiff::gradient) of a function of
 //! them hands value and gradient to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
@@ -55,7 +55,7 @@
 //! [`BackwardEuler`](crate::BackwardEuler) moves no joints;
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with steps of 0.1 ms some ten times faster than the default. But
 //! [`World::simulate_controlled`] says nothing of steps that are too long: ask [`World::check_time_step`]. What presses should hold with
-//! [`Sticking`](crate::Sticking), as the guide's [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) and a slip scale of 1 cm/s a gripped box slides by 5 mm in two
+//! [`BristleFriction`](crate::BristleFriction), as the guide's [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) and a slip scale of 1 cm/s a gripped box slides by 5 mm in two
 //! seconds.
 
 #[cfg(doc)]

@@ -56,7 +56,7 @@ use crate::world::World;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", stone));
+/// world.add(Body::dynamic("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
 /// let tight = Adaptive { tolerance: 1e-10, sensitivity_tolerance: 1e-9, ..Adaptive::default() };
 /// let run = world.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
@@ -74,7 +74,7 @@ pub struct Adaptive {
     /// too short for may be off by 10⁻³.
     pub sensitivity_tolerance: f64,
     /// Parts of a step at most.
-    pub max_parts: usize,
+    pub max_substeps: usize,
 }
 
 impl Adaptive {
@@ -96,7 +96,7 @@ impl Adaptive {
 impl Default for Adaptive {
     /// 5·10⁻⁶ for states, 2·10⁻⁵ for sensitivities, a million parts.
     fn default() -> Self {
-        Self { tolerance: 5e-6, sensitivity_tolerance: 2e-5, max_parts: 1_000_000 }
+        Self { tolerance: 5e-6, sensitivity_tolerance: 2e-5, max_substeps: 1_000_000 }
     }
 }
 

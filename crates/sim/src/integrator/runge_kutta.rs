@@ -83,7 +83,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.add_combined(weights, &mut change);
         let mut states = self.moved(&change);
         self.change = change;
-        self.world.drive(&mut states, self.step.start + fraction * self.step.dt);
+        self.world.update_kinematics(&mut states, self.step.start + fraction * self.step.dt);
         let wrenches = self.world.wrenches(&states, self.step.index);
         self.add_slopes(&states, &wrenches);
         (states, wrenches)

@@ -26,7 +26,7 @@ use crate::world::body::Body;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", stone));
+/// world.add(Body::dynamic("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
 /// let integrator = SubStepped { integrator: SemiImplicitEuler, max_substeps: 32 };
 /// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
@@ -55,7 +55,7 @@ impl<I: Integrator> SubStepped<I> {
         let mut states = states.to_vec();
         for part in step.parts(parts) {
             states = self.integrator.step(world, &states, part)?;
-            world.drive(&mut states, part.end());
+            world.update_kinematics(&mut states, part.end());
         }
         Ok(states)
     }
@@ -79,7 +79,7 @@ impl<I: Integrator> SubStepped<I> {
         let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
         then.extend_from_slice(&now[then.len()..]);
         plain.swing(&mut then, &vec![Vector6::zeros(); now.len()], dt);
-        plain.place_links(&mut then);
+        plain.forward_kinematics(&mut then);
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }

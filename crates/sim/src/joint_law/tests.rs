@@ -88,7 +88,7 @@ fn what_cannot_be_is_refused_where_it_is_added() {
     let mut world = World::new(Vector3::zeros());
     let rod = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();
     let hinge = Joint::Revolute(Vector3::x_axis());
-    let stone = world.add(Body::free("stone", rod));
+    let stone = world.add(Body::dynamic("stone", rod));
     let links = vec![Link::new("rod", hinge.clone(), &rod), Link::new("plate", Joint::Fixed, &rod)];
     let links = world.add_articulation(links).unwrap();
     let other = world.add_articulation(vec![Link::new("other", hinge.clone(), &rod)]).unwrap()[0];

@@ -42,7 +42,7 @@ impl<C: Fn(f64) -> JointState> DrivenRobot<C> {
         let joints = position.iter().zip(&velocity);
         let joints: Vec<Fwd<1>> =
             joints.map(|(&value, &rate)| Fwd { value, derivative: [rate] }).collect();
-        let base: State<Fwd<1>> = State::at_rest(self.t_world_base).lift();
+        let base: State<Fwd<1>> = State::at_rest(self.t_world_base).cast();
         let moving = State::at_rest(base.pose * self.robot.forward_kinematics(&joints)[link]);
         let rate = moving.sensitivity();
         State {
@@ -58,7 +58,7 @@ impl World {
     /// each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
     /// how the joints are and move at a time \[s\], and limits are not enforced.
     ///
-    /// [`World::drive`] brings states to their start. Distances reach as far as the margin of `shape`.
+    /// [`World::update_kinematics`] brings states to their start. Distances reach as far as the margin of `shape`.
     ///
     /// # Errors
     /// If `shape` is not the robot's, or `joints` does not have as many entries as the robot at time 0. Should it not later,
@@ -89,7 +89,8 @@ impl World {
         let bodies = shape.links().iter().enumerate().map(|(link, shape)| {
             shape.grid()?;
             let driven = Arc::clone(&driven);
-            let body = Body::driven(&robot.links()[link].name, move |t: f64| driven.link(link, t));
+            let body =
+                Body::kinematic(&robot.links()[link].name, move |t: f64| driven.link(link, t));
             Some(self.add(body.with_field(shape.clone())))
         });
         Ok(bodies.collect())
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(world.bodies[1].name, "tip");
         let at = |time: f64| {
             let mut states = vec![State::at_rest(Isometry3::identity()); 2];
-            world.drive(&mut states, time);
+            world.update_kinematics(&mut states, time);
             states
         };
         let (before, now, after) = (at(0.7 - 1e-5), at(0.7), at(0.7 + 1e-5));
@@ -161,14 +162,14 @@ mod tests {
         let (radius, mass) = (0.03, 0.1);
         let rigid = RigidBody::ball(mass, radius).unwrap();
         let surface = Surface::uniform(&ellipsoid(400, [radius; 3]), 0.0113).unwrap();
-        let ball = world.add(Body::free("ball", rigid).with_surface(surface));
+        let ball = world.add(Body::dynamic("ball", rigid).with_surface(surface));
         // Critically damped, or nearly: the ball keeps to the finger rather than bounce off.
         let law = Arc::new(penalty(1e8, 1e6, 0.5, 1e-2));
         let (bodies, smoothing) =
             (ContactBodies { samples: ball, field: tip }, GapSmoothing::Softplus { width: 1e-4 });
         world.add_contact(bodies, law, smoothing).unwrap();
         let mut states = vec![State::at_rest(Isometry3::identity()); 3];
-        world.drive(&mut states, 0.0);
+        world.update_kinematics(&mut states, 0.0);
         let ahead = Vector3::new(0.04 + radius + 0.002, 0.0, 0.0);
         states[ball].pose = states[tip].pose * nalgebra::Translation3::from(ahead);
         let axis = states[tip].pose.rotation * Vector3::x();

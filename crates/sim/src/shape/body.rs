@@ -29,13 +29,13 @@ impl<S: Scalar> Body<S> {
     /// # Errors
     /// If the shape has no mass, as a half-space, or the density is not positive and finite.
     pub fn from_shape(name: &str, shape: &Shape<S>, density: S) -> Result<Self, ShapeError> {
-        let body = Self::free(name, shape.rigid(density)?);
+        let body = Self::dynamic(name, shape.rigid(density)?);
         Ok(body.made_of(Matter { shape: shape.clone(), density: Some(density) }))
     }
 
     /// A body that keeps the state it is given, with the samples and the field of `shape`.
     pub fn fixed_from_shape(name: &str, shape: &Shape<S>) -> Self {
-        Self::kinematic(name).made_of(Matter { shape: shape.clone(), density: None })
+        Self::fixed(name).made_of(Matter { shape: shape.clone(), density: None })
     }
 
     fn made_of(mut self, Matter { shape, density }: Matter<S>) -> Self {
@@ -56,7 +56,7 @@ impl<S: Scalar> Body<S> {
         let mut shape = shape.clone();
         shape.set_dimension(name, value)?;
         let density = *density;
-        if let (Motion::Free(rigid), Some(density)) = (&mut self.motion, density) {
+        if let (Motion::Dynamic(rigid), Some(density)) = (&mut self.motion, density) {
             *rigid = shape.rigid(density)?;
         }
         self.reshape(shape, density);

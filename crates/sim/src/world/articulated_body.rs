@@ -103,7 +103,7 @@ impl<S: Scalar> World<S> {
     pub fn neutral_states(&self) -> Vec<State<S>> {
         let at_rest = State::at_rest(Isometry3::identity());
         let mut states = vec![at_rest; self.bodies.len() + self.joint_count()];
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         states
     }
 
@@ -119,7 +119,7 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         self.write_joint(states, link, position, velocity)?;
-        self.place_links(states);
+        self.forward_kinematics(states);
         Ok(())
     }
 
@@ -271,7 +271,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves the links to where their joints put them.
-    pub(crate) fn place_links(&self, states: &mut [State<S>]) {
+    pub(crate) fn forward_kinematics(&self, states: &mut [State<S>]) {
         if self.articulations.is_empty() {
             return;
         }

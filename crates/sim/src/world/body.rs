@@ -34,13 +34,13 @@ pub struct Body<S: Scalar = f64> {
 /// What moves a body.
 #[derive(Clone)]
 pub enum Motion<S: Scalar = f64> {
-    /// Forces.
-    Free(RigidBody<S>),
-    /// Nothing but whoever sets its state. What touches it feels the state's velocity, a conveyor's for instance.
-    Kinematic,
-    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a lifted world one that carries derivatives
+    /// Forces, on a body with these mass properties.
+    Dynamic(RigidBody<S>),
+    /// Nothing but whoever sets its state. A body that touches it feels the state's velocity, a conveyor's for instance.
+    Fixed,
+    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a world of numbers with derivatives one that carries them
     /// may take its place.
-    Driven(Arc<dyn Trajectory<S>>),
+    Kinematic(Arc<dyn Trajectory<S>>),
     /// The joint that it hangs on, as a link of one of the world's [articulations](crate::World::add_articulation). Its model frame is the link's.
     Link,
 }
@@ -59,18 +59,18 @@ impl<S: Scalar> Body<S> {
     }
 
     /// A body that forces move.
-    pub fn free(name: &str, body: RigidBody<S>) -> Self {
-        Self::new(name, Motion::Free(body))
+    pub fn dynamic(name: &str, body: RigidBody<S>) -> Self {
+        Self::new(name, Motion::Dynamic(body))
     }
 
     /// A body that keeps the state it is given. Its center of mass is the origin of its model frame.
-    pub fn kinematic(name: &str) -> Self {
-        Self::new(name, Motion::Kinematic)
+    pub fn fixed(name: &str) -> Self {
+        Self::new(name, Motion::Fixed)
     }
 
     /// A body on a trajectory. Its center of mass is the origin of its model frame.
-    pub fn driven(name: &str, trajectory: impl Trajectory<S>) -> Self {
-        Self::new(name, Motion::Driven(Arc::new(trajectory)))
+    pub fn kinematic(name: &str, trajectory: impl Trajectory<S>) -> Self {
+        Self::new(name, Motion::Kinematic(Arc::new(trajectory)))
     }
 
     /// A link.
@@ -80,7 +80,7 @@ impl<S: Scalar> Body<S> {
 
     /// Whether forces move it, alone or as a link.
     pub(crate) fn feels_forces(&self) -> bool {
-        matches!(self.motion, Motion::Free(_) | Motion::Link)
+        matches!(self.motion, Motion::Dynamic(_) | Motion::Link)
     }
 
     /// The same body with samples of its surface.
@@ -109,8 +109,8 @@ impl<S: Scalar> Body<S> {
     #[inline]
     pub fn rigid(&self) -> Option<&RigidBody<S>> {
         match &self.motion {
-            Motion::Free(body) => Some(body),
-            Motion::Kinematic | Motion::Driven(_) | Motion::Link => None,
+            Motion::Dynamic(body) => Some(body),
+            Motion::Fixed | Motion::Kinematic(_) | Motion::Link => None,
         }
     }
 
@@ -125,10 +125,12 @@ impl<S: Scalar> Body<S> {
         Body {
             name: self.name.clone(),
             motion: match &self.motion {
-                Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
-                Motion::Kinematic => Motion::Kinematic,
+                Motion::Dynamic(rigid) => Motion::Dynamic(rigid.map(&f)),
+                Motion::Fixed => Motion::Fixed,
                 Motion::Link => Motion::Link,
-                Motion::Driven(trajectory) => Motion::Driven(trajectory::constant(trajectory)),
+                Motion::Kinematic(trajectory) => {
+                    Motion::Kinematic(trajectory::constant(trajectory))
+                }
             },
             surface: self.surface.clone(),
             field: self.field.clone(),

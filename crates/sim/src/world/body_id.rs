@@ -10,7 +10,7 @@ use std::ops::{Index, IndexMut};
 /// use prehend_sim::{Body, State, World};
 ///
 /// let mut world = World::new(Vector3::zeros());
-/// let belt = world.add(Body::kinematic("belt"));
+/// let belt = world.add(Body::fixed("belt"));
 /// let mut states = [State::at_rest(Isometry3::identity())];
 /// states[belt].linear.x = 0.1;
 /// assert_eq!(world.bodies[belt].name, "belt");

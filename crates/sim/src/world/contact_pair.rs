@@ -156,7 +156,8 @@ mod tests {
     use crate::contact::registry::LawRegistry;
     use crate::scenes::{egg_on, floor};
     use crate::{
-        AnisotropicFriction, Contact, ContactLaw, Coulomb, Hertz, Law, Response, Sticking,
+        AnisotropicFriction, BristleFriction, ContactForce, ContactKinematics, ContactLaw, Coulomb,
+        Hertz, Law,
     };
 
     #[test]
@@ -187,7 +188,7 @@ mod tests {
         let expected =
             "the law has no parameter called \"mu\": one of stiffness, friction, across_ratio";
         assert_eq!(error, expected);
-        let held = Sticking { friction: along, deflection: 1e-4 };
+        let held = BristleFriction { friction: along, deflection: 1e-4 };
         pair.set_law(Arc::new(Law::new(Hertz { stiffness: 1e9 }, held).unwrap()));
         assert_eq!(pair.param_mut("friction"), Ok(&mut 0.2));
     }
@@ -199,8 +200,8 @@ mod tests {
             fn params(&self) -> &[f64] {
                 &self.0
             }
-            fn law<S: Scalar>(&self, _: &[S], _: &Contact<S>) -> Response<S> {
-                Response::zero()
+            fn law<S: Scalar>(&self, _: &[S], _: &ContactKinematics<S>) -> ContactForce<S> {
+                ContactForce::zero()
             }
             fn reach(&self) -> f64 {
                 0.0

@@ -81,7 +81,7 @@ impl<S: Scalar> World<S> {
         if S::RECORDED {
             linear.record(self, states, &mut wrenches);
         }
-        self.add_welds(states, &mut wrenches);
+        self.add_bushings(states, &mut wrenches);
         wrenches
     }
 

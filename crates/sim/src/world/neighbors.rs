@@ -75,7 +75,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         }
         let bodies = deviations.iter_mut().zip(&self.world.bodies).zip(&self.grouped);
         for ((deviation, body), _) in bodies.filter(|(_, grouped)| **grouped) {
-            if let Motion::Driven(trajectory) = &body.motion {
+            if let Motion::Kinematic(trajectory) = &body.motion {
                 let looks = (step.dt / LOOK).ceil().min(LOOKS);
                 let place = |look: usize| {
                     let state = trajectory.state(step.start + step.dt * look as f64 / looks);
@@ -160,7 +160,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         let (body, base) = (&self.world.bodies[samples], &self.world.bodies[field]);
         let (Some(surface), Some(distance)) = (&body.surface, &base.field) else { return false };
         // What turns may come anywhere within its ball.
-        if !matches!(base.motion, Motion::Kinematic) {
+        if !matches!(base.motion, Motion::Fixed) {
             return true;
         }
         let pattern = &self.world.contact_groups[contact.group].contact;
@@ -251,7 +251,7 @@ impl<S: Scalar> World<S> {
             contact_groups: Vec::new(),
             articulations: self.articulations.clone(),
             joint_forces: self.joint_forces.clone(),
-            welds: self.welds.clone(),
+            bushings: self.bushings.clone(),
             transmissions: self.transmissions.clone(),
             gravity: self.gravity,
         })

@@ -10,7 +10,7 @@ use crate::error::SimulationError;
 use crate::state::State;
 
 impl<S: Scalar> World<S> {
-    /// What contacts and welds do to a body: force \[N\] and torque \[N m\] about its center of mass, of a link about the origin of its frame; world
+    /// What contacts and bushings do to a body: force \[N\] and torque \[N m\] about its center of mass, of a link about the origin of its frame; world
     /// frame.
     ///
     /// # Errors
@@ -89,7 +89,7 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         Ok(states)
     }
 }

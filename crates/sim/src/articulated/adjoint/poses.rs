@@ -23,7 +23,7 @@ pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -
     let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
     match S::recorded(&varying, &outputs, node) {
         Some(recorded) => states_of(&recorded).collect(),
-        None => result.iter().map(State::lift).collect(),
+        None => result.iter().map(State::cast).collect(),
     }
 }
 

@@ -23,7 +23,7 @@ fn weighed<S: Scalar>(tree: &Articulation, start: &[f64], x: &[S]) -> S {
     let efforts: Vec<S> = (0..tree.freedoms()).map(|_| next()).collect();
     let wrenches: Vec<Vector6<S>> =
         tree.links().iter().map(|_| Vector6::from_fn(|_, _| next())).collect();
-    let mut links = tree.lift::<S>().links().to_vec();
+    let mut links = tree.cast::<S>().links().to_vec();
     for link in &mut links {
         let turn = nalgebra::Vector3::from_fn(|_, _| next());
         link.t_parent_joint.rotation =

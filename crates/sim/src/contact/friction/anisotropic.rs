@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use super::{FrictionCoefficient, FrictionLaw, regularized_speed};
 use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, Parameters, Tabulated, entry};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::range::ParameterRange;
 
 /// Friction with the coefficient μ of `along` along the unit direction a, and r·μ across it. The direction is fixed to the
@@ -95,7 +95,7 @@ impl<F: FrictionCoefficient> FrictionLaw for AnisotropicFriction<F> {
         &self,
         (along, [across]): Self::Params<S>,
         normal_force: S,
-        contact: &Contact<S>,
+        contact: &ContactKinematics<S>,
     ) -> Vector3<S> {
         let speed = regularized_speed(&contact.slip, self.along.slip_scale());
         let scale = -(self.along.coefficient(along, speed) * normal_force) / speed;
@@ -129,8 +129,8 @@ mod tests {
         AnisotropicFriction { along, across_ratio, direction }
     }
 
-    fn contact(slip: Vector3<f64>, normal: Vector3<f64>) -> Contact<f64> {
-        Contact { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 }
+    fn contact(slip: Vector3<f64>, normal: Vector3<f64>) -> ContactKinematics<f64> {
+        ContactKinematics { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 }
     }
 
     #[test]
@@ -186,7 +186,7 @@ mod tests {
         let law = Law::new(SPRING, friction(Vector3::x_axis(), 3.0)).unwrap();
         let rigid = RigidBody::new(0.2, Matrix3::identity(), Point3::origin()).unwrap();
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let runner = Body::free("runner", rigid).with_surface(surface);
+        let runner = Body::dynamic("runner", rigid).with_surface(surface);
         let world = on_ground(Vector3::zeros(), floor(), runner, Arc::new(law), GapSmoothing::Hard);
         let friction = |degrees: f64, slip: Vector3<f64>| {
             let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());

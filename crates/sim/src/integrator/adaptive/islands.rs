@@ -42,9 +42,9 @@ impl Island {
         for articulation in &world.articulations {
             articulation.bodies().windows(2).for_each(|pair| join(&mut roots, [pair[0], pair[1]]));
         }
-        for weld in &world.welds {
-            if weld.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
-                join(&mut roots, weld.bodies);
+        for bushing in &world.bushings {
+            if bushing.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
+                join(&mut roots, bushing.bodies);
             }
         }
         let mut place = vec![None; world.bodies.len()];
@@ -78,9 +78,9 @@ impl Island {
             }
             deflection += usize::from(sticks);
         }
-        for weld in &world.welds {
+        for bushing in &world.bushings {
             let (moved, fixed): (Vec<BodyId>, Vec<BodyId>) =
-                weld.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
+                bushing.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
             let root = moved.first().map(|id| root_of(&mut roots, id.index()));
             if let Some(place) = root.and_then(|root| place[root]) {
                 islands[place].bodies.extend(fixed);
@@ -130,12 +130,12 @@ impl Island {
                 .filter(|force| force.axes.iter().all(|(axis, _)| self.has(axis.link)))
                 .map(|force| force.with_bodies(body))
                 .collect(),
-            welds: world
-                .welds
+            bushings: world
+                .bushings
                 .iter()
-                .filter(|weld| weld.bodies.iter().all(|id| self.has(*id)))
-                .filter(|weld| weld.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
-                .map(|weld| weld.with_bodies(body))
+                .filter(|bushing| bushing.bodies.iter().all(|id| self.has(*id)))
+                .filter(|bushing| bushing.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
+                .map(|bushing| bushing.with_bodies(body))
                 .collect(),
             transmissions: world.transmissions.with_bodies(|id| self.has(id), body),
             gravity: world.gravity,

@@ -78,7 +78,7 @@ impl Planner {
         whole: Step,
         first: Option<f64>,
     ) -> Self {
-        let lifted = plain.lift::<Probe>();
+        let lifted = plain.cast::<Probe>();
         let values: Vec<State> = states.iter().map(State::value).collect();
         let norm = ErrorNorm::new(settings, &plain, &values);
         let wrenches = lifted.wrenches(&states, whole.index);
@@ -159,9 +159,9 @@ impl Planner {
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
-                if self.parts > self.settings.max_parts {
-                    let max_parts = self.settings.max_parts;
-                    return Err(self.plain.too_many_parts(&values, self.time, max_parts));
+                if self.parts > self.settings.max_substeps {
+                    let max_substeps = self.settings.max_substeps;
+                    return Err(self.plain.too_many_substeps(&values, self.time, max_substeps));
                 }
                 if let Some(pair) = self.travel.crossed(&self.plain, &self.states, trial.end()) {
                     return Err(self.plain.passed_through(pair, self.time));

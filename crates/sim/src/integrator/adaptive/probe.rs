@@ -15,7 +15,7 @@ pub(super) fn seeded(
     units: impl Iterator<Item = (usize, [f64; 12])>,
 ) -> Vec<State<Probe>> {
     let mut random = SplitMix64::new(7);
-    let mut seeded: Vec<State<Probe>> = states.iter().map(State::lift).collect();
+    let mut seeded: Vec<State<Probe>> = states.iter().map(State::cast).collect();
     for (place, units) in units {
         let tangent = units.map(|unit| {
             let (size, sign) = (0.5 + 0.5 * random.uniform(), (random.uniform() - 0.5).signum());

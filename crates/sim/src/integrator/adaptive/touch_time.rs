@@ -152,9 +152,9 @@ mod tests {
         let (dt, speed, depth) = (0.01, 0.4, 1e-4);
         let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
         let mut world = World::new(Vector3::zeros());
-        let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+        let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let samples = world.add(Body::free("foot", rigid).with_surface(surface));
+        let samples = world.add(Body::dynamic("foot", rigid).with_surface(surface));
         let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
         let bodies = ContactBodies { samples, field };

@@ -60,7 +60,8 @@ impl Travel {
             let thinnest = FREE_THICKNESS * thickness;
             let [free, short] = [FREE_TRAVEL, SHORT].map(|part| (part * size).min(thinnest));
             let radius = surface.spread_about(&body.com());
-            let driven = [body, other].iter().any(|body| matches!(body.motion, Motion::Driven(_)));
+            let driven =
+                [body, other].iter().any(|body| matches!(body.motion, Motion::Kinematic(_)));
             // The ends of a part say nothing of a trajectory in between.
             let free = if driven { short } else { free };
             Some(Limit { radius, size, free, short, thin: thickness.is_finite(), driven })
@@ -168,7 +169,7 @@ impl Limit {
         let deviation = |look: usize| {
             let elapsed = LOOK * (look + 1) as f64;
             for body in [pair.bodies.samples, pair.bodies.field] {
-                let Motion::Driven(trajectory) = &world.bodies[body].motion else { continue };
+                let Motion::Kinematic(trajectory) = &world.bodies[body].motion else { continue };
                 there[body] = trajectory.state(time + elapsed);
                 uniform[body] = states[body].drifted(elapsed);
             }

@@ -39,12 +39,12 @@ pub(super) fn step<S: Scalar>(
     whole: Step,
 ) -> Result<Vec<State<S>>, SimulationError> {
     let plain = world.plain();
-    let driving = plain.lift::<Probe>();
+    let driving = plain.cast::<Probe>();
     let search = NeighborSearch::new(&plain);
     let mut states = states.to_vec();
     let values: Vec<State> = states.iter().map(State::value).collect();
     let mut probes = probe::seeded(&values, ErrorNorm::new(settings, &plain, &values).units());
-    driving.place_links(&mut probes);
+    driving.forward_kinematics(&mut probes);
     let mut next_parts = vec![None; world.bodies.len()];
     let mut window = whole;
     for windows in 0.. {
@@ -55,8 +55,8 @@ pub(super) fn step<S: Scalar>(
         if window.dt <= SHORTEST * whole.dt.max(window.start.abs()) && window.dt < left {
             return Err(plain.stalled(&values(), window.start, window.dt));
         }
-        if windows > settings.max_parts {
-            return Err(plain.too_many_parts(&values(), window.start, settings.max_parts));
+        if windows > settings.max_substeps {
+            return Err(plain.too_many_substeps(&values(), window.start, settings.max_substeps));
         }
         let Window { neighbors, islands } =
             Window::find(settings, &search, &probes, window, &next_parts)?;
@@ -68,7 +68,7 @@ pub(super) fn step<S: Scalar>(
             for (k, (place, probe)) in island.places().zip(&course.states).enumerate() {
                 states[place] = match after.get(i) {
                     Some(after) => after[k],
-                    None => probe.value().lift(),
+                    None => probe.value().cast(),
                 };
                 probes[place] = *probe;
             }
@@ -78,8 +78,8 @@ pub(super) fn step<S: Scalar>(
             break;
         }
         let start = window.end();
-        driving.drive(&mut probes, start);
-        world.drive(&mut states, start);
+        driving.update_kinematics(&mut probes, start);
+        world.update_kinematics(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
     Ok(states)

@@ -112,7 +112,7 @@ impl ImplicitStep<'_> {
             let at = velocity_at(x, slot);
             let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
             let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
-            let state = self.states[body].lift();
+            let state = self.states[body].cast();
             let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
             let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
             write(slot, slot, by(0));
@@ -145,8 +145,8 @@ impl Equations for ImplicitStep<'_> {
         let mut wrenches: Vec<Vector6<f64>> =
             self.world.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
-        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
-        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::lift);
+        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::cast).collect();
+        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::cast);
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
             let bodies = [pair.bodies.samples, pair.bodies.field];
@@ -154,7 +154,7 @@ impl Equations for ImplicitStep<'_> {
                 if let Some(slot) = slots[body] {
                     let at = velocity_at(x, slot);
                     let velocity = std::array::from_fn(|i| Fwd::variable(at[i], lane + i));
-                    states[body] = arrived(&self.states[body].lift(), &velocity, dt);
+                    states[body] = arrived(&self.states[body].cast(), &velocity, dt);
                 }
             }
             let deflection = pair.law().bristles().and_then(|_| deflections.next());
@@ -170,7 +170,7 @@ impl Equations for ImplicitStep<'_> {
                     }
                 }
             }
-            bodies.into_iter().for_each(|body| states[body] = ends[body].lift());
+            bodies.into_iter().for_each(|body| states[body] = ends[body].cast());
         }
         let jacobian = self.jacobian(x, &wrenches, &by_velocity)?;
         Ok((self.excesses(x, &wrenches), jacobian))

@@ -37,7 +37,7 @@ impl MjcfRobot {
             };
             world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
         }
-        world.place_links(states);
+        world.forward_kinematics(states);
         Ok(())
     }
 
@@ -69,7 +69,7 @@ impl MjcfRobot {
             }
             world.write_joint(states, *link, &joint.position, &velocity)?;
         }
-        world.place_links(states);
+        world.forward_kinematics(states);
         Ok(())
     }
 

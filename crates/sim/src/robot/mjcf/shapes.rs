@@ -44,7 +44,7 @@ impl World {
                         normal: nalgebra::Unit::new_normalize(normal),
                         height: normal.dot(&place),
                     };
-                    let body = Body::kinematic(&geom.name);
+                    let body = Body::fixed(&geom.name);
                     self.add(body.with_field(std::sync::Arc::new(field)));
                     continue;
                 }

@@ -11,7 +11,7 @@ const STEPS: TimeSteps = TimeSteps { dt: 2e-4, steps: 6 };
 /// Whether contacts push at the start.
 fn touches((world, states): &(World, Vec<State>)) -> bool {
     let mut world = world.clone();
-    world.welds.clear();
+    world.bushings.clear();
     world.bodies.iter().zip(world.wrenches(states, 0)).any(|(_, wrench)| wrench.norm() > 0.1)
 }
 
@@ -26,7 +26,7 @@ fn weighed<S: Scalar>(
     let world = world.with_parameters(&moved).unwrap();
     let mut rest = x[parameters.len()..].iter().copied();
     let mut next = || rest.next().unwrap();
-    let mut start: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
     start[1] = states[1].retract(&std::array::from_fn(|_| next()));
     let links = world.articulations[0].bodies().to_vec();
     for (link, body) in world.articulations[0].tree.links().iter().zip(links) {

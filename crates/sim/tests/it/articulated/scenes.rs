@@ -7,9 +7,9 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::{Joint, JointModel, Link};
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, JointDamper,
-    JointFriction, JointLimits, JointSpring, KelvinVoigt, Law, PositionServo, RigidBody, Sphere,
-    State, Sticking, Surface, VelocityServo, Weld, WeldStiffness, World,
+    Body, BristleFriction, Bushing, BushingStiffness, ContactBodies, Coulomb, DynContactLaw,
+    GapSmoothing, HalfSpace, JointDamper, JointFriction, JointLimits, JointSpring, KelvinVoigt,
+    Law, PositionServo, RigidBody, Sphere, State, Surface, VelocityServo, World,
 };
 
 /// A nut on a thread.
@@ -70,7 +70,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     let links = (0..count).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
     let links: Vec<Link> = links.collect();
     let mut world = World::new(Vector3::new(0.1, -0.2, -9.81));
-    let floor = Body::kinematic("floor")
+    let floor = Body::fixed("floor")
         .with_field(Arc::new(HalfSpace { height: -0.02, ..HalfSpace::floor() }));
     let floor = world.add(floor);
     let ball = |world: &mut World, body, radius: f64| {
@@ -78,12 +78,12 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         body.surface = Some(Arc::new(Surface::ball(radius).unwrap()));
         body.field = Some(Arc::new(Sphere { center: Point3::origin(), radius }));
     };
-    let free = world.add(Body::free("ball", RigidBody::ball(0.3, 0.06).unwrap()));
+    let free = world.add(Body::dynamic("ball", RigidBody::ball(0.3, 0.06).unwrap()));
     ball(&mut world, free, 0.06);
     let bodies = world.add_articulation(links).unwrap();
     bodies.iter().for_each(|body| ball(&mut world, *body, 0.08));
     let (slides, smoothing) = coulomb_law();
-    let holds = Sticking { friction: FRICTION, deflection: 1e-3 };
+    let holds = BristleFriction { friction: FRICTION, deflection: 1e-3 };
     let holds: Arc<dyn DynContactLaw> = Arc::new(Law::new(SPRING, holds).unwrap());
     for (index, &samples) in bodies.iter().enumerate() {
         let field = if index % 2 == 0 { floor } else { free };
@@ -125,9 +125,9 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         ];
         let (others, last) = ([free, floor], bodies[count - 1]);
         let inertia = if seed.is_multiple_of(2) { 1e-3 } else { 0.0 };
-        let stiffness = WeldStiffness::critical(0.03, inertia, 0.05);
+        let stiffness = BushingStiffness::critical(0.03, inertia, 0.05);
         let bodies = [last, others[seed as usize % 5]];
-        world.add_weld(Weld { bodies, frames, stiffness }).unwrap();
+        world.add_bushing(Bushing { bodies, frames, stiffness }).unwrap();
     }
     let mut states = world.neutral_states();
     states[free].pose.translation.vector = Vector3::new(0.05, 0.02, 0.03);

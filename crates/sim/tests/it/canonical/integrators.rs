@@ -90,7 +90,7 @@ impl<I: Integrator> Method for I {
         start: &[State<Fwd<INPUTS>>],
         time_steps: TimeSteps,
     ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
-        world.lift().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
+        world.cast().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
     }
 }
 

@@ -20,10 +20,10 @@ pub(crate) fn on_floor(
     inertia: f64,
 ) -> World {
     let mut world = World::new(gravity);
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = rigid(spec.mass, inertia);
     let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
-    let samples = world.add(Body::free("body", rigid).with_surface(surface));
+    let samples = world.add(Body::dynamic("body", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
     world.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
     world

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{Contact, GapSmoothing, HalfSpace, LeakSteps, Patch, State, Surface};
+use prehend_sim::{ContactKinematics, GapSmoothing, HalfSpace, LeakSteps, Patch, State, Surface};
 
 use super::laws::{Law, Spec};
 use super::rows::Row;
@@ -58,8 +58,9 @@ pub(crate) fn cone(law: &Law) -> Vec<Row> {
             for exponent in -14..6 {
                 let slip = Vector3::new(1.0, -0.5, 0.0) * 10f64.powi(exponent);
                 let normal = Vector3::z();
-                let contact = Contact { gap: -depth, normal_speed, slip, normal, area: 1e-4 };
-                let force = law.response(law.params(), &contact);
+                let contact =
+                    ContactKinematics { gap: -depth, normal_speed, slip, normal, area: 1e-4 };
+                let force = law.force(law.params(), &contact);
                 let (across, limit) = (force.tangential.norm(), bound * force.normal);
                 worst = worst.max(if across == 0.0 { 0.0 } else { across / limit });
             }

@@ -69,18 +69,19 @@ impl Generalized {
         Self { count, joints, wrenches, by_position, by_velocity, by_effort }
     }
 
-    /// Adds contacts and welds: their wrenches on bodies, and what follows along the coordinates.
+    /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
     fn add_forces(&mut self, world: &World, states: &[State], trees: &[Tree<'_>], step: usize) {
         let contacts = world.contacts.iter();
         let contacts = contacts.filter_map(|pair| Between::contact(world, pair, states, step));
-        let welds = world.welds.iter().map(|weld| Between::weld(world, weld, states));
+        let bushings =
+            world.bushings.iter().map(|bushing| Between::bushing(world, bushing, states));
         let mut motions: Vec<Option<Vec<Motion>>> = Vec::new();
         motions.resize_with(world.bodies.len(), || None);
         let mut own = Vec::new();
-        if !(world.contacts.is_empty() && world.welds.is_empty()) {
+        if !(world.contacts.is_empty() && world.bushings.is_empty()) {
             own = places(world, trees);
         }
-        for between in contacts.chain(welds) {
+        for between in contacts.chain(bushings) {
             for body in between.bodies {
                 motions[body].get_or_insert_with(|| match own[body.index()] {
                     Place::Free(first) => of_free_body(first),

@@ -15,9 +15,9 @@ fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
         world.articulations[0].tree.links().iter().map(|link| &link.joint).collect();
     let n = 6 + joints.iter().map(|joint| joint.freedoms()).sum::<usize>();
     let mut all = DMatrix::zeros(n, n);
-    let lifted = world.lift::<Fwd<1>>();
+    let lifted = world.cast::<Fwd<1>>();
     for column in 0..n {
-        let mut start: Vec<State<Fwd<1>>> = states.iter().map(State::lift).collect();
+        let mut start: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
         if column < 6 {
             let velocity =
                 if column < 3 { &mut start[free].linear } else { &mut start[free].angular };
@@ -61,7 +61,7 @@ fn the_closed_form_is_forward_mode() {
         }
         let sticks = world.contacts.iter().any(|pair| pair.law().bristles().is_some());
         let step = Step::new(0, 1e-3);
-        let found = world.linear_step(&states, step).unwrap();
+        let found = world.linearize_step(&states, step).unwrap();
         let n = found.by_force.ncols();
         let end = world.step(&SemiImplicitEuler, &states, step).unwrap();
         for (a, b) in found.states.iter().zip(&end) {
@@ -76,7 +76,7 @@ fn the_closed_form_is_forward_mode() {
             continue;
         }
         closed += 1;
-        let reference = world.linear_step_by_forward_mode(&states, step).unwrap();
+        let reference = world.linearize_step_by_forward_mode(&states, step).unwrap();
         for (name, a, b) in [
             ("state", &found.by_state, &reference.by_state),
             ("force", &found.by_force, &reference.by_force),

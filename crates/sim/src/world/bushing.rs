@@ -12,20 +12,20 @@ use crate::first_order::{Linearized, first_order, linearized};
 use crate::state::State;
 use crate::state_coordinates::STATE;
 
-/// A soft weld of two bodies, or a soft ball joint: springs and dampers between a frame of one and a frame of the other.
+/// A soft bushing of two bodies, or a soft ball joint: springs and dampers between a frame of one and a frame of the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weld<S: Scalar = f64> {
+pub struct Bushing<S: Scalar = f64> {
     /// The bodies.
     pub bodies: [BodyId; 2],
     /// Their frames, each in its body's model frame \[m\].
     pub frames: [Isometry3<f64>; 2],
     /// How stiff it is.
-    pub stiffness: WeldStiffness<S>,
+    pub stiffness: BushingStiffness<S>,
 }
 
-/// Stiffness and damping of a [`Weld`].
+/// Stiffness and damping of a [`Bushing`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WeldStiffness<S: Scalar = f64> {
+pub struct BushingStiffness<S: Scalar = f64> {
     /// Force by distance of the frames' origins \[N/m\].
     pub linear: S,
     /// Force by the rate of that \[N s/m\].
@@ -36,9 +36,9 @@ pub struct WeldStiffness<S: Scalar = f64> {
     pub angular_damping: S,
 }
 
-impl WeldStiffness {
+impl BushingStiffness {
     /// Critically damped, so that a displacement of what weighs `mass` \[kg\] and has `inertia` \[kg m²\] decays in `time` \[s\]. With an inertia of 0
-    /// the frames turn freely. Infinite for a time of 0, which [`World::add_weld`] refuses.
+    /// the frames turn freely. Infinite for a time of 0, which [`World::add_bushing`] refuses.
     pub fn critical(mass: f64, inertia: f64, time: f64) -> Self {
         let [linear, angular] = [mass, inertia].map(|m| m / (time * time));
         let [linear_damping, angular_damping] = [mass, inertia].map(|m| 2.0 * m / time);
@@ -46,7 +46,7 @@ impl WeldStiffness {
     }
 }
 
-impl<S: Scalar> WeldStiffness<S> {
+impl<S: Scalar> BushingStiffness<S> {
     pub(crate) fn numbers(&self) -> [S; 4] {
         [self.linear, self.linear_damping, self.angular, self.angular_damping]
     }
@@ -56,34 +56,36 @@ impl<S: Scalar> WeldStiffness<S> {
     }
 }
 
-impl<S: Scalar> Weld<S> {
-    pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Weld<T> {
-        let stiffness = WeldStiffness::of(self.stiffness.numbers().map(f));
-        Weld { bodies: self.bodies, frames: self.frames, stiffness }
+impl<S: Scalar> Bushing<S> {
+    pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Bushing<T> {
+        let stiffness = BushingStiffness::of(self.stiffness.numbers().map(f));
+        Bushing { bodies: self.bodies, frames: self.frames, stiffness }
     }
 
-    /// The same weld of other bodies.
+    /// The same bushing of other bodies.
     pub(crate) fn with_bodies(self, body: impl Fn(BodyId) -> BodyId) -> Self {
         Self { bodies: self.bodies.map(body), ..self }
     }
 }
 
 impl World {
-    /// Adds a weld.
+    /// Adds a bushing.
     ///
     /// # Errors
     /// If there is no such body, or both are the same; if a stiffness or damping is negative or not finite.
-    pub fn add_weld(&mut self, weld: Weld) -> Result<(), SimulationError> {
-        for body in weld.bodies {
+    pub fn add_bushing(&mut self, bushing: Bushing) -> Result<(), SimulationError> {
+        for body in bushing.bodies {
             self.body(body)?;
         }
-        if weld.bodies[0] == weld.bodies[1] {
-            return Err(SimulationError::Itself { body: self.bodies[weld.bodies[0]].name.clone() });
+        if bushing.bodies[0] == bushing.bodies[1] {
+            return Err(SimulationError::Itself {
+                body: self.bodies[bushing.bodies[0]].name.clone(),
+            });
         }
-        self.welds.push(weld);
-        let checked = self.check_welds();
+        self.bushings.push(bushing);
+        let checked = self.check_bushings();
         if checked.is_err() {
-            self.welds.pop();
+            self.bushings.pop();
         }
         checked
     }
@@ -91,38 +93,38 @@ impl World {
 
 impl<S: Scalar> World<S> {
     /// # Errors
-    /// If there are welds, of which `integrator` knows nothing.
-    pub(crate) fn refuse_welds(&self, integrator: &'static str) -> Result<(), SimulationError> {
-        match self.welds.is_empty() {
+    /// If there are bushings, of which `integrator` knows nothing.
+    pub(crate) fn refuse_bushings(&self, integrator: &'static str) -> Result<(), SimulationError> {
+        match self.bushings.is_empty() {
             true => Ok(()),
-            false => Err(SimulationError::Welds { integrator }),
+            false => Err(SimulationError::Bushings { integrator }),
         }
     }
 
-    /// Whether the stiffness of every weld is one.
-    pub(crate) fn check_welds(&self) -> Result<(), SimulationError> {
-        let numbers = self.welds.iter().flat_map(|weld| weld.stiffness.numbers());
+    /// Whether the stiffness of every bushing is one.
+    pub(crate) fn check_bushings(&self) -> Result<(), SimulationError> {
+        let numbers = self.bushings.iter().flat_map(|bushing| bushing.stiffness.numbers());
         let mut values = numbers.map(|x| x.value());
         match values.find(|value| !(value.is_finite() && *value >= 0.0)) {
             Some(value) => {
-                let (setting, range) = ("WeldStiffness", "zero or positive, and finite");
+                let (setting, range) = ("BushingStiffness", "zero or positive, and finite");
                 Err(SimulationError::Setting { setting, range, value })
             }
             None => Ok(()),
         }
     }
 
-    /// Adds what welds do to the wrenches on the bodies.
-    pub(super) fn add_welds(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
-        for weld in &self.welds {
+    /// Adds what bushings do to the wrenches on the bodies.
+    pub(super) fn add_bushings(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
+        for bushing in &self.bushings {
             // Where a center of mass varies, of the point that has its value for coordinates.
-            let shifted = weld.bodies.map(|body| self.shifted(body, states));
+            let shifted = bushing.bodies.map(|body| self.shifted(body, states));
             let ends = [0, 1].map(|end| match &shifted[end] {
                 Some((state, _)) => state,
-                None => &states[weld.bodies[end]],
+                None => &states[bushing.bodies[end]],
             });
-            let both = self.pull(weld, ends, weld.stiffness.numbers());
-            for ((body, wrench), shifted) in weld.bodies.into_iter().zip(both).zip(&shifted) {
+            let both = self.pull(bushing, ends, bushing.stiffness.numbers());
+            for ((body, wrench), shifted) in bushing.bodies.into_iter().zip(both).zip(&shifted) {
                 wrenches[body] += wrench;
                 if let Some((_, from_com)) = shifted {
                     let force = wrench.fixed_rows::<3>(0).into_owned();
@@ -132,14 +134,14 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// What a weld of this stiffness does to both bodies in these states.
+    /// What a bushing of this stiffness does to both bodies in these states.
     pub(crate) fn pull<T: Scalar>(
         &self,
-        weld: &Weld<S>,
+        bushing: &Bushing<S>,
         states: [&State<T>; 2],
         stiffness: [T; 4],
     ) -> [Vector6<T>; 2] {
-        let pull = Pull { frames: self.frames_from_com(weld) };
+        let pull = Pull { frames: self.frames_from_com(bushing) };
         let mut x = [T::zero(); INPUTS];
         x[..STATE].copy_from_slice(&states[0].coordinates());
         x[STATE..2 * STATE].copy_from_slice(&states[1].coordinates());
@@ -148,23 +150,23 @@ impl<S: Scalar> World<S> {
         [0, 6].map(|from| Vector6::from_column_slice(&both[from..from + 6]))
     }
 
-    /// The frames of a weld, from the centers of mass.
-    fn frames_from_com(&self, weld: &Weld<S>) -> [Isometry3<f64>; 2] {
+    /// The frames of a bushing, from the centers of mass.
+    fn frames_from_com(&self, bushing: &Bushing<S>) -> [Isometry3<f64>; 2] {
         std::array::from_fn(|end| {
-            let com = self.bodies[weld.bodies[end]].com().coords.map(S::value);
-            Translation3::from(-com) * weld.frames[end]
+            let com = self.bodies[bushing.bodies[end]].com().coords.map(S::value);
+            Translation3::from(-com) * bushing.frames[end]
         })
     }
 
-    /// What the springs of welds have stored at `states` \[J\].
-    pub(crate) fn energy_of_welds(&self, states: &[State]) -> f64 {
-        let energy = |weld: &Weld<S>| {
-            let [a, b] = weld.bodies.map(|body| states[body]);
-            let Gap { apart, turn, .. } = Gap::new(&self.frames_from_com(weld), &a, &b);
-            let [linear, _, angular, _] = weld.stiffness.numbers().map(S::value);
+    /// What the springs of bushings have stored at `states` \[J\].
+    pub(crate) fn energy_of_bushings(&self, states: &[State]) -> f64 {
+        let energy = |bushing: &Bushing<S>| {
+            let [a, b] = bushing.bodies.map(|body| states[body]);
+            let Gap { apart, turn, .. } = Gap::new(&self.frames_from_com(bushing), &a, &b);
+            let [linear, _, angular, _] = bushing.stiffness.numbers().map(S::value);
             0.5 * (linear * apart.norm_squared() + angular * turn.norm_squared())
         };
-        self.welds.iter().map(energy).sum()
+        self.bushings.iter().map(energy).sum()
     }
 }
 

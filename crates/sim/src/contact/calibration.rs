@@ -7,22 +7,22 @@ use super::range::ParameterRange;
 ///
 /// The coefficient of restitution that `from_target` of a law takes is that of an impact without gravity
 /// ([`restitution`](crate::contact::restitution)). Under gravity it holds for impacts far faster than √(g δ) for the depth δ at
-/// rest; slower ones bounce less, and at last not at all. Fast ones go deep ([`StaticContactTarget::impact_depth`]): a field
+/// rest; slower ones bounce less, and at last not at all. Fast ones go deep ([`ContactCalibration::impact_depth`]): a field
 /// must have that depth to give, and a corner, whose area is small, goes several times as deep as all of the area together.
 ///
 /// ```
-/// use prehend_sim::{KelvinVoigt, StaticContactTarget};
+/// use prehend_sim::{KelvinVoigt, ContactCalibration};
 ///
 /// // 300 g on 4 cm², half a millimeter deep, that bounces back at 45 % of its speed.
 /// let target =
-///     StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+///     ContactCalibration { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 /// let law = KelvinVoigt::from_target(&target, 0.45)?;
 /// // At 1 m/s it goes 7 mm deep at most.
 /// assert!((target.impact_depth(1.0, 1.0) - 7.1e-3).abs() < 1e-4);
 /// # Ok::<(), prehend_sim::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StaticContactTarget {
+pub struct ContactCalibration {
     /// Mass of the body \[kg\].
     pub mass: f64,
     /// Gravity across the contact \[m/s²\].
@@ -36,7 +36,7 @@ pub struct StaticContactTarget {
     pub contact_area: f64,
 }
 
-impl StaticContactTarget {
+impl ContactCalibration {
     /// Checks that every field is positive.
     ///
     /// # Errors
@@ -126,7 +126,7 @@ mod tests {
                 let mut x = [0.3, 9.81, 5e-4, 4e-4];
                 x[k] = bad;
                 let [mass, gravity, penetration, contact_area] = x;
-                let target = StaticContactTarget { mass, gravity, penetration, contact_area };
+                let target = ContactCalibration { mass, gravity, penetration, contact_area };
                 assert_eq!(target.check().unwrap_err().name(), Some(name));
                 assert!(Hertz::from_target(&target).is_err());
             }

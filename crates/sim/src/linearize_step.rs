@@ -27,7 +27,7 @@ use joint_advance::JointAdvance;
 /// six, a twist about its center of mass along the world's axes, as in [`State::tangent`]; of each joint they are as many as it has
 /// velocities, and along these. Free bodies come first, then articulations, both in their order in the world.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LinearStep {
+pub struct LinearizedStep {
     /// The states after the step.
     pub states: Vec<State>,
     /// Derivatives by the states before it, 2N × 2N.
@@ -44,15 +44,19 @@ impl World {
     ///
     /// # Errors
     /// As [`World::step`].
-    pub fn linear_step(&self, states: &[State], step: Step) -> Result<LinearStep, SimulationError> {
+    pub fn linearize_step(
+        &self,
+        states: &[State],
+        step: Step,
+    ) -> Result<LinearizedStep, SimulationError> {
         let mut states = self.with_deflections(states);
         self.check(&states, step)?;
         if !self.contact_groups.is_empty() {
-            self.place_links(&mut states);
+            self.forward_kinematics(&mut states);
         }
         let near = self.with_neighbors(&states, step);
         if !near.has_closed_form() {
-            return near.linear_step_by_forward_mode(&states, step);
+            return near.linearize_step_by_forward_mode(&states, step);
         }
         let forces = Generalized::new(&near, &mut states, step.index);
         let next = moved(&near, &states, &forces.wrenches, step.dt);
@@ -61,11 +65,15 @@ impl World {
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
         near.bodies_after(&states, &forces, step.dt, &mut by_state, &mut by_force);
         near.joints_after(&next, &forces, step.dt, &mut by_state, &mut by_force);
-        near.finite(LinearStep { states: next, by_state, by_force }, step)
+        near.finite(LinearizedStep { states: next, by_state, by_force }, step)
     }
 
     /// `result`, unless its derivatives overflow.
-    fn finite(&self, result: LinearStep, step: Step) -> Result<LinearStep, SimulationError> {
+    fn finite(
+        &self,
+        result: LinearizedStep,
+        step: Step,
+    ) -> Result<LinearizedStep, SimulationError> {
         match result.by_state.iter().chain(result.by_force.iter()).all(|x| x.is_finite()) {
             true => Ok(result),
             false => Err(self.blown_up(&result.states, step.end())),

@@ -7,7 +7,7 @@ use super::{FrictionCoefficient, FrictionLaw};
 use crate::contact::bristles::Bristles;
 use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, Parameters, Tabulated, entry};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 
 /// Friction with tangential springs: what it holds does not creep, see [`Bristles`]. What only slides is five to ten times cheaper, with
 /// derivatives, under the friction within alone: [`Coulomb`](super::coulomb::Coulomb) says how to choose its slip scale.
@@ -17,14 +17,14 @@ use crate::contact::point::Contact;
 /// deflection counts as five times that slip, which is 98 % of full friction.
 ///
 /// ```
-/// use prehend_sim::{Coulomb, HuntCrossley, Law, Sticking};
+/// use prehend_sim::{Coulomb, HuntCrossley, Law, BristleFriction};
 ///
-/// let friction = Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
+/// let friction = BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 /// let law = Law::new(HuntCrossley { stiffness: 1e9, damping: 1.0, exponent: 1.5 }, friction)?;
 /// # Ok::<(), prehend_sim::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sticking<F> {
+pub struct BristleFriction<F> {
     /// Friction of what slides.
     pub friction: F,
     /// Deflection of full friction \[m\], positive.
@@ -36,7 +36,7 @@ const FULL: f64 = 5.0;
 
 const DEFLECTION: LawParameter = entry!(deflection "m" Positive "deflection of full friction");
 
-impl<F: FrictionCoefficient> Parameters for Sticking<F> {
+impl<F: FrictionCoefficient> Parameters for BristleFriction<F> {
     type Params<T: Copy> = F::Params<T>;
 
     fn values(&self) -> Self::Params<f64> {
@@ -53,7 +53,7 @@ impl<F: FrictionCoefficient> Parameters for Sticking<F> {
     }
 }
 
-impl<F: FrictionCoefficient + Tabulated> Tabulated for Sticking<F> {
+impl<F: FrictionCoefficient + Tabulated> Tabulated for BristleFriction<F> {
     type Constants<T: Copy> = (F::Constants<T>, [T; 1]);
 
     const SUMMARY: &'static str = "friction that holds";
@@ -70,13 +70,13 @@ impl<F: FrictionCoefficient + Tabulated> Tabulated for Sticking<F> {
     }
 }
 
-impl<F: FrictionCoefficient> FrictionLaw for Sticking<F> {
+impl<F: FrictionCoefficient> FrictionLaw for BristleFriction<F> {
     #[inline]
     fn force<S: Scalar>(
         &self,
         p: Self::Params<S>,
         normal_force: S,
-        contact: &Contact<S>,
+        contact: &ContactKinematics<S>,
     ) -> Vector3<S> {
         self.friction.isotropic_force(p, normal_force, &contact.slip)
     }
@@ -101,15 +101,16 @@ mod tests {
         TimeSteps, World,
     };
 
-    const FRICTION: Sticking<Coulomb> =
-        Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
+    const FRICTION: BristleFriction<Coulomb> =
+        BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 
     /// 200 g on four feet that rest on the floor.
     fn stool(gravity: Vector3<f64>) -> (World, Vec<State>) {
         let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin()).unwrap();
         let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
             .map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.01));
-        let stool = Body::free("stool", rigid).with_surface(Surface::uniform(&feet, 4e-4).unwrap());
+        let stool =
+            Body::dynamic("stool", rigid).with_surface(Surface::uniform(&feet, 4e-4).unwrap());
         let law = Arc::new(sticking(1e7, 1e5, 0.5, 1e-2));
         let smoothing = GapSmoothing::Softplus { width: 5e-5 };
         let world = on_ground(gravity, floor(), stool, law, smoothing);
@@ -124,7 +125,7 @@ mod tests {
         check_law(&Law::new(KelvinVoigt { stiffness, damping }, FRICTION).unwrap(), &claims);
         let normal = HuntCrossley { stiffness: 1e9, damping: 0.5, exponent: 1.5 };
         check_law(&Law::new(normal, FRICTION).unwrap(), &claims);
-        let error = Law::new(normal, Sticking { deflection: 0.0, ..FRICTION }).unwrap_err();
+        let error = Law::new(normal, BristleFriction { deflection: 0.0, ..FRICTION }).unwrap_err();
         assert_eq!(error.name(), Some("deflection"));
     }
 

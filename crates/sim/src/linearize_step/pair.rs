@@ -9,8 +9,8 @@ use crate::contact::wrench::stack;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
-use crate::world::weld::Weld;
 
 /// A force between two bodies.
 pub(super) struct Between {
@@ -67,18 +67,18 @@ impl Between {
         Some(Self::reacting(bodies, on[0], [own, other], &arm, place))
     }
 
-    /// What a weld does.
-    pub(super) fn weld(world: &World, weld: &Weld, states: &[State]) -> Self {
+    /// What a bushing does.
+    pub(super) fn bushing(world: &World, bushing: &Bushing, states: &[State]) -> Self {
         let inputs = Fwd::<24>::variables([0.0; 24]);
         let [a, b] = [0, 1].map(|end| {
-            states[weld.bodies[end]].retract(&std::array::from_fn(|i| inputs[12 * end + i]))
+            states[bushing.bodies[end]].retract(&std::array::from_fn(|i| inputs[12 * end + i]))
         });
-        let both = world.pull(weld, [&a, &b], weld.stiffness.numbers().map(Fwd::constant));
+        let both = world.pull(bushing, [&a, &b], bushing.stiffness.numbers().map(Fwd::constant));
         let on = both.map(|wrench| wrench.map(|x| x.value));
         let by = both.map(|wrench| {
             [0, 12].map(|lane| SMatrix::from_fn(|i, j| wrench[i].derivative[lane + j]))
         });
-        Self { bodies: weld.bodies, on, by }
+        Self { bodies: bushing.bodies, on, by }
     }
 
     /// With the reaction −f, −(τ + r×f) at the other end, r to the first from there, which changes by `places` with the places of both.

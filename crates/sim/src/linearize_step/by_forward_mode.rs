@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 
-use super::LinearStep;
+use super::LinearizedStep;
 use super::generalized::Generalized;
 use crate::articulated::Joint;
 use crate::error::SimulationError;
@@ -13,20 +13,20 @@ use crate::time::Step;
 use crate::world::World;
 
 impl World {
-    /// [`World::linear_step`] by forward mode, direction by direction: what its closed form is tested against.
+    /// [`World::linearize_step`] by forward mode, direction by direction: what its closed form is tested against.
     ///
     /// # Errors
     /// As there.
     #[doc(hidden)]
-    pub fn linear_step_by_forward_mode(
+    pub fn linearize_step_by_forward_mode(
         &self,
         states: &[State],
         step: Step,
-    ) -> Result<LinearStep, SimulationError> {
+    ) -> Result<LinearizedStep, SimulationError> {
         let next = self.step(&SemiImplicitEuler, states, step)?;
         let n = self.degrees_of_freedom();
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
-        let lifted = self.lift::<Fwd<1>>();
+        let lifted = self.cast::<Fwd<1>>();
         let zeros = vec![Fwd::<1>::constant(0.0); 2 * n];
         for column in 0..2 * n {
             let mut along = zeros.clone();
@@ -47,10 +47,10 @@ impl World {
         let forces = Generalized::without_forces(self, states);
         let mut scratch = DMatrix::zeros(2 * n, 2 * n);
         self.joints_after(&next, &forces, step.dt, &mut scratch, &mut by_force);
-        self.finite(LinearStep { states: next, by_state, by_force }, step)
+        self.finite(LinearizedStep { states: next, by_state, by_force }, step)
     }
 
-    /// N of [`LinearStep`].
+    /// N of [`LinearizedStep`].
     fn degrees_of_freedom(&self) -> usize {
         6 * self.free_bodies().len() + self.joints().map(Joint::freedoms).sum::<usize>()
     }
@@ -58,7 +58,7 @@ impl World {
     /// The states displaced and sped up by `along`.
     fn displaced<S: Scalar>(&self, states: &[State], along: &[S]) -> Vec<State<S>> {
         let n = self.degrees_of_freedom();
-        let mut displaced: Vec<State<S>> = states.iter().map(State::lift).collect();
+        let mut displaced: Vec<State<S>> = states.iter().map(State::cast).collect();
         let mut first = 0;
         for body in self.free_bodies() {
             let part = |i: usize| if i < 6 { along[first + i] } else { along[n + first + i - 6] };
@@ -75,11 +75,11 @@ impl World {
             displaced[place] = joint.write(&moved, &v);
             first += count;
         }
-        self.lift::<S>().place_links(&mut displaced);
+        self.cast::<S>().forward_kinematics(&mut displaced);
         displaced
     }
 
-    /// The derivatives of `after`, whose values are `next`, along the coordinates of a [`LinearStep`].
+    /// The derivatives of `after`, whose values are `next`, along the coordinates of a [`LinearizedStep`].
     fn displacements(&self, next: &[State], after: &[State<Fwd<1>>]) -> Vec<f64> {
         let (mut displacements, mut velocities) = (Vec::<f64>::new(), Vec::<f64>::new());
         for body in self.free_bodies() {
