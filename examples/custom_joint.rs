@@ -17,7 +17,7 @@ const GRAVITY: f64 = 9.81;
 struct Cycloid;
 
 impl JointModel for Cycloid {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         1
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {

@@ -29,7 +29,7 @@ pub(crate) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
     for _ in 0..CONTACTS {
         let mut spread = || 2.0 * random.uniform() - 1.0;
         let at = [
-            contact_point.law.reach() - DEPTH * (1.0 + 0.9 * spread()),
+            contact_point.law.cutoff() - DEPTH * (1.0 + 0.9 * spread()),
             0.5 * spread(),
             0.2 * spread(),
             0.2 * spread(),
@@ -50,7 +50,7 @@ pub(crate) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
             by_parameters.push(differs(&lifted(contact_point, &at, p, Some(k)), moved, &[step]));
         }
     }
-    let rest = [contact_point.law.reach() - DEPTH, 0.0, 0.0, 0.0];
+    let rest = [contact_point.law.cutoff() - DEPTH, 0.0, 0.0, 0.0];
     let at_rest = lifted(contact_point, &rest, contact_point.law.params(), None);
     finite &= at_rest.as_flattened().iter().all(|x| x.is_finite());
     let finding = |what: &str, wrong: &[bool]| {

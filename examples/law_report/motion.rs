@@ -80,7 +80,7 @@ impl Specimen<'_> {
         let rigid = RigidBody::new(self.mass, inertia, Point3::origin()).map_err(failed)?;
         let surface = Surface::uniform(&[Point3::origin()], AREA).map_err(failed)?;
         let mut world = World::new(gravity);
-        let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.reach() };
+        let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.cutoff() };
         let field = world.add(Body::fixed("plane").with_field(Arc::new(plane)));
         let samples = world.add(Body::dynamic("specimen", rigid).with_surface(surface));
         let bodies = ContactBodies { samples, field };

@@ -21,7 +21,7 @@ impl PointContact<'_> {
         normal_speed: f64,
         slip: Vector3<f64>,
     ) -> ContactForce<f64> {
-        let (gap, normal) = (self.law.reach() - depth, Vector3::z());
+        let (gap, normal) = (self.law.cutoff() - depth, Vector3::z());
         let contact = ContactKinematics { gap, normal_speed, slip, normal, area: AREA };
         match depth > 0.0 {
             true => self.law.force(self.law.params(), &contact),

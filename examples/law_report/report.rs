@@ -104,7 +104,7 @@ mod tests {
             let normal = (-p[0] * contact.gap).times(contact.area);
             ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
         }
-        fn reach(&self) -> f64 {
+        fn cutoff(&self) -> f64 {
             0.0
         }
     }
@@ -137,7 +137,7 @@ mod tests {
             let normal = (-stiffness * gap).times(contact.area);
             ContactForce { normal, tangential: contact.slip.map(|_| S::zero()) }
         }
-        fn reach(&self) -> f64 {
+        fn cutoff(&self) -> f64 {
             0.0
         }
     }

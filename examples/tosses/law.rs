@@ -37,7 +37,7 @@ impl ContactLaw for CubeLaw {
         ContactForce { normal, tangential: contact.slip * scale }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

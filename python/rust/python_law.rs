@@ -126,7 +126,7 @@ impl ContactLaw for PythonLaw {
         ContactForce { normal, tangential: Vector3::new(x, y, z) }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         self.reach
     }
 }

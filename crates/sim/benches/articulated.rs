@@ -53,8 +53,8 @@ fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, 
     let ranges: Vec<_> = (0..tree.links().len()).map(|link| tree.range(link)).collect();
     let bodies = world.add_articulation(tree.links().to_vec())?;
     let mut states = world.neutral_states();
-    for (body, [coordinates, freedoms]) in bodies.iter().zip(ranges) {
-        world.set_joint(&mut states, *body, &q[coordinates], &v[freedoms])?;
+    for (body, [coordinates, dofs]) in bodies.iter().zip(ranges) {
+        world.set_joint(&mut states, *body, &q[coordinates], &v[dofs])?;
     }
     let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
     let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
@@ -86,7 +86,7 @@ fn time(name: &str, mut evaluate: impl FnMut()) {
 
 fn main() -> anyhow::Result<()> {
     for (name, tree) in [("7", tree(7, false)?), ("36", tree(30, true)?)] {
-        let n = tree.freedoms();
+        let n = tree.nv();
         let vector = |phase: f64| (0..n).map(|k| (k as f64 + phase).sin()).collect::<Vec<f64>>();
         let (q, v, tau) = (tree.moved(&tree.neutral(), &vector(0.3)), vector(0.7), vector(1.1));
         let of = |what: &str| format!("{what}, {name} degrees of freedom");

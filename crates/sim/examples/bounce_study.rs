@@ -50,7 +50,7 @@ impl ContactLaw for Power {
         ContactForce { normal, tangential: Vector3::zeros() }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

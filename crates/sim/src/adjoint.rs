@@ -49,24 +49,24 @@ use crate::world::trajectory::plain;
 /// ```
 #[derive(Debug)]
 pub struct StepCheckpointed<I> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
 }
 
 /// What all steps, or all worlds of a batch, share.
 #[derive(Debug)]
-pub(crate) struct Scene<I> {
+pub(crate) struct WorldTemplate<I> {
     pub(crate) integrator: I,
     world: World,
     parameters: Vec<f64>,
 }
 
-/// Parameters of a world that are not its scene's constants, by their places.
-pub(crate) struct Changes<S> {
+/// Parameters of a world that are not its template's constants, by their places.
+pub(crate) struct ParameterDelta<S> {
     pub(crate) places: Box<[u32]>,
     pub(crate) values: Vec<S>,
 }
 
-impl<I: Integrator> Scene<I> {
+impl<I: Integrator> WorldTemplate<I> {
     pub(crate) fn new<S: Scalar>(
         integrator: I,
         world: &World<S>,
@@ -76,16 +76,16 @@ impl<I: Integrator> Scene<I> {
         Ok(Arc::new(Self { world: world.map(S::value), parameters, integrator }))
     }
 
-    pub(crate) fn plain_world(&self) -> &World {
+    pub(crate) fn world_values(&self) -> &World {
         &self.world
     }
 
-    pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
+    pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> ParameterDelta<S> {
         let changed = |x: S, own: f64| x.value() != own || !x.is_constant();
         let all = (0..).zip(world.parameters()).zip(&self.parameters);
         let changes = all.filter(|((_, x), own)| changed(*x, **own)).map(|(change, _)| change);
         let (places, values): (Vec<u32>, _) = changes.unzip();
-        Changes { places: places.into(), values }
+        ParameterDelta { places: places.into(), values }
     }
 
     /// Whether `world` differs in parameters only.
@@ -93,7 +93,7 @@ impl<I: Integrator> Scene<I> {
         has_parts_of(world, &self.world)
     }
 
-    /// This scene's world with `values` at `places`.
+    /// This template's world with `values` at `places`.
     pub(crate) fn world<S: Scalar>(
         &self,
         places: &[u32],
@@ -116,12 +116,12 @@ impl<I: Integrator> StepCheckpointed<I> {
     /// # Errors
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
     pub fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self, SimulationError> {
-        Ok(Self { scene: Scene::new(integrator, world)? })
+        Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
-    /// Of a world of `scene`.
-    pub(crate) fn of(scene: &Arc<Scene<I>>) -> Self {
-        Self { scene: Arc::clone(scene) }
+    /// Of a world of `template`.
+    pub(crate) fn of(template: &Arc<WorldTemplate<I>>) -> Self {
+        Self { template: Arc::clone(template) }
     }
 }
 
@@ -136,28 +136,28 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         if S::ORDER == 0 {
-            return world.stepped(&self.scene.integrator, states, step);
+            return world.integrate(&self.template.integrator, states, step);
         }
         world.check_trajectories()?;
-        if !self.scene.is_of(world) {
+        if !self.template.is_of(world) {
             return Err(SimulationError::AnotherWorld);
         }
         self.check_differentiable(world)?;
-        let (function, x) = OneStep::new(&self.scene, world, states, step);
+        let (function, x) = OneStep::new(&self.template, world, states, step);
         let after = S::recompute(function, &x)?;
         Ok(with_moved(world, states, &after))
     }
 
     fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
-        self.scene.integrator.check_differentiable(world)
+        self.template.integrator.check_differentiable(world)
     }
 
     fn stability_limit(&self) -> f64 {
-        self.scene.integrator.stability_limit()
+        self.template.integrator.stability_limit()
     }
 
     fn controls_error(&self) -> bool {
-        self.scene.integrator.controls_error()
+        self.template.integrator.controls_error()
     }
 
     fn finds_contacts(&self) -> bool {
@@ -166,24 +166,24 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
 }
 
 /// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies and of
-/// contacts that stick.
+/// contacts with bristles.
 pub(crate) struct OneStep<I> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
     places: Box<[u32]>,
     step: Step,
 }
 
 impl<I: Integrator> OneStep<I> {
-    /// `step` from `states` in `world`, one of the worlds of `scene`, and the numbers that it is a function of.
+    /// `step` from `states` in `world`, one of the worlds of `template`, and the numbers that it is a function of.
     pub(crate) fn new<S: Scalar>(
-        scene: &Arc<Scene<I>>,
+        template: &Arc<WorldTemplate<I>>,
         world: &World<S>,
         states: &[State<S>],
         step: Step,
     ) -> (Self, Vec<S>) {
-        let Changes { places, values } = scene.changes(world);
+        let ParameterDelta { places, values } = template.changes(world);
         let x = coordinates_of(states).chain(values).collect();
-        (Self { scene: Arc::clone(scene), places, step }, x)
+        (Self { template: Arc::clone(template), places, step }, x)
     }
 }
 
@@ -205,10 +205,10 @@ impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {
     type Error = SimulationError;
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
-        let (states, values) = x.split_at(STATE * self.scene.world.state_count());
-        let world = self.scene.world(&self.places, values)?;
+        let (states, values) = x.split_at(STATE * self.template.world.state_count());
+        let world = self.template.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
-        let next = world.stepped(&self.scene.integrator, &states, self.step)?;
+        let next = world.integrate(&self.template.integrator, &states, self.step)?;
         let moved = next.into_iter().enumerate().filter(|(index, _)| world.moves_by_forces(*index));
         Ok(moved.flat_map(|(_, state)| state.coordinates()).collect())
     }

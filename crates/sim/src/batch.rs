@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Recompute, Scalar};
 
-use crate::adjoint::{Changes, Scene, StepCheckpointed};
+use crate::adjoint::{ParameterDelta, StepCheckpointed, WorldTemplate};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
@@ -52,7 +52,7 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct Batch<I = Adaptive> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
 }
 
 impl Batch {
@@ -74,7 +74,7 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         integrator: I,
         world: &World<S>,
     ) -> Result<Self, SimulationError> {
-        Ok(Self { scene: Scene::new(integrator, world)? })
+        Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
     /// Where each of `variants`, a world and the states that it starts from, is after `time_steps`, as
@@ -115,15 +115,16 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         time_steps: TimeSteps,
     ) -> Result<(Run<I>, Vec<S>), SimulationError> {
         world.check_trajectories()?;
-        if !self.scene.is_of(world) {
+        if !self.template.is_of(world) {
             return Err(SimulationError::AnotherWorld);
         }
         if S::ORDER > 0 {
-            self.scene.integrator.check_differentiable(world)?;
+            self.template.integrator.check_differentiable(world)?;
         }
-        let Changes { places, values } = self.scene.changes(world);
+        let ParameterDelta { places, values } = self.template.changes(world);
         let numbers = coordinates_of(states).chain(values).collect();
-        let run = Run { scene: Arc::clone(&self.scene), places, states: states.len(), time_steps };
+        let run =
+            Run { template: Arc::clone(&self.template), places, states: states.len(), time_steps };
         Ok((run, numbers))
     }
 }
@@ -133,7 +134,7 @@ const FEW: usize = 2000;
 
 /// A simulation as a function of the states' coordinates and of the world's parameters at `places`, to the states at its end.
 struct Run<I> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
     places: Box<[u32]>,
     /// How many states it starts from.
     states: usize,
@@ -145,19 +146,20 @@ impl<I: Integrator + Send + 'static> Recompute for Run<I> {
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
         let (states, values) = x.split_at(STATE * self.states);
-        let world = self.scene.world(&self.places, values)?;
+        let world = self.template.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
         // Few steps are recorded as they are, of many one at a time.
         let TimeSteps { steps, .. } = self.time_steps;
         let few = steps == 1
-            || steps.saturating_mul(states.len()) <= FEW && !self.scene.integrator.controls_error();
+            || steps.saturating_mul(states.len()) <= FEW
+                && !self.template.integrator.controls_error();
         let end = match S::RECORDED && !few {
             true => {
-                let steps = StepCheckpointed::of(&self.scene);
+                let steps = StepCheckpointed::of(&self.template);
                 world.simulate_with(&steps, &states, self.time_steps, |_, _| ())
             }
             false => {
-                let integrator = &self.scene.integrator;
+                let integrator = &self.template.integrator;
                 world.simulate_with(integrator, &states, self.time_steps, |_, _| ())
             }
         };

@@ -164,7 +164,7 @@ impl<S: Scalar> RigidBody<S> {
     /// Velocity of the center of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
     /// center of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
     #[inline]
-    pub(crate) fn kicked(
+    pub(crate) fn apply_impulse(
         &self,
         state: &State<S>,
         wrench: &Vector6<S>,

@@ -45,7 +45,7 @@ impl World {
     /// # Panics
     /// If there are fewer states than bodies and joints.
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
-        let lifted = self.with_touching(states, 0.0).plain().cast::<Fwd<12>>();
+        let lifted = self.with_touching(states, 0.0).to_f64().cast::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
         let UnitMotions { motions, roots, size } = self.unit_motions(states);
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
@@ -85,7 +85,8 @@ impl World {
         }
         let (stiffness, damping) = (largest(stiffness), largest(damping));
         // Bristles are springs behind the damping of friction.
-        let bristles = self.sticking().map(|(_, bristles)| bristles.fastest()).fold(0.0, f64::max);
+        let bristles =
+            self.bristle_contacts().map(|(_, bristles)| bristles.fastest()).fold(0.0, f64::max);
         let fastest = if damping > 0.0 { damping.max(bristles) } else { damping };
         let frequency = (stiffness + damping * bristles).sqrt();
         if frequency.is_nan() { frequency } else { fastest.max(frequency) }
@@ -121,10 +122,10 @@ impl World {
         roots: &[(usize, DMatrix<f64>)],
     ) -> Vec<(usize, DVector<f64>, [f64; 2])> {
         let slopes = |force: &JointForce| {
-            let Along { articulation, freedoms, position, velocity } = self.along(force, states)?;
+            let Along { articulation, dofs, position, velocity } = self.along(force, states)?;
             let (first, root) = &roots[articulation];
             let mut along = DVector::zeros(root.nrows());
-            freedoms.iter().for_each(|(freedom, factor)| along[*freedom] += factor);
+            dofs.iter().for_each(|(dof, factor)| along[*dof] += factor);
             let effort = force.law().effort_by_motion(force.params(), position, velocity);
             Some((*first, root.tr_mul(&along), effort.derivative))
         };

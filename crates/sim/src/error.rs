@@ -122,7 +122,7 @@ pub enum SimulationError {
     },
     /// States and bodies differ in number.
     #[error(
-        "{states} states for {bodies} bodies, {joints} joints and {sticking} contacts that stick"
+        "{states} states for {bodies} bodies, {joints} joints and {bristles} contacts with bristles"
     )]
     States {
         /// How many states.
@@ -132,7 +132,7 @@ pub enum SimulationError {
         /// How many joints of articulations, whose states follow those of the bodies.
         joints: usize,
         /// How many contacts have a deflection, whose states come last.
-        sticking: usize,
+        bristles: usize,
     },
     /// A number of an integrator is out of its range.
     #[error("{setting} must be {range}, is {value}")]

@@ -39,7 +39,7 @@ pub struct LinearizedStep {
 impl World {
     /// A step of [`SemiImplicitEuler`] with its Jacobian.
     ///
-    /// Contacts that stick are as they are given, their deflections are no rows. Where there are such contacts, laws along spherical joints or joint
+    /// Contacts with bristles are as they are given, their deflections are no rows. Where there are such contacts, laws along spherical joints or joint
     /// types of one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
     ///
     /// # Errors
@@ -54,13 +54,13 @@ impl World {
         if !self.contact_groups.is_empty() {
             self.forward_kinematics(&mut states);
         }
-        let near = self.with_neighbors(&states, step);
+        let near = self.with_candidates(&states, step);
         if !near.has_closed_form() {
             return near.linearize_step_by_forward_mode(&states, step);
         }
         let forces = Generalized::new(&near, &mut states, step.index);
         let next = moved(&near, &states, &forces.wrenches, step.dt);
-        let next = near.arrived(&states, next, step.end())?;
+        let next = near.finish_step(&states, next, step.end())?;
         let n = forces.count;
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
         near.bodies_after(&states, &forces, step.dt, &mut by_state, &mut by_force);
@@ -140,7 +140,7 @@ impl World {
         for (place, joint) in self.joint_places().zip(self.joints()) {
             let state = &next[place];
             let JointAdvance { of_place, of_velocity } = JointAdvance::new(joint, state, dt);
-            let count = joint.freedoms();
+            let count = joint.nv();
             let velocity = by_state.rows(n + row, count).into_owned();
             by_state.rows_mut(row, count).copy_from(&(&of_velocity * velocity));
             let mut view = by_state.view_mut((row, row), (count, count));
@@ -157,7 +157,7 @@ impl World {
         let curved = |(axis, _): &(JointAxis, f64)| {
             self.link(axis.link).is_ok_and(|link| matches!(link.joint, Joint::Spherical))
         };
-        self.sticking().next().is_none()
+        self.bristle_contacts().next().is_none()
             && !self.joints().any(|joint| matches!(joint, Joint::Custom(_)))
             && !self.joint_forces.iter().flat_map(|force| &force.axes).any(curved)
             && !self.joint_forces.iter().any(|force| force.path.is_some() || force.input.is_some())

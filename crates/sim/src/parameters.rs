@@ -89,7 +89,7 @@ impl<S: Scalar> World<S> {
             own.tree.check_numbers()?;
         }
         world.gravity = Vector3::from_fn(|_, _| next());
-        let pairs = world.kinds_of_contact_mut();
+        let pairs = world.contact_materials_mut();
         pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
         let forces = world.joint_forces.iter_mut();
         forces.flat_map(|force| force.params_mut()).for_each(|p| *p = next());
@@ -101,7 +101,7 @@ impl<S: Scalar> World<S> {
 
     /// The parameters of the laws of contacts and groups.
     fn contact_params(&self) -> impl Iterator<Item = &S> {
-        self.kinds_of_contact().flat_map(|pair| pair.params())
+        self.contact_materials().flat_map(|pair| pair.params())
     }
 }
 

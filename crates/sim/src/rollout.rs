@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 
 use prehend_autodiff::Scalar;
 
-use crate::audit::{Audit, Resolution};
-use crate::broad_phase::BroadPhase;
+use crate::diagnostics::{Diagnostics, Resolution};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
+use crate::sample_culling::SampleCulling;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
@@ -53,7 +53,7 @@ impl<C: ControlResult, E: Into<SimulationError>> ControlResult for Result<C, E> 
 impl<S: Scalar> World<S> {
     /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
     ///
-    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts that stick
+    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts with bristles
     /// ([`Bristles`](crate::Bristles)), if there are such. What goes on
     /// from there remembers them; with the states of the bodies alone it starts without deflection.
     ///
@@ -102,23 +102,23 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
         visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        self.audited(integrator, self.begin(initial, time_steps)?, time_steps, visit)
+        self.run_checked(integrator, self.initialize(initial, time_steps)?, time_steps, visit)
     }
 
     /// [`World::simulate_with`] of what has begun.
-    pub(crate) fn audited(
+    pub(crate) fn run_checked(
         &self,
         integrator: &impl Integrator,
         initial: Vec<State<S>>,
         time_steps: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        let mut audit = Audit::new(self, &initial, integrator.controls_error());
-        let states = self.march(integrator, initial, time_steps, |step, states| {
+        let mut diagnostics = Diagnostics::new(self, &initial, integrator.controls_error());
+        let states = self.run_steps(integrator, initial, time_steps, |step, states| {
             visit(step, states);
-            audit.step(step, states)
+            diagnostics.step(step, states)
         })?;
-        let resolution = audit.finish(time_steps, &states)?;
+        let resolution = diagnostics.finish(time_steps, &states)?;
         Ok(Simulation { states, resolution })
     }
 
@@ -132,11 +132,12 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
-        let initial = self.begin(initial, time_steps)?;
+        let initial = self.initialize(initial, time_steps)?;
         let mut states = room_for(time_steps.steps)?;
         states.push(initial.clone());
         let keep = |_, next: &[State<S>]| states.push(next.to_vec());
-        let Simulation { resolution, .. } = self.audited(integrator, initial, time_steps, keep)?;
+        let Simulation { resolution, .. } =
+            self.run_checked(integrator, initial, time_steps, keep)?;
         Ok(Simulation { states, resolution })
     }
 
@@ -209,7 +210,7 @@ impl<S: Scalar> World<S> {
         mut control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
         mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let (mut states, mut world) = (self.begin(initial, time_steps)?, self.clone());
+        let (mut states, mut world) = (self.initialize(initial, time_steps)?, self.clone());
         let TimeSteps { dt, steps } = time_steps;
         for index in 0..steps {
             let step = Step::new(index, dt);
@@ -224,14 +225,14 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::simulate_with`] of what has begun, without the report; an error of `visit` ends it.
-    pub(crate) fn march(
+    pub(crate) fn run_steps(
         &self,
         integrator: &impl Integrator,
         mut states: Vec<State<S>>,
         TimeSteps { dt, steps }: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]) -> Result<(), SimulationError>,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut near = BroadPhase::new(self);
+        let mut near = SampleCulling::new(self);
         for index in 0..steps {
             let step = Step::new(index, dt);
             let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
@@ -265,15 +266,15 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let next = self.stepped(integrator, states, step)?;
-        self.arrived(states, next, step.end())
+        let next = self.integrate(integrator, states, step)?;
+        self.finish_step(states, next, step.end())
     }
 
     /// `next` at `time` \[s\], with driven bodies and links where they are then, after a step from `states`.
     ///
     /// # Errors
     /// If one is not finite.
-    pub(crate) fn arrived(
+    pub(crate) fn finish_step(
         &self,
         states: &[State<S>],
         mut next: Vec<State<S>>,
@@ -287,7 +288,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The integrator's step, among the contacts of groups that may touch within it.
-    pub(crate) fn stepped(
+    pub(crate) fn integrate(
         &self,
         integrator: &impl Integrator,
         states: &[State<S>],
@@ -296,7 +297,7 @@ impl<S: Scalar> World<S> {
         if self.contact_groups.is_empty() || integrator.finds_contacts() {
             return integrator.step(self, states, step);
         }
-        let near = self.with_neighbors(states, step);
+        let near = self.with_candidates(states, step);
         integrator.step(&near, states, step)
     }
 
@@ -304,7 +305,7 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
-    pub(crate) fn begin(
+    pub(crate) fn initialize(
         &self,
         initial: &[State<S>],
         TimeSteps { dt, steps }: TimeSteps,
@@ -325,7 +326,7 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        self.kinds_of_contact().try_for_each(ContactPair::check)?;
+        self.contact_materials().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
         self.check_bushings()?;
         match states.iter().all(State::is_finite) {
@@ -363,7 +364,7 @@ mod tests {
         };
         assert_eq!(
             step(&world, &states[..1], 1e-3),
-            SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 }
+            SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 }
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
@@ -454,7 +455,7 @@ mod tests {
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();
-        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 });
+        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 });
         let mut lost = states.clone();
         lost[1].linear = Vector3::repeat(f64::NAN);
         let error = roll(&lost, 1e-3).unwrap_err();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
-use crate::adjoint::Scene;
+use crate::adjoint::WorldTemplate;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
@@ -18,7 +18,7 @@ use crate::world::World;
 /// [parameters](World::parameters), and of others that a controller sets before each step.
 ///
 /// A state is a row of 13 numbers: position x, y, z \[m\], unit quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
-/// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts that stick, as in
+/// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts with bristles, as in
 /// [`World::neutral_states`]. The rows of links follow from those of joints.
 ///
 /// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
@@ -47,7 +47,7 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct RolloutFunction<I = Adaptive> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
     time_steps: TimeSteps,
     /// Places of the parameters among all, then of the controls.
     places: Box<[u32]>,
@@ -119,13 +119,13 @@ impl<I: Integrator> RolloutFunction<I> {
         if time_steps.steps == 0 {
             return Err(SimulationError::Inputs { what: "steps", given: 0, expected: 1 });
         }
-        let scene = Scene::new(integrator, world)?;
-        Ok(Self { scene, time_steps, places: places.into(), parameters: parameters.len() })
+        let template = WorldTemplate::new(integrator, world)?;
+        Ok(Self { template, time_steps, places: places.into(), parameters: parameters.len() })
     }
 
     /// The world as it was given.
     pub fn world(&self) -> &World {
-        self.scene.plain_world()
+        self.template.world_values()
     }
 
     /// The steps.
@@ -138,7 +138,7 @@ impl<I: Integrator> RolloutFunction<I> {
         [self.parameters, self.places.len() - self.parameters]
     }
 
-    /// How many numbers all states are at one time: 13 for each body, joint and contact that sticks.
+    /// How many numbers all states are at one time: 13 for each body, joint and contact with bristles.
     pub fn width(&self) -> usize {
         STATE * self.world().state_count()
     }
@@ -159,7 +159,7 @@ impl<I: Integrator> RolloutFunction<I> {
         if !reserved {
             return Err(SimulationError::Memory { steps: self.time_steps.steps });
         }
-        self.march(inputs, |states| run.extend(coordinates_of(states)))?;
+        self.run_steps(inputs, |states| run.extend(coordinates_of(states)))?;
         Ok(run)
     }
 
@@ -168,28 +168,28 @@ impl<I: Integrator> RolloutFunction<I> {
     /// # Errors
     /// See [`RolloutFunction::evaluate`].
     pub fn end<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>, SimulationError> {
-        Ok(coordinates_of(&self.march(inputs, |_| ())?).collect())
+        Ok(coordinates_of(&self.run_steps(inputs, |_| ())?).collect())
     }
 
     /// The states at the end; those at the start and after each step go to `visit`.
-    fn march<S: Scalar>(
+    fn run_steps<S: Scalar>(
         &self,
         inputs: RolloutInputs<'_, S>,
         mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
         self.check(&inputs)?;
-        let (integrator, time_steps) = (&self.scene.integrator, self.time_steps);
+        let (integrator, time_steps) = (&self.template.integrator, self.time_steps);
         let initial: Vec<State<S>> = states_of(inputs.states).collect();
-        let world = self.scene.world(&self.places, &self.values_at(&inputs, 0))?;
-        let mut states = world.begin(&initial, time_steps)?;
+        let world = self.template.world(&self.places, &self.values_at(&inputs, 0))?;
+        let mut states = world.initialize(&initial, time_steps)?;
         visit(&states);
         let [_, controls] = self.inputs();
         if controls == 0 {
             let follow = |_, states: &[State<S>]| visit(states);
-            return Ok(world.audited(integrator, states, time_steps, follow)?.states);
+            return Ok(world.run_checked(integrator, states, time_steps, follow)?.states);
         }
         for step in self.steps() {
-            let world = self.scene.world(&self.places, &self.values_at(&inputs, step.index))?;
+            let world = self.template.world(&self.places, &self.values_at(&inputs, step.index))?;
             world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
             visit(&states);
@@ -250,7 +250,7 @@ impl<I: Integrator> RolloutFunction<I> {
         adjoints: &[f64],
     ) -> Result<RolloutGradient, SimulationError> {
         self.check(&inputs)?;
-        self.scene.integrator.check_differentiable(self.world())?;
+        self.template.integrator.check_differentiable(self.world())?;
         let (width, steps) = (self.width(), self.time_steps.steps);
         let expected = width * (steps + 1);
         for (what, given) in [("numbers of a run", run.len()), ("adjoints", adjoints.len())] {
@@ -271,14 +271,14 @@ impl<I: Integrator> RolloutFunction<I> {
             let states = &run[before.clone()];
             let [by_before, by_values] =
                 self.pull_back(&inputs, step.index, states, &by_states, |world, states| {
-                    world.advance(&self.scene.integrator, states, step)
+                    world.advance(&self.template.integrator, states, step)
                 })?;
             add(step.index, &by_values);
             by_states = by_before;
             by_states.iter_mut().zip(&adjoints[before]).for_each(|(by, own)| *by += own);
         }
         let begin =
-            |world: &World<Var>, states: &[State<Var>]| world.begin(states, self.time_steps);
+            |world: &World<Var>, states: &[State<Var>]| world.initialize(states, self.time_steps);
         let [states, by_values] = self.pull_back(&inputs, 0, inputs.states, &by_states, begin)?;
         add(0, &by_values);
         Ok(RolloutGradient { states, parameters: by_parameters, controls: by_controls })
@@ -302,7 +302,7 @@ impl<I: Integrator> RolloutFunction<I> {
         let recording = Recording::start();
         let states = recording.variables_of(before);
         let values = recording.variables_of(&values);
-        let world = self.scene.world(&self.places, &values)?;
+        let world = self.template.world(&self.places, &values)?;
         let after = change(&world, &states_of(&states).collect::<Vec<_>>())?;
         let seeds = coordinates_of(&after).zip(adjoints.iter().copied());
         let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();

@@ -53,7 +53,7 @@ impl<S: Scalar> State<S> {
 
     /// What an observer in `frame` sees, who moves and turns with it: `self` along the axes of `frame`.
     #[inline]
-    pub fn seen_from(&self, frame: &Self) -> Self {
+    pub fn relative_to(&self, frame: &Self) -> Self {
         let to_frame = frame.pose.rotation.inverse();
         let offset = self.pose.translation.vector - frame.pose.translation.vector;
         let linear = self.linear - frame.linear - frame.angular.cross(&offset);
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn the_view_from_a_moving_frame_is_the_derivative_of_the_relative_pose() {
         let (body, frame) = (state(0.7), state(-0.4));
-        let seen = body.seen_from(&frame);
+        let seen = body.relative_to(&frame);
         // Both move on for a moment: where the body's points go in the frame is what the view says.
         let point = Vector3::new(0.2, -0.1, 0.3);
         let position = |time: f64| {
@@ -213,12 +213,12 @@ mod tests {
     #[test]
     fn derivatives_of_the_view_match_differences() {
         let (body, frame) = (state(0.7), state(-0.4));
-        let seen = body.variables().seen_from(&frame.cast()).sensitivity();
-        let value = body.seen_from(&frame);
+        let seen = body.variables().relative_to(&frame.cast()).sensitivity();
+        let value = body.relative_to(&frame);
         let differences = finite_difference_jacobian(
             |x| {
                 let moved =
-                    body.retract(&std::array::from_fn::<f64, 12, _>(|i| x[i])).seen_from(&frame);
+                    body.retract(&std::array::from_fn::<f64, 12, _>(|i| x[i])).relative_to(&frame);
                 let turn = prehend_autodiff::lie::so3_log(
                     &(moved.pose.rotation * value.pose.rotation.inverse()),
                 );

@@ -289,7 +289,7 @@ mod tests {
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{
-        Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State,
+        Body, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State,
     };
 
     #[test]

@@ -3,19 +3,19 @@
 pub(crate) mod articulated_body;
 pub(crate) mod body;
 pub(crate) mod body_id;
+pub(crate) mod bristle_states;
+pub(crate) mod broad_phase;
 pub(crate) mod bushing;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 mod contacts_between;
-pub(crate) mod deflection;
-mod effect;
 pub(crate) mod joint_force;
 mod linear_contacts;
 mod matter;
-pub(crate) mod neighbors;
 mod pair_function;
+mod pair_wrench;
 pub(crate) mod path;
-mod seen;
+mod relative_state;
 mod sensors;
 pub(crate) mod trajectory;
 mod trajectory_checks;
@@ -223,13 +223,13 @@ impl<S: Scalar> World<S> {
     }
 
     /// The contacts, and what those of each group are like.
-    pub(crate) fn kinds_of_contact(&self) -> impl Iterator<Item = &ContactPair<S>> {
+    pub(crate) fn contact_materials(&self) -> impl Iterator<Item = &ContactPair<S>> {
         let groups = self.contact_groups.iter().map(|group| &group.contact);
         self.contacts.iter().chain(groups)
     }
 
-    /// [`World::kinds_of_contact`], to be changed.
-    pub(crate) fn kinds_of_contact_mut(&mut self) -> impl Iterator<Item = &mut ContactPair<S>> {
+    /// [`World::contact_materials`], to be changed.
+    pub(crate) fn contact_materials_mut(&mut self) -> impl Iterator<Item = &mut ContactPair<S>> {
         let groups = self.contact_groups.iter_mut().map(|group| &mut group.contact);
         self.contacts.iter_mut().chain(groups)
     }
@@ -249,9 +249,9 @@ impl<S: Scalar> World<S> {
     }
 
     /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
-    pub(crate) fn plain(&self) -> World {
+    pub(crate) fn to_f64(&self) -> World {
         let mut plain = self.map(S::value);
-        for pair in plain.kinds_of_contact_mut() {
+        for pair in plain.contact_materials_mut() {
             if pair.smoothing.leaks() {
                 pair.smoothing = GapSmoothing::Hard;
             }

@@ -17,7 +17,7 @@ impl World {
     /// Python (`prehend.laws`). Returns the names of its parameters.
     ///
     /// `smoothing` is how contact begins: the width of a softplus [m], None for a hard beginning, or "leaky". With `both_ways` the field of the first
-    /// is touched, too, each with half of the force. Contacts that stick have a set of parameters for each way then, of which the first is returned.
+    /// is touched, too, each with half of the force. Contacts with bristles have a set of parameters for each way then, of which the first is returned.
     #[pyo3(signature = (samples, field, law, *, smoothing=None, both_ways=false, **parameters))]
     fn add_contact(
         &mut self,

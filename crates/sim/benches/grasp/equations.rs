@@ -32,7 +32,7 @@ impl ContactLaw for SmoothedPenalty {
         ContactForce { normal, tangential: regularized_coulomb(p[2], normal, &contact.slip, 1e-2) }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

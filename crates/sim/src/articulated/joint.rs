@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{se3_exp, so3_exp};
 
-use super::joint_model::{DynJointModel, JointModel, MOST_FREEDOMS};
+use super::joint_model::{DynJointModel, JointModel, MAX_NV};
 use super::spatial::spatial;
 
 /// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
@@ -55,24 +55,24 @@ impl Joint {
     }
 
     /// Number of coordinates.
-    pub fn coordinates(&self) -> usize {
+    pub fn nq(&self) -> usize {
         match self {
             Self::Fixed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 4,
             Self::Floating => 7,
-            Self::Custom(CustomJoint(model)) => model.freedoms(),
+            Self::Custom(CustomJoint(model)) => model.nv(),
         }
     }
 
     /// Number of degrees of freedom.
-    pub fn freedoms(&self) -> usize {
+    pub fn nv(&self) -> usize {
         match self {
             Self::Fixed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 3,
             Self::Floating => 6,
-            Self::Custom(CustomJoint(model)) => model.freedoms(),
+            Self::Custom(CustomJoint(model)) => model.nv(),
         }
     }
 
@@ -88,9 +88,7 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
             Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-            Self::Custom(CustomJoint(model)) => {
-                &[0.0; MOST_FREEDOMS][..model.freedoms().min(MOST_FREEDOMS)]
-            }
+            Self::Custom(CustomJoint(model)) => &[0.0; MAX_NV][..model.nv().min(MAX_NV)],
         }
     }
 
@@ -108,13 +106,13 @@ impl Joint {
 
     /// The motions of unit velocities, in the frame of the link, at its origin: constant; not of a joint type of one's own.
     #[inline]
-    pub(super) fn axis(&self, freedom: usize) -> Vector6<f64> {
+    pub(super) fn axis(&self, dof: usize) -> Vector6<f64> {
         match self {
             Self::Fixed | Self::Custom(_) => Vector6::zeros(),
             Self::Revolute(axis) => spatial(&Vector3::zeros(), axis),
             Self::Prismatic(axis) => spatial(axis, &Vector3::zeros()),
-            Self::Spherical => Vector6::ith(3 + freedom, 1.0),
-            Self::Floating => Vector6::ith(freedom, 1.0),
+            Self::Spherical => Vector6::ith(3 + dof, 1.0),
+            Self::Floating => Vector6::ith(dof, 1.0),
         }
     }
 

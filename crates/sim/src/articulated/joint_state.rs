@@ -23,8 +23,8 @@ impl Joint {
                 v.extend(state.linear.iter().chain(state.angular.iter()));
             }
             Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                q.extend(place.iter().take(self.coordinates()));
-                v.extend(state.linear.iter().take(self.freedoms()));
+                q.extend(place.iter().take(self.nq()));
+                v.extend(state.linear.iter().take(self.nv()));
             }
         }
     }
@@ -67,7 +67,7 @@ impl Joint {
     /// Which of a state's velocities, linear and angular, are its own.
     fn velocities(&self) -> std::ops::Range<usize> {
         let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        first..first + self.freedoms()
+        first..first + self.nv()
     }
 
     /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, Vecto
 use prehend_autodiff::Scalar;
 
 use super::joint::{CustomJoint, Joint};
-use super::joint_model::MOST_FREEDOMS;
-use super::kinematics::{Kinematics, Moves};
+use super::joint_model::MAX_NV;
+use super::kinematics::{Kinematics, Scope};
 use crate::body::RigidBody;
 
 /// A link and the joint that it hangs on.
@@ -193,12 +193,12 @@ pub enum ArticulationError {
         link: String,
     },
     /// A joint type of one's own with too few or too many coordinates.
-    #[error("link {link}: a joint has 1 to 3 coordinates, not {freedoms}")]
-    Freedoms {
+    #[error("link {link}: a joint has 1 to 3 coordinates, not {count}")]
+    DegreesOfFreedom {
         /// The link.
         link: String,
         /// How many its joint has.
-        freedoms: usize,
+        count: usize,
     },
     /// A link that could be accelerated without effort.
     #[error("link {link}: {problem}")]
@@ -224,7 +224,7 @@ fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
             let problem = "its joint turns or slides without moving any mass, or has no axis";
             return Err(ArticulationError::Mass { link: link.name.clone(), problem });
         }
-        if !weighs[index] && link.joint.freedoms() > 0 && link.armature.value() == 0.0 {
+        if !weighs[index] && link.joint.nv() > 0 && link.armature.value() == 0.0 {
             let problem = "its joint moves no mass: neither the link nor what hangs on it has any";
             return Err(ArticulationError::Mass { link: link.name.clone(), problem });
         }
@@ -251,18 +251,18 @@ impl<S: Scalar> Articulation<S> {
             }
             link.check_numbers()?;
             if let Joint::Custom(CustomJoint(model)) = &link.joint
-                && !(1..=MOST_FREEDOMS).contains(&model.freedoms())
+                && !(1..=MAX_NV).contains(&model.nv())
             {
-                let (link, freedoms) = (link.name.clone(), model.freedoms());
-                return Err(ArticulationError::Freedoms { link, freedoms });
+                let (link, count) = (link.name.clone(), model.nv());
+                return Err(ArticulationError::DegreesOfFreedom { link, count });
             }
             first.push(next);
-            next = [next[0] + link.joint.coordinates(), next[1] + link.joint.freedoms()];
+            next = [next[0] + link.joint.nq(), next[1] + link.joint.nv()];
             link_of.resize(next[1], index);
             let mut carrier = link.parent.and_then(|parent| last[parent]);
-            for freedom in carriers.len()..next[1] {
+            for dof in carriers.len()..next[1] {
                 carriers.push(carrier);
-                carrier = Some(freedom);
+                carrier = Some(dof);
             }
             last.push(carrier);
         }
@@ -293,12 +293,12 @@ impl<S: Scalar> Articulation<S> {
     }
 
     /// Number of coordinates q.
-    pub fn coordinates(&self) -> usize {
+    pub fn nq(&self) -> usize {
         self.first[self.links.len()][0]
     }
 
     /// Number of degrees of freedom, and so of velocities v and efforts τ.
-    pub fn freedoms(&self) -> usize {
+    pub fn nv(&self) -> usize {
         self.link_of.len()
     }
 
@@ -308,12 +308,12 @@ impl<S: Scalar> Articulation<S> {
     }
 
     /// The link that a degree of freedom moves.
-    pub(crate) fn link_of(&self, freedom: usize) -> usize {
-        self.link_of[freedom]
+    pub(crate) fn link_of(&self, dof: usize) -> usize {
+        self.link_of[dof]
     }
 
     /// The degrees of freedom that move a link, the nearest first.
-    pub(crate) fn freedoms_of(&self, link: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn dofs_of(&self, link: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(self.last[link], |k| self.carriers[*k])
     }
 
@@ -346,17 +346,17 @@ impl<S: Scalar> Articulation<S> {
     /// # Panics
     /// If there are not as many as there should be.
     pub fn kinematics(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
-        Kinematics::new(self, q, v, Moves::WithMass)
+        Kinematics::new(self, q, v, Scope::WithInertia)
     }
 
     /// [`kinematics`](Self::kinematics) without inertias: where links are and how they move.
     pub(crate) fn motion(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
-        Kinematics::new(self, q, v, Moves::Only)
+        Kinematics::new(self, q, v, Scope::KinematicsOnly)
     }
 
     pub(crate) fn check(&self, q: &[S], v: &[S]) {
-        assert_eq!(q.len(), self.coordinates(), "one number a coordinate");
-        assert_eq!(v.len(), self.freedoms(), "one number a degree of freedom");
+        assert_eq!(q.len(), self.nq(), "one number a coordinate");
+        assert_eq!(v.len(), self.nv(), "one number a degree of freedom");
     }
 }
 

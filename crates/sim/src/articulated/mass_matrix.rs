@@ -12,15 +12,15 @@ impl<S: Scalar> Kinematics<'_, S> {
         let composites = self.composites();
         let mut matrix = DMatrix::zeros(self.axes.len(), self.axes.len());
         for (index, link) in self.tree.links().iter().enumerate() {
-            let [_, freedoms] = self.tree.range(index);
-            for freedom in freedoms {
-                let force = composites[index].times(&self.axes[freedom]);
-                for other in self.tree.freedoms_of(index) {
+            let [_, dofs] = self.tree.range(index);
+            for dof in dofs {
+                let force = composites[index].times(&self.axes[dof]);
+                for other in self.tree.dofs_of(index) {
                     let entry = self.axes[other].dot(&force);
-                    matrix[(other, freedom)] = entry;
-                    matrix[(freedom, other)] = entry;
+                    matrix[(other, dof)] = entry;
+                    matrix[(dof, other)] = entry;
                 }
-                matrix[(freedom, freedom)] += link.armature;
+                matrix[(dof, dof)] += link.armature;
             }
         }
         matrix

@@ -57,9 +57,9 @@ impl<'a> TreeFactor<'a> {
     }
 }
 
-/// The degrees of freedom that carry `freedom`, the nearest first.
-fn carriers(parents: &[Option<usize>], freedom: usize) -> impl Iterator<Item = usize> {
-    std::iter::successors(parents[freedom], |k| parents[*k])
+/// The degrees of freedom that carry `dof`, the nearest first.
+fn carriers(parents: &[Option<usize>], dof: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(parents[dof], |k| parents[*k])
 }
 
 /// Column `to` −= `factor` · column `from`.

@@ -1,13 +1,13 @@
-//! Wrench and rate of the deflection of a contact that sticks.
+//! Wrench and rate of the deflection of a contact with bristles.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
 use super::bristles::Bristles;
+use super::contact_query::{ContactPoint, ContactQuery};
 use super::dynamic::DynContactLaw;
-use super::moved::{LiftedContact, MovedPatch};
-use super::patch::{Patch, Touch};
+use super::moved::{LiftedContact, MovedQuery};
 use crate::first_order::{Linearized, first_order, linearized};
 
 /// Depth over which bristles take hold, in multiples of their deflection.
@@ -17,12 +17,12 @@ const LET_GO: f64 = 1e-3;
 /// Part of what contacts hold that holds every other direction.
 const REGULARIZATION: f64 = 1e-6;
 
-/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, as a
+/// The wrench of all contacts of `query` about the center of mass and the rate of the deflection, along the axes of the field, as a
 /// function of the tangent of the body's state and of the change of the deflection, to first order.
 pub(crate) struct BristleFunction<'a> {
     pub(crate) law: &'a dyn DynContactLaw,
     pub(crate) p: &'a [f64],
-    pub(crate) patch: &'a Patch<'a>,
+    pub(crate) query: &'a ContactQuery<'a>,
     pub(crate) bristles: Bristles,
     pub(crate) deflection: Vector6<f64>,
 }
@@ -45,7 +45,7 @@ impl LocalFunction<18, 12> for BristleFunction<'_> {
     }
 }
 
-/// Also of the place of the patch's point from the center of mass, after the rest.
+/// Also of the place of the query's point from the center of mass, after the rest.
 impl LocalFunction<21, 12> for BristleFunction<'_> {
     #[inline]
     fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
@@ -105,7 +105,7 @@ impl BristleFunction<'_> {
     }
 }
 
-/// The place of the patch's point from the center of mass, if it is among what changes.
+/// The place of the query's point from the center of mass, if it is among what changes.
 fn about<T: Scalar>(change: &[T]) -> Option<Vector3<T>> {
     change.get(18..21).map(Vector3::from_column_slice)
 }
@@ -115,9 +115,9 @@ impl BristleFunction<'_> {
         self.p.iter().map(|&p| S::constant(p)).collect()
     }
 
-    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
+    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the query has the state of.
     fn wrench<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
-        let moved = MovedPatch::new(self.patch, change);
+        let moved = MovedQuery::new(self.query, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
         self.wrench_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
     }
@@ -125,7 +125,7 @@ impl BristleFunction<'_> {
     /// The function of dimensions of the shapes, with which `lift` gives a contact.
     pub(crate) fn wrench_by_dimensions<T: Scalar>(
         &self,
-        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+        lift: impl Fn(&ContactPoint, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
         self.wrench_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
     }
@@ -135,13 +135,13 @@ impl BristleFunction<'_> {
         p: &[T],
         deflection: &Vector6<T>,
         from_com: Option<&Vector3<T>>,
-        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+        lift: impl Fn(&ContactPoint, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
-        let Self { patch, bristles, .. } = *self;
-        let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
+        let Self { query, bristles, .. } = *self;
+        let (cutoff, law) = (self.law.cutoff(), BristleLaw::new(self.law, p));
         let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
-        let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
+        let sound = query.for_each_contact(cutoff, T::ORDER == 0, |touch| {
             let LiftedContact { mut contact, lever, stretch } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);

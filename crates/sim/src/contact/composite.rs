@@ -66,8 +66,8 @@ impl<N: NormalLaw, F: FrictionLaw> ContactLaw for Law<N, F> {
     }
 
     #[inline]
-    fn reach(&self) -> f64 {
-        self.normal.reach()
+    fn cutoff(&self) -> f64 {
+        self.normal.cutoff()
     }
 
     fn bristles(&self) -> Option<Bristles> {

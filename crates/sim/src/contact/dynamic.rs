@@ -3,9 +3,9 @@
 use nalgebra::Vector6;
 use prehend_autodiff::Fwd;
 
+use super::contact_query::ContactQuery;
 use super::error::LawError;
 use super::law::ContactLaw;
-use super::patch::Patch;
 use super::point::{ContactForce, ContactKinematics};
 use super::wrench::{self, WrenchJacobian};
 
@@ -27,14 +27,24 @@ pub trait DynContactLaw: ContactLaw + sealed::Sealed {
         contact: &ContactKinematics<Fwd<6>>,
     ) -> ContactForce<Fwd<6>>;
 
-    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `patch`, in the field's frame.
-    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
+    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `query`, in the field's frame.
+    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64>;
 
     /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
-    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
+    fn wrench_jacobian(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        by_params: bool,
+    ) -> WrenchJacobian;
 
     /// [`DynContactLaw::wrench`] with its derivative along a direction of the state's [`tangent`](crate::State::tangent).
-    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2];
+    fn wrench_along(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        tangent: &[f64; 12],
+    ) -> [Vector6<f64>; 2];
 }
 
 impl dyn DynContactLaw {
@@ -60,16 +70,26 @@ impl<L: ContactLaw> DynContactLaw for L {
         self.law(p, contact)
     }
 
-    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
-        wrench::wrench(self, p, patch)
+    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64> {
+        wrench::wrench(self, p, query)
     }
 
-    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian {
-        wrench::wrench_jacobian(self, p, patch, by_params)
+    fn wrench_jacobian(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        by_params: bool,
+    ) -> WrenchJacobian {
+        wrench::wrench_jacobian(self, p, query, by_params)
     }
 
-    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2] {
-        wrench::wrench_along(self, p, patch, tangent)
+    fn wrench_along(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        tangent: &[f64; 12],
+    ) -> [Vector6<f64>; 2] {
+        wrench::wrench_along(self, p, query, tangent)
     }
 }
 
@@ -99,6 +119,6 @@ mod tests {
         assert_eq!(own.normal.derivative, twin.normal.derivative);
         assert_eq!(own.tangential.x.derivative, twin.tangential.x.derivative);
         // With both traits in scope.
-        assert_eq!((boxed.params(), boxed.reach()), (law.params(), law.reach()));
+        assert_eq!((boxed.params(), boxed.cutoff()), (law.params(), law.cutoff()));
     }
 }

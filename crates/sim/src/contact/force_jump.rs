@@ -19,7 +19,7 @@ pub(crate) fn jumps(law: &dyn DynContactLaw, p: &[f64], smoothing: &GapSmoothing
             GapSmoothing::Softplus { width } => -(-depth / width).exp_m1(),
             GapSmoothing::Hard | GapSmoothing::Leaky { .. } => 1.0,
         };
-        let gap = law.reach() - depth;
+        let gap = law.cutoff() - depth;
         let (slip, normal) = (Vector3::x(), Vector3::z());
         let contact =
             ContactKinematics { gap, normal_speed: -activation, slip, normal, area: 1e-4 };

@@ -3,7 +3,7 @@
 use super::error::LawError;
 use super::range::ParameterRange;
 
-/// The map x ↦ effective gap that precedes a contact law, for the gap x beyond the law's reach.
+/// The map x ↦ effective gap that precedes a contact law, for the gap x beyond the law's cutoff.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GapSmoothing {
     /// min(x, 0).

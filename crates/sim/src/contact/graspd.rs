@@ -87,7 +87,7 @@ impl ContactLaw for GraspD {
     }
 
     #[inline]
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         self.parameters.offset
     }
 

@@ -8,7 +8,7 @@ use super::point::{ContactForce, ContactKinematics};
 
 /// A contact law: one function, generic over the scalar, from which come forces and derivatives.
 ///
-/// A response must vanish where the gap equals [`reach`](Self::reach) and its rate is zero. [`Law`](super::composite::Law)
+/// A response must vanish where the gap equals [`cutoff`](Self::cutoff) and its rate is zero. [`Law`](super::composite::Law)
 /// makes one of a normal law and a friction law. A frictionless law whose pressure grows with the square of the depth:
 ///
 /// ```
@@ -26,7 +26,7 @@ use super::point::{ContactForce, ContactKinematics};
 ///         let normal = p[0] * contact.gap * contact.gap * S::constant(contact.area);
 ///         ContactForce { normal, tangential: Vector3::zeros() }
 ///     }
-///     fn reach(&self) -> f64 {
+///     fn cutoff(&self) -> f64 {
 ///         0.0
 ///     }
 /// }
@@ -54,8 +54,8 @@ pub trait ContactLaw: Send + Sync {
     where
         Self: Sized;
 
-    /// Beyond this gap value and derivative are zero \[m\].
-    fn reach(&self) -> f64;
+    /// Gap beyond which value and derivative are zero \[m\].
+    fn cutoff(&self) -> f64;
 
     /// Tangential springs that make contacts hold; none, and friction knows nothing of what was. With them, `slip` is that of
     /// the contact and of its springs.

@@ -94,10 +94,10 @@ pub(crate) fn check_law(law: &impl ContactLaw, claims: &Claims) {
             prop_assume!(normal.norm() > 0.1);
             let (normal, slip) = (normal.normalize(), Vector3::from(slip));
             let slip = slip - normal * normal.dot(&slip);
-            let x = pack(law.reach() + depth, speed, &slip, &normal);
+            let x = pack(law.cutoff() + depth, speed, &slip, &normal);
             assert_partials(law, x);
             assert_physical(law, x, claims);
-            let fast = pack(law.reach() + depth, 1e3 * speed, &(slip * 1e6), &normal);
+            let fast = pack(law.cutoff() + depth, 1e3 * speed, &(slip * 1e6), &normal);
             assert_physical(law, fast, claims);
             Ok(())
         })
@@ -176,13 +176,13 @@ fn assert_physical(law: &impl ContactLaw, x: [f64; INPUTS], claims: &Claims) {
 /// No slip, no normal speed, the gap at the reach: finite everywhere, and exact where there is a derivative.
 fn assert_singular_points(law: &impl ContactLaw, claims: &Claims) {
     let (none, slip, normal) = (Vector3::zeros(), Vector3::new(0.1, -0.2, 0.0), Vector3::z());
-    let inside = law.reach() - 1e-3;
+    let inside = law.cutoff() - 1e-3;
     assert_partials(law, pack(inside, -0.1, &none, &normal));
     if claims.smooth_at_rest {
         assert_partials(law, pack(inside, 0.0, &slip, &normal));
         assert_partials(law, pack(inside, 0.0, &none, &normal));
     }
-    for gap in [inside, law.reach() - 1e-300, law.reach() - f64::MIN_POSITIVE, law.reach()] {
+    for gap in [inside, law.cutoff() - 1e-300, law.cutoff() - f64::MIN_POSITIVE, law.cutoff()] {
         for speed in [0.0, -0.0, -0.1, 0.1] {
             for slip in [none, slip, slip * 1e-200, slip * 1e-8] {
                 let x = pack(gap, speed, &slip, &normal);
@@ -191,7 +191,7 @@ fn assert_singular_points(law: &impl ContactLaw, claims: &Claims) {
                         row.value.is_finite() && row.derivative.iter().all(|d| d.is_finite());
                     assert!(finite, "{row:?} at {x:?}");
                     assert!(
-                        gap < law.reach() || speed != 0.0 || row.value == 0.0,
+                        gap < law.cutoff() || speed != 0.0 || row.value == 0.0,
                         "{row:?} at {x:?}"
                     );
                 }
@@ -204,7 +204,7 @@ fn assert_nothing_beyond_reach(law: &impl ContactLaw) {
     for beyond in [1e-12, 1e-3, 10.0] {
         for speed in [-1.0, 0.0, 1.0] {
             let slip = Vector3::new(0.1, -0.2, 0.0);
-            let x = pack(law.reach() + beyond, speed, &slip, &Vector3::z());
+            let x = pack(law.cutoff() + beyond, speed, &slip, &Vector3::z());
             for row in forward(law, &with_params(law, x)) {
                 assert_eq!((row.value, row.derivative), (0.0, [0.0; DIRECTIONS]), "at {x:?}");
             }

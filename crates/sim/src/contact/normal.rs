@@ -45,7 +45,7 @@ pub trait NormalLaw: Parameters {
     fn force<S: Scalar>(&self, p: Self::Params<S>, contact: &ContactKinematics<S>) -> S;
 
     /// Beyond this gap value and derivative are zero \[m\].
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

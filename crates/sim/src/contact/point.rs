@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 /// direction has the axes of its own field's body.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactKinematics<S: Scalar> {
-    /// Effective gap after the [`GapSmoothing`](super::gap_smoothing::GapSmoothing) \[m\], at most the law's reach;
+    /// Effective gap after the [`GapSmoothing`](super::gap_smoothing::GapSmoothing) \[m\], at most the law's cutoff;
     /// negative in penetration.
     pub gap: S,
     /// Rate of the effective gap \[m/s\], negative while approaching. The smoothing scales it too, so that damping fades in with

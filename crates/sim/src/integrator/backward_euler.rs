@@ -24,7 +24,7 @@ use crate::world::World;
 ///
 /// With the cargo feature `faer` the equations of many bodies are solved as sparse ones.
 ///
-/// The deflections of contacts that stick ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
+/// The deflections of contacts with bristles ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
 /// v_b), which is 1 ms for [`BristleFriction`](crate::BristleFriction) of 0.1 mm and a slip scale of 1 cm/s.
 ///
 /// # Errors
@@ -41,14 +41,14 @@ impl Integrator for BackwardEuler {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        world.refuse_joints("BackwardEuler")?;
-        world.refuse_bushings("BackwardEuler")?;
+        world.ensure_no_joints("BackwardEuler")?;
+        world.ensure_no_bushings("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
             return Ok(states.to_vec());
         }
         let values: Vec<State> = states.iter().map(State::value).collect();
-        let plain = world.plain();
+        let plain = world.to_f64();
         let lifted = plain.cast();
         let mut at_end = values.clone();
         plain.update_kinematics(&mut at_end, step.end());
@@ -77,7 +77,7 @@ impl Integrator for BackwardEuler {
     }
 }
 
-/// The states at the end of a step that free bodies make with these velocities, before contacts that stick are deflected.
+/// The states at the end of a step that free bodies make with these velocities, before contacts with bristles are deflected.
 fn moved<S: Scalar>(
     world: &World<S>,
     states: &[State<S>],
@@ -121,7 +121,7 @@ fn carried<S: Scalar>(
 fn deflected<S: Scalar>(world: &World<S>, mut next: Vec<State<S>>, step: &Step) -> Vec<State<S>> {
     if next.len() > world.bodies.len() {
         let rates = world.wrenches(&next, step.index);
-        world.deflect(&mut next, &rates, S::constant(step.dt));
+        world.integrate_bristles(&mut next, &rates, S::constant(step.dt));
     }
     next
 }

@@ -18,7 +18,7 @@ use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 
 /// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a joint the same
-/// of its state, with its angular velocity. Of a contact that sticks: the two halves of its deflection, and nothing.
+/// of its state, with its angular velocity. Of a contact with bristles: the two halves of its deflection, and nothing.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
@@ -32,9 +32,9 @@ pub(super) struct Stages<'a, S: Scalar> {
     states: &'a [State<S>],
     step: Step,
     free: Vec<Free<'a, S>>,
-    /// Free bodies, joints and contacts that stick.
+    /// Free bodies, joints and contacts with bristles.
     moving: usize,
-    /// Of each stage, those of the free bodies, then of the joints and of the contacts that stick.
+    /// Of each stage, those of the free bodies, then of the joints and of the contacts with bristles.
     slopes: Vec<Change<S>>,
     /// What led to the last stage.
     change: Vec<Change<S>>,
@@ -94,7 +94,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.moved(&self.combined(weights))
     }
 
-    /// Of each free body, joint and contact that sticks, the step's length times the sum of the slopes with `weights`.
+    /// Of each free body, joint and contact with bristles, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
         let mut sums = vec![[Vector3::zeros(); 4]; self.moving];
         self.add_combined(weights, &mut sums);

@@ -37,7 +37,7 @@ use crate::world::body::Body;
 pub struct SubStepped<I> {
     /// What takes the steps.
     pub integrator: I,
-    /// Parts of a step at most; 0 counts as 1.
+    /// Substeps of a step at most; 0 counts as 1.
     pub max_substeps: usize,
 }
 
@@ -66,7 +66,7 @@ impl<I: Integrator> SubStepped<I> {
         if limit.is_infinite() {
             return 1.0;
         }
-        let plain = world.plain();
+        let plain = world.to_f64();
         let now: Vec<State> = states.iter().map(State::value).collect();
         let drift = |(body, state): (&Body, &State)| {
             let mut falling = *state;
@@ -78,7 +78,7 @@ impl<I: Integrator> SubStepped<I> {
         };
         let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
         then.extend_from_slice(&now[then.len()..]);
-        plain.swing(&mut then, &vec![Vector6::zeros(); now.len()], dt);
+        plain.integrate_joints(&mut then, &vec![Vector6::zeros(); now.len()], dt);
         plain.forward_kinematics(&mut then);
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)

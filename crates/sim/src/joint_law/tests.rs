@@ -122,7 +122,7 @@ fn what_cannot_be_is_refused_where_it_is_added() {
     #[derive(Debug)]
     struct Many;
     impl JointModel for Many {
-        fn freedoms(&self) -> usize {
+        fn nv(&self) -> usize {
             4
         }
         fn placement<S: Scalar>(&self, _: &[S]) -> Isometry3<S> {
@@ -130,7 +130,7 @@ fn what_cannot_be_is_refused_where_it_is_added() {
         }
     }
     let many = world.add_articulation(vec![Link::new("many", Joint::custom(Many), &rod)]);
-    let expected = ArticulationError::Freedoms { link: "many".to_owned(), freedoms: 4 };
+    let expected = ArticulationError::DegreesOfFreedom { link: "many".to_owned(), count: 4 };
     assert_eq!(many, Err(SimulationError::Articulation(expected)));
     let light = world.add_articulation(vec![Link::massless("feather", hinge.clone())]);
     assert!(matches!(light, Err(SimulationError::Articulation(ArticulationError::Mass { .. }))));

@@ -52,7 +52,7 @@ impl World {
 
     /// N of [`LinearizedStep`].
     fn degrees_of_freedom(&self) -> usize {
-        6 * self.free_bodies().len() + self.joints().map(Joint::freedoms).sum::<usize>()
+        6 * self.free_bodies().len() + self.joints().map(Joint::nv).sum::<usize>()
     }
 
     /// The states displaced and sped up by `along`.
@@ -66,7 +66,7 @@ impl World {
             first += 6;
         }
         for (place, joint) in self.joint_places().zip(self.joints()) {
-            let count = joint.freedoms();
+            let count = joint.nv();
             let (mut q, mut v) = (Vec::new(), Vec::new());
             joint.read(&displaced[place], &mut q, &mut v);
             let mut moved = Vec::new();
@@ -91,7 +91,7 @@ impl World {
             let tangent = after[place].tangent().map(|x| x.derivative[0]);
             let part = |from: usize| Vector3::from_column_slice(&tangent[from..from + 3]);
             let back = next[place].pose.rotation.inverse();
-            let count = joint.freedoms();
+            let count = joint.nv();
             match joint {
                 Joint::Spherical => {
                     displacements.extend((back * part(3)).iter());

@@ -41,8 +41,8 @@ impl Generalized {
         for (tree, efforts) in trees.iter().zip(&efforts) {
             let accelerations = all.accelerate(tree, efforts);
             for (index, link) in tree.own.tree.links().iter().enumerate() {
-                let [_, freedoms] = tree.own.tree.range(index);
-                all.wrenches.push(link.joint.rate_of_velocities(&accelerations[freedoms]));
+                let [_, dofs] = tree.own.tree.range(index);
+                all.wrenches.push(link.joint.rate_of_velocities(&accelerations[dofs]));
             }
         }
         all
@@ -62,7 +62,7 @@ impl Generalized {
 
     fn empty(world: &World, trees: &[Tree<'_>]) -> Self {
         let joints = 6 * world.free_bodies().len();
-        let count = joints + trees.iter().map(|tree| tree.freedoms).sum::<usize>();
+        let count = joints + trees.iter().map(|tree| tree.dofs).sum::<usize>();
         let [by_position, by_velocity] = [(); 2].map(|()| DMatrix::zeros(count, count));
         let by_effort = DMatrix::zeros(count - joints, count - joints);
         let wrenches = world.bodies.iter().map(|body| body.external_wrench).collect();
@@ -105,10 +105,10 @@ impl Generalized {
 
     /// Adds, along the motions of one body, the change of a wrench with those of another.
     fn add_slopes(&mut self, by: &SMatrix<f64, 6, 12>, of: &[Motion], moving: &[Motion]) {
-        for Motion { freedom: column, displaced, unit } in moving {
+        for Motion { dof: column, displaced, unit } in moving {
             let by_displacement = by * displaced;
             let by_velocity = by.fixed_columns::<6>(6) * unit;
-            for Motion { freedom: row, unit, .. } in of {
+            for Motion { dof: row, unit, .. } in of {
                 self.by_position[(*row, *column)] += unit.dot(&by_displacement);
                 self.by_velocity[(*row, *column)] += unit.dot(&by_velocity);
             }
@@ -118,9 +118,9 @@ impl Generalized {
     /// Adds the change of the coordinates' share in a wrench on a link as its point moves; that by the turn of axes follows for the sum.
     fn add_turns(&mut self, wrench: &Vector6<f64>, motions: &[Motion]) {
         let force = linear(wrench);
-        for Motion { freedom: column, unit: moved, .. } in motions {
+        for Motion { dof: column, unit: moved, .. } in motions {
             let change = linear(moved).cross(&force);
-            for Motion { freedom: row, unit, .. } in motions {
+            for Motion { dof: row, unit, .. } in motions {
                 self.by_position[(*row, *column)] += angular(unit).dot(&change);
             }
         }
@@ -133,20 +133,18 @@ impl Generalized {
         states: &[State],
         trees: &[Tree<'_>],
     ) -> Vec<Vec<f64>> {
-        let mut efforts: Vec<Vec<f64>> =
-            trees.iter().map(|tree| vec![0.0; tree.freedoms]).collect();
+        let mut efforts: Vec<Vec<f64>> = trees.iter().map(|tree| vec![0.0; tree.dofs]).collect();
         for force in &world.joint_forces {
-            let Some(Along { articulation, freedoms, position, velocity }) =
-                world.along(force, states)
+            let Some(Along { articulation, dofs, position, velocity }) = world.along(force, states)
             else {
                 continue;
             };
             let Fwd { value, derivative: [by_position, by_velocity] } =
                 force.law().effort_by_motion(force.params(), position, velocity);
             let first = trees[articulation].first;
-            for (row, share) in &freedoms {
+            for (row, share) in &dofs {
                 efforts[articulation][*row] += value * share;
-                for (column, factor) in &freedoms {
+                for (column, factor) in &dofs {
                     let at = (first + row, first + column);
                     self.by_velocity[at] += by_velocity * share * factor;
                     self.by_position[at] += by_position * share * factor;
@@ -207,9 +205,9 @@ impl Generalized {
             if sum == Vector6::zeros() {
                 continue;
             }
-            let [_, freedoms] = own.tree.range(index);
-            for row in freedoms {
-                for column in own.tree.freedoms_of(index) {
+            let [_, dofs] = own.tree.range(index);
+            for row in dofs {
+                for column in own.tree.dofs_of(index) {
                     let turned = cross_motion(&at.axes[column], &at.axes[row]);
                     self.by_position[(first + row, first + column)] += turned.dot(&sum);
                 }
@@ -228,18 +226,18 @@ struct Tree<'a> {
     /// The first of its coordinates.
     first: usize,
     /// How many there are.
-    freedoms: usize,
+    dofs: usize,
 }
 
 fn trees<'a>(world: &'a World, states: &[State]) -> Vec<Tree<'a>> {
     let mut first = 6 * world.free_bodies().len();
     let mut trees = Vec::with_capacity(world.articulations.len());
     for (index, own) in world.articulations.iter().enumerate() {
-        let freedoms = own.tree.freedoms();
+        let dofs = own.tree.nv();
         let [q, v] = own.coordinates(&states[world.joint_range(index)]);
         let at = own.tree.kinematics(&q, &v).under(world.gravity);
-        trees.push(Tree { own, at, first, freedoms });
-        first += freedoms;
+        trees.push(Tree { own, at, first, dofs });
+        first += dofs;
     }
     trees
 }

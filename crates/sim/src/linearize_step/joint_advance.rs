@@ -14,7 +14,7 @@ pub(super) struct JointAdvance {
 
 impl JointAdvance {
     pub(super) fn new(joint: &Joint, after: &State, dt: f64) -> Self {
-        let count = joint.freedoms();
+        let count = joint.nv();
         let mut advance = Self {
             of_place: DMatrix::identity(count, count),
             of_velocity: DMatrix::from_diagonal_element(count, count, dt),

@@ -9,7 +9,7 @@ use crate::contact::wrench::stack;
 /// Changes of a body's state, in the order of [`State::tangent`](crate::State::tangent), by one coordinate.
 pub(super) struct Motion {
     /// Which coordinate.
-    pub(super) freedom: usize,
+    pub(super) dof: usize,
     /// By its displacement.
     pub(super) displaced: SVector<f64, 12>,
     /// By its velocity: velocity and angular velocity, and by the displacement place and turn.
@@ -19,7 +19,7 @@ pub(super) struct Motion {
 /// Of a free body whose first coordinate is `first`.
 pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
     let motion = |k: usize| Motion {
-        freedom: first + k,
+        dof: first + k,
         displaced: SVector::ith(k, 1.0),
         unit: Vector6::ith(k, 1.0),
     };
@@ -31,9 +31,9 @@ pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Mot
     let place = at.places[link];
     let spin = angular(&at.velocities[link]);
     let mut motions = Vec::with_capacity(at.axes.len());
-    for freedom in at.tree.freedoms_of(link) {
-        let axis = &at.axes[freedom];
-        let carrier = at.tree.links()[at.tree.link_of(freedom)].parent;
+    for dof in at.tree.dofs_of(link) {
+        let axis = &at.axes[dof];
+        let carrier = at.tree.links()[at.tree.link_of(dof)].parent;
         let relative = match carrier {
             Some(parent) => at.velocities[link] - at.velocities[parent],
             None => at.velocities[link],
@@ -44,7 +44,7 @@ pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Mot
         let mut displaced = SVector::<f64, 12>::zeros();
         displaced.fixed_rows_mut::<6>(0).copy_from(&stack(&moved, &turned));
         displaced.fixed_rows_mut::<6>(6).copy_from(&spatial(&velocity, &angular(&change)));
-        motions.push(Motion { freedom: first + freedom, displaced, unit: stack(&moved, &turned) });
+        motions.push(Motion { dof: first + dof, displaced, unit: stack(&moved, &turned) });
     }
     motions
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, Scalar};
 
-use crate::contact::patch::Patch;
+use crate::contact::contact_query::ContactQuery;
 use crate::contact::wrench::stack;
 use crate::state::State;
 use crate::world::World;
@@ -30,9 +30,9 @@ impl Between {
         step: usize,
     ) -> Option<Self> {
         let bodies = [pair.bodies.samples, pair.bodies.field];
-        let patch = world.patch(pair, world.seen_value(pair, states))?;
-        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let found = pair.law().wrench_jacobian(&pair.param_values(), &patch, false);
+        let query = world.contact_query(pair, world.relative_value(pair, states))?;
+        let query = ContactQuery { smoothing: pair.smoothing.at_step(step), ..query };
+        let found = pair.law().wrench_jacobian(&pair.param_values(), &query, false);
         if found.wrench == Vector6::zeros() && found.by_state == [[0.0; 12]; 6] {
             return None;
         }

@@ -53,11 +53,11 @@ impl World {
 
     /// The inertia along a sum of joints of the last articulation, whose mobility this is.
     pub(super) fn inertia_along(&self, mobility: &Mobility, axes: &[(JointAxis, f64)]) -> f64 {
-        let mut along = DMatrix::zeros(mobility.freedoms, 1);
+        let mut along = DMatrix::zeros(mobility.dofs, 1);
         for (JointAxis { link, index }, factor) in axes {
             if let Ok((articulation, own)) = self.link_of(*link) {
-                let [_, freedoms] = self.articulations[articulation].tree.range(own);
-                along[freedoms.start + index] += factor;
+                let [_, dofs] = self.articulations[articulation].tree.range(own);
+                along[dofs.start + index] += factor;
             }
         }
         1.0 / along.dot(&mobility.times(&along))
@@ -66,9 +66,9 @@ impl World {
     /// The mobility of the last articulation, with its joints at their neutral coordinates.
     pub(super) fn mobility(&self) -> Mobility {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.freedoms()]).mass_matrix();
+        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.nv()]).mass_matrix();
         let factor = TreeFactor::new(&mass, tree.carriers().to_vec());
-        Mobility { freedoms: tree.freedoms(), factor }
+        Mobility { dofs: tree.nv(), factor }
     }
 }
 
@@ -89,7 +89,7 @@ pub(super) fn limits((lower, upper): (f64, f64), stiffness: f64) -> Arc<dyn DynJ
 
 /// The inverse of a mass matrix.
 pub(super) struct Mobility {
-    pub(super) freedoms: usize,
+    pub(super) dofs: usize,
     /// Of the mass matrix; none where something that moves has no mass.
     factor: Option<TreeFactor<'static>>,
 }

@@ -46,8 +46,7 @@ impl<S: Scalar> ArticulatedBody<S> {
 
     /// Coordinates and velocities of all joints with these states.
     pub(crate) fn coordinates<T: Scalar>(&self, joints: &[State<T>]) -> [Vec<T>; 2] {
-        let [mut q, mut v] =
-            [self.tree.coordinates(), self.tree.freedoms()].map(Vec::with_capacity);
+        let [mut q, mut v] = [self.tree.nq(), self.tree.nv()].map(Vec::with_capacity);
         for (link, state) in self.tree.links().iter().zip(joints) {
             link.joint.read(state, &mut q, &mut v);
         }
@@ -132,11 +131,11 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         let (place, joint) = self.joint_place(states, link)?;
-        if position.len() != joint.coordinates() || velocity.len() != joint.freedoms() {
+        if position.len() != joint.nq() || velocity.len() != joint.nv() {
             return Err(SimulationError::JointNumbers {
                 link: self.bodies[link].name.clone(),
                 given: [position.len(), velocity.len()],
-                expected: [joint.coordinates(), joint.freedoms()],
+                expected: [joint.nq(), joint.nv()],
             });
         }
         if joint.turns() {
@@ -201,7 +200,7 @@ impl<S: Scalar> World<S> {
 
     /// # Errors
     /// If there are joints, which `integrator` does not move.
-    pub(crate) fn refuse_joints(&self, integrator: &'static str) -> Result<(), SimulationError> {
+    pub(crate) fn ensure_no_joints(&self, integrator: &'static str) -> Result<(), SimulationError> {
         match self.articulations.is_empty() {
             true => Ok(()),
             false => Err(SimulationError::Joints { integrator }),
@@ -209,7 +208,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves on the joints among `states`, for `dt` \[s\] by semi-implicit Euler with the accelerations among `wrenches`.
-    pub(crate) fn swing(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
+    pub(crate) fn integrate_joints(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
         for (place, joint) in self.joint_places().zip(self.joints()) {
             let (state, rate) = (&mut states[place], &wrenches[place]);
             state.linear += rate.fixed_rows::<3>(0) * dt;
@@ -300,8 +299,8 @@ impl<S: Scalar> World<S> {
             let accelerations =
                 self.accelerated(own, joints, [coordinates, velocities], efforts, &wrenches);
             for (index, link) in own.tree.links().iter().enumerate() {
-                let [_, freedoms] = own.tree.range(index);
-                all.push(link.joint.rate_of_velocities(&accelerations.as_slice()[freedoms]));
+                let [_, dofs] = own.tree.range(index);
+                all.push(link.joint.rate_of_velocities(&accelerations.as_slice()[dofs]));
             }
         }
         all

@@ -94,7 +94,10 @@ impl World {
 impl<S: Scalar> World<S> {
     /// # Errors
     /// If there are bushings, of which `integrator` knows nothing.
-    pub(crate) fn refuse_bushings(&self, integrator: &'static str) -> Result<(), SimulationError> {
+    pub(crate) fn ensure_no_bushings(
+        &self,
+        integrator: &'static str,
+    ) -> Result<(), SimulationError> {
         match self.bushings.is_empty() {
             true => Ok(()),
             false => Err(SimulationError::Bushings { integrator }),

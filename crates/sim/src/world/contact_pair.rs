@@ -203,7 +203,7 @@ mod tests {
             fn law<S: Scalar>(&self, _: &[S], _: &ContactKinematics<S>) -> ContactForce<S> {
                 ContactForce::zero()
             }
-            fn reach(&self) -> f64 {
+            fn cutoff(&self) -> f64 {
                 0.0
             }
         }

@@ -19,7 +19,7 @@ impl World {
     /// by [`add_symmetric_contact`](World::add_symmetric_contact) where each has samples and a field, unless one is a
     /// ball, a single round sample: then that touches the field of the other, which is all there is to it.
     ///
-    /// Contacts that stick remember how: they are added one by one for all pairs, to [`contacts`](World::contacts). All others make
+    /// Contacts with bristles remember how: they are added one by one for all pairs, to [`contacts`](World::contacts). All others make
     /// up one of [`contact_groups`](World::contact_groups).
     ///
     /// # Errors

@@ -142,7 +142,7 @@ fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
 pub(crate) struct Along<S> {
     pub(crate) articulation: usize,
     /// Degrees of freedom of the articulation, with the derivatives of the position by them.
-    pub(crate) freedoms: Vec<(usize, S)>,
+    pub(crate) dofs: Vec<(usize, S)>,
     pub(crate) position: S,
     pub(crate) velocity: S,
 }
@@ -189,7 +189,7 @@ impl<S: Scalar> World<S> {
     /// Whether the joint of a link has such an axis.
     pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), SimulationError> {
         let joint = &self.link(link)?.joint;
-        match axis < joint.freedoms() && !matches!(joint, Joint::Floating) {
+        match axis < joint.nv() && !matches!(joint, Joint::Floating) {
             true => Ok(()),
             false => Err(SimulationError::NoAxis { link: self.bodies[link].name.clone(), axis }),
         }
@@ -216,7 +216,7 @@ impl<S: Scalar> World<S> {
     /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
     pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
         let none = || -> Vec<Vec<S>> {
-            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect()
+            self.articulations.iter().map(|own| vec![S::zero(); own.tree.nv()]).collect()
         };
         let is_bounded = !self.transmissions.bounds.is_empty();
         let (mut efforts, mut driven) = (none(), if is_bounded { none() } else { Vec::new() });
@@ -238,8 +238,8 @@ impl<S: Scalar> World<S> {
         bound_groups(&mut acting);
         for (force, along, effort) in acting {
             let all = if is_bounded && force.is_actuator { &mut driven } else { &mut efforts };
-            for (freedom, factor) in along.freedoms {
-                all[along.articulation][freedom] += effort * factor;
+            for (dof, factor) in along.dofs {
+                all[along.articulation][dof] += effort * factor;
             }
         }
         let mut carried: Vec<Vec<S>> = Vec::new();
@@ -250,10 +250,10 @@ impl<S: Scalar> World<S> {
                 self.add_carried(own, at, &mut carried[index]);
             }
         }
-        for (articulation, freedom, [low, high], counts) in self.bounded() {
-            let own = &mut driven[articulation][freedom];
+        for (articulation, dof, [low, high], counts) in self.bounded() {
+            let own = &mut driven[articulation][dof];
             if let Some(carried) = carried.get_mut(articulation).filter(|_| counts) {
-                *own += std::mem::replace(&mut carried[freedom], S::zero());
+                *own += std::mem::replace(&mut carried[dof], S::zero());
             }
             match own.value() {
                 value if value < low => *own = S::constant(low),
@@ -310,7 +310,7 @@ impl<S: Scalar> World<S> {
         let (own, joints) = (&self.articulations[articulation], self.joint_range(articulation));
         let mut along = Along {
             articulation,
-            freedoms: Vec::with_capacity(force.axes.len()),
+            dofs: Vec::with_capacity(force.axes.len()),
             position: S::zero(),
             velocity: S::zero(),
         };
@@ -319,10 +319,10 @@ impl<S: Scalar> World<S> {
             let [_, velocities] = own.coordinates(states.get(joints)?);
             let length = path.length(at, false);
             along.position = length.value;
-            for (freedom, slope) in length.slopes.into_iter().enumerate() {
-                along.velocity += slope * velocities[freedom];
+            for (dof, slope) in length.slopes.into_iter().enumerate() {
+                along.velocity += slope * velocities[dof];
                 if !slope.is_constant_zero() {
-                    along.freedoms.push((freedom, slope));
+                    along.dofs.push((dof, slope));
                 }
             }
             return Some(along);
@@ -330,15 +330,14 @@ impl<S: Scalar> World<S> {
         for (JointAxis { link, index }, factor) in &force.axes {
             let link = own.bodies().iter().position(|body| body == link)?;
             let (joint, state) = (&own.tree.links()[link].joint, states.get(joints.start + link)?);
-            let [_, freedoms] = own.tree.range(link);
+            let [_, dofs] = own.tree.range(link);
             let [position, velocity] = joint.along(state, *index);
             along.position += position.times(*factor);
             along.velocity += velocity.times(*factor);
             // A virtual displacement moves the position by its slopes, and so the effort acts along them.
             let slopes = joint.position_slopes(state, *index);
-            let slopes =
-                freedoms.zip(slopes).map(|(freedom, slope)| (freedom, slope.times(*factor)));
-            along.freedoms.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));
+            let slopes = dofs.zip(slopes).map(|(dof, slope)| (dof, slope.times(*factor)));
+            along.dofs.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));
         }
         Some(along)
     }

@@ -6,7 +6,7 @@ use prehend_autodiff::{CustomVjp, Scalar};
 use super::World;
 use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
-use crate::contact::patch::Patch;
+use crate::contact::contact_query::ContactQuery;
 use crate::contact::wrench::{WrenchJacobian, stack};
 use crate::state::State;
 use crate::state_coordinates::STATE;
@@ -58,9 +58,11 @@ impl LinearContacts {
         wrenches: &mut [Vector6<S>],
     ) {
         let ids = [pair.bodies.samples, pair.bodies.field];
-        let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { return };
-        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let (WrenchJacobian { wrench, by_state, .. }, slopes) = world.linearized(pair, &patch);
+        let Some(query) = world.contact_query(pair, world.relative_value(pair, states)) else {
+            return;
+        };
+        let query = ContactQuery { smoothing: pair.smoothing.at_step(step), ..query };
+        let (WrenchJacobian { wrench, by_state, .. }, slopes) = world.linearized(pair, &query);
         let [samples, field] = ids.map(|id| states[id].value().pose);
         let axes = field.rotation.to_rotation_matrix();
         let offset = samples.translation.vector - field.translation.vector;

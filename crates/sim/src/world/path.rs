@@ -158,8 +158,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
     ) {
         let Some(link) = link else { return };
         let wrench = spatial(force, &(torque + place.cross(force)));
-        for freedom in self.at.tree.freedoms_of(link).filter(|freedom| counts(*freedom)) {
-            self.slopes[freedom] += self.at.axes[freedom].dot(&wrench);
+        for dof in self.at.tree.dofs_of(link).filter(|dof| counts(*dof)) {
+            self.slopes[dof] += self.at.axes[dof].dot(&wrench);
         }
     }
 
@@ -205,7 +205,7 @@ impl<S: Scalar> Sum<'_, '_, S> {
             self.value += turn[k].times(gear[3 + k]);
         }
         let of = |link: Option<usize>| -> Vec<usize> {
-            link.map(|link| self.at.tree.freedoms_of(link).collect()).unwrap_or_default()
+            link.map(|link| self.at.tree.dofs_of(link).collect()).unwrap_or_default()
         };
         let [own, other] = [of(frame.link), of(reference.link)];
         self.add_wrench(frame.link, &place, &force, &torque, &|k| !other.contains(&k));
@@ -244,8 +244,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
         }
         let torque = if in_parent { base * torque } else { rotation * torque };
         let place = self.at.places[link];
-        let [_, freedoms] = self.at.tree.range(link);
-        self.add_wrench(Some(link), &place, &(base * force), &torque, &|k| freedoms.contains(&k));
+        let [_, dofs] = self.at.tree.range(link);
+        self.add_wrench(Some(link), &place, &(base * force), &torque, &|k| dofs.contains(&k));
     }
 
     fn add_angle(&mut self, link: usize) {
@@ -263,8 +263,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
         self.value += angle;
         let torque = rotation * (turn / angle);
         let place = self.at.places[link];
-        let [_, freedoms] = self.at.tree.range(link);
-        self.add_wrench(Some(link), &place, &Vector3::zeros(), &torque, &|k| freedoms.contains(&k));
+        let [_, dofs] = self.at.tree.range(link);
+        self.add_wrench(Some(link), &place, &Vector3::zeros(), &torque, &|k| dofs.contains(&k));
     }
 
     fn add_crank(&mut self, pin: &Anchor, slider: &Frame, rod: f64, factor: f64) {

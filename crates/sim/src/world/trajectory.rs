@@ -72,7 +72,7 @@ mod tests {
             Motion::Kinematic(trajectory) => plain(trajectory).unwrap(),
             _ => panic!("not driven"),
         };
-        let there_and_back = world.cast::<Fwd<1>>().plain().cast::<Fwd<2>>().plain();
+        let there_and_back = world.cast::<Fwd<1>>().to_f64().cast::<Fwd<2>>().to_f64();
         let [a, b] = [&world, &there_and_back].map(|world| source(&world.bodies[0].motion));
         assert!(Arc::ptr_eq(&a, &b));
     }
@@ -87,7 +87,7 @@ mod tests {
             state
         }));
         let mut state = [State::at_rest(Isometry3::identity())];
-        world.plain().update_kinematics(&mut state, 0.5);
+        world.to_f64().update_kinematics(&mut state, 0.5);
         assert_eq!(state[0].pose.translation.x, 0.1);
     }
 }

@@ -71,18 +71,18 @@ impl CustomVjp for Node {
             let of_parent = link.parent.map_or_else(Vector6::zeros, |p| at.velocities[p]);
             let (placed_here, moving_here) = (placed[index], moving[index]);
             let displacement = placed_here - cross_force(&of_parent, &moving_here);
-            let [coordinates, freedoms] = self.tree.range(index);
+            let [coordinates, dofs] = self.tree.range(index);
             let own = &self.q[coordinates.clone()];
             at.coordinate_adjoint(index, own, &displacement, &mut q[coordinates.clone()]);
-            freedoms.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
+            dofs.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
             let by_axes: Vec<Vector6<f64>> =
-                freedoms.clone().map(|k| moving_here * self.v[k]).collect();
+                dofs.clone().map(|k| moving_here * self.v[k]).collect();
             at.custom_adjoint(
                 index,
-                [own, &self.v[freedoms.clone()]],
+                [own, &self.v[dofs.clone()]],
                 &by_axes,
                 None,
-                [&mut q[coordinates], &mut v[freedoms]],
+                [&mut q[coordinates], &mut v[dofs]],
             );
             links[index].displacement = displacement;
             if let Some(parent) = link.parent {

@@ -5,8 +5,8 @@ use prehend_autodiff::Scalar;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+use crate::world::broad_phase::CandidateContact;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
-use crate::world::neighbors::Neighbors;
 
 /// Bodies that are linked by contacts or joints, and what they touch that no force moves. What happens to them depends on no others.
 #[derive(Default)]
@@ -95,9 +95,10 @@ impl Island {
 
     /// What happens to it follows from its bodies and these of its contacts, the group and bodies of those of groups; the others are
     /// first among all, as many as `single`.
-    pub(super) fn links(&self, single: usize, neighbors: &[Neighbors]) -> Links {
-        let neighbors = self.contacts.iter().filter_map(|i| neighbors.get(i.checked_sub(single)?));
-        let contacts = neighbors.map(|contact| (contact.group, contact.bodies)).collect();
+    pub(super) fn links(&self, single: usize, candidates: &[CandidateContact]) -> Links {
+        let candidates =
+            self.contacts.iter().filter_map(|i| candidates.get(i.checked_sub(single)?));
+        let contacts = candidates.map(|contact| (contact.group, contact.bodies)).collect();
         Links { bodies: self.bodies.clone(), contacts }
     }
 

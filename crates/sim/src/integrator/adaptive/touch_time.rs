@@ -2,8 +2,8 @@
 
 use prehend_geometry::FieldSample;
 
+use crate::contact::contact_query::ContactQuery;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::surface::SurfacePoint;
 use crate::world::World;
@@ -31,7 +31,7 @@ fn first_of(
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
-    let reach = pair.law().reach();
+    let reach = pair.law().cutoff();
     let passage = Passage::new(world, pair, ends, dt)?;
     let times = passage.each_near(reach).filter_map(|(point, _)| {
         let [from, to] = passage.gaps(point, reach);
@@ -48,7 +48,7 @@ pub(super) fn dips(
     dt: f64,
     depth: f64,
 ) -> bool {
-    let reach = pair.law().reach() + pair.smoothing.force_band();
+    let reach = pair.law().cutoff() + pair.smoothing.force_band();
     let Some(passage) = Passage::new(world, pair, ends, dt) else { return false };
     passage.each_near(reach).any(|(point, distance)| {
         // Most of those that are asked about touch.
@@ -63,7 +63,7 @@ pub(super) fn dips(
 /// Samples beside a field at both ends of a step.
 struct Passage<'a> {
     /// At the start.
-    patch: Patch<'a>,
+    query: ContactQuery<'a>,
     ends: [State; 2],
     /// How far a sample moves at most \[m\].
     travel: f64,
@@ -72,21 +72,21 @@ struct Passage<'a> {
 impl<'a> Passage<'a> {
     /// Of `pair` in a step of `dt` \[s\].
     fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
-        let ends = ends.map(|states| world.seen_value(pair, states));
-        let patch = world.patch(pair, ends[0])?;
-        let radius = patch.surface.radius_about(&patch.com);
+        let ends = ends.map(|states| world.relative_value(pair, states));
+        let query = world.contact_query(pair, ends[0])?;
+        let radius = query.surface.radius_about(&query.com);
         let travel = dt * ends[0].speed_within(radius).max(ends[1].speed_within(radius));
-        Some(Self { patch, ends, travel })
+        Some(Self { query, ends, travel })
     }
 
     /// The samples that may come within `reach` \[m\], each with its center's distance at the start \[m\].
     fn each_near(&self, reach: f64) -> impl Iterator<Item = (&SurfacePoint, f64)> {
-        self.patch.each_near(reach, self.travel)
+        self.query.each_near(reach, self.travel)
     }
 
     /// The gaps of a sample beyond `reach` \[m\] and their rates \[m/s\], at both ends.
     fn gaps(&self, point: &SurfacePoint, reach: f64) -> [Option<[f64; 2]>; 2] {
-        let Patch { com, field, .. } = self.patch;
+        let ContactQuery { com, field, .. } = self.query;
         self.ends.map(|state| {
             let arm = state.pose.rotation * (point.position - com);
             let place = (state.pose.translation.vector + arm).into();

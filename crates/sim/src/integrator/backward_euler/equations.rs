@@ -32,7 +32,7 @@ pub(super) fn excess<S: Scalar>(
     dt: f64,
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
-    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, S::constant(dt));
+    let (linear, momentum) = body.apply_impulse(state, wrench, &world.gravity, S::constant(dt));
     let rotation = turned(&state.pose.rotation, &Vector3::new(wx, wy, wz).map(|w| w.times(dt)));
     let angular = body.angular(&rotation, &momentum);
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
@@ -158,7 +158,8 @@ impl Equations for ImplicitStep<'_> {
                 }
             }
             let deflection = pair.law().bristles().and_then(|_| deflections.next());
-            let effect = self.lifted.effect(pair, &states, deflection.as_ref(), self.step.index);
+            let effect =
+                self.lifted.pair_wrench(pair, &states, deflection.as_ref(), self.step.index);
             for (on, wrench) in bodies.into_iter().zip([effect.on_samples, effect.on_field]) {
                 wrenches[on] += wrench.map(|w| w.value);
                 let Some(row) = slots[on] else { continue };

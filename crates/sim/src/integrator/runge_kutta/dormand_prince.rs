@@ -55,7 +55,7 @@ pub(in crate::integrator) struct Trial<S: Scalar> {
 
 /// How far off a step may be.
 pub(in crate::integrator) struct Estimate<S: Scalar> {
-    /// Of each free body and contact that sticks, by how much the solutions of fifth and fourth order differ.
+    /// Of each free body and contact with bristles, by how much the solutions of fifth and fourth order differ.
     orders: Vec<Change<S>>,
     /// Divided differences of its slopes.
     third: [Vec<Change<S>>; 3],

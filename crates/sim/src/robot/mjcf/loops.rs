@@ -117,9 +117,9 @@ impl World {
         mobility: &Mobility,
     ) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        let rest = vec![0.0; tree.freedoms()];
+        let rest = vec![0.0; tree.nv()];
         let at = tree.kinematics(&tree.neutral(), &rest);
-        let mut relative = DMatrix::zeros(3, tree.freedoms());
+        let mut relative = DMatrix::zeros(3, tree.nv());
         for ((body, point), sign) in bodies.into_iter().zip(points).zip([1.0, -1.0]) {
             if let Ok((_, link)) = self.link_of(body) {
                 relative += at.jacobian(link, &point).rows(0, 3) * sign;

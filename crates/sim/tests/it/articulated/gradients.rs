@@ -31,11 +31,11 @@ fn weighed<S: Scalar>(
     let links = world.articulations[0].bodies().to_vec();
     for (link, body) in world.articulations[0].tree.links().iter().zip(links) {
         let at = world.joint(&start, body).unwrap();
-        let freedoms = link.joint.freedoms();
+        let dofs = link.joint.nv();
         let velocity: Vec<S> = at.velocity.iter().map(|v| *v + next()).collect();
         // Along coordinates, quaternions too: they are normalized where they are read.
         let position: Vec<S> = at.position.iter().map(|q| *q + next()).collect();
-        assert_eq!(velocity.len(), freedoms);
+        assert_eq!(velocity.len(), dofs);
         world.set_joint(&mut start, body, &position, &velocity).unwrap();
     }
     let end = world.simulate_with(integrator, &start, STEPS, |_, _| ()).unwrap().states;
@@ -53,7 +53,7 @@ fn weighed<S: Scalar>(
 
 fn inputs((world, _): &(World, Vec<State>)) -> usize {
     let joints = world.articulations[0].tree.links().iter().map(|link| &link.joint);
-    let joints = joints.map(|joint| joint.coordinates() + joint.freedoms());
+    let joints = joints.map(|joint| joint.nq() + joint.nv());
     world.parameters().len() + 12 + joints.sum::<usize>()
 }
 

@@ -13,7 +13,7 @@ fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
     let links = world.articulations[0].bodies();
     let joints: Vec<&Joint> =
         world.articulations[0].tree.links().iter().map(|link| &link.joint).collect();
-    let n = 6 + joints.iter().map(|joint| joint.freedoms()).sum::<usize>();
+    let n = 6 + joints.iter().map(|joint| joint.nv()).sum::<usize>();
     let mut all = DMatrix::zeros(n, n);
     let lifted = world.cast::<Fwd<1>>();
     for column in 0..n {
@@ -25,7 +25,7 @@ fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
         }
         let mut next = 6;
         for (link, joint) in links.iter().zip(&joints) {
-            let count = joint.freedoms();
+            let count = joint.nv();
             if (next..next + count).contains(&column) {
                 let at = lifted.joint(&start, *link).unwrap();
                 let mut velocity = at.velocity;

@@ -17,7 +17,7 @@ use prehend_sim::{
 struct Thread;
 
 impl JointModel for Thread {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         1
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -89,7 +89,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         let field = if index % 2 == 0 { floor } else { free };
         let law = if index % 3 == 2 { holds.clone() } else { slides.clone() };
         world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
-        let moves = world.articulations[0].tree.links()[index].joint.freedoms();
+        let moves = world.articulations[0].tree.links()[index].joint.nv();
         if moves == 0 || matches!(world.articulations[0].tree.links()[index].joint, Joint::Floating)
         {
             continue;
@@ -138,7 +138,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         let mut q: Vec<f64> = joint.neutral().to_vec();
         let change = numbers(q.len());
         q.iter_mut().zip(change).for_each(|(q, x)| *q += 0.3 * x);
-        let v = numbers(joint.freedoms());
+        let v = numbers(joint.nv());
         world.set_joint(&mut states, link, &q, &v).unwrap();
     }
     (world, states)

@@ -2,7 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{ContactKinematics, GapSmoothing, HalfSpace, LeakSteps, Patch, State, Surface};
+use prehend_sim::{
+    ContactKinematics, ContactQuery, GapSmoothing, HalfSpace, LeakSteps, State, Surface,
+};
 
 use super::laws::{Law, Spec};
 use super::rows::Row;
@@ -29,8 +31,8 @@ pub(crate) fn finite(law: &Law) -> Vec<Row> {
             let rest = State::at_rest(Isometry3::translation(0.0, 0.0, height));
             let state = State { linear, ..rest };
             let com = Point3::origin();
-            let patch = Patch { surface: &surface, com, state, field, smoothing };
-            let jacobian = law.wrench_jacobian(law.params(), &patch, true);
+            let query = ContactQuery { surface: &surface, com, state, field, smoothing };
+            let jacobian = law.wrench_jacobian(law.params(), &query, true);
             let slopes = jacobian.by_params.iter().flat_map(|slope| slope.iter());
             let all = jacobian.wrench.iter().chain(jacobian.by_state.as_flattened()).chain(slopes);
             all.filter(|x| !x.is_finite()).count()

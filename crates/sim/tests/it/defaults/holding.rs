@@ -1,4 +1,4 @@
-//! Contacts that stick hold.
+//! Contacts with bristles hold.
 
 use std::sync::Arc;
 

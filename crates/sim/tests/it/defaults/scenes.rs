@@ -29,7 +29,7 @@ impl ContactLaw for Quadratic {
         let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
         ContactForce { normal, tangential }
     }
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

@@ -166,7 +166,7 @@ impl ContactLaw for Belt {
         let normal = (-p[0] * contact.gap).times(contact.area);
         ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
     }
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

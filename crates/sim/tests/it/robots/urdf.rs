@@ -65,7 +65,7 @@ fn links_are_where_kinematics_has_them() {
     }
     // What holds the shoulder against gravity.
     let own = &world.articulations[0];
-    assert_eq!(own.tree.freedoms(), 2);
+    assert_eq!(own.tree.nv(), 2);
     let [q, v] = super::coordinates(&world, &states);
     let at = own.tree.kinematics(&q, &v).under(world.gravity);
     let efforts = at.inverse_dynamics(&[0.0; 2]);

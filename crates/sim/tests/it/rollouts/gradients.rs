@@ -37,7 +37,7 @@ impl ContactLaw for Powers {
         ContactForce { normal, tangential }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

@@ -216,7 +216,7 @@ fn bodies_that_cannot_touch_are_refused() {
     assert!(world.contact_groups.is_empty());
     world.add_contacts_between(&pebbles, &[wall, bare][..1], law, GapSmoothing::Hard).unwrap();
     assert_eq!(world.contact_groups[0].bodies(), [&pebbles[..], &[wall]]);
-    // Contacts that stick are named one by one.
+    // Contacts with bristles are named one by one.
     let law = Arc::new(sticking(2e6, 1e3, 0.4, 2e-2));
     world.add_contacts_between(&pebbles, &[wall], law, GapSmoothing::Hard).unwrap();
     assert_eq!((world.contacts.len(), world.contact_groups.len()), (2, 1));

@@ -1,7 +1,7 @@
 //! Whether the steps of a simulation were short enough.
 
 mod energy;
-mod roughness;
+mod step_resolution;
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use energy::EnergyBalance;
-use roughness::Roughness;
+use step_resolution::StepResolution;
 
 /// Roughness up to which a simulation is resolved.
 const FINE: f64 = 0.1;
@@ -56,17 +56,17 @@ impl fmt::Display for Resolution {
 }
 
 /// Follows a simulation from step to step.
-pub(crate) struct Audit<'a, S: Scalar> {
+pub(crate) struct Diagnostics<'a, S: Scalar> {
     world: &'a World<S>,
     /// None if the integrator holds its error itself.
-    roughness: Option<Roughness>,
+    roughness: Option<StepResolution>,
     energy: EnergyBalance,
 }
 
-impl<'a, S: Scalar> Audit<'a, S> {
+impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// Of a simulation from `initial` by an integrator that `controls_error` or not.
     pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
-        let roughness = (!controls_error).then(|| Roughness::new(world, initial));
+        let roughness = (!controls_error).then(|| StepResolution::new(world, initial));
         let energy = EnergyBalance::new(world, initial, controls_error);
         Self { world, roughness, energy }
     }
@@ -93,12 +93,12 @@ impl<'a, S: Scalar> Audit<'a, S> {
     ) -> Result<Resolution, SimulationError> {
         let time = dt * steps as f64;
         self.energy.check(self.world, time, states)?;
-        let roughness = self.roughness.as_ref().map(Roughness::mean);
+        let roughness = self.roughness.as_ref().map(StepResolution::mean);
         if roughness.is_some_and(|roughness| !roughness.is_finite()) {
             return Err(self.world.blown_up(states, time));
         }
         let name = |body: BodyId| self.world.bodies[body].name.clone();
-        let roughest = self.roughness.as_ref().and_then(Roughness::roughest);
+        let roughest = self.roughness.as_ref().and_then(StepResolution::roughest);
         Ok(Resolution {
             steps,
             roughness,

@@ -32,7 +32,7 @@ impl<S: Scalar> World<S> {
             failed.checked_sub(self.bodies.len()).and_then(|joint| links.clone().nth(joint));
         let body = match failed.checked_sub(self.joint_places().end) {
             Some(deflection) => {
-                self.sticking().nth(deflection).map(|(pair, _)| pair.bodies.samples)
+                self.bristle_contacts().nth(deflection).map(|(pair, _)| pair.bodies.samples)
             }
             None => joint.or(Some(BodyId(failed))),
         };
@@ -110,7 +110,7 @@ impl<S: Scalar> World<S> {
     /// Whether derivatives through the beginning of every contact are right.
     pub(crate) fn check_onsets(&self) -> Result<(), SimulationError> {
         let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
-        match self.kinds_of_contact().find(jumps) {
+        match self.contact_materials().find(jumps) {
             Some(pair) => {
                 let [body, contact] = self.names_of(pair);
                 Err(SimulationError::ForceJumps { body, contact })

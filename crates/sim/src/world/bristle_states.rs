@@ -1,4 +1,4 @@
-//! The states of contacts that stick.
+//! The states of contacts with bristles.
 //!
 //! They follow the states of the bodies and joints, in the order of the contacts. Each is a state at the origin, whose velocities are the
 //! deflection of the contact's [`Bristles`]: a twist along the axes of the field, \[m\] and \[rad\].
@@ -29,28 +29,33 @@ impl<S: Scalar> State<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// The contacts that stick.
-    pub(crate) fn sticking(&self) -> impl Iterator<Item = (&ContactPair<S>, Bristles)> {
+    /// The contacts with bristles.
+    pub(crate) fn bristle_contacts(&self) -> impl Iterator<Item = (&ContactPair<S>, Bristles)> {
         self.contacts.iter().filter_map(|pair| Some((pair, pair.law().bristles()?)))
     }
 
-    /// Whether the state at `index` is that of a free body, a joint or a contact that sticks.
+    /// Whether the state at `index` is that of a free body, a joint or a contact with bristles.
     pub(crate) fn moves_by_forces(&self, index: usize) -> bool {
         self.bodies.get(index).is_none_or(|body| body.rigid().is_some())
     }
 
     /// How many states there are.
     pub(crate) fn state_count(&self) -> usize {
-        self.bodies.len() + self.joint_count() + self.sticking().count()
+        self.bodies.len() + self.joint_count() + self.bristle_contacts().count()
     }
 
     /// The error of as many `states`.
     pub(crate) fn wrong_count(&self, states: usize) -> SimulationError {
         let (bodies, joints) = (self.bodies.len(), self.joint_count());
-        SimulationError::States { states, bodies, joints, sticking: self.sticking().count() }
+        SimulationError::States {
+            states,
+            bodies,
+            joints,
+            bristles: self.bristle_contacts().count(),
+        }
     }
 
-    /// `states` with those of contacts that stick, not deflected if they are missing.
+    /// `states` with those of contacts with bristles, not deflected if they are missing.
     pub(crate) fn with_deflections(&self, states: &[State<S>]) -> Vec<State<S>> {
         let mut states = states.to_vec();
         if states.len() == self.bodies.len() + self.joint_count() {
@@ -60,7 +65,12 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves on the deflections among `states`, for `dt` \[s\] at the rates that follow the `wrenches` on the bodies.
-    pub(crate) fn deflect(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
+    pub(crate) fn integrate_bristles(
+        &self,
+        states: &mut [State<S>],
+        wrenches: &[Vector6<S>],
+        dt: S,
+    ) {
         for (state, rate) in states.iter_mut().zip(wrenches).skip(self.joint_places().end) {
             *state = state.deflected(&(rate * dt));
         }

@@ -12,7 +12,7 @@ use crate::state::State;
 ///
 /// Samples are plain numbers from the center of mass. Where that carries derivatives, they are about the point of the body
 /// which has its value for coordinates, as if the body were that: it does not move as the center of mass does.
-pub(super) struct Seen<S: Scalar> {
+pub(super) struct RelativeState<S: Scalar> {
     /// The state of that point.
     pub(super) state: State<S>,
     /// From the center of mass to that point \[m\], a zero that carries derivatives; none if they are the same.
@@ -22,16 +22,20 @@ pub(super) struct Seen<S: Scalar> {
 impl<S: Scalar> World<S> {
     /// How the field of `pair` sees its samples.
     #[inline]
-    pub(super) fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> Seen<S> {
+    pub(super) fn relative_state(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+    ) -> RelativeState<S> {
         let com = self.bodies[pair.bodies.field].com();
         let frame = states[pair.bodies.field].shifted(&-com.coords);
         let state = &states[pair.bodies.samples];
         let rigid = self.bodies[pair.bodies.samples].rigid();
         match rigid.and_then(|rigid| rigid.com_change()) {
-            None => Seen { state: state.seen_from(&frame), from_com: None },
+            None => RelativeState { state: state.relative_to(&frame), from_com: None },
             Some(change) => {
-                let state = state.shifted(&-change).seen_from(&frame);
-                Seen { from_com: Some(-(state.pose.rotation * change)), state }
+                let state = state.shifted(&-change).relative_to(&frame);
+                RelativeState { from_com: Some(-(state.pose.rotation * change)), state }
             }
         }
     }
@@ -49,8 +53,8 @@ impl<S: Scalar> World<S> {
         Some((state, -(state.pose.rotation * change)))
     }
 
-    /// [`World::seen`] without derivatives: nothing is recorded.
-    pub(crate) fn seen_value<T: Scalar>(
+    /// [`World::relative_state`] without derivatives: nothing is recorded.
+    pub(crate) fn relative_value<T: Scalar>(
         &self,
         pair: &ContactPair<S>,
         states: &[State<T>],
@@ -60,6 +64,6 @@ impl<S: Scalar> World<S> {
         if com != Vector3::zeros() {
             frame = frame.shifted(&-com);
         }
-        states[pair.bodies.samples].value().seen_from(&frame)
+        states[pair.bodies.samples].value().relative_to(&frame)
     }
 }

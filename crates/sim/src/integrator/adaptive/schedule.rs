@@ -1,12 +1,12 @@
-//! The parts of a step and where they lead.
+//! The substeps of a step and where they lead.
 
 use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
 use super::Adaptive;
-use super::planner::Planner;
-use super::probe::Probe;
+use super::sensitivity::Tangent;
+use super::substep_controller::SubstepController;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;
@@ -15,49 +15,55 @@ use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 
-/// The parts of a step, found by values alone.
-pub(super) struct Course {
-    pub(super) parts: Parts,
+/// The substeps of a step, found by values alone.
+pub(super) struct Schedule {
+    pub(super) substeps: Substeps,
     /// The states at its end, with the sensitivity.
-    pub(super) states: Vec<State<Probe>>,
-    /// Length of the part that would come next \[s\].
-    pub(super) next_part: f64,
+    pub(super) states: Vec<State<Tangent>>,
+    /// Length of the substep that would come next \[s\].
+    pub(super) next_substep: f64,
     /// Of each of the bodies that were watched, how far its center came at most from where it would have been if it had gone on
     /// as it moved at the start \[m\].
     pub(super) deviations: Vec<f64>,
 }
 
-impl Course {
-    /// The parts of `step` from `states`; `next_part` \[s\] is that of the step before.
+impl Schedule {
+    /// The substeps of `step` from `states`; `next_substep` \[s\] is that of the step before.
     pub(super) fn find(
         settings: &Adaptive,
         world: World,
-        states: Vec<State<Probe>>,
+        states: Vec<State<Tangent>>,
         step: Step,
-        next_part: Option<f64>,
+        next_substep: Option<f64>,
         watched: &[BodyId],
     ) -> Result<Self, SimulationError> {
-        let mut planner = Planner::new(settings, world, states, step, next_part);
-        let mut parts = Vec::new();
+        let mut substep_controller =
+            SubstepController::new(settings, world, states, step, next_substep);
+        let mut substeps = Vec::new();
         let mut watched: Vec<Watched> =
-            watched.iter().map(|id| Watched::new(*id, planner.state(*id))).collect();
-        while let Some(part) = planner.advance()? {
+            watched.iter().map(|id| Watched::new(*id, substep_controller.state(*id))).collect();
+        while let Some(substep) = substep_controller.advance()? {
             for body in &mut watched {
-                body.moved(planner.state(body.id), part, step.start);
+                body.moved(substep_controller.state(body.id), substep, step.start);
             }
-            parts.push(part);
+            substeps.push(substep);
         }
-        let next_part = planner.next_part();
+        let next_substep = substep_controller.next_substep();
         let deviations = watched.into_iter().map(|body| body.farthest).collect();
-        Ok(Self { parts: Parts(parts.into()), states: planner.states(), next_part, deviations })
+        Ok(Self {
+            substeps: Substeps(substeps.into()),
+            states: substep_controller.states(),
+            next_substep,
+            deviations,
+        })
     }
 }
 
-/// The parts of a step.
+/// The substeps of a step.
 #[derive(Clone, Debug)]
-pub(super) struct Parts(Arc<[Step]>);
+pub(super) struct Substeps(Arc<[Step]>);
 
-impl Parts {
+impl Substeps {
     /// The states to which they lead in `world` from `states` in which `step` starts.
     pub(super) fn follow<S: Scalar>(
         &self,
@@ -67,11 +73,11 @@ impl Parts {
     ) -> Vec<State<S>> {
         let mut states = states.to_vec();
         let mut wrenches = world.wrenches(&states, step.index);
-        for &part in self.0.iter() {
-            let mut trial = dormand_prince::step(world, &states, &wrenches, part);
+        for &substep in self.0.iter() {
+            let mut trial = dormand_prince::step(world, &states, &wrenches, substep);
             states = trial.stages.pop().unwrap_or(states);
-            wrenches = match part.index {
-                // Leaks of the first part are not of the next one.
+            wrenches = match substep.index {
+                // Leaks of the first substep are not of the next one.
                 0 => world.wrenches(&states, 1),
                 _ => trial.wrenches,
             };
@@ -80,7 +86,7 @@ impl Parts {
     }
 }
 
-impl Integrator for Parts {
+impl Integrator for Substeps {
     fn step<S: Scalar>(
         &self,
         world: &World<S>,
@@ -106,12 +112,12 @@ impl Watched {
         Self { id, start, off: 0.0, speed: 0.0, farthest: 0.0 }
     }
 
-    /// After a `part` of a step that started at `time` \[s\] has led to `state`.
-    fn moved(&mut self, state: State, part: Step, time: f64) {
+    /// After a `substep` of a step that started at `time` \[s\] has led to `state`.
+    fn moved(&mut self, state: State, substep: Step, time: f64) {
         let [from, to] = [self.start, state].map(|state| state.pose.translation.vector);
-        let uniform = from + self.start.linear * (part.end() - time);
+        let uniform = from + self.start.linear * (substep.end() - time);
         let speed = (state.linear - self.start.linear).norm();
-        self.farthest = self.farthest.max(self.off + part.dt * speed.max(self.speed));
+        self.farthest = self.farthest.max(self.off + substep.dt * speed.max(self.speed));
         self.off = (to - uniform).norm();
         self.speed = speed;
     }

@@ -14,7 +14,7 @@ use crate::world::body_id::BodyId;
 const NOISE: f64 = 1e-6;
 
 /// Follows the velocities of free bodies and joints.
-pub(super) struct Roughness {
+pub(super) struct StepResolution {
     bodies: Vec<Followed>,
     joints: Vec<FollowedJoint>,
     sums: Sums,
@@ -69,7 +69,7 @@ struct FollowedJoint {
     kick: Option<Vector6<f64>>,
 }
 
-impl Roughness {
+impl StepResolution {
     pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
         let follow = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?.map(S::value);

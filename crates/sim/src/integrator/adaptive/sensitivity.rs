@@ -5,17 +5,17 @@ use prehend_geometry::SplitMix64;
 
 use crate::state::State;
 
-/// Numbers that carry the derivative along the probe.
-pub(super) type Probe = Fwd<1>;
+/// A number with its derivative along the direction of the sensitivity.
+pub(super) type Tangent = Fwd<1>;
 
 /// The states with derivatives along a direction in which everything that is free moves: each coordinate of the bodies and joints by half to all of its
 /// unit.
 pub(super) fn seeded(
     states: &[State],
     units: impl Iterator<Item = (usize, [f64; 12])>,
-) -> Vec<State<Probe>> {
+) -> Vec<State<Tangent>> {
     let mut random = SplitMix64::new(7);
-    let mut seeded: Vec<State<Probe>> = states.iter().map(State::cast).collect();
+    let mut seeded: Vec<State<Tangent>> = states.iter().map(State::cast).collect();
     for (place, units) in units {
         let tangent = units.map(|unit| {
             let (size, sign) = (0.5 + 0.5 * random.uniform(), (random.uniform() - 0.5).signum());

@@ -24,14 +24,14 @@ const LOOKS: f64 = 1000.0;
 
 /// A contact of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Neighbors {
+pub(crate) struct CandidateContact {
     pub(crate) group: usize,
     pub(crate) bodies: ContactBodies,
     weight: f64,
 }
 
 /// Looks for contacts of groups.
-pub(crate) struct NeighborSearch<'a, S: Scalar> {
+pub(crate) struct BroadPhase<'a, S: Scalar> {
     world: &'a World<S>,
     /// For each body, the radius of a ball about its center of mass that holds its samples and the solid of its field \[m\]; none if
     /// that has no end.
@@ -40,7 +40,7 @@ pub(crate) struct NeighborSearch<'a, S: Scalar> {
     grouped: Vec<bool>,
 }
 
-impl<'a, S: Scalar> NeighborSearch<'a, S> {
+impl<'a, S: Scalar> BroadPhase<'a, S> {
     pub(crate) fn new(world: &'a World<S>) -> Self {
         let mut grouped = vec![false; world.bodies.len()];
         let lists = world.contact_groups.iter().flat_map(ContactGroup::bodies);
@@ -90,7 +90,12 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
     /// The contacts of groups whose samples may touch within `dt` \[s\] from `states` on, if no body's center comes farther than its
     /// one of `deviations` \[m\] from where it would be if what is free went on as it moves and nothing else did, in an order that
     /// depends on nothing but the bodies.
-    pub(crate) fn find(&self, states: &[State], deviations: &[f64], dt: f64) -> Vec<Neighbors> {
+    pub(crate) fn find(
+        &self,
+        states: &[State],
+        deviations: &[f64],
+        dt: f64,
+    ) -> Vec<CandidateContact> {
         let reach = |(id, deviation): (BodyId, &f64)| {
             let free = self.world.bodies[id].feels_forces();
             Reach {
@@ -105,9 +110,12 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         for (index, group) in self.world.contact_groups.iter().enumerate() {
             for (a, b) in self.pairs(group, &reaches) {
                 let contacts = self.world.sides(a, b).unwrap_or_default().into_iter();
-                let contacts =
-                    contacts.map(|(bodies, weight)| Neighbors { group: index, bodies, weight });
-                let may_touch = |contact: &Neighbors| {
+                let contacts = contacts.map(|(bodies, weight)| CandidateContact {
+                    group: index,
+                    bodies,
+                    weight,
+                });
+                let may_touch = |contact: &CandidateContact| {
                     let reach = &reaches[contact.bodies.samples.index()];
                     let deviation = deviations[contact.bodies.samples.index()];
                     self.may_touch(contact, states, reach, deviation)
@@ -151,7 +159,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
     /// Whether samples of a body with this reach may touch a field that has no end, or is far from filling its ball.
     fn may_touch(
         &self,
-        contact: &Neighbors,
+        contact: &CandidateContact,
         states: &[State],
         reach: &Reach,
         deviation: f64,
@@ -173,7 +181,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
 
 /// How far from a surface a contact begins \[m\].
 fn reach_of<S: Scalar>(contact: &ContactPair<S>) -> f64 {
-    contact.law().reach() + contact.smoothing.band()
+    contact.law().cutoff() + contact.smoothing.band()
 }
 
 /// Radius of a ball about the center of mass that holds samples and solid \[m\].
@@ -212,17 +220,17 @@ impl Reach {
 }
 
 impl<S: Scalar> World<S> {
-    /// The contacts, and those of groups that are among `neighbors`.
-    pub(crate) fn contacts_with(&self, neighbors: &[Neighbors]) -> Vec<ContactPair<S>> {
+    /// The contacts, and those of groups that are among `candidates`.
+    pub(crate) fn contacts_with(&self, candidates: &[CandidateContact]) -> Vec<ContactPair<S>> {
         let mut contacts = self.contacts.clone();
-        contacts.extend(neighbors.iter().map(|Neighbors { group, bodies, weight }| {
+        contacts.extend(candidates.iter().map(|CandidateContact { group, bodies, weight }| {
             self.contact_groups[*group].pair(*bodies, *weight)
         }));
         contacts
     }
 
     /// The same world with those contacts of its groups one by one that may touch in `step` from `states`.
-    pub(crate) fn with_neighbors<T: Scalar>(
+    pub(crate) fn with_candidates<T: Scalar>(
         &self,
         states: &[State<T>],
         step: Step,
@@ -236,15 +244,15 @@ impl<S: Scalar> World<S> {
         &self,
         states: &[State<T>],
         dt: f64,
-        deviations: impl FnOnce(&NeighborSearch<'_, S>) -> Vec<f64>,
+        deviations: impl FnOnce(&BroadPhase<'_, S>) -> Vec<f64>,
     ) -> Cow<'_, Self> {
         if self.contact_groups.is_empty() {
             return Cow::Borrowed(self);
         }
         let values: Vec<State> = states.iter().map(State::value).collect();
-        let search = NeighborSearch::new(self);
-        let neighbors = search.find(&values, &deviations(&search), dt);
-        let contacts = self.contacts_with(&neighbors);
+        let search = BroadPhase::new(self);
+        let candidates = search.find(&values, &deviations(&search), dt);
+        let contacts = self.contacts_with(&candidates);
         Cow::Owned(Self {
             bodies: self.bodies.clone(),
             contacts,
@@ -257,7 +265,7 @@ impl<S: Scalar> World<S> {
         })
     }
 
-    /// [`World::with_neighbors`] of those that touch, or are no farther than `reach` \[m\] from it.
+    /// [`World::with_candidates`] of those that touch, or are no farther than `reach` \[m\] from it.
     pub(crate) fn with_touching<T: Scalar>(
         &self,
         states: &[State<T>],

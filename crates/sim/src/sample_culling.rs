@@ -19,7 +19,7 @@ const STEPS: f64 = 2.0;
 const FEW: usize = 8;
 
 /// A world in which contacts of more than [`FEW`] samples know only those near to the field. The others exert no force, so results are the same to the last bit.
-pub(crate) struct BroadPhase<S: Scalar> {
+pub(crate) struct SampleCulling<S: Scalar> {
     world: Option<World<S>>,
     /// The contacts whose near samples are looked for, and how far the samples of each are from their body's center of mass \[m\].
     followed: Vec<(usize, f64)>,
@@ -29,7 +29,7 @@ pub(crate) struct BroadPhase<S: Scalar> {
     margin: f64,
 }
 
-impl<S: Scalar> BroadPhase<S> {
+impl<S: Scalar> SampleCulling<S> {
     pub(crate) fn new(full: &World<S>) -> Self {
         let followed = |(index, pair): (usize, &ContactPair<S>)| {
             let body = &full.bodies[pair.bodies.samples];
@@ -52,7 +52,7 @@ impl<S: Scalar> BroadPhase<S> {
         }
         let (mut moved, mut ahead): (f64, f64) = (0.0, 0.0);
         for (place, (index, radius)) in self.followed.iter().enumerate() {
-            let now = full.seen_value(&full.contacts[*index], states);
+            let now = full.relative_value(&full.contacts[*index], states);
             ahead = ahead.max(now.speed_within(*radius));
             if let Some(then) = self.made_at.get(place) {
                 let shift = now.pose.translation.vector - then.pose.translation.vector;
@@ -76,10 +76,10 @@ impl<S: Scalar> BroadPhase<S> {
         self.made_at.clear();
         for (index, _) in &self.followed {
             let (pair, near) = (&full.contacts[*index], &mut near.contacts[*index]);
-            let state = full.seen_value(pair, states);
+            let state = full.relative_value(pair, states);
             self.made_at.push(state);
-            if let Some(patch) = full.patch(pair, state) {
-                near.near = Some(Arc::new(patch.near(pair.law().reach(), self.margin)));
+            if let Some(query) = full.contact_query(pair, state) {
+                near.near = Some(Arc::new(query.near(pair.law().cutoff(), self.margin)));
             }
         }
         self.world = Some(near);

@@ -17,7 +17,7 @@ const OPPOSITE: f64 = -0.5;
 
 /// A body's surface beside a distance field, at one moment; everything in the field's frame.
 #[derive(Clone, Copy)]
-pub struct Patch<'a> {
+pub struct ContactQuery<'a> {
     /// The samples that may touch.
     pub surface: &'a Surface,
     /// Center of mass of the body that carries them, in its model frame \[m\].
@@ -31,7 +31,7 @@ pub struct Patch<'a> {
 }
 
 /// A point in contact: what both the value and its derivative start from.
-pub(crate) struct Touch {
+pub(crate) struct ContactPoint {
     /// From the center of mass to the sample, and to where it touches.
     pub(super) arm: Vector3<f64>,
     pub(super) lever: Vector3<f64>,
@@ -48,7 +48,7 @@ pub(crate) struct Touch {
     pub(super) index: u32,
 }
 
-impl Patch<'_> {
+impl ContactQuery<'_> {
     /// Distance of a sample's center beyond which there is no force, for a law that reaches to `cutoff`.
     #[inline]
     fn reach(&self, cutoff: f64) -> f64 {
@@ -74,7 +74,7 @@ impl Patch<'_> {
         Point3::from(pose.translation.vector + pose.rotation * (point - self.com))
     }
 
-    /// The samples of [`Patch::each_near`].
+    /// The samples of [`ContactQuery::each_near`].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
         self.surface.only(self.each_near(cutoff, margin).map(|(point, _)| *point).collect())
     }
@@ -101,8 +101,8 @@ impl Patch<'_> {
     pub(crate) fn has_crossed(&self, before: State) -> bool {
         let reach = self.surface.rounding();
         let earlier = Self { state: before, ..*self };
-        let gradient = |patch: &Self, point: &SurfacePoint| {
-            Some(patch.field.sample(&patch.place(&point.position), point.radius)?.gradient)
+        let gradient = |query: &Self, point: &SurfacePoint| {
+            Some(query.field.sample(&query.place(&point.position), point.radius)?.gradient)
         };
         let crosses = |point: &SurfacePoint| {
             gradient(&earlier, point).is_some_and(|from| {
@@ -130,11 +130,11 @@ impl Patch<'_> {
     /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes
     /// nothing. Says whether every distance was a number.
     #[inline(always)]
-    pub(super) fn for_each_touch(
+    pub(super) fn for_each_contact(
         &self,
         cutoff: f64,
         pressing_only: bool,
-        mut visit: impl FnMut(&Touch),
+        mut visit: impl FnMut(&ContactPoint),
     ) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
@@ -169,7 +169,7 @@ impl Patch<'_> {
                 let (normal, area) = (gradient / length, point.area);
                 let lever = if radius > 0.0 { arm - normal * radius } else { arm };
                 let velocity = linear + angular.cross(&lever);
-                visit(&Touch {
+                visit(&ContactPoint {
                     arm,
                     lever,
                     radius,
@@ -187,7 +187,7 @@ impl Patch<'_> {
     }
 }
 
-impl Touch {
+impl ContactPoint {
     /// What the law sees.
     #[inline(always)]
     pub(super) fn contact(&self, cutoff: f64) -> ContactKinematics<f64> {

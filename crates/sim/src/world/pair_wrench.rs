@@ -9,26 +9,26 @@ use super::World;
 use super::contact_pair::ContactPair;
 use super::linear_contacts::LinearContacts;
 use super::pair_function::Relation;
-use super::seen::Seen;
+use super::relative_state::RelativeState;
 use crate::contact::bristle_function::BristleFunction;
 use crate::contact::bristles::Bristles;
+use crate::contact::contact_query::ContactQuery;
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
-use crate::contact::patch::Patch;
 use crate::contact::wrench::{LinearWrench, WrenchJacobian, stack};
 use crate::contact::wrench_function::WrenchFunction;
 use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
 /// What a contact does.
-pub(crate) struct Effect<S: Scalar> {
+pub(crate) struct PairWrench<S: Scalar> {
     /// Wrench on the body with the samples and on that with the field, each about its own center of mass.
     pub(crate) on_samples: Vector6<S>,
     pub(crate) on_field: Vector6<S>,
-    /// Rate of the deflection of a contact that sticks, along the axes of the field \[m/s\], \[rad/s\].
+    /// Rate of the deflection of a contact with bristles, along the axes of the field \[m/s\], \[rad/s\].
     pub(crate) rate: Vector6<S>,
 }
 
-impl<S: Scalar> Default for Effect<S> {
+impl<S: Scalar> Default for PairWrench<S> {
     fn default() -> Self {
         let zero = Vector6::zeros();
         Self { on_samples: zero, on_field: zero, rate: zero }
@@ -38,7 +38,7 @@ impl<S: Scalar> Default for Effect<S> {
 impl<S: Scalar> World<S> {
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
     /// world frame), without gravity; then the accelerations of every joint, in the order of its state's velocities, and the rate of the
-    /// deflection (\[m/s\], \[rad/s\]) of every contact that sticks.
+    /// deflection (\[m/s\], \[rad/s\]) of every contact with bristles.
     /// `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
@@ -63,18 +63,18 @@ impl<S: Scalar> World<S> {
         wrenches.resize(self.joint_places().end, Vector6::zeros());
         let mut linear = LinearContacts::new(if S::RECORDED { self.bodies.len() } else { 0 });
         for pair in &self.contacts {
-            let Effect { on_samples, on_field, .. } = if let Some(bristles) = pair.law().bristles()
-            {
-                let deflection = states.get(wrenches.len());
-                let effect = self.sticking_effect(pair, states, bristles, deflection, step);
-                wrenches.push(effect.rate);
-                effect
-            } else if S::RECORDED {
-                linear.add(self, pair, states, step, &mut wrenches);
-                continue;
-            } else {
-                self.plain_effect(pair, states, step)
-            };
+            let PairWrench { on_samples, on_field, .. } =
+                if let Some(bristles) = pair.law().bristles() {
+                    let deflection = states.get(wrenches.len());
+                    let effect = self.bristle_wrench(pair, states, bristles, deflection, step);
+                    wrenches.push(effect.rate);
+                    effect
+                } else if S::RECORDED {
+                    linear.add(self, pair, states, step, &mut wrenches);
+                    continue;
+                } else {
+                    self.memoryless_wrench(pair, states, step)
+                };
             wrenches[pair.bodies.samples] += on_samples;
             wrenches[pair.bodies.field] += on_field;
         }
@@ -86,28 +86,28 @@ impl<S: Scalar> World<S> {
     }
 
     /// What `pair` does with its `deflection`, if it sticks and has one.
-    pub(crate) fn effect(
+    pub(crate) fn pair_wrench(
         &self,
         pair: &ContactPair<S>,
         states: &[State<S>],
         deflection: Option<&State<S>>,
         step: usize,
-    ) -> Effect<S> {
+    ) -> PairWrench<S> {
         match pair.law().bristles() {
-            Some(bristles) => self.sticking_effect(pair, states, bristles, deflection, step),
-            None => self.plain_effect(pair, states, step),
+            Some(bristles) => self.bristle_wrench(pair, states, bristles, deflection, step),
+            None => self.memoryless_wrench(pair, states, step),
         }
     }
 
     /// How large the force of `pair` is without a memory \[N\].
     pub(crate) fn force(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
-        let Some(patch) = &self.patch_at(pair, states, 1) else { return 0.0 };
+        let Some(query) = &self.contact_query_at(pair, states, 1) else { return 0.0 };
         let (law, p) = (pair.law().as_ref(), &pair.param_values());
         let wrench = match law.bristles() {
-            None => law.wrench(p, patch),
+            None => law.wrench(p, query),
             Some(bristles) => {
                 let deflection = Vector6::zeros();
-                let function = BristleFunction { law, p, patch, bristles, deflection };
+                let function = BristleFunction { law, p, query, bristles, deflection };
                 Vector6::from_column_slice(&f64::local(&function, [0.0; 18])[..6])
             }
         };
@@ -115,51 +115,60 @@ impl<S: Scalar> World<S> {
     }
 
     /// The samples of `pair` beside its field in a step, if there are both.
-    fn patch_at<'a>(
+    fn contact_query_at<'a>(
         &'a self,
         pair: &'a ContactPair<S>,
         states: &[State<S>],
         step: usize,
-    ) -> Option<Patch<'a>> {
-        let patch = self.patch(pair, self.seen_value(pair, states))?;
-        Some(Patch { smoothing: pair.smoothing.at_step(step), ..patch })
+    ) -> Option<ContactQuery<'a>> {
+        let query = self.contact_query(pair, self.relative_value(pair, states))?;
+        Some(ContactQuery { smoothing: pair.smoothing.at_step(step), ..query })
     }
 
     /// What `pair`, which sticks, does with its `deflection`.
-    fn sticking_effect(
+    fn bristle_wrench(
         &self,
         pair: &ContactPair<S>,
         states: &[State<S>],
         bristles: Bristles,
         deflection: Option<&State<S>>,
         step: usize,
-    ) -> Effect<S> {
-        let Some(patch) = self.patch_at(pair, states, step) else { return Effect::default() };
+    ) -> PairWrench<S> {
+        let Some(query) = self.contact_query_at(pair, states, step) else {
+            return PairWrench::default();
+        };
         let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
-        let seen = self.seen(pair, states);
-        let (wrench, rate) = local_bristles(pair, &seen, &patch, bristles, deflection);
+        let seen = self.relative_state(pair, states);
+        let (wrench, rate) = local_bristles(pair, &seen, &query, bristles, deflection);
         let mut slopes = [S::zero(); 12];
         if S::ORDER > 0 {
-            self.add_slopes_by_dimensions(pair, &patch, &deflection, &mut slopes);
+            self.add_slopes_by_dimensions(pair, &query, &deflection, &mut slopes);
         }
         let rate = Vector6::from_fn(|i, _| rate[i] + slopes[6 + i]);
         let wrench = std::array::from_fn(|i| wrench[i] + slopes[i]);
         let axes = states[pair.bodies.field].pose.rotation;
-        Effect { rate, ..self.effect_of(pair, states, &axes, wrench) }
+        PairWrench { rate, ..self.pair_wrench_along(pair, states, &axes, wrench) }
     }
 
     /// What `pair` does without a memory.
-    fn plain_effect(&self, pair: &ContactPair<S>, states: &[State<S>], step: usize) -> Effect<S> {
-        let Some(patch) = &self.patch_at(pair, states, step) else { return Effect::default() };
+    fn memoryless_wrench(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        step: usize,
+    ) -> PairWrench<S> {
+        let Some(query) = &self.contact_query_at(pair, states, step) else {
+            return PairWrench::default();
+        };
         let law = pair.law().as_ref();
         let values = pair.param_values();
         if S::ORDER == 0 {
             let axes = &states[pair.bodies.field].pose.rotation;
-            return self.effect_of(
+            return self.pair_wrench_along(
                 pair,
                 states,
                 axes,
-                law.wrench(&values, patch).map(S::constant).into(),
+                law.wrench(&values, query).map(S::constant).into(),
             );
         }
         let ends = [pair.bodies.samples, pair.bodies.field];
@@ -168,10 +177,10 @@ impl<S: Scalar> World<S> {
             [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
         let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
         let (all, slopes) = if pair.params().iter().all(|x| x.is_constant()) {
-            let function = at.function(WrenchFunction { law, p: &values, patch });
-            (function.of(samples, field), self.slopes(pair, patch, &[]))
+            let function = at.function(WrenchFunction { law, p: &values, query });
+            (function.of(samples, field), self.slopes(pair, query, &[]))
         } else {
-            let (WrenchJacobian { wrench, by_state, .. }, slopes) = self.linearized(pair, patch);
+            let (WrenchJacobian { wrench, by_state, .. }, slopes) = self.linearized(pair, query);
             let function = at.function(LinearWrench { value: wrench.into(), by_state });
             (function.of(samples, field), slopes)
         };
@@ -189,13 +198,13 @@ impl<S: Scalar> World<S> {
     }
 
     /// Of the `wrench` of `pair` along the `axes` of its field.
-    fn effect_of(
+    fn pair_wrench_along(
         &self,
         pair: &ContactPair<S>,
         states: &[State<S>],
         axes: &UnitQuaternion<S>,
         wrench: [S; 6],
-    ) -> Effect<S> {
+    ) -> PairWrench<S> {
         let [fx, fy, fz, tx, ty, tz] = wrench.map(|x| x.times(pair.weight));
         self.on_both(pair, states, axes * Vector3::new(fx, fy, fz), axes * Vector3::new(tx, ty, tz))
     }
@@ -208,18 +217,18 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         force: Vector3<S>,
         torque: Vector3<S>,
-    ) -> Effect<S> {
+    ) -> PairWrench<S> {
         let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let offset = state.pose.translation.vector - base.pose.translation.vector;
         let on_field = stack(&-force, &-(torque + offset.cross(&force)));
-        Effect { on_samples: stack(&force, &torque), on_field, rate: Vector6::zeros() }
+        PairWrench { on_samples: stack(&force, &torque), on_field, rate: Vector6::zeros() }
     }
 
-    /// Adds the derivatives by the dimensions of its shapes to those of the wrench of `patch`, which is `pair`, and of its rate.
+    /// Adds the derivatives by the dimensions of its shapes to those of the wrench of `query`, which is `pair`, and of its rate.
     fn add_slopes_by_dimensions(
         &self,
         pair: &ContactPair<S>,
-        patch: &Patch<'_>,
+        query: &ContactQuery<'_>,
         deflection: &Vector6<S>,
         sums: &mut [S; 12],
     ) {
@@ -248,14 +257,14 @@ impl<S: Scalar> World<S> {
                 None => LiftedField::Constant(Arc::clone(field)),
             };
             let samples = ends[0].shape().map(|shape| shape.lifted_samples(&seeded(0)));
-            let shapes = VariableShapes { patch, samples, field };
+            let shapes = VariableShapes { query, samples, field };
             let law = pair.law().as_ref();
             let mut slopes = [Lane::constant(0.0); 12];
             match law.bristles() {
                 None => slopes[..6].copy_from_slice(&shapes.wrench(law, &values)),
                 Some(bristles) => {
                     let deflection = deflection.map(S::value);
-                    let function = BristleFunction { law, p: &values, patch, bristles, deflection };
+                    let function = BristleFunction { law, p: &values, query, bristles, deflection };
                     slopes = shapes.bristles(&function);
                 }
             }
@@ -271,17 +280,17 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// What `pair`, which is `patch`, does without a memory, with derivatives by the state that the field sees; and what it changes with
+    /// What `pair`, which is `query`, does without a memory, with derivatives by the state that the field sees; and what it changes with
     /// parameters and dimensions, if any vary: zeros that carry derivatives, along the axes of the field.
     pub(super) fn linearized(
         &self,
         pair: &ContactPair<S>,
-        patch: &Patch<'_>,
+        query: &ContactQuery<'_>,
     ) -> (WrenchJacobian, Option<[S; 12]>) {
         let values = pair.param_values();
         let vary = !pair.params().iter().all(|x| x.is_constant());
-        let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
-        let slopes = self.slopes(pair, patch, &jacobian.by_params);
+        let jacobian = pair.law().wrench_jacobian(&values, query, vary);
+        let slopes = self.slopes(pair, query, &jacobian.by_params);
         (jacobian, slopes)
     }
 
@@ -289,7 +298,7 @@ impl<S: Scalar> World<S> {
     fn slopes(
         &self,
         pair: &ContactPair<S>,
-        patch: &Patch<'_>,
+        query: &ContactQuery<'_>,
         by_params: &[Vector6<f64>],
     ) -> Option<[S; 12]> {
         let mut slopes = [S::zero(); 12];
@@ -299,15 +308,19 @@ impl<S: Scalar> World<S> {
                 *component += moved.times(*slope);
             }
         }
-        self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
+        self.add_slopes_by_dimensions(pair, query, &Vector6::zeros(), &mut slopes);
         let any = !slopes.iter().all(|x| x.is_constant_zero());
         any.then_some(slopes)
     }
 
     /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
-    pub(crate) fn patch<'a>(&'a self, pair: &'a ContactPair<S>, state: State) -> Option<Patch<'a>> {
+    pub(crate) fn contact_query<'a>(
+        &'a self,
+        pair: &'a ContactPair<S>,
+        state: State,
+    ) -> Option<ContactQuery<'a>> {
         let body = &self.bodies[pair.bodies.samples];
-        Some(Patch {
+        Some(ContactQuery {
             surface: pair.near.as_ref().or(body.surface.as_ref())?,
             com: body.com().map(S::value),
             state,
@@ -317,11 +330,11 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// The wrench of a contact that sticks along the axes of its field, and the rate of its deflection.
+/// The wrench of a contact with bristles along the axes of its field, and the rate of its deflection.
 fn local_bristles<S: Scalar>(
     pair: &ContactPair<S>,
-    seen: &Seen<S>,
-    patch: &Patch<'_>,
+    seen: &RelativeState<S>,
+    query: &ContactQuery<'_>,
     bristles: Bristles,
     deflection: Vector6<S>,
 ) -> ([S; 6], Vector6<S>) {
@@ -331,7 +344,7 @@ fn local_bristles<S: Scalar>(
     let split = |all: [S; 12]| -> ([S; 6], Vector6<S>) {
         (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))
     };
-    let function = BristleFunction { law, p: &values, patch, bristles, deflection: at };
+    let function = BristleFunction { law, p: &values, query, bristles, deflection: at };
     let tangent = seen.state.tangent();
     let change = |i: usize| if i < 12 { tangent[i] } else { deflection[i - 12].plus(-at[i - 12]) };
     let mut all = match &seen.from_com {

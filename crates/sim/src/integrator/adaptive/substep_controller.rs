@@ -1,10 +1,10 @@
-//! Chooses the parts of a step.
+//! Chooses the substeps of a step.
 
 use nalgebra::Vector6;
 
 use super::error_norm::ErrorNorm;
-use super::probe::Probe;
-use super::travel::Travel;
+use super::sensitivity::Tangent;
+use super::step_limiter::StepLimiter;
 use super::{Adaptive, touch_time};
 use crate::error::SimulationError;
 use crate::integrator::runge_kutta::dormand_prince;
@@ -19,66 +19,66 @@ const EXPONENT: f64 = -0.2;
 const SAFETY: f64 = 0.9;
 /// Change of length from one step to the next, the least and the most.
 const LENGTH_CHANGE: [f64; 2] = [0.2, 5.0];
-/// Times that a part is brought to where a contact begins or ends before it is only made shorter.
+/// Times that a substep is brought to where a contact begins or ends before it is only made shorter.
 const TOUCH_ATTEMPTS: usize = 3;
-/// Power of the length by which the error of a part falls at least where there is no kink in it.
+/// Power of the length by which the error of a substep falls at least where there is no kink in it.
 const SMOOTH: i32 = 2;
-/// Error below which that of a part says nothing of how errors grow.
+/// Error below which that of a substep says nothing of how errors grow.
 const SMALL: f64 = 1e-2;
-/// Shortest part, of the whole step or of the time that it starts at.
+/// Shortest substep, of the whole step or of the time that it starts at.
 pub(super) const SHORTEST: f64 = 1e-13;
 
-/// A place where derivatives jump, such as the onset of a contact: the error of a part that it lies in falls with its length,
+/// A place where derivatives jump, such as the onset of a contact: the error of a substep that it lies in falls with its length,
 /// not with the fifth power.
 struct Kink {
     /// When it is, if that is known \[s\].
     at: Option<f64>,
-    /// End of the shortest part so far that it is known to lie in \[s\].
+    /// End of the shortest substep so far that it is known to lie in \[s\].
     end: f64,
-    /// Length of a part that it may lie in \[s\].
+    /// Length of a substep that it may lie in \[s\].
     tolerated: f64,
-    /// Length of parts without it \[s\].
+    /// Length of substeps without it \[s\].
     resume: f64,
 }
 
 impl Kink {
-    /// The next part to try at `time` \[s\]: up to a little before it and then over it, or half of where it may be.
+    /// The next substep to try at `time` \[s\]: up to a little before it and then over it, or half of where it may be.
     fn next(&self, time: f64) -> f64 {
         let next = self.at.map_or(0.5 * (self.end - time), |at| at - time - 0.5 * self.tolerated);
         next.max(self.tolerated)
     }
 }
 
-/// Takes the parts of a step one after the other, over values and one sensitivity.
-pub(super) struct Planner {
+/// Takes the substeps of a step one after the other, over values and one sensitivity.
+pub(super) struct SubstepController {
     settings: Adaptive,
-    world: World<Probe>,
+    world: World<Tangent>,
     plain: World,
     whole: Step,
     norm: ErrorNorm,
-    travel: Travel,
-    states: Vec<State<Probe>>,
-    wrenches: Vec<Vector6<Probe>>,
-    /// Parts taken, and the time that they have led to \[s\].
-    parts: usize,
+    limiter: StepLimiter,
+    states: Vec<State<Tangent>>,
+    wrenches: Vec<Vector6<Tangent>>,
+    /// Substeps taken, and the time that they have led to \[s\].
+    substeps: usize,
     time: f64,
-    /// Length of the next part \[s\].
+    /// Length of the next substep \[s\].
     dt: f64,
     kink: Option<Kink>,
-    /// Length \[s\] and error of the last part.
+    /// Length \[s\] and error of the last substep.
     previous: Option<(f64, f64)>,
 }
 
-impl Planner {
-    /// Of a step from `states`, which carry the sensitivity, whose first part is about `first` \[s\] long, if that is known.
+impl SubstepController {
+    /// Of a step from `states`, which carry the sensitivity, whose first substep is about `first` \[s\] long, if that is known.
     pub(super) fn new(
         settings: &Adaptive,
         plain: World,
-        states: Vec<State<Probe>>,
+        states: Vec<State<Tangent>>,
         whole: Step,
         first: Option<f64>,
     ) -> Self {
-        let lifted = plain.cast::<Probe>();
+        let lifted = plain.cast::<Tangent>();
         let values: Vec<State> = states.iter().map(State::value).collect();
         let norm = ErrorNorm::new(settings, &plain, &values);
         let wrenches = lifted.wrenches(&states, whole.index);
@@ -86,14 +86,14 @@ impl Planner {
         let dt = first.min(whole.dt);
         Self {
             settings: *settings,
-            travel: Travel::new(&plain),
+            limiter: StepLimiter::new(&plain),
             world: lifted,
             plain,
             whole,
             norm,
             states,
             wrenches,
-            parts: 0,
+            substeps: 0,
             time: whole.start,
             dt,
             kink: None,
@@ -101,22 +101,22 @@ impl Planner {
         }
     }
 
-    /// The states that the parts have led to, with the sensitivity.
-    pub(super) fn states(self) -> Vec<State<Probe>> {
+    /// The states that the substeps have led to, with the sensitivity.
+    pub(super) fn states(self) -> Vec<State<Tangent>> {
         self.states
     }
 
-    /// The state of a body that the parts have led to.
+    /// The state of a body that the substeps have led to.
     pub(super) fn state(&self, body: BodyId) -> State {
         self.states[body].value()
     }
 
-    /// Length of the part that would come next \[s\].
-    pub(super) fn next_part(&self) -> f64 {
+    /// Length of the substep that would come next \[s\].
+    pub(super) fn next_substep(&self) -> f64 {
         self.dt
     }
 
-    /// Takes the next part; none when the step is done.
+    /// Takes the next substep; none when the step is done.
     ///
     /// # Errors
     /// If it would have to be too short, or one too many.
@@ -130,17 +130,17 @@ impl Planner {
         let wanted = self.dt;
         let to_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
         let dt = wanted.min(left).min(to_kink);
-        self.dt = self.travel.longest(&self.plain, &values, self.time, dt);
+        self.dt = self.limiter.longest(&self.plain, &values, self.time, dt);
         let (mut failed, mut touches) = (None, TOUCH_ATTEMPTS);
         loop {
-            // A last part that is next to nothing would be lost in rounding.
+            // A last substep that is next to nothing would be lost in rounding.
             let dt = if self.dt >= left * (1.0 - 1e-6) { left } else { self.dt };
-            // Leaks of the first step are of its first part.
-            let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
-            let part = Step { index, start: self.time, dt };
+            // Leaks of the first step are of its first substep.
+            let index = if self.substeps == 0 { self.whole.index } else { self.whole.index.max(1) };
+            let substep = Step { index, start: self.time, dt };
             let (mut trial, estimate) =
-                dormand_prince::estimated(&self.world, &self.states, &self.wrenches, part);
-            if self.travel.passes_over(&self.plain, &values, &trial.stages, dt) {
+                dormand_prince::estimated(&self.world, &self.states, &self.wrenches, substep);
+            if self.limiter.passes_over(&self.plain, &values, &trial.stages, dt) {
                 self.dt = 0.5 * dt;
                 continue;
             }
@@ -148,7 +148,7 @@ impl Planner {
             let error = self.norm.error_ratio(&errors);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
-            // Where errors have grown from part to part, they go on to (K. Gustafsson, "Control-theoretic techniques for stepsize selection in
+            // Where errors have grown from substep to substep, they go on to (K. Gustafsson, "Control-theoretic techniques for stepsize selection in
             // implicit Runge–Kutta methods", ACM Trans. Math. Softw. 20, 1994).
             let change = match self.previous {
                 Some((length, previous)) if error <= 1.0 => {
@@ -158,12 +158,12 @@ impl Planner {
             };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
-                self.parts += 1;
-                if self.parts > self.settings.max_substeps {
+                self.substeps += 1;
+                if self.substeps > self.settings.max_substeps {
                     let max_substeps = self.settings.max_substeps;
                     return Err(self.plain.too_many_substeps(&values, self.time, max_substeps));
                 }
-                if let Some(pair) = self.travel.crossed(&self.plain, &self.states, trial.end()) {
+                if let Some(pair) = self.limiter.crossed(&self.plain, &self.states, trial.end()) {
                     return Err(self.plain.passed_through(pair, self.time));
                 }
                 let end = self.time + dt;
@@ -179,7 +179,7 @@ impl Planner {
                 self.time = if dt == left { self.whole.end() } else { end };
                 self.states = trial.stages.pop().unwrap_or_default();
                 self.wrenches = trial.wrenches;
-                return Ok(Some(part));
+                return Ok(Some(substep));
             }
             let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if chosen <= shortest {

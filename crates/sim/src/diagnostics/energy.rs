@@ -151,7 +151,7 @@ impl EnergyBalance {
         }
         // What contacts had stored at the start they may give back.
         let now: Vec<State> = states.iter().map(State::value).collect();
-        let plain = world.plain();
+        let plain = world.to_f64();
         let stored = |states: &[State]| stored_energy(&plain.with_touching(states, 0.0), states);
         let before = stored(&self.initial);
         let energy = gain - before + stored(&now);
@@ -213,9 +213,11 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 fn stored_energy(world: &World, states: &[State]) -> f64 {
     let mut energy = energy_of_bristles(world, states) + world.energy_of_bushings(states);
     for pair in &world.contacts {
-        let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { continue };
-        let (reach, smoothing) = (pair.law().reach(), pair.smoothing);
-        patch.for_each_gap(reach, |gap, area| {
+        let Some(query) = world.contact_query(pair, world.relative_value(pair, states)) else {
+            continue;
+        };
+        let (reach, smoothing) = (pair.law().cutoff(), pair.smoothing);
+        query.for_each_gap(reach, |gap, area| {
             let force = |x: f64| {
                 let (slip, normal) = (Vector3::zeros(), Vector3::z());
                 let gap = reach + smoothing.at(x).map_or(0.0, |smoothed| smoothed.gap);
@@ -237,7 +239,7 @@ fn stored_energy(world: &World, states: &[State]) -> f64 {
     energy
 }
 
-/// The work of the bristles of all contacts that stick, from their deflections to none, while nothing else moves \[J\].
+/// The work of the bristles of all contacts with bristles, from their deflections to none, while nothing else moves \[J\].
 fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
     let resting: Vec<State> = states.iter().map(|state| State::at_rest(state.pose)).collect();
     let work = |((pair, _), state): ((&ContactPair, Bristles), &State)| {
@@ -246,11 +248,11 @@ fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
         let twist = stack(&linear, &angular);
         let along = |part: f64| {
             let deflection = State::at_rest(state.pose).deflected(&(state.deflection() * part));
-            world.effect(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
+            world.pair_wrench(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
         };
         let undeflected = along(0.0);
         let mean: f64 = GAUSS.iter().map(|(x, weight)| weight * along(*x)).sum();
         undeflected - mean
     };
-    world.sticking().zip(&states[world.joint_places().end..]).map(work).sum()
+    world.bristle_contacts().zip(&states[world.joint_places().end..]).map(work).sum()
 }

@@ -2,9 +2,9 @@
 
 use std::cell::LazyCell;
 
-use super::probe::Probe;
+use super::sensitivity::Tangent;
 use super::touch_time;
-use crate::contact::patch::Patch;
+use crate::contact::contact_query::ContactQuery;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body::Motion;
@@ -22,11 +22,11 @@ const FREE_THICKNESS: f64 = 0.25;
 const FREE_DEVIATION: f64 = 0.05;
 /// How often trajectories are looked at \[s\].
 const LOOK: f64 = 1e-3;
-/// Looks ahead at most: no part is longer.
+/// Looks ahead at most: no substep is longer.
 const LOOKS: usize = 1000;
 
 /// For each contact, what its samples may do, if a force moves one of the bodies.
-pub(super) struct Travel(Vec<Option<Limit>>);
+pub(super) struct StepLimiter(Vec<Option<Limit>>);
 
 /// What the samples of a contact may do.
 struct Limit {
@@ -44,7 +44,7 @@ struct Limit {
     driven: bool,
 }
 
-impl Travel {
+impl StepLimiter {
     pub(super) fn new(world: &World) -> Self {
         let limit = |pair: &ContactPair| {
             let ends = [pair.bodies.samples, pair.bodies.field];
@@ -58,11 +58,11 @@ impl Travel {
             let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.smallest();
             let size = if own > 0.0 { own } else { other_gyration };
             let thinnest = FREE_THICKNESS * thickness;
-            let [free, short] = [FREE_TRAVEL, SHORT].map(|part| (part * size).min(thinnest));
+            let [free, short] = [FREE_TRAVEL, SHORT].map(|substep| (substep * size).min(thinnest));
             let radius = surface.spread_about(&body.com());
             let driven =
                 [body, other].iter().any(|body| matches!(body.motion, Motion::Kinematic(_)));
-            // The ends of a part say nothing of a trajectory in between.
+            // The ends of a substep say nothing of a trajectory in between.
             let free = if driven { short } else { free };
             Some(Limit { radius, size, free, short, thin: thickness.is_finite(), driven })
         };
@@ -79,20 +79,20 @@ impl Travel {
 
     /// The longest of the lengths `dt`, `dt`/2, … \[s\] from `time` on in which bodies that go on as they move, or as their
     /// trajectories say, could not pass over a contact: no sample moves by more than its clearance and a small part of its
-    /// body's size. Of a trajectory that does not go on as it moves, a yet smaller part counts, for all that it touches may be
+    /// body's size. Of a trajectory that does not go on as it moves, a yet smaller substep counts, for all that it touches may be
     /// at rest.
     pub(super) fn longest(&self, world: &World, states: &[State], time: f64, mut dt: f64) -> f64 {
         // Both may fall, but not away from each other faster than one does.
         let fall = 0.5 * world.gravity.norm();
         for (pair, limit) in self.limits(world) {
-            let state = world.seen_value(pair, states);
+            let state = world.relative_value(pair, states);
             let speed = state.speed_within(limit.radius);
             if limit.driven {
                 dt = dt.min(LOOK * LOOKS as f64);
             }
             let deviations = limit.deviations(world, pair, states, time, dt);
             let passes_over = |dt: f64| {
-                // The largest of those within the part, which ascend.
+                // The largest of those within the substep, which ascend.
                 let looks = deviations.len().min((dt / LOOK) as usize);
                 let deviation = deviations[..looks].last().copied().unwrap_or(0.0);
                 let travel = dt * (speed + dt * fall) + deviation;
@@ -110,13 +110,13 @@ impl Travel {
     pub(super) fn crossed<'a>(
         &'a self,
         world: &'a World,
-        before: &[State<Probe>],
-        after: &[State<Probe>],
+        before: &[State<Tangent>],
+        after: &[State<Tangent>],
     ) -> Option<&'a ContactPair> {
         let mut thin = self.limits(world).filter(|(_, limit)| limit.thin).map(|(pair, _)| pair);
         thin.find(|pair| {
-            let [from, to] = [before, after].map(|states| world.seen_value(pair, states));
-            world.patch(pair, to).is_some_and(|patch| patch.has_crossed(from))
+            let [from, to] = [before, after].map(|states| world.relative_value(pair, states));
+            world.contact_query(pair, to).is_some_and(|query| query.has_crossed(from))
         })
     }
 
@@ -125,16 +125,16 @@ impl Travel {
         &self,
         world: &World,
         states: &[State],
-        stages: &[Vec<State<Probe>>],
+        stages: &[Vec<State<Tangent>>],
         dt: f64,
     ) -> bool {
         let end = LazyCell::new(|| -> Vec<State> {
             stages.last().into_iter().flatten().map(State::value).collect()
         });
         self.limits(world).any(|(pair, limit)| {
-            let state = world.seen_value(pair, states);
+            let state = world.relative_value(pair, states);
             let speed = |state: State| state.speed_within(limit.radius);
-            let speeds = stages.iter().map(|stage| speed(world.seen_value(pair, stage)));
+            let speeds = stages.iter().map(|stage| speed(world.relative_value(pair, stage)));
             let travel = dt * speeds.fold(speed(state), f64::max);
             travel > limit.short
                 && (travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
@@ -146,8 +146,9 @@ impl Travel {
 impl Limit {
     /// Whether samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
     fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
-        let near = |patch: Patch<'_>| patch.each_near(pair.law().reach(), travel).next().is_some();
-        world.patch(pair, state).is_some_and(near)
+        let near =
+            |query: ContactQuery<'_>| query.each_near(pair.law().cutoff(), travel).next().is_some();
+        world.contact_query(pair, state).is_some_and(near)
     }
 
     /// How far the samples of `pair` have been at most \[m\] from where they would be if what is driven went on as in `states`,
@@ -173,9 +174,9 @@ impl Limit {
                 there[body] = trajectory.state(time + elapsed);
                 uniform[body] = states[body].drifted(elapsed);
             }
-            let place = world.seen_value(pair, &there).pose;
+            let place = world.relative_value(pair, &there).pose;
             let from = [&uniform[..], states].map(|states| {
-                let other = world.seen_value(pair, states).pose;
+                let other = world.relative_value(pair, states).pose;
                 let moved = place.translation.vector - other.translation.vector;
                 moved.norm() + self.radius * place.rotation.angle_to(&other.rotation)
             });
