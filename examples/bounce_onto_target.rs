@@ -10,9 +10,11 @@ use nalgebra::{Isometry3, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, Bounce, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HalfSpace,
-    HuntCrossley, Law, RigidBody, SimulationError, State, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody,
+    SimulationError, State, Surface, TimeSteps, World,
 };
 
 const RADIUS: f64 = 0.03;

@@ -7,9 +7,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
+use prehend::sim::contact::regularized_coulomb;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, HalfSpace,
-    RigidBody, SimulationError, State, Surface, World, regularized_coulomb,
+    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, RigidBody,
+    SimulationError, State, Surface, World,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.

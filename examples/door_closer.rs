@@ -14,10 +14,12 @@ use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, forward_jacobian};
 use prehend::sim::articulated::{Joint, Link};
+use prehend::sim::contact::{Bounce, Parameters};
+use prehend::sim::fields::{Cuboid, Placed};
+use prehend::sim::joint_law::{JointLaw, JointLimits, JointSpring};
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, ContactCalibration, Coulomb, Cuboid, GapSmoothing,
-    HuntCrossley, JointForceId, JointLaw, JointLimits, JointSpring, Law, Parameters, Placed,
-    RigidBody, SimulationError, State, Surface, TimeSteps, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    JointForceId, Law, RigidBody, SimulationError, State, Surface, TimeSteps, World,
 };
 
 /// Half of the door's width, thickness and height \[m\].

@@ -20,9 +20,10 @@ use prehend::autodiff::lie::lift;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, Cuboid, GapSmoothing, HalfSpace,
-    HuntCrossley, KelvinVoigt, Law, Motion, RigidBody, State, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+    Motion, RigidBody, State, Surface, TimeSteps, World,
 };
 
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.

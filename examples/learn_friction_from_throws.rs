@@ -17,8 +17,9 @@ use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Batch, Body, Bounce, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    Batch, Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
     SimulationError, State, TimeSteps, World,
 };
 

@@ -14,9 +14,10 @@ use parry3d_f64::shape::{Ball, HeightField};
 use parry3d_f64::utils::Array2;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Adaptive, Body, BodyId, Bounce, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law,
-    Shape, SimulationError, State, TimeSteps, World,
+    Adaptive, Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    SimulationError, State, TimeSteps, World,
 };
 
 /// Radius \[m\] and density \[kg/m³\] of a marble.

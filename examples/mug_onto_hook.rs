@@ -18,8 +18,9 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::TriMesh;
 use prehend::geometry::shapes::{Mug, tube};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, look_at};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, Bounce, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape,
+    Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape,
     ShapeOptions, SimulationError, State, TimeSteps, World,
 };
 

@@ -13,9 +13,10 @@ use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, SceneVars};
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SimulationError, State, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError,
+    State, Surface, TimeSteps, World,
 };
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };

@@ -12,10 +12,11 @@ use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector2, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, Bounce, BristleFriction, ContactBodies, ContactCalibration, Coulomb, Cuboid,
-    GapSmoothing, HalfSpace, HuntCrossley, Law, Motion, RigidBody, SimulationError, State, Surface,
-    TimeSteps, Trajectory, World,
+    Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Law, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, Trajectory, World,
 };
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].

@@ -11,8 +11,9 @@ use parry3d_f64::shape::{Ball, Cuboid, HalfSpace, RoundCuboid};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, BodyId, Bounce, BristleFriction, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Body, BodyId, BristleFriction, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
     KelvinVoigt, Law, Shape, SimulationError, State, TimeSteps, World,
 };
 

@@ -10,9 +10,10 @@ use prehend::autodiff::lie::lift;
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SemiImplicitEuler, State, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SemiImplicitEuler,
+    State, Surface, TimeSteps, World,
 };
 
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };

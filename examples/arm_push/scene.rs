@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::sim::articulated::{Joint, Link};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::{Cuboid, HalfSpace};
+use prehend::sim::joint_law::PositionServo;
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, ContactCalibration, Coulomb, Cuboid, GapSmoothing,
-    HalfSpace, HuntCrossley, JointForceId, Law, PositionServo, RigidBody, State, Surface, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    JointForceId, Law, RigidBody, State, Surface, World,
 };
 
 /// Lengths of upper arm and forearm, and the height at which they turn above the table \[m\].

@@ -10,10 +10,10 @@ mod hull;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Adaptive, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, Cuboid,
-    DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody, SimulationError, State,
-    Step, TimeSteps, World,
+    Adaptive, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, DynContactLaw,
+    GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError, State, Step, TimeSteps, World,
 };
 
 use gripper::Gripper;

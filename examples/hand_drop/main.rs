@@ -13,9 +13,12 @@ use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::geometry::hand::{allegro_xela_urdf, default_grasp};
 use prehend::geometry::robot::{KinematicTree, RobotShape};
+use prehend::sim::contact::Bounce;
+use prehend::sim::joint_law::PositionServo;
+use prehend::sim::robot::UrdfOptions;
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing,
-    HuntCrossley, Law, PositionServo, RigidBody, State, Surface, TimeSteps, UrdfOptions, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing,
+    HuntCrossley, Law, RigidBody, State, Surface, TimeSteps, World,
 };
 
 /// The ball: radius \[m\], mass \[kg\], and how high over the base of the hand it starts \[m\].

@@ -15,7 +15,8 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use plotters::prelude::*;
-use prehend::sim::{ContactCalibration, DynContactLaw, LawRegistry};
+use prehend::sim::contact::LawRegistry;
+use prehend::sim::{ContactCalibration, DynContactLaw};
 
 use crate::curves::Curve;
 use crate::report::{LawReport, law_report};

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Adaptive, Body, ContactBodies, DynContactLaw, GapSmoothing, HalfSpace, Integrator, RigidBody,
+    Adaptive, Body, ContactBodies, DynContactLaw, GapSmoothing, Integrator, RigidBody,
     SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
 };
 

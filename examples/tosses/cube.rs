@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::Scalar;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, GapSmoothing, HalfSpace, Integrator, Motion, RigidBody, SimulationError,
-    State, Surface, TimeSteps, World,
+    Body, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody, SimulationError, State,
+    Surface, TimeSteps, World,
 };
 
 use crate::law::CubeLaw;

@@ -7,9 +7,10 @@ use std::time::Instant;
 
 use nalgebra::{DVector, Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    SemiImplicitEuler, State, Step, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler,
+    State, Step, Surface, TimeSteps, World,
 };
 
 /// Evaluations in a row, and how often; the fastest counts.

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Recording, Scalar, Var};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Batch, Body, Bounce, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HalfSpace,
-    HuntCrossley, Law, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps,
-    World,
+    Batch, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 
 /// Balls of a world, each with a contact of its own.

@@ -10,7 +10,8 @@ use std::time::Instant;
 
 use grasp::{Derivatives, FirstOrder, Grasp, loss, start, time_steps};
 use prehend_autodiff::{Fwd, Scalar, gradient};
-use prehend_sim::{GapSmoothing, LeakSteps, State, World};
+use prehend_sim::contact::LeakSteps;
+use prehend_sim::{GapSmoothing, State, World};
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();

@@ -9,8 +9,9 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{Ball, HalfSpace, HeightField};
 use parry3d_f64::utils::Array2;
 use prehend_autodiff::{Recording, Var};
+use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Bounce, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    BackwardEuler, Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
     HuntCrossley, Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State, TimeSteps, World,
 };
 

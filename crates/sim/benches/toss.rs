@@ -7,9 +7,11 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Body, Bounce, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HalfSpace,
-    HuntCrossley, Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
+    Adaptive, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
 /// Free fall, impact and slide \[s\].

@@ -11,9 +11,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, HalfSpace,
-    Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, Integrator,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
 

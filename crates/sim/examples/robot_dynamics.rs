@@ -15,7 +15,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use prehend_geometry::mjcf::{EqualityKind, Model, Transmission};
 use prehend_geometry::robot::{Drive, KinematicTree, Motion};
 use prehend_geometry::{Inertial, ReadOptions};
-use prehend_sim::{BodyId, MjcfOptions, MjcfRobot, State, UrdfOptions, World};
+use prehend_sim::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
+use prehend_sim::{BodyId, State, World};
 use serde_json::{Value, json};
 
 /// Degrees of freedom up to which mass matrices are printed.

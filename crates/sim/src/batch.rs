@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Recompute, Scalar};
 
-use crate::adjoint::{ParameterDelta, StepCheckpointed, WorldTemplate};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::integrator::step_checkpointed::StepCheckpointed;
+use crate::integrator::world_template::{ParameterDelta, WorldTemplate};
+use crate::state::{STATE, State, coordinates_of, states_of};
 use crate::time::TimeSteps;
 use crate::world::World;
 

@@ -8,10 +8,10 @@ use std::fmt;
 use prehend_autodiff::Scalar;
 
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use energy::EnergyBalance;
 use step_resolution::StepResolution;
 

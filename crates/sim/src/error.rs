@@ -1,16 +1,16 @@
-//! Why a simulation cannot be set up or cannot go on.
+//! Errors of building a world, and of simulating it.
 
 use thiserror::Error;
 
 use crate::articulated::ArticulationError;
 use crate::body::error::BodyError;
 use crate::contact::error::LawError;
+use crate::handle::BodyId;
 use crate::shape::error::ShapeError;
-use crate::world::body_id::BodyId;
 
-/// Why a simulation cannot be set up or cannot go on.
+/// Error of building or changing a world.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum SimulationError {
+pub enum BuildError {
     /// A body is not of this world.
     #[error("there is no body {body}: the world has {bodies}")]
     NoBody {
@@ -30,12 +30,6 @@ pub enum SimulationError {
     NoField {
         /// Its name.
         body: String,
-    },
-    /// Two bodies have no contact.
-    #[error("bodies '{}' and '{}' have no contact", .bodies[0], .bodies[1])]
-    NoContact {
-        /// Their names.
-        bodies: [String; 2],
     },
     /// Lists of bodies of which no two can move against each other.
     #[error("no two of these bodies can move against each other")]
@@ -85,6 +79,69 @@ pub enum SimulationError {
     /// A force along no joint.
     #[error("a force along joints needs an axis to act along")]
     NoAxes,
+    /// Parameters of a world that are too few or too many.
+    #[error("{given} parameters for a world of {expected}")]
+    Parameters {
+        /// How many were given.
+        given: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// A body has an impossible mass, inertia or center of mass.
+    #[error("body '{body}': {error}")]
+    Body {
+        /// Its name.
+        body: String,
+        /// What is wrong.
+        error: BodyError,
+    },
+    /// A body has impossible dimensions.
+    #[error("body '{body}': {error}")]
+    Shape {
+        /// Its name.
+        body: String,
+        /// What is wrong.
+        error: ShapeError,
+    },
+    /// A robot, its shape and the trajectory of its joints do not belong together.
+    #[error("{found} {what} for a robot that has {expected}")]
+    Robot {
+        /// What was counted.
+        what: &'static str,
+        /// How many there were.
+        found: usize,
+        /// How many the robot has.
+        expected: usize,
+    },
+
+    /// A trajectory that carries derivatives, where only values of it would be kept.
+    #[error(
+        "body '{body}' is driven by a trajectory that carries derivatives: checkpoints and parameters in a row know its values \
+         only, so record the simulation as it is"
+    )]
+    TrajectoryDerivatives {
+        /// Its name.
+        body: String,
+    },
+    /// A stiffness or damping of a bushing is negative or not finite.
+    #[error(
+        "stiffness and damping of a bushing must be zero or positive, and finite, one is {value}"
+    )]
+    BushingStiffness {
+        /// What it is.
+        value: f64,
+    },
+}
+
+/// Error of a simulation.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SimulationError {
+    /// The world is none that can be simulated.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A parameter of a contact is out of its range.
+    #[error(transparent)]
+    Law(#[from] LawError),
     /// Coordinates and velocities of a joint that are too few or too many.
     #[error(
         "{} coordinates and {} velocities for the joint of link '{link}', which has {} and {}", .given[0], .given[1], .expected[0],
@@ -144,14 +201,6 @@ pub enum SimulationError {
         /// What it is.
         value: f64,
     },
-    /// Parameters of a world that are too few or too many.
-    #[error("{given} parameters for a world of {expected}")]
-    Parameters {
-        /// How many were given.
-        given: usize,
-        /// How many it has.
-        expected: usize,
-    },
     /// A world has no parameter of that name, or it was named before.
     #[error("the world has no parameter called '{name}', or it was named twice: see its names")]
     NoParameter {
@@ -182,34 +231,9 @@ pub enum SimulationError {
         /// How many it takes.
         expected: usize,
     },
-    /// A body has an impossible mass, inertia or center of mass.
-    #[error("body '{body}': {error}")]
-    Body {
-        /// Its name.
-        body: String,
-        /// What is wrong.
-        error: BodyError,
-    },
-    /// A body has impossible dimensions.
-    #[error("body '{body}': {error}")]
-    Shape {
-        /// Its name.
-        body: String,
-        /// What is wrong.
-        error: ShapeError,
-    },
     /// A world that differs in more than parameters from the one its integrator was made for.
     #[error("the integrator was made for a world of other bodies or contacts")]
     AnotherWorld,
-    /// A trajectory that carries derivatives, where only values of it would be kept.
-    #[error(
-        "body '{body}' is driven by a trajectory that carries derivatives: checkpoints and parameters in a row know its values \
-         only, so record the simulation as it is"
-    )]
-    TrajectoryDerivatives {
-        /// Its name.
-        body: String,
-    },
     /// The velocity of a trajectory is not the rate of its pose.
     #[error(
         "body '{body}' is driven by a trajectory whose velocity at {time} s is far from the rate of its pose, which what touches it \
@@ -349,16 +373,6 @@ pub enum SimulationError {
         needed: f64,
         /// Parts that are allowed.
         max_substeps: usize,
-    },
-    /// A robot, its shape and the trajectory of its joints do not belong together.
-    #[error("{found} {what} for a robot that has {expected}")]
-    Robot {
-        /// What was counted.
-        what: &'static str,
-        /// How many there were.
-        found: usize,
-        /// How many the robot has.
-        expected: usize,
     },
 }
 

@@ -9,10 +9,8 @@
 //! use std::sync::Arc;
 //!
 //! use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-//! use prehend_sim::{
-//!     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody, State,
-//!     Surface, World,
-//! };
+//! use prehend_sim::fields::HalfSpace;
+//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // 200 g; inertia in kg m², center of mass in m.
@@ -67,7 +65,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
 //! let table = world.add(Body::kinematic("table", |time: f64| {
@@ -106,7 +104,7 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Vector3};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A slope of 6°.
 //! let mut world = World::new(Vector3::new(1.0, 0.0, -9.75));
@@ -150,7 +148,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let surface = Arc::new(Surface::uniform(&[Point3::origin()], 1e-4)?);
@@ -184,7 +182,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
@@ -221,7 +219,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! /// Pressure by the square of the depth, and a film whose drag grows with slip.
 //! struct Wet([f64; 2]);
 //!
@@ -324,7 +322,7 @@
 //! # use nalgebra::{Isometry3, Vector3};
 //! use prehend_autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 //! use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
@@ -375,7 +373,7 @@
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! # use prehend_autodiff::{Recording, Var};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
@@ -405,7 +403,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
@@ -432,7 +430,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));

@@ -4,7 +4,9 @@ pub(crate) mod adaptive;
 pub(crate) mod backward_euler;
 pub(crate) mod runge_kutta;
 pub(crate) mod semi_implicit;
+pub(crate) mod step_checkpointed;
 pub(crate) mod sub_stepped;
+pub(crate) mod world_template;
 
 use prehend_autodiff::Scalar;
 

@@ -16,6 +16,20 @@ pub(crate) mod spring;
 mod tests;
 pub(crate) mod velocity_servo;
 
+pub use self::activation::Activation;
+pub use self::affine_actuator::AffineActuator;
+pub use self::damper::JointDamper;
+pub use self::dynamic::DynJointLaw;
+pub use self::friction::JointFriction;
+pub use self::limits::JointLimits;
+pub use self::motor::Motor;
+pub use self::polynomial::{PolynomialDamper, PolynomialSpring};
+pub use self::position_servo::PositionServo;
+pub use self::registry::{JointLawEntry, joint_laws};
+pub use self::slack_spring::SlackSpring;
+pub use self::spring::JointSpring;
+pub use self::velocity_servo::VelocityServo;
+
 use prehend_autodiff::Scalar;
 
 use crate::contact::error::LawError;
@@ -26,7 +40,8 @@ use crate::contact::parameters::Parameters;
 ///
 /// ```
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{JointLaw, Parameters};
+/// use prehend_sim::contact::Parameters;
+/// use prehend_sim::joint_law::JointLaw;
 ///
 /// /// A spring that hardens with the cube of its deflection.
 /// struct Hardening {

@@ -3,16 +3,18 @@
 use std::ops::ControlFlow;
 
 use prehend_autodiff::Scalar;
+use thiserror::Error;
 
 use crate::diagnostics::{Diagnostics, Resolution};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::sample_culling::SampleCulling;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
+use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
+use crate::world::sample_culling::SampleCulling;
 
 /// What a simulation with an integrator of one's own choice led to.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,11 +52,41 @@ impl<C: ControlResult, E: Into<SimulationError>> ControlResult for Result<C, E> 
     }
 }
 
+/// Error of a time step too long for the stiffness or damping of the contacts.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("time step {dt} s is too long for these contacts: at most {limit} s")]
+pub struct StepError {
+    /// The time step \[s\].
+    pub dt: f64,
+    /// The longest step that passes \[s\].
+    pub limit: f64,
+}
+
+impl World {
+    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`: dt·ω ≤
+    /// [`Integrator::stability_limit`] for their [`World::contact_frequency`] ω. Impacts to come are not among them.
+    ///
+    /// # Errors
+    /// With the longest step that passes.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies.
+    pub fn check_time_step(
+        &self,
+        integrator: &impl Integrator,
+        states: &[State],
+        dt: f64,
+    ) -> Result<(), StepError> {
+        let limit = integrator.stability_limit() / self.contact_frequency(states);
+        if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
+    }
+}
+
 impl<S: Scalar> World<S> {
     /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
     ///
     /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts with bristles
-    /// ([`Bristles`](crate::Bristles)), if there are such. What goes on
+    /// ([`Bristles`](crate::contact::Bristles)), if there are such. What goes on
     /// from there remembers them; with the states of the bodies alone it starts without deflection.
     ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
@@ -153,7 +185,7 @@ impl<S: Scalar> World<S> {
     /// ```
     /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
     /// # use prehend_autodiff::Fwd;
-    /// # use prehend_sim::*;
+    /// # use prehend_sim::prelude::*;
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::zeros());
     /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
@@ -328,7 +360,7 @@ impl<S: Scalar> World<S> {
         }
         self.contact_materials().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
-        self.check_bushings()?;
+        self.bushings.iter().try_for_each(Bushing::check)?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),
@@ -353,8 +385,9 @@ mod tests {
     use prehend_autodiff::Fwd;
 
     use super::*;
+    use crate::contact::{LawError, LawRegistry};
     use crate::scenes::{bowl, egg_on};
-    use crate::{GapSmoothing, LawError, LawRegistry, Motion, SemiImplicitEuler};
+    use crate::{GapSmoothing, Motion, SemiImplicitEuler};
 
     #[test]
     fn parameters_out_of_range_and_missing_states_are_refused() {

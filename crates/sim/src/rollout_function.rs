@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
-use crate::adjoint::WorldTemplate;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::integrator::world_template::WorldTemplate;
+use crate::state::{STATE, State, coordinates_of, states_of};
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 

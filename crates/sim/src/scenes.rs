@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::DistanceField;
 
+use crate::fields::{HalfSpace, SphereCavity};
 use crate::{
-    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace,
-    KelvinVoigt, Law, RigidBody, SphereCavity, State, Surface, World,
+    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
+    RigidBody, State, Surface, World,
 };
 
 /// Kelvin and Voigt's normal law with Coulomb friction, the law of most tests.

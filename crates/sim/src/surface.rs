@@ -138,7 +138,7 @@ impl Surface {
     /// there, since one of them touches at a time: where distances come out equal along all axes, every face presses with its own area,
     /// evenly, and [`Surface::area`] is less than that of the box.
     ///
-    /// Beside the field of a box, whose edges are round, take [`Cuboid::surface`](crate::Cuboid::surface): the samples on
+    /// Beside the field of a box, whose edges are round, take [`Cuboid::surface`](crate::fields::Cuboid::surface): the samples on
     /// the edges of this one never touch it.
     ///
     /// # Errors

@@ -2,21 +2,26 @@
 
 pub(crate) mod articulated_body;
 pub(crate) mod body;
-pub(crate) mod body_id;
 pub(crate) mod bristle_states;
 pub(crate) mod broad_phase;
 pub(crate) mod bushing;
+mod contact_frequency;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 mod contacts_between;
+mod failure;
 pub(crate) mod joint_force;
 mod linear_contacts;
 mod matter;
 mod pair_function;
 mod pair_wrench;
+mod parameter_names;
+mod parameters;
 pub(crate) mod path;
 mod relative_state;
+pub(crate) mod sample_culling;
 mod sensors;
+mod shaped_body;
 pub(crate) mod trajectory;
 mod trajectory_checks;
 pub(crate) mod transmission;
@@ -28,12 +33,13 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use crate::contact::dynamic::DynContactLaw;
+use crate::contact::error::LawError;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, ContactId, ContactPlace};
 use crate::state::State;
 use articulated_body::ArticulatedBody;
 use body::{Body, Motion};
-use body_id::BodyId;
 use bushing::Bushing;
 use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
@@ -95,10 +101,9 @@ impl World {
         bodies: ContactBodies,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         let pair = self.pair(bodies, law, smoothing)?;
-        self.contacts.push(pair);
-        Ok(())
+        Ok(self.push_contacts([pair]))
     }
 
     /// Lets two bodies touch both ways, samples on field, each with half of the force: two entries of
@@ -114,13 +119,19 @@ impl World {
         b: BodyId,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         let there = ContactBodies { samples: a, field: b };
         let pair = |bodies| self.pair(bodies, Arc::clone(&law), smoothing);
         let mut both = [pair(there)?, pair(there.swapped())?];
         both.iter_mut().for_each(|pair| pair.weight = 0.5);
-        self.contacts.extend(both);
-        Ok(())
+        Ok(self.push_contacts(both))
+    }
+
+    /// Adds contacts that one handle stands for.
+    fn push_contacts(&mut self, contacts: impl IntoIterator<Item = ContactPair>) -> ContactId {
+        let first = self.contacts.len();
+        self.contacts.extend(contacts);
+        ContactId(ContactPlace::Pairs { first, count: self.contacts.len() - first })
     }
 
     fn pair(
@@ -128,16 +139,16 @@ impl World {
         bodies: ContactBodies,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<ContactPair, SimulationError> {
+    ) -> Result<ContactPair, BuildError> {
         let (samples, field) = (self.body(bodies.samples)?, self.body(bodies.field)?);
         if bodies.samples == bodies.field {
-            return Err(SimulationError::Itself { body: samples.name.clone() });
+            return Err(BuildError::Itself { body: samples.name.clone() });
         }
         if samples.surface.is_none() {
-            return Err(SimulationError::NoSamples { body: samples.name.clone() });
+            return Err(BuildError::NoSamples { body: samples.name.clone() });
         }
         if field.field.is_none() {
-            return Err(SimulationError::NoField { body: field.name.clone() });
+            return Err(BuildError::NoField { body: field.name.clone() });
         }
         smoothing.check()?;
         Ok(ContactPair::new(bodies, law, smoothing))
@@ -151,8 +162,8 @@ impl World {
 
 impl<S: Scalar> World<S> {
     /// The body `id`, if it is of this world.
-    pub(crate) fn body(&self, id: BodyId) -> Result<&Body<S>, SimulationError> {
-        let no_body = SimulationError::NoBody { body: id, bodies: self.bodies.len() };
+    pub(crate) fn body(&self, id: BodyId) -> Result<&Body<S>, BuildError> {
+        let no_body = BuildError::NoBody { body: id, bodies: self.bodies.len() };
         self.bodies.get(id.index()).ok_or(no_body)
     }
 
@@ -178,14 +189,14 @@ impl<S: Scalar> World<S> {
         self.body_ids().filter(free).collect()
     }
 
-    /// Sets the parameter called `name`, such as `"friction"`, of every contact between two bodies: to differentiate by it, put in a
-    /// variable. That of a group is in [`contact_groups`](World::contact_groups), for all of its contacts.
+    /// Sets the parameter called `name`, such as `"friction"`, of contacts that were added together: to differentiate by it, put in a
+    /// variable.
     ///
     /// ```
     /// # use std::sync::Arc;
     /// # use nalgebra::Vector3;
     /// use prehend_autodiff::Fwd;
-    /// # use prehend_sim::*;
+    /// # use prehend_sim::prelude::*;
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
@@ -194,29 +205,33 @@ impl<S: Scalar> World<S> {
     /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
     /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
     /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-    /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
-    /// let mut lifted = world.cast::<Fwd<1>>();
-    /// lifted.set_contact_param(ball, floor, "friction", Fwd::variable(0.4, 0))?;
-    /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
+    /// # let bodies = ContactBodies { samples: ball, field: floor };
+    /// let contact = world.add_contact(bodies, law, GapSmoothing::Hard)?;
+    /// let mut dual = world.cast::<Fwd<1>>();
+    /// dual.set_contact_param(contact, "friction", Fwd::variable(0.4, 0))?;
+    /// # assert_eq!(dual.contacts[0].params()[3].value, 0.4);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// If the two have no contact, or its law no parameter of that name.
+    /// If their law has no parameter of that name.
+    ///
+    /// # Panics
+    /// If they are of another world.
     pub fn set_contact_param(
         &mut self,
-        a: BodyId,
-        b: BodyId,
+        contact: ContactId,
         name: &str,
         value: S,
-    ) -> Result<(), SimulationError> {
-        let between = |pair: &ContactPair<S>| a != b && pair.joins(a) && pair.joins(b);
-        if !self.contacts.iter().any(between) {
-            let bodies = [self.body(a)?.name.clone(), self.body(b)?.name.clone()];
-            return Err(SimulationError::NoContact { bodies });
-        }
-        for pair in self.contacts.iter_mut().filter(|pair| between(pair)) {
+    ) -> Result<(), LawError> {
+        let pairs = match contact.0 {
+            ContactPlace::Pairs { first, count } => &mut self.contacts[first..first + count],
+            ContactPlace::Group(group) => {
+                std::slice::from_mut(&mut self.contact_groups[group].contact)
+            }
+        };
+        for pair in pairs {
             *pair.param_mut(name)? = value;
         }
         Ok(())
@@ -295,8 +310,9 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
+    use crate::fields::{Sphere, SphereCavity};
     use crate::scenes::{egg_on, ellipsoid, floor, penalty, sticking};
-    use crate::{RigidBody, Sphere, SphereCavity, Surface};
+    use crate::{RigidBody, Surface};
 
     /// A pebble in a cup, both free, turned and moving; they touch both ways.
     fn pebble_in_cup() -> (World, Vec<State>) {
@@ -456,8 +472,8 @@ mod tests {
             let bodies = ContactBodies { samples: BodyId(samples), field: BodyId(field) };
             world.add_contact(bodies, Arc::clone(&law), GapSmoothing::Hard).unwrap_err()
         };
-        assert_eq!(touch(1, 2), SimulationError::NoBody { body: BodyId(2), bodies: 2 });
-        assert_eq!(touch(1, 1), SimulationError::Itself { body: "egg".to_owned() });
-        assert_eq!(touch(0, 1), SimulationError::NoSamples { body: "ground".to_owned() });
+        assert_eq!(touch(1, 2), BuildError::NoBody { body: BodyId(2), bodies: 2 });
+        assert_eq!(touch(1, 1), BuildError::Itself { body: "egg".to_owned() });
+        assert_eq!(touch(0, 1), BuildError::NoSamples { body: "ground".to_owned() });
     }
 }

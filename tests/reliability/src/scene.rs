@@ -5,9 +5,9 @@ use std::sync::Arc;
 use anyhow::Result;
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::shapes;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody, Surface,
-    World,
+    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, Surface, World,
 };
 
 /// A floor and, as the second body, a box with round edges of so many segments, half of which squared are its contact points.

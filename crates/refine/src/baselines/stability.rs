@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps,
-    RigidBody, StepError, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
+    StepError, Surface, TimeSteps, World,
 };
 
 use super::stability_loss::{StabilityJacobian, StabilityLoss, StabilityWeights};

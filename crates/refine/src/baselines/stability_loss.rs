@@ -196,10 +196,9 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
     use prehend_autodiff::lie::perturb_about;
     use prehend_geometry::DistanceField;
-    use prehend_sim::{
-        Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, LeakSteps,
-        SphereCavity, Surface,
-    };
+    use prehend_sim::contact::LeakSteps;
+    use prehend_sim::fields::{HalfSpace, SphereCavity};
+    use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Surface};
 
     use super::*;
 

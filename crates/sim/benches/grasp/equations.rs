@@ -2,9 +2,10 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
+use prehend_sim::contact::regularized_coulomb;
 use prehend_sim::{
     ContactForce, ContactKinematics, ContactLaw, Integrator, RigidBody, SimulationError, State,
-    Step, World, regularized_coulomb,
+    Step, World,
 };
 
 /// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.

@@ -15,9 +15,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, SemiImplicitEuler, SimulationError, State,
-    TimeSteps, World,
+    Coulomb, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler, SimulationError, State, TimeSteps,
+    World,
 };
 use scene::OBJECT;
 use smoothing::{SmoothedGradient, Smoothing};

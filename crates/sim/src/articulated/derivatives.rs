@@ -6,8 +6,8 @@ use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::kinematics::Kinematics;
-use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
 use super::tree_factor::TreeFactor;
+use crate::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
 
 /// Derivatives of efforts τ: by displacements along unit velocities, and by velocities.
 #[derive(Clone, Debug, PartialEq)]

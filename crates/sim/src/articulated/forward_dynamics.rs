@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::cross_force;
+use crate::spatial::cross_force;
 
 /// What is left of the algorithm when accelerations are known: the factor of the mass matrix.
 pub(super) struct ArticulatedInertia<S: Scalar> {

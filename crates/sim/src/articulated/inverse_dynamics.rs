@@ -4,7 +4,7 @@ use nalgebra::{DVector, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::{angular, cross_force, linear, spatial};
+use crate::spatial::{angular, cross_force, linear, spatial};
 
 /// Motion and force of all links at some accelerations.
 pub(super) struct Effort<S: Scalar> {

@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{se3_exp, so3_exp};
 
 use super::joint_model::{DynJointModel, JointModel, MAX_NV};
-use super::spatial::spatial;
+use crate::spatial::spatial;
 
 /// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
 ///

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::spatial::spatial;
+use crate::spatial::spatial;
 
 /// Coordinates of a joint type of one's own at most.
 pub(super) const MAX_NV: usize = 3;

@@ -9,6 +9,15 @@ use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 use super::joint::{Joint, quaternion};
 use crate::state::State;
 
+/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`](prehend_geometry::robot::KinematicTree::joint_names), or of one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointState<S = f64> {
+    /// Positions \[rad or m\].
+    pub position: Vec<S>,
+    /// Velocities \[rad/s or m/s\].
+    pub velocity: Vec<S>,
+}
+
 impl Joint {
     /// Appends the coordinates and velocities that `state` is.
     pub(crate) fn read<S: Scalar>(&self, state: &State<S>, q: &mut Vec<S>, v: &mut Vec<S>) {

@@ -8,7 +8,7 @@ use prehend_autodiff::Scalar;
 use super::joint::{CustomJoint, Joint};
 use super::joint_model::CustomMotion;
 use super::link::Articulation;
-use super::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
+use crate::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
 
 /// Positions, velocities and inertias of the links at some coordinates and velocities.
 ///

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::SpatialInertia;
+use crate::spatial::SpatialInertia;
 
 impl<S: Scalar> Kinematics<'_, S> {
     /// M, by which accelerations cause efforts: symmetric, positive definite where every degree of freedom moves mass or has armature.

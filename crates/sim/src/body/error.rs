@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::contact::range::{LARGEST, SMALLEST};
+use crate::magnitude::{LARGEST, SMALLEST};
 
 /// Why a body cannot be simulated.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]

@@ -19,7 +19,7 @@ use super::range::ParameterRange;
 /// let law = KelvinVoigt::from_target(&target, 0.45)?;
 /// // At 1 m/s it goes 7 mm deep at most.
 /// assert!((target.impact_depth(1.0, 1.0) - 7.1e-3).abs() < 1e-4);
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactCalibration {
@@ -84,9 +84,8 @@ impl ContactCalibration {
 mod tests {
     use super::*;
     use crate::contact::law_checks::{TARGET, load};
-    use crate::{
-        ApproachDamped, Bounce, Coulomb, Hertz, HuntCrossley, KelvinVoigt, Law, NormalLaw,
-    };
+    use crate::contact::{ApproachDamped, Bounce, Hertz, NormalLaw};
+    use crate::{Coulomb, HuntCrossley, KelvinVoigt, Law};
 
     #[test]
     fn every_law_carries_the_weight_however_finely_the_surface_is_sampled() {

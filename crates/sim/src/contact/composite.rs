@@ -20,7 +20,7 @@ use super::point::{ContactForce, ContactKinematics};
 /// let spring = KelvinVoigt { stiffness: 2e7, damping: 1e4 };
 /// let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-3 })?;
 /// assert_eq!(law.params(), [2e7, 1e4, 0.5]);
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law<N, F> {

@@ -33,19 +33,19 @@ pub struct ContactQuery<'a> {
 /// A point in contact: what both the value and its derivative start from.
 pub(crate) struct ContactPoint {
     /// From the center of mass to the sample, and to where it touches.
-    pub(super) arm: Vector3<f64>,
-    pub(super) lever: Vector3<f64>,
+    pub(crate) arm: Vector3<f64>,
+    pub(crate) lever: Vector3<f64>,
     /// Radius of the sample \[m\].
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// Velocity where it touches.
-    pub(super) velocity: Vector3<f64>,
-    pub(super) smoothing: SmoothedGap,
-    pub(super) normal: Vector3<f64>,
-    pub(super) length: f64,
-    pub(super) area: f64,
-    pub(super) hessian: Matrix3<f64>,
+    pub(crate) velocity: Vector3<f64>,
+    pub(crate) smoothing: SmoothedGap,
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) length: f64,
+    pub(crate) area: f64,
+    pub(crate) hessian: Matrix3<f64>,
     /// Place of the sample among those that the surface was made of.
-    pub(super) index: u32,
+    pub(crate) index: u32,
 }
 
 impl ContactQuery<'_> {
@@ -130,7 +130,7 @@ impl ContactQuery<'_> {
     /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes
     /// nothing. Says whether every distance was a number.
     #[inline(always)]
-    pub(super) fn for_each_contact(
+    pub(crate) fn for_each_contact(
         &self,
         cutoff: f64,
         pressing_only: bool,
@@ -190,7 +190,7 @@ impl ContactQuery<'_> {
 impl ContactPoint {
     /// What the law sees.
     #[inline(always)]
-    pub(super) fn contact(&self, cutoff: f64) -> ContactKinematics<f64> {
+    pub(crate) fn contact(&self, cutoff: f64) -> ContactKinematics<f64> {
         let speed = self.velocity.dot(&self.normal);
         ContactKinematics {
             gap: cutoff + self.smoothing.gap,
@@ -203,7 +203,7 @@ impl ContactPoint {
 
     /// What the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
     #[inline(always)]
-    pub(super) fn lifted(&self, cutoff: f64) -> ContactKinematics<Fwd<6>> {
+    pub(crate) fn lifted(&self, cutoff: f64) -> ContactKinematics<Fwd<6>> {
         let gradient = self.normal * self.length;
         let along_gradient = |value: f64, slope: f64| {
             let g = gradient * slope;

@@ -1,9 +1,9 @@
 //! Friction laws: the force across the normal.
 
-pub mod anisotropic;
-pub mod bristle;
-pub mod coulomb;
-pub mod stribeck;
+pub(crate) mod anisotropic;
+pub(crate) mod bristle;
+pub(crate) mod coulomb;
+pub(crate) mod stribeck;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
@@ -51,7 +51,7 @@ pub trait FrictionCoefficient: Parameters {
 
 /// √(|slip|² + `slip_scale`²) \[m/s\]: smooth everywhere and never below |slip|.
 #[inline]
-pub fn regularized_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
+pub(super) fn regularized_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
     let [x, y, z] = [slip.x, slip.y, slip.z];
     (x * x + y * y + z * z + S::constant(slip_scale * slip_scale)).sqrt()
 }

@@ -8,14 +8,14 @@ use super::point::ContactKinematics;
 
 /// A contact, and where it is from the center of mass.
 pub(crate) struct LiftedContact<T: Scalar> {
-    pub(super) contact: ContactKinematics<T>,
-    pub(super) lever: Vector3<T>,
+    pub(crate) contact: ContactKinematics<T>,
+    pub(crate) lever: Vector3<T>,
     /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
-    pub(super) stretch: Option<T>,
+    pub(crate) stretch: Option<T>,
 }
 
 /// A query whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
-pub(super) struct MovedQuery<T: Scalar> {
+pub(crate) struct MovedQuery<T: Scalar> {
     position: Vector3<T>,
     turn: Vector3<T>,
     linear: Vector3<T>,
@@ -24,7 +24,7 @@ pub(super) struct MovedQuery<T: Scalar> {
 }
 
 impl<T: Scalar> MovedQuery<T> {
-    pub(super) fn new(query: &ContactQuery<'_>, tangent: &[T]) -> Self {
+    pub(crate) fn new(query: &ContactQuery<'_>, tangent: &[T]) -> Self {
         let part = |i: usize| Vector3::new(tangent[i], tangent[i + 1], tangent[i + 2]);
         let (position, turn, linear, angular) = (part(0), part(3), part(6), part(9));
         Self { position, turn, linear, angular, spin: query.state.angular.map(T::constant) }
@@ -32,7 +32,7 @@ impl<T: Scalar> MovedQuery<T> {
 
     /// `touch` with derivatives: the normal turns with the sample's place x by (I − nnᵀ)∇²φ δx/|∇φ|.
     #[inline(always)]
-    pub(super) fn lift(&self, touch: &ContactPoint, cutoff: f64) -> LiftedContact<T> {
+    pub(crate) fn lift(&self, touch: &ContactPoint, cutoff: f64) -> LiftedContact<T> {
         let constant = |v: &Vector3<f64>| v.map(T::constant);
         let ContactPoint {
             arm, lever, radius, velocity, smoothing, normal, length, hessian, ..

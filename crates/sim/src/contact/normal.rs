@@ -1,9 +1,9 @@
 //! Normal laws: the force along the normal.
 
-pub mod approach_damped;
-pub mod hertz;
-pub mod hunt_crossley;
-pub mod kelvin_voigt;
+pub(crate) mod approach_damped;
+pub(crate) mod hertz;
+pub(crate) mod hunt_crossley;
+pub(crate) mod kelvin_voigt;
 
 use prehend_autodiff::Scalar;
 
@@ -16,7 +16,8 @@ use super::point::ContactKinematics;
 ///
 /// ```
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{ContactKinematics, Law, NormalLaw, Parameters, Stribeck};
+/// use prehend_sim::contact::{NormalLaw, Parameters, Stribeck};
+/// use prehend_sim::{ContactKinematics, Law};
 ///
 /// struct Exponential {
 ///     pressure: f64,
@@ -38,7 +39,7 @@ use super::point::ContactKinematics;
 /// let friction =
 ///     Stribeck { friction: 0.5, kinetic_friction: 0.3, stribeck_speed: 1e-2, slip_scale: 1e-3 };
 /// let law = Law::new(Exponential { pressure: 1e4 }, friction)?;
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 pub trait NormalLaw: Parameters {
     /// Force along the normal \[N\], never negative, with parameters `p`.

@@ -190,7 +190,7 @@ macro_rules! field_doc {
             $meaning,
             " ([`",
             stringify!($range),
-            "`](crate::ParameterRange::",
+            "`](crate::contact::ParameterRange::",
             stringify!($range),
             "))"
         )
@@ -202,7 +202,7 @@ macro_rules! field_doc {
             $unit,
             "\\] ([`",
             stringify!($range),
-            "`](crate::ParameterRange::",
+            "`](crate::contact::ParameterRange::",
             stringify!($range),
             "))"
         )

@@ -84,7 +84,7 @@ pub(crate) fn exactly<P: ParameterArray<f64>>(
 /// Contact laws by name, in alphabetical order.
 ///
 /// ```
-/// use prehend_sim::LawRegistry;
+/// use prehend_sim::contact::LawRegistry;
 ///
 /// let registry = LawRegistry::default();
 /// for (name, law) in registry.entries() {

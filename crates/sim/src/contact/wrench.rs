@@ -9,6 +9,7 @@ use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedQuery};
 use super::param_values::ParamValues;
 use super::point::ContactKinematics;
+use crate::spatial::spatial;
 
 /// A wrench about the center of mass with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +50,7 @@ pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], query: &ContactQuery<'_>
         torque += touch.lever.cross(&f);
     });
     // A field that fails must not look like free space.
-    if sound { stack(&force, &torque) } else { Vector6::repeat(f64::NAN) }
+    if sound { spatial(&force, &torque) } else { Vector6::repeat(f64::NAN) }
 }
 
 /// [`wrench`] with its derivative.
@@ -92,7 +93,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         }
         // Torque l×f: δ(l×f) = δl×f + l×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
-        wrench += stack(&f, &lever.cross(&f));
+        wrench += spatial(&f, &lever.cross(&f));
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
     if !sound {
@@ -122,7 +123,7 @@ pub(crate) fn wrench_along<L: ContactLaw>(
         force += f;
         torque += lever.cross(&f);
     });
-    let all = stack(&force, &torque);
+    let all = spatial(&force, &torque);
     let value = if sound { all.map(|x| x.value) } else { Vector6::repeat(f64::NAN) };
     [value, all.map(|x| x.derivative[0])]
 }
@@ -179,7 +180,7 @@ fn add_param_slopes<L: ContactLaw>(
         for (lane, slope) in slopes.iter_mut().enumerate() {
             let f = touch.normal * response.normal.derivative[lane]
                 + response.tangential.map(|x| x.derivative[lane]);
-            *slope += stack(&f, &touch.lever.cross(&f));
+            *slope += spatial(&f, &touch.lever.cross(&f));
         }
     }
 }
@@ -196,12 +197,6 @@ fn times_cross(m: &Matrix3<f64>, a: &Vector3<f64>) -> Matrix3<f64> {
     -cross_times(a, &m.transpose()).transpose()
 }
 
-/// Force and torque in one vector.
-#[inline]
-pub(crate) fn stack<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector6<S> {
-    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -211,11 +206,12 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
     use prehend_geometry::{DistanceField, FieldSample};
 
+    use crate::contact::LeakSteps;
+    use crate::contact::contact_query::ContactQuery;
+    use crate::contact::dynamic::QueryWrench;
+    use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
-    use crate::{
-        ContactLaw, ContactQuery, DynContactLaw, GapSmoothing, LeakSteps, State, Surface, World,
-        WrenchJacobian,
-    };
+    use crate::{ContactLaw, GapSmoothing, State, Surface, World};
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(

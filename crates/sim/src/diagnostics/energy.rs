@@ -6,13 +6,13 @@ use prehend_autodiff::Scalar;
 use crate::articulated::{Articulation, Energy};
 use crate::contact::bristles::Bristles;
 use crate::contact::point::ContactKinematics;
-use crate::contact::wrench::stack;
 use crate::error::SimulationError;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::{Body, Motion};
-use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactPair;
 use crate::world::joint_force::JointForce;
 
@@ -245,7 +245,7 @@ fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
     let work = |((pair, _), state): ((&ContactPair, Bristles), &State)| {
         let rotation = states[pair.bodies.field].pose.rotation;
         let [linear, angular] = [state.linear, state.angular].map(|x| rotation * x);
-        let twist = stack(&linear, &angular);
+        let twist = spatial(&linear, &angular);
         let along = |part: f64| {
             let deflection = State::at_rest(state.pose).deflected(&(state.deflection() * part));
             world.pair_wrench(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)

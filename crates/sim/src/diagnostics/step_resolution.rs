@@ -4,11 +4,11 @@ use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use crate::body::RigidBody;
-use crate::contact::wrench::stack;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 
 /// Part of a body's speed below which a change of it is rounding, or an integrator's own error.
 const NOISE: f64 = 1e-6;
@@ -44,7 +44,7 @@ impl Sums {
 /// The velocities of a joint's state.
 fn velocity<S: Scalar>(state: &State<S>) -> Vector6<f64> {
     let state = state.value();
-    stack(&state.linear, &state.angular)
+    spatial(&state.linear, &state.angular)
 }
 
 /// A free body and what is known of its last step.
@@ -104,7 +104,7 @@ impl StepResolution {
             let momentum = followed.rigid.momentum(&state.pose.rotation, &state.angular);
             let linear = state.linear - followed.linear - followed.pull * step.dt;
             let angular = momentum - followed.momentum - followed.torque * step.dt;
-            let mut kick = stack(&linear, &(angular / (followed.rigid.mass() * followed.length)));
+            let mut kick = spatial(&linear, &(angular / (followed.rigid.mass() * followed.length)));
             if kick.norm() < NOISE * state.speed_within(followed.length) {
                 kick = Vector6::zeros();
             }

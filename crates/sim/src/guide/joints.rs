@@ -5,7 +5,7 @@
 //! [`World::neutral_states`], set joints by [`World::set_joint`], and read them by [`World::joint_motion`]. States of links follow from them: what is written there is overwritten. Samples and
 //! fields go to a link once it is there: `world.bodies[finger] = world.bodies[finger].clone().with_cuboid(shape, 0.005)?`.
 //!
-//! What acts along a joint is a [`JointLaw`](crate::JointLaw): springs, dampers, dry friction, limits (no joint has any by itself), motors and servos. A
+//! What acts along a joint is a [`JointLaw`](crate::joint_law::JointLaw): springs, dampers, dry friction, limits (no joint has any by itself), motors and servos. A
 //! controller sets their parameters by name; they keep these values for the whole step, however it is divided, so that smooth targets want short steps. Over
 //! numbers that carry derivatives, these pass through it; to end a run early it returns [`ControlFlow::Break`](std::ops::ControlFlow). A servo whose effort
 //! is at its bound has a derivative of 0 by its target.
@@ -14,7 +14,8 @@
 //! # use nalgebra::{Isometry3, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
 //! use prehend_sim::articulated::{Joint, Link};
-//! use prehend_sim::{Adaptive, JointLimits, Motor, RigidBody, State, Step, TimeSteps, World};
+//! use prehend_sim::joint_law::{JointLimits, Motor};
+//! use prehend_sim::{Adaptive, RigidBody, State, Step, TimeSteps, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A rod of 0.5 m and 0.3 kg that hangs on a motor.

@@ -39,7 +39,7 @@ use crate::world::World;
 /// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of driven bodies are
 /// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///
-/// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::LeakSteps::First)) leak in its first
+/// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::contact::LeakSteps::First)) leak in its first
 /// substep, whose length is not known beforehand: leaks on every step, or a fixed step, have more of a meaning.
 ///
 /// Substeps are chosen by values alone, so that they are the same whatever the scalar. Derivatives are those of the substeps that

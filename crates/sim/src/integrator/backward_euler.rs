@@ -24,7 +24,7 @@ use crate::world::World;
 ///
 /// With the cargo feature `faer` the equations of many bodies are solved as sparse ones.
 ///
-/// The deflections of contacts with bristles ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
+/// The deflections of contacts with bristles ([`Bristles`](crate::contact::Bristles)) follow explicitly: steps should not be longer than u_b/(2
 /// v_b), which is 1 ms for [`BristleFriction`](crate::BristleFriction) of 0.1 mm and a slip scale of 1 cm/s.
 ///
 /// # Errors
@@ -133,8 +133,9 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
+    use crate::contact::LeakSteps;
     use crate::scenes::{bowl, egg_on};
-    use crate::{GapSmoothing, LeakSteps, Motion, RigidBody, TimeSteps};
+    use crate::{GapSmoothing, Motion, RigidBody, TimeSteps};
 
     /// The egg in a bowl that flies freely.
     fn egg_in_free_bowl(smoothing: GapSmoothing) -> (World, Vec<State>) {
@@ -236,8 +237,10 @@ mod tests {
         let mut states = vec![State::at_rest(nalgebra::Isometry3::identity())];
         let rigid = RigidBody::ball(0.5, radius).unwrap();
         let surface = std::sync::Arc::new(crate::Surface::ball(radius).unwrap());
-        let field =
-            std::sync::Arc::new(crate::Sphere { center: nalgebra::Point3::origin(), radius });
+        let field = std::sync::Arc::new(crate::fields::Sphere {
+            center: nalgebra::Point3::origin(),
+            radius,
+        });
         let place = |i: usize| 0.0998 * i as f64;
         for i in 0..BALLS {
             let ball = crate::Body::dynamic(&format!("ball {i}"), rigid);

@@ -10,12 +10,12 @@ use prehend_autodiff::rigid::turned;
 use prehend_autodiff::{LocalFunction, Scalar};
 
 use crate::body::RigidBody;
-use crate::contact::wrench::stack;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
 
 /// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a joint the same
 /// of its state, with its angular velocity. Of a contact with bristles: the two halves of its deflection, and nothing.
@@ -141,7 +141,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         }
         let states = moved.iter_mut().skip(self.world.joint_places().end);
         for (state, [linear, angular, ..]) in states.zip(deflections) {
-            *state = state.deflected(&stack(linear, angular));
+            *state = state.deflected(&spatial(linear, angular));
         }
         moved
     }

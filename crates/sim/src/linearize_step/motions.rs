@@ -3,8 +3,7 @@
 use nalgebra::{SVector, Vector6};
 
 use crate::articulated::Kinematics;
-use crate::articulated::spatial::{angular, cross_motion, linear, spatial};
-use crate::contact::wrench::stack;
+use crate::spatial::{angular, cross_motion, linear, spatial};
 
 /// Changes of a body's state, in the order of [`State::tangent`](crate::State::tangent), by one coordinate.
 pub(super) struct Motion {
@@ -42,9 +41,9 @@ pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Mot
         let (moved, turned) = (linear(axis) + angular(axis).cross(&place), angular(axis));
         let velocity = linear(&change) + angular(&change).cross(&place) + spin.cross(&moved);
         let mut displaced = SVector::<f64, 12>::zeros();
-        displaced.fixed_rows_mut::<6>(0).copy_from(&stack(&moved, &turned));
+        displaced.fixed_rows_mut::<6>(0).copy_from(&spatial(&moved, &turned));
         displaced.fixed_rows_mut::<6>(6).copy_from(&spatial(&velocity, &angular(&change)));
-        motions.push(Motion { dof: first + dof, displaced, unit: stack(&moved, &turned) });
+        motions.push(Motion { dof: first + dof, displaced, unit: spatial(&moved, &turned) });
     }
     motions
 }

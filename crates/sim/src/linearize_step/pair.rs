@@ -5,10 +5,10 @@ use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::contact::contact_query::ContactQuery;
-use crate::contact::wrench::stack;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
 
@@ -61,7 +61,7 @@ impl Between {
             -by_velocity,
             by_velocity * r - by_spin,
         ]);
-        let on = [stack(&force, &torque), Vector6::zeros()];
+        let on = [spatial(&force, &torque), Vector6::zeros()];
         let place = [Matrix3::identity(), -Matrix3::identity()];
         let arm = samples.pose.translation.vector - field.pose.translation.vector;
         Some(Self::reacting(bodies, on[0], [own, other], &arm, place))
@@ -90,7 +90,7 @@ impl Between {
         places: [Matrix3<f64>; 2],
     ) -> Self {
         let (force, torque) = (on.fixed_rows::<3>(0).into_owned(), on.fixed_rows::<3>(3));
-        let reaction = stack(&-force, &-(torque + arm.cross(&force)));
+        let reaction = spatial(&-force, &-(torque + arm.cross(&force)));
         let back = [0, 1].map(|end| {
             let mut back = -by[end];
             let pushed = cross_matrix(arm) * by[end].fixed_rows::<3>(0);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use crate::articulated::tree_factor::TreeFactor;
-use crate::error::SimulationError;
+use crate::error::BuildError;
 use crate::joint_law::damper::JointDamper;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::friction::JointFriction;
@@ -26,7 +26,7 @@ impl World {
         axes: &[(JointAxis, f64)],
         damping: f64,
         friction: f64,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         losses(damping, friction).try_for_each(|law| self.add_coupled_force(axes, law).map(|_| ()))
     }
 
@@ -36,7 +36,7 @@ impl World {
         axes: &[(JointAxis, f64)],
         range: (f64, f64),
         stiffness: f64,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         self.add_coupled_force(axes, limits(range, stiffness)).map(|_| ())
     }
 
@@ -46,7 +46,7 @@ impl World {
         axes: &[(JointAxis, f64)],
         rest: f64,
         [stiffness, damping]: [f64; 2],
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         self.add_coupled_force(axes, Arc::new(JointSpring { stiffness, rest }))?;
         self.add_coupled_force(axes, Arc::new(JointDamper { damping })).map(|_| ())
     }

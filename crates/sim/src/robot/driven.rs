@@ -6,20 +6,12 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::Fwd;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
 
-use crate::error::SimulationError;
+use crate::articulated::joint_state::JointState;
+use crate::error::BuildError;
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
-
-/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`], or of one joint.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JointState<S = f64> {
-    /// Positions \[rad or m\].
-    pub position: Vec<S>,
-    /// Velocities \[rad/s or m/s\].
-    pub velocity: Vec<S>,
-}
 
 /// A robot whose joints follow a trajectory.
 struct DrivenRobot<C> {
@@ -69,8 +61,8 @@ impl World {
         shape: &RobotShape,
         t_world_base: &Isometry3<f64>,
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
-    ) -> Result<Vec<Option<BodyId>>, SimulationError> {
-        let mismatch = |what, found, expected| SimulationError::Robot { what, found, expected };
+    ) -> Result<Vec<Option<BodyId>>, BuildError> {
+        let mismatch = |what, found, expected| BuildError::Robot { what, found, expected };
         let (found, expected) = (shape.links().len(), robot.links().len());
         if found != expected {
             return Err(mismatch("links of the shape", found, expected));
@@ -102,6 +94,7 @@ mod tests {
     use prehend_autodiff::lie::so3_log;
 
     use super::*;
+    use crate::SimulationError;
     use crate::scenes::{ellipsoid, penalty};
     use crate::{ContactBodies, GapSmoothing, RigidBody, SemiImplicitEuler, Surface, TimeSteps};
 
@@ -192,10 +185,7 @@ mod tests {
         let mut world = World::new(Vector3::zeros());
         let short = |_: f64| JointState { position: vec![0.0; 2], velocity: vec![0.0] };
         let refused = world.add_robot(&robot, &shape, &Isometry3::identity(), short).unwrap_err();
-        assert_eq!(
-            refused,
-            SimulationError::Robot { what: "joint velocities", found: 1, expected: 2 }
-        );
+        assert_eq!(refused, BuildError::Robot { what: "joint velocities", found: 1, expected: 2 });
         let (world, _) = arm(|t| JointState {
             position: vec![0.0; 2],
             velocity: vec![0.0; if t > 0.5 { 1 } else { 2 }],

@@ -16,8 +16,8 @@ use super::lifted::LiftedField;
 use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
 use super::solid::{Sample, Solid};
-use crate::contact::range::{LARGEST, SMALLEST};
 use crate::fields::INSET;
+use crate::magnitude::{LARGEST, SMALLEST};
 use crate::surface::check_spacing;
 
 /// What a shape is, but for the values of its dimensions.

@@ -12,12 +12,12 @@ use prehend_autodiff::rigid::turned;
 
 use super::World;
 use super::body::Body;
-use super::body_id::BodyId;
 use super::joint_force::JointAxis;
 use crate::articulated::adjoint::link_states;
+use crate::articulated::joint_state::JointState;
 use crate::articulated::{Articulation, Joint, Link};
-use crate::error::SimulationError;
-use crate::robot::driven::JointState;
+use crate::error::{BuildError, SimulationError};
+use crate::handle::BodyId;
 use crate::state::State;
 
 /// A tree of links, each a body of its world.
@@ -87,7 +87,7 @@ impl World {
     ///
     /// # Errors
     /// If the links are no tree, a joint moves no mass, or a link's inertia has a negative principal moment.
-    pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, SimulationError> {
+    pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, BuildError> {
         let tree = Articulation::new(links, self.gravity)?;
         let links = tree.links().iter();
         let bodies: Vec<BodyId> =
@@ -190,12 +190,12 @@ impl<S: Scalar> World<S> {
     }
 
     /// The articulation and the link in it that a body is.
-    pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), SimulationError> {
+    pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), BuildError> {
         let name = &self.body(body)?.name;
         let found = self.articulations.iter().enumerate().find_map(|(index, own)| {
             Some((index, own.bodies.iter().position(|link| *link == body)?))
         });
-        found.ok_or_else(|| SimulationError::NotALink { body: name.clone() })
+        found.ok_or_else(|| BuildError::NotALink { body: name.clone() })
     }
 
     /// # Errors
@@ -240,7 +240,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The link that a body is.
-    pub(crate) fn link(&self, body: BodyId) -> Result<&Link<S>, SimulationError> {
+    pub(crate) fn link(&self, body: BodyId) -> Result<&Link<S>, BuildError> {
         let (articulation, link) = self.link_of(body)?;
         Ok(&self.articulations[articulation].tree.links()[link])
     }

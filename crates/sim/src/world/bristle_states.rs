@@ -9,14 +9,14 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::contact_pair::ContactPair;
 use crate::contact::bristles::Bristles;
-use crate::contact::wrench::stack;
 use crate::error::SimulationError;
+use crate::spatial::spatial;
 use crate::state::State;
 
 impl<S: Scalar> State<S> {
     /// The deflection that this state is.
     pub(crate) fn deflection(&self) -> Vector6<S> {
-        stack(&self.linear, &self.angular)
+        spatial(&self.linear, &self.angular)
     }
 
     /// The state of this deflection after a change.

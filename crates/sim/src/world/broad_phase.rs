@@ -10,9 +10,9 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::body::{Body, Motion};
-use super::body_id::BodyId;
 use super::contact_group::ContactGroup;
 use super::contact_pair::{ContactBodies, ContactPair};
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::time::Step;
 

@@ -5,12 +5,12 @@ use prehend_autodiff::lie::{lift, so3_log};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::World;
-use super::body_id::BodyId;
-use crate::contact::wrench::stack;
-use crate::error::SimulationError;
+use crate::error::{BuildError, SimulationError};
 use crate::first_order::{Linearized, first_order, linearized};
+use crate::handle::{BodyId, BushingId};
+use crate::spatial::spatial;
+use crate::state::STATE;
 use crate::state::State;
-use crate::state_coordinates::STATE;
 
 /// A soft bushing of two bodies, or a soft ball joint: springs and dampers between a frame of one and a frame of the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +62,18 @@ impl<S: Scalar> Bushing<S> {
         Bushing { bodies: self.bodies, frames: self.frames, stiffness }
     }
 
+    /// Checks stiffness and damping.
+    ///
+    /// # Errors
+    /// If one is negative or not finite.
+    pub(crate) fn check(&self) -> Result<(), BuildError> {
+        let mut values = self.stiffness.numbers().into_iter().map(|x| x.value());
+        match values.find(|value| !(value.is_finite() && *value >= 0.0)) {
+            Some(value) => Err(BuildError::BushingStiffness { value }),
+            None => Ok(()),
+        }
+    }
+
     /// The same bushing of other bodies.
     pub(crate) fn with_bodies(self, body: impl Fn(BodyId) -> BodyId) -> Self {
         Self { bodies: self.bodies.map(body), ..self }
@@ -73,21 +85,17 @@ impl World {
     ///
     /// # Errors
     /// If there is no such body, or both are the same; if a stiffness or damping is negative or not finite.
-    pub fn add_bushing(&mut self, bushing: Bushing) -> Result<(), SimulationError> {
+    pub fn add_bushing(&mut self, bushing: Bushing) -> Result<BushingId, BuildError> {
         for body in bushing.bodies {
             self.body(body)?;
         }
         if bushing.bodies[0] == bushing.bodies[1] {
-            return Err(SimulationError::Itself {
-                body: self.bodies[bushing.bodies[0]].name.clone(),
-            });
+            let body = self.bodies[bushing.bodies[0]].name.clone();
+            return Err(BuildError::Itself { body });
         }
+        bushing.check()?;
         self.bushings.push(bushing);
-        let checked = self.check_bushings();
-        if checked.is_err() {
-            self.bushings.pop();
-        }
-        checked
+        Ok(BushingId(self.bushings.len() - 1))
     }
 }
 
@@ -104,17 +112,12 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Whether the stiffness of every bushing is one.
-    pub(crate) fn check_bushings(&self) -> Result<(), SimulationError> {
-        let numbers = self.bushings.iter().flat_map(|bushing| bushing.stiffness.numbers());
-        let mut values = numbers.map(|x| x.value());
-        match values.find(|value| !(value.is_finite() && *value >= 0.0)) {
-            Some(value) => {
-                let (setting, range) = ("BushingStiffness", "zero or positive, and finite");
-                Err(SimulationError::Setting { setting, range, value })
-            }
-            None => Ok(()),
-        }
+    /// The bushing `id`, to be changed.
+    ///
+    /// # Panics
+    /// If it is of another world.
+    pub fn bushing_mut(&mut self, id: BushingId) -> &mut Bushing<S> {
+        &mut self.bushings[id.0]
     }
 
     /// Adds what bushings do to the wrenches on the bodies.
@@ -131,7 +134,7 @@ impl<S: Scalar> World<S> {
                 wrenches[body] += wrench;
                 if let Some((_, from_com)) = shifted {
                     let force = wrench.fixed_rows::<3>(0).into_owned();
-                    wrenches[body] += stack(&Vector3::zeros(), &from_com.cross(&force));
+                    wrenches[body] += spatial(&Vector3::zeros(), &from_com.cross(&force));
                 }
             }
         }
@@ -244,8 +247,8 @@ impl Pull {
             .map(|(state, arm)| state.linear + state.angular.cross(&arm));
         let force = apart * linear + (other - velocity) * linear_damping;
         let torque = turn * angular + (b.angular - a.angular) * angular_damping;
-        let on_first = stack(&force, &(torque + arms[0].cross(&force)));
-        let on_second = stack(&-force, &-(torque + arms[1].cross(&force)));
+        let on_first = spatial(&force, &(torque + arms[0].cross(&force)));
+        let on_second = spatial(&-force, &-(torque + arms[1].cross(&force)));
         std::array::from_fn(|i| if i < 6 { on_first[i] } else { on_second[i - 6] })
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use super::body_id::BodyId;
 use super::contact_pair::{ContactBodies, ContactPair};
+use crate::handle::BodyId;
 
 /// Contacts between each body of one list and each of another, under one law with one set of parameters.
 ///

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use super::body_id::BodyId;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::param_values::ParamValues;
 use crate::contact::range::ParameterRange;
+use crate::handle::BodyId;
 use crate::surface::Surface;
 
 /// The two sides of a contact.
@@ -154,11 +154,9 @@ mod tests {
 
     use super::*;
     use crate::contact::registry::LawRegistry;
+    use crate::contact::{AnisotropicFriction, Hertz};
     use crate::scenes::{egg_on, floor};
-    use crate::{
-        AnisotropicFriction, BristleFriction, ContactForce, ContactKinematics, ContactLaw, Coulomb,
-        Hertz, Law,
-    };
+    use crate::{BristleFriction, ContactForce, ContactKinematics, ContactLaw, Coulomb, Law};
 
     #[test]
     fn parameters_are_found_by_the_names_of_the_registry() {

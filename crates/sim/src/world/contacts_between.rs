@@ -6,12 +6,12 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::body::Body;
-use super::body_id::BodyId;
 use super::contact_group::{ContactGroup, ascending};
 use super::contact_pair::{ContactBodies, ContactPair};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, ContactId, ContactPlace};
 use crate::surface::Surface;
 
 impl World {
@@ -31,7 +31,7 @@ impl World {
         b: &[BodyId],
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         a.iter().chain(b).try_for_each(|body| self.body(*body).map(|_| ()))?;
         smoothing.check()?;
         let lists = [a, b].map(ascending);
@@ -39,15 +39,14 @@ impl World {
         let group = ContactGroup::new(lists, ContactPair::new(first, law, smoothing));
         if group.contact.law().bristles().is_some() {
             let every = self.all_pairs(&group);
-            self.contacts.extend(every);
-        } else {
-            self.contact_groups.push(group);
+            return Ok(self.push_contacts(every));
         }
-        Ok(())
+        self.contact_groups.push(group);
+        Ok(ContactId(ContactPlace::Group(self.contact_groups.len() - 1)))
     }
 
     /// One of the contacts between two lists of bodies, if all of them can touch.
-    fn first_contact(&self, lists: &[Arc<[BodyId]>; 2]) -> Result<ContactBodies, SimulationError> {
+    fn first_contact(&self, lists: &[Arc<[BodyId]>; 2]) -> Result<ContactBodies, BuildError> {
         let mut first = None;
         // Bodies that can do the same need be asked once, or twice where they are to touch each other.
         let kind = |id: BodyId| {
@@ -70,7 +69,7 @@ impl World {
                 }
             }
         }
-        first.ok_or(SimulationError::NoContacts)
+        first.ok_or(BuildError::NoContacts)
     }
 
     /// All contacts of a group, one by one.
@@ -95,7 +94,7 @@ impl<S: Scalar> World<S> {
         &self,
         a: BodyId,
         b: BodyId,
-    ) -> Result<Vec<(ContactBodies, f64)>, SimulationError> {
+    ) -> Result<Vec<(ContactBodies, f64)>, BuildError> {
         let there = ContactBodies { samples: a, field: b };
         let [on_b, on_a] = [there, there.swapped()].map(|ContactBodies { samples, field }| {
             self.bodies[samples].surface.is_some() && self.bodies[field].field.is_some()
@@ -109,9 +108,9 @@ impl<S: Scalar> World<S> {
             (false, false) => {
                 let name = |id: BodyId| self.bodies[id].name.clone();
                 Err(match [a, b].map(|id| self.bodies[id].surface.is_some()) {
-                    [false, false] => SimulationError::NoSamples { body: name(a) },
-                    [true, _] => SimulationError::NoField { body: name(b) },
-                    [false, true] => SimulationError::NoField { body: name(a) },
+                    [false, false] => BuildError::NoSamples { body: name(a) },
+                    [true, _] => BuildError::NoField { body: name(b) },
+                    [false, true] => BuildError::NoField { body: name(a) },
                 })
             }
         }

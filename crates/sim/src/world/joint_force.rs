@@ -6,12 +6,12 @@ use std::sync::Arc;
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
 use super::path::Path;
 use crate::articulated::{Joint, Kinematics};
 use crate::contact::error::LawError;
 use crate::contact::range::ParameterRange;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, JointForceId};
 use crate::joint_law::JointLaw;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::state::State;
@@ -31,10 +31,6 @@ impl From<BodyId> for JointAxis {
         Self { link, index: 0 }
     }
 }
-
-/// Which force along joints of a world: given by [`World::add_joint_force`](super::World::add_joint_force).
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-pub struct JointForceId(pub(crate) usize);
 
 /// An effort along a joint, or along a weighted sum of joints: a tendon, a gear, a coupling.
 #[derive(Clone)]
@@ -156,7 +152,7 @@ impl World {
         &mut self,
         axis: impl Into<JointAxis>,
         law: impl JointLaw,
-    ) -> Result<JointForceId, SimulationError> {
+    ) -> Result<JointForceId, BuildError> {
         self.add_coupled_force(&[(axis.into(), 1.0)], Arc::new(law))
     }
 
@@ -169,13 +165,13 @@ impl World {
         &mut self,
         axes: &[(JointAxis, f64)],
         law: Arc<dyn DynJointLaw>,
-    ) -> Result<JointForceId, SimulationError> {
-        let Some((first, _)) = axes.first() else { return Err(SimulationError::NoAxes) };
+    ) -> Result<JointForceId, BuildError> {
+        let Some((first, _)) = axes.first() else { return Err(BuildError::NoAxes) };
         for (axis, _) in axes {
             self.check_axis(axis.link, axis.index)?;
             if self.link_of(axis.link)?.0 != self.link_of(first.link)?.0 {
                 let links = [axis.link, first.link].map(|link| self.bodies[link].name.clone());
-                return Err(SimulationError::Apart { links });
+                return Err(BuildError::Apart { links });
             }
         }
         let force = JointForce::new(axes.to_vec(), law);
@@ -187,20 +183,20 @@ impl World {
 
 impl<S: Scalar> World<S> {
     /// Whether the joint of a link has such an axis.
-    pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), SimulationError> {
+    pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), BuildError> {
         let joint = &self.link(link)?.joint;
         match axis < joint.nv() && !matches!(joint, Joint::Floating) {
             true => Ok(()),
-            false => Err(SimulationError::NoAxis { link: self.bodies[link].name.clone(), axis }),
+            false => Err(BuildError::NoAxis { link: self.bodies[link].name.clone(), axis }),
         }
     }
 
     /// Whether a law takes its parameters.
-    pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), SimulationError> {
+    pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), BuildError> {
         let link = |(axis, _): &(JointAxis, f64)| self.bodies[axis.link].name.clone();
         let wrong = |error| {
             let link = force.axes.first().map(link).unwrap_or_default();
-            SimulationError::JointLaw { link, error }
+            BuildError::JointLaw { link, error }
         };
         force.check().map_err(wrong)
     }

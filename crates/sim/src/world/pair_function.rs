@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
+use crate::state::STATE;
 use crate::state::State;
-use crate::state_coordinates::STATE;
 
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;

@@ -13,10 +13,11 @@ use super::relative_state::RelativeState;
 use crate::contact::bristle_function::BristleFunction;
 use crate::contact::bristles::Bristles;
 use crate::contact::contact_query::ContactQuery;
-use crate::contact::dimensions::{LANES, Lane, VariableShapes};
-use crate::contact::wrench::{LinearWrench, WrenchJacobian, stack};
+use crate::contact::wrench::{LinearWrench, WrenchJacobian};
 use crate::contact::wrench_function::WrenchFunction;
 use crate::shape::lifted::LiftedField;
+use crate::shape::variable::{LANES, Lane, VariableShapes};
+use crate::spatial::spatial;
 use crate::state::State;
 
 /// What a contact does.
@@ -220,8 +221,8 @@ impl<S: Scalar> World<S> {
     ) -> PairWrench<S> {
         let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let offset = state.pose.translation.vector - base.pose.translation.vector;
-        let on_field = stack(&-force, &-(torque + offset.cross(&force)));
-        PairWrench { on_samples: stack(&force, &torque), on_field, rate: Vector6::zeros() }
+        let on_field = spatial(&-force, &-(torque + offset.cross(&force)));
+        PairWrench { on_samples: spatial(&force, &torque), on_field, rate: Vector6::zeros() }
     }
 
     /// Adds the derivatives by the dimensions of its shapes to those of the wrench of `query`, which is `pair`, and of its rate.

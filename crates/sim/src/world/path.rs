@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::so3_log;
 
 use crate::articulated::Kinematics;
-use crate::articulated::spatial::{angular, linear, spatial};
+use crate::spatial::{angular, linear, spatial};
 
 /// A point of a link, or of the world where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]

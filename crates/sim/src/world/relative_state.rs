@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
+use crate::handle::BodyId;
 use crate::state::State;
 
 /// The body with the samples of a contact, in the model frame of the body with the field.

@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
-use crate::articulated::spatial::{angular, linear};
 use crate::error::SimulationError;
+use crate::handle::BodyId;
+use crate::spatial::{angular, linear};
 use crate::state::State;
 
 impl<S: Scalar> World<S> {

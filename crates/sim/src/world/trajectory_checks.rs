@@ -6,15 +6,15 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::body::Motion;
 use super::trajectory::plain;
-use crate::error::SimulationError;
+use crate::error::{BuildError, SimulationError};
 use crate::state::State;
 
 impl<S: Scalar> World<S> {
     /// Refuses trajectories that may carry derivatives, for what keeps their values only.
-    pub(crate) fn check_trajectories(&self) -> Result<(), SimulationError> {
+    pub(crate) fn check_trajectories(&self) -> Result<(), BuildError> {
         let carries = |motion: &Motion<S>| matches!(motion, Motion::Kinematic(trajectory) if plain(trajectory).is_none());
         match self.bodies.iter().find(|body| S::ORDER > 0 && carries(&body.motion)) {
-            Some(body) => Err(SimulationError::TrajectoryDerivatives { body: body.name.clone() }),
+            Some(body) => Err(BuildError::TrajectoryDerivatives { body: body.name.clone() }),
             None => Ok(()),
         }
     }
@@ -99,7 +99,7 @@ mod tests {
             state.pose.translation.x = speed.times(time);
             state
         }));
-        let error = SimulationError::TrajectoryDerivatives { body: "table".to_owned() };
+        let error = BuildError::TrajectoryDerivatives { body: "table".to_owned() };
         assert_eq!(lifted.check_trajectories(), Err(error.clone()));
         assert_eq!(lifted.with_parameters(&lifted.parameters()).unwrap_err(), error);
     }

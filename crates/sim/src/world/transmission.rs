@@ -7,16 +7,16 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
 use super::joint_force::{JointAxis, JointForce};
 use super::path::Path;
 use crate::articulated::Kinematics;
 use crate::articulated::adjoint::{Acting, accelerations};
-use crate::articulated::spatial::spatial;
+use crate::handle::BodyId;
+use crate::handle::JointForceId;
 use crate::joint_law::dynamic::DynJointLaw;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::world::articulated_body::ArticulatedBody;
-use crate::world::joint_force::JointForceId;
 
 /// Transmissions of the robots of a world.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +72,7 @@ impl World {
         link: BodyId,
         path: Arc<Path>,
         law: Arc<dyn DynJointLaw>,
-    ) -> Result<JointForceId, crate::error::SimulationError> {
+    ) -> Result<JointForceId, crate::error::BuildError> {
         let mut force = JointForce::new(vec![(link.into(), 0.0)], law);
         force.path = Some(path);
         self.check_joint_force(&force)?;

@@ -7,7 +7,7 @@ use super::inputs::{Inputs, LinkAdjoint, add_varying};
 use super::motion::{Force, mass_adjoint};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
-use crate::articulated::spatial::{angular, cross_force, cross_motion, linear, spatial};
+use crate::spatial::{angular, cross_force, cross_motion, linear, spatial};
 
 /// What a tree's accelerations follow from.
 pub(crate) struct Acting<'a, S: Scalar> {

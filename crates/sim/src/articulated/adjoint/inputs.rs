@@ -7,7 +7,7 @@ use crate::articulated::joint::{CustomJoint, Joint, quaternion};
 use crate::articulated::joint_model::{MAX_NV, inputs};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::{Articulation, Link, NUMBERS};
-use crate::articulated::spatial::{angular, linear, spatial};
+use crate::spatial::{angular, linear, spatial};
 
 /// Adjoints of what a link is made of.
 #[derive(Clone, Copy, Default)]

@@ -6,9 +6,8 @@ use prehend_autodiff::{CustomVjp, Scalar};
 use super::inputs::{Inputs, LinkAdjoint, add_varying};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
-use crate::articulated::spatial::{angular, cross_force, spatial};
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::spatial::{angular, cross_force, spatial};
+use crate::state::{STATE, State, coordinates_of, states_of};
 
 /// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
 pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {

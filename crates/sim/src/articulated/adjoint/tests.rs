@@ -6,7 +6,7 @@ use prehend_autodiff::{Fwd, Scalar, gradient};
 use super::*;
 use crate::articulated::link::Articulation;
 use crate::articulated::tests::{random_state, random_tree};
-use crate::state_coordinates::coordinates_of;
+use crate::state::coordinates_of;
 
 /// How many numbers [`weighed`] is a function of.
 fn inputs(tree: &Articulation) -> usize {

@@ -24,14 +24,15 @@ use crate::contact::range::ParameterRange;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{AnisotropicFriction, ContactLaw, Coulomb, KelvinVoigt, Law};
+/// use prehend_sim::contact::AnisotropicFriction;
+/// use prehend_sim::{ContactLaw, Coulomb, KelvinVoigt, Law};
 ///
 /// // Slides three times as easily along x as along y.
 /// let along = Coulomb { friction: 0.2, slip_scale: 1e-3 };
 /// let friction = AnisotropicFriction { along, across_ratio: 3.0, direction: Vector3::x_axis() };
 /// let law = Law::new(KelvinVoigt { stiffness: 2e7, damping: 1e4 }, friction)?;
 /// assert_eq!(law.params(), [2e7, 1e4, 0.2, 3.0]);
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnisotropicFriction<F> {
@@ -115,11 +116,12 @@ mod tests {
     use nalgebra::{Isometry3, Matrix3, Point3};
 
     use super::*;
+    use crate::contact::Stribeck;
     use crate::contact::law_checks::{Claims, check_law};
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{
         Body, ContactLaw, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State,
-        Stribeck, Surface,
+        Surface,
     };
 
     const SPRING: KelvinVoigt = KelvinVoigt { stiffness: 1e7, damping: 0.0 };

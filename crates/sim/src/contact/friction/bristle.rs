@@ -21,7 +21,7 @@ use crate::contact::point::ContactKinematics;
 ///
 /// let friction = BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 /// let law = Law::new(HuntCrossley { stiffness: 1e9, damping: 1.0, exponent: 1.5 }, friction)?;
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BristleFriction<F> {

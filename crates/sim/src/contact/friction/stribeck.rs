@@ -62,7 +62,8 @@ impl FrictionLaw for Stribeck {
 mod tests {
     use super::*;
     use crate::contact::law_checks::{Claims, check_law};
-    use crate::{ApproachDamped, ContactLaw, Hertz, HuntCrossley, KelvinVoigt, Law, NormalLaw};
+    use crate::contact::{ApproachDamped, Hertz, NormalLaw};
+    use crate::{ContactLaw, HuntCrossley, KelvinVoigt, Law};
 
     const FRICTION: Stribeck =
         Stribeck { friction: 0.6, kinetic_friction: 0.35, stribeck_speed: 0.05, slip_scale: 1e-2 };

@@ -73,8 +73,9 @@ impl NormalLaw for HuntCrossley {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Hertz;
     use crate::contact::law_checks::{Claims, TARGET, bounce, check_law, frictionless, load};
-    use crate::{Coulomb, Hertz, Law};
+    use crate::{Coulomb, Law};
 
     #[test]
     fn keeps_what_laws_promise() {

@@ -8,10 +8,10 @@ use super::Adaptive;
 use super::sensitivity::Tangent;
 use crate::articulated::Joint;
 use crate::contact::bristles::Bristles;
+use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
 use crate::state::State;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactPair;
 
 /// Part of the fastest body's speed that counts for all: what is at rest may be hit by it.

@@ -2,9 +2,9 @@
 
 use prehend_autodiff::Scalar;
 
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::broad_phase::CandidateContact;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
 

@@ -8,12 +8,12 @@ use super::Adaptive;
 use super::sensitivity::Tangent;
 use super::substep_controller::SubstepController;
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 
 /// The substeps of a step, found by values alone.
 pub(super) struct Schedule {

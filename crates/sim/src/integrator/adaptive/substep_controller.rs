@@ -7,11 +7,11 @@ use super::sensitivity::Tangent;
 use super::step_limiter::StepLimiter;
 use super::{Adaptive, touch_time};
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 
 /// The exponent by which the length of a step follows from its error, for an estimate of fourth order.
 const EXPONENT: f64 = -0.2;

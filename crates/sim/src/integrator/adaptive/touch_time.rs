@@ -144,7 +144,8 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::{Body, ContactBodies, Coulomb, HalfSpace, KelvinVoigt, Law, RigidBody, Surface};
+    use crate::fields::HalfSpace;
+    use crate::{Body, ContactBodies, Coulomb, KelvinVoigt, Law, RigidBody, Surface};
 
     /// A foot that comes down and goes up again by the cubic whose least value is a quarter of the way of its speed below both ends.
     #[test]

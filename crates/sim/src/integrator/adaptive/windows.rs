@@ -11,12 +11,13 @@ use super::islands::{Island, Links};
 use super::schedule::{Schedule, Substeps};
 use super::sensitivity::{self, Tangent};
 use super::substep_controller::SHORTEST;
-use crate::adjoint::{OneStep, WorldTemplate, with_moved};
 use crate::error::SimulationError;
+use crate::handle::BodyId;
+use crate::integrator::step_checkpointed::{OneStep, with_moved};
+use crate::integrator::world_template::WorldTemplate;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::broad_phase::{BroadPhase, CandidateContact};
 use crate::world::contact_pair::ContactPair;
 

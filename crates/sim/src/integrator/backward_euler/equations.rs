@@ -10,10 +10,10 @@ use prehend_autodiff::{Fwd, Scalar};
 
 use crate::body::RigidBody;
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
 pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -> State<S> {

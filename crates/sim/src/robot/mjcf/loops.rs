@@ -6,9 +6,9 @@ use prehend_geometry::mjcf::{EqualityKind, Model, SolverParameters};
 use super::super::constraints::Mobility;
 use super::forces::stiffness;
 use super::{MjcfError, MjcfOptions, MjcfRobot};
+use crate::handle::BodyId;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
 use crate::world::bushing::{Bushing, BushingStiffness};
 use crate::world::joint_force::JointAxis;
 

@@ -12,12 +12,13 @@ use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Shape as MjcfShape, Tra
 use thiserror::Error;
 
 use crate::articulated::Joint;
-use crate::error::SimulationError;
+use crate::error::{BuildError, SimulationError};
+use crate::handle::BodyId;
+use crate::handle::JointForceId;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
 use crate::world::World;
-use crate::world::body_id::BodyId;
-use crate::world::joint_force::{JointAxis, JointForceId};
+use crate::world::joint_force::JointAxis;
 
 /// How a robot in MJCF becomes part of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,9 +93,12 @@ pub enum MjcfError {
         /// What is wrong.
         error: ShapeError,
     },
-    /// Its bodies are no articulation, or a force or state does not fit.
+    /// Its bodies are no articulation, or a force does not fit.
     #[error(transparent)]
-    World(#[from] SimulationError),
+    World(#[from] BuildError),
+    /// A state does not fit.
+    #[error(transparent)]
+    State(#[from] SimulationError),
     /// Positions that are too few or too many.
     #[error("{given} positions for a model of {expected}")]
     Positions {

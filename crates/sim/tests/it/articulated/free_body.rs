@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law, RigidBody, State,
-    Surface, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, State, Surface, World,
 };
 
 /// A brick over a floor, free or as a link.

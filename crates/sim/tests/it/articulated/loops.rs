@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
+use prehend_sim::joint_law::{JointLimits, JointSpring};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Bushing, BushingStiffness, JointLimits, JointSpring, Motion,
-    RigidBody, SimulationError, State, Step, TimeSteps, World,
+    BackwardEuler, Body, BodyId, Bushing, BushingStiffness, Motion, RigidBody, SimulationError,
+    State, Step, TimeSteps, World,
 };
 
 #[test]

@@ -6,10 +6,13 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, V
 use prehend_autodiff::Scalar;
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::{Joint, JointModel, Link};
+use prehend_sim::fields::{HalfSpace, Sphere};
+use prehend_sim::joint_law::{
+    JointDamper, JointFriction, JointLimits, JointSpring, PositionServo, VelocityServo,
+};
 use prehend_sim::{
     Body, BristleFriction, Bushing, BushingStiffness, ContactBodies, Coulomb, DynContactLaw,
-    GapSmoothing, HalfSpace, JointDamper, JointFriction, JointLimits, JointSpring, KelvinVoigt,
-    Law, PositionServo, RigidBody, Sphere, State, Surface, VelocityServo, World,
+    GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World,
 };
 
 /// A nut on a thread.

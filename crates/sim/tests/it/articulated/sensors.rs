@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
-use prehend_sim::{Body, ContactBodies, HalfSpace, JointDamper, RigidBody, State, Surface, World};
+use prehend_sim::fields::HalfSpace;
+use prehend_sim::joint_law::JointDamper;
+use prehend_sim::{Body, ContactBodies, RigidBody, State, Surface, World};
 
 use super::scenes::coulomb_law;
 

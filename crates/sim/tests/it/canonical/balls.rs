@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
-use prehend_sim::{Body, DynContactLaw, GapSmoothing, Sphere, State, Surface, TimeSteps, World};
+use prehend_sim::fields::Sphere;
+use prehend_sim::{Body, DynContactLaw, GapSmoothing, State, Surface, TimeSteps, World};
 
 use super::integrators::{INPUTS, Scheme};
 use super::laws::{G, Law, Spec};

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use prehend_sim::contact::restitution::{
     approach_restitution, hunt_crossley_restitution, restitution,
 };
+use prehend_sim::contact::{ApproachDamped, GraspD, GraspDParameters, Hertz, NormalLaw, Stribeck};
 use prehend_sim::{
-    ApproachDamped, ContactCalibration, Coulomb, DynContactLaw, GraspD, GraspDParameters, Hertz,
-    HuntCrossley, KelvinVoigt, Law as Product, NormalLaw, Stribeck,
+    ContactCalibration, Coulomb, DynContactLaw, HuntCrossley, KelvinVoigt, Law as Product,
 };
 
 /// Gravity \[m/s²\].

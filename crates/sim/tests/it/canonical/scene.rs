@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use prehend_sim::{Body, ContactBodies, GapSmoothing, HalfSpace, RigidBody, State, Surface, World};
+use prehend_sim::fields::HalfSpace;
+use prehend_sim::{Body, ContactBodies, GapSmoothing, RigidBody, State, Surface, World};
 
 use super::laws::{G, Law, Spec};
 

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Bounce, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing, HalfSpace,
-    HuntCrossley, KelvinVoigt, Law, State, Surface, TimeSteps, World,
+    Adaptive, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
+    Law, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
 

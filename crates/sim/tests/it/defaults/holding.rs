@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Fwd;
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Adaptive, Body, BodyId, Bounce, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
-    Cuboid, DynContactLaw, GapSmoothing, HalfSpace, HuntCrossley, KelvinVoigt, Law, RigidBody,
-    State, TimeSteps, World,
+    Adaptive, Body, BodyId, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
+    DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State, TimeSteps,
+    World,
 };
 
 use super::CONVERGED;

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, Cuboid, GapSmoothing, HalfSpace,
-    HuntCrossley, KelvinVoigt, Law, RigidBody, State, Surface, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+    RigidBody, State, Surface, World,
 };
 
 use super::scenes::{HARD, down};

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
+use prehend_sim::contact::{Bounce, Hertz, Stribeck, regularized_coulomb};
+use prehend_sim::fields::{HalfSpace, Sphere, SphereCavity};
 use prehend_sim::{
-    Body, Bounce, BristleFriction, ContactBodies, ContactCalibration, ContactForce,
-    ContactKinematics, ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, Hertz,
-    HuntCrossley, KelvinVoigt, Law, RigidBody, Sphere, SphereCavity, State, Stribeck, Surface,
-    World, regularized_coulomb,
+    Body, BristleFriction, ContactBodies, ContactCalibration, ContactForce, ContactKinematics,
+    ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody,
+    State, Surface, World,
 };
 
 use super::parcel;

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Recording, Scalar};
+use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, Cuboid,
-    DynContactLaw, GapSmoothing, HalfSpace, RungeKutta4, SemiImplicitEuler, SimulationError,
-    Sphere, State, StepCheckpointed, Surface, TimeSteps, World,
+    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, DynContactLaw,
+    GapSmoothing, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
+    Surface, TimeSteps, World,
 };
 
 use super::scenes::{

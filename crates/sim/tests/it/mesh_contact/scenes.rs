@@ -7,8 +7,9 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::shape::Cuboid;
 use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::{Mug, cuboid};
+use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    Body, BodyId, Bounce, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
     ShapeOptions, State, World,
 };
 

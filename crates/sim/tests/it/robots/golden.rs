@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Quaternion, Translation3, UnitQuater
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::articulated::Articulation;
-use prehend_sim::{BodyId, MjcfOptions, State, UrdfOptions, World};
+use prehend_sim::robot::{MjcfOptions, UrdfOptions};
+use prehend_sim::{BodyId, State, World};
 use serde_json::Value;
 
 use super::data_folder;

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::robot::KinematicTree;
-use prehend_sim::{BodyId, State, UrdfOptions, World};
+use prehend_sim::robot::UrdfOptions;
+use prehend_sim::{BodyId, State, World};
 
 /// The links are not in the order of the tree.
 const ARM: &str = r#"<robot name="arm">

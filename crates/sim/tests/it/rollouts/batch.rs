@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Batch, Body, ContactBodies, GapSmoothing, HalfSpace, Integrator, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Adaptive, Batch, Body, ContactBodies, GapSmoothing, Integrator, RigidBody, SemiImplicitEuler,
+    SimulationError, State, Surface, TimeSteps, World,
 };
 
 use crate::scenes::penalty;

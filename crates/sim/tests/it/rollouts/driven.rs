@@ -6,9 +6,10 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
+use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody,
-    RungeKutta4, SemiImplicitEuler, SimulationError, Sphere, State, StepCheckpointed, Surface,
+    Adaptive, BackwardEuler, Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion,
+    RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed, Surface,
     TimeSteps, Trajectory, World,
 };
 
@@ -110,7 +111,8 @@ fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
     let (world, start) = scene(INPUTS);
     let (carrying, lifted_start) = scene(recording.variables(INPUTS));
     let time_steps = TimeSteps { dt: 1e-4, steps: 3 };
-    let error = SimulationError::TrajectoryDerivatives { body: "pusher".to_owned() };
+    let error: SimulationError =
+        BuildError::TrajectoryDerivatives { body: "pusher".to_owned() }.into();
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
     let run = carrying.simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
     assert_eq!(run.unwrap_err(), error);

@@ -7,12 +7,14 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
 use parry3d_f64::shape::Capsule;
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::contact::Stribeck;
+use prehend_sim::fields::{HalfSpace, Sphere};
+use prehend_sim::joint_law::{JointFriction, JointLimits, JointSpring};
 use prehend_sim::{
     Adaptive, BackwardEuler, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
-    DynContactLaw, GapSmoothing, HalfSpace, HuntCrossley, Integrator, JointFriction, JointLimits,
-    JointSpring, KelvinVoigt, Law, RigidBody, RolloutFunction, RolloutInputs, RungeKutta4,
-    SemiImplicitEuler, Shape, SimulationError, Sphere, State, Step, Stribeck, SubStepped, Surface,
-    TimeSteps, World,
+    DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, RigidBody,
+    RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
+    Step, SubStepped, Surface, TimeSteps, World,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -131,7 +133,8 @@ fn pair(
     let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::cuboid(mass, [0.02; 3]).unwrap();
     let ball = Arc::new(Sphere { center: Point3::origin(), radius: 0.02 });
-    let cuboid = prehend_sim::Cuboid { half_extents: Vector3::repeat(0.02), rounding: 1e-3 };
+    let cuboid =
+        prehend_sim::fields::Cuboid { half_extents: Vector3::repeat(0.02), rounding: 1e-3 };
     let capsule = Shape::from_parry(&Capsule::new_y(0.02, 0.02)).unwrap();
     let body = |name| {
         let body = Body::dynamic(name, rigid);

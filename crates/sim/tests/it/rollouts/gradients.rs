@@ -9,11 +9,12 @@ use prehend_autodiff::check::{
 use prehend_autodiff::lie::lift;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
 use prehend_geometry::DistanceField;
+use prehend_sim::contact::{LeakSteps, regularized_coulomb};
+use prehend_sim::fields::Sphere;
 use prehend_sim::{
     Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, ContactPair,
-    DynContactLaw, GapSmoothing, Integrator, LeakSteps, Motion, RigidBody, SemiImplicitEuler,
-    SimulationError, Sphere, State, Step, StepCheckpointed, Surface, TimeSteps, World,
-    regularized_coulomb,
+    DynContactLaw, GapSmoothing, Integrator, Motion, RigidBody, SemiImplicitEuler, SimulationError,
+    State, Step, StepCheckpointed, Surface, TimeSteps, World,
 };
 use proptest::prelude::*;
 

@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Var};
 use prehend_geometry::{DistanceField, FieldSample};
+use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyId, ContactBodies, GapSmoothing, HalfSpace, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, Sphere, State, StepCheckpointed, SubStepped,
-    Surface, TimeSteps, World,
+    Adaptive, BackwardEuler, Body, BodyId, BuildError, ContactBodies, GapSmoothing, Integrator,
+    RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, SubStepped, Surface,
+    TimeSteps, World,
 };
 
 use crate::scenes::{penalty, sticking};
@@ -205,14 +206,11 @@ fn bodies_that_cannot_touch_are_refused() {
     let mut refused = |a: &[BodyId], b: &[BodyId]| {
         world.add_contacts_between(a, b, law.clone(), GapSmoothing::Hard).unwrap_err()
     };
-    let none = SimulationError::NoSamples { body: "bare".to_owned() };
+    let none = BuildError::NoSamples { body: "bare".to_owned() };
     assert_eq!(refused(&[bare], &[wall]), none);
-    assert_eq!(
-        refused(&pebbles, &pebbles),
-        SimulationError::NoField { body: "pebble 1".to_owned() }
-    );
-    assert_eq!(refused(&[wall], &[wall]), SimulationError::NoContacts);
-    assert_eq!(refused(&[], &pebbles), SimulationError::NoContacts);
+    assert_eq!(refused(&pebbles, &pebbles), BuildError::NoField { body: "pebble 1".to_owned() });
+    assert_eq!(refused(&[wall], &[wall]), BuildError::NoContacts);
+    assert_eq!(refused(&[], &pebbles), BuildError::NoContacts);
     assert!(world.contact_groups.is_empty());
     world.add_contacts_between(&pebbles, &[wall, bare][..1], law, GapSmoothing::Hard).unwrap();
     assert_eq!(world.contact_groups[0].bodies(), [&pebbles[..], &[wall]]);

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
+use super::World;
+use super::contact_pair::ContactPair;
 use crate::state::State;
-use crate::world::World;
-use crate::world::contact_pair::ContactPair;
 
 /// How far samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
 /// that pays.

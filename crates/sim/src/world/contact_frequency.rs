@@ -1,44 +1,14 @@
-//! Whether a time step is short enough for the stiffness and damping of the contacts.
+//! Fastest rate of stiffness and damping of contacts and forces along joints.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Point3};
 use prehend_autodiff::Fwd;
-use thiserror::Error;
 
-use crate::integrator::Integrator;
+use super::World;
+use super::joint_force::{Along, JointForce};
+use crate::handle::BodyId;
 use crate::state::State;
-use crate::world::World;
-use crate::world::body_id::BodyId;
-use crate::world::joint_force::{Along, JointForce};
-
-/// A time step too long for the stiffness or damping of the contacts.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("time step {dt} s is too long for these contacts: at most {limit} s")]
-pub struct StepError {
-    /// The time step \[s\].
-    pub dt: f64,
-    /// The longest step that passes \[s\].
-    pub limit: f64,
-}
 
 impl World {
-    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`: dt·ω ≤
-    /// [`Integrator::stability_limit`] for their [`World::contact_frequency`] ω. Impacts to come are not among them.
-    ///
-    /// # Errors
-    /// With the longest step that passes.
-    ///
-    /// # Panics
-    /// If there are fewer states than bodies.
-    pub fn check_time_step(
-        &self,
-        integrator: &impl Integrator,
-        states: &[State],
-        dt: f64,
-    ) -> Result<(), StepError> {
-        let limit = integrator.stability_limit() / self.contact_frequency(states);
-        if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
-    }
-
     /// The largest of natural frequency ω_max and damping rate \[1/s\] of contacts and forces along joints at `states`: of M⁻¹K and
     /// M⁻¹D, with the symmetric parts of their stiffness K and damping D; NaN for states that are.
     ///

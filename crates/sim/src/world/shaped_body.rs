@@ -4,23 +4,10 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use super::Shape;
-use super::error::ShapeError;
-use super::matter::Matter;
-use crate::body::RigidBody;
-use crate::world::body::{Body, Motion};
-
-impl<S: Scalar> Shape<S> {
-    /// Mass properties at a uniform `density` \[kg/m³\].
-    fn rigid(&self, density: S) -> Result<RigidBody<S>, ShapeError> {
-        if let Some(kind) = self.built.kind.fixed_only() {
-            return Err(ShapeError::FixedOnly { kind });
-        }
-        let (mass, com, inertia) =
-            self.moments().ok_or(ShapeError::FixedOnly { kind: "shape" })?.of_density(density);
-        Ok(RigidBody::new(mass, inertia, com)?)
-    }
-}
+use super::body::{Body, Motion};
+use crate::shape::Shape;
+use crate::shape::error::ShapeError;
+use crate::shape::matter::Matter;
 
 impl<S: Scalar> Body<S> {
     /// A body of uniform `density` \[kg/m³\] that forces move, with the mass properties, samples and field of `shape`. Its model frame is
@@ -80,7 +67,7 @@ impl<S: Scalar> Body<S> {
 
     /// The numbers of its shape's dimensions.
     pub(crate) fn dimensions(&self) -> &[S] {
-        self.matter.as_ref().map_or(&[], |matter| &matter.shape.dimensions)
+        self.matter.as_ref().map_or(&[], |matter| &matter.shape.dimension_values())
     }
 
     /// The shape that it is made of, if any.

@@ -3,12 +3,12 @@
 use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
+use super::World;
+use super::body::Motion;
+use super::bushing::BushingStiffness;
 use crate::articulated::link::NUMBERS;
 use crate::body::RigidBody;
-use crate::error::SimulationError;
-use crate::world::World;
-use crate::world::body::Motion;
-use crate::world::bushing::BushingStiffness;
+use crate::error::BuildError;
 
 impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, but for trajectories, in a row.
@@ -49,10 +49,7 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// If there are too few or too many, or a body of such a mass, inertia or center of mass is impossible; if a trajectory of this
     /// world carries derivatives, which are no parameters.
-    pub fn with_parameters<T: Scalar>(
-        &self,
-        parameters: &[T],
-    ) -> Result<World<T>, SimulationError> {
+    pub fn with_parameters<T: Scalar>(&self, parameters: &[T]) -> Result<World<T>, BuildError> {
         self.check_trajectories()?;
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
         let params = self.contact_params().count()
@@ -62,7 +59,7 @@ impl<S: Scalar> World<S> {
         let dimensions: usize = self.bodies.iter().map(|body| body.dimensions().len()).sum();
         let expected = 10 * free + 6 * self.bodies.len() + dimensions + links + 3 + params;
         if parameters.len() != expected {
-            return Err(SimulationError::Parameters { given: parameters.len(), expected });
+            return Err(BuildError::Parameters { given: parameters.len(), expected });
         }
         let mut world = self.map(|x| T::constant(x.value()));
         let mut rest = parameters.iter().copied();
@@ -75,12 +72,12 @@ impl<S: Scalar> World<S> {
                 let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
                 let com = Point3::from(Vector3::from_fn(|_, _| next()));
                 *rigid = RigidBody::new(mass, inertia, com)
-                    .map_err(|error| SimulationError::Body { body: body.name.clone(), error })?;
+                    .map_err(|error| BuildError::Body { body: body.name.clone(), error })?;
             }
             body.external_wrench = Vector6::from_fn(|_, _| next());
             let dimensions = body.dimensions().iter().map(|_| next()).collect();
             body.set_dimensions(dimensions)
-                .map_err(|error| SimulationError::Shape { body: body.name.clone(), error })?;
+                .map_err(|error| BuildError::Shape { body: body.name.clone(), error })?;
         }
         for link in world.articulations.iter_mut().flat_map(|own| own.tree.links_mut()) {
             link.set_numbers(&std::array::from_fn(|_| next()));
@@ -139,10 +136,10 @@ mod tests {
         let (world, _) = egg_on(floor(), GapSmoothing::Hard);
         let mut numbers = world.parameters();
         let error = world.with_parameters(&numbers[1..]).unwrap_err();
-        assert_eq!(error, SimulationError::Parameters { given: 27, expected: 28 });
+        assert_eq!(error, BuildError::Parameters { given: 27, expected: 28 });
         numbers[6] = -1.0;
         let error = BodyError::Mass(-1.0);
         let refused = world.with_parameters(&numbers).unwrap_err();
-        assert_eq!(refused, SimulationError::Body { body: "egg".to_owned(), error });
+        assert_eq!(refused, BuildError::Body { body: "egg".to_owned(), error });
     }
 }

@@ -3,11 +3,11 @@
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 
-use super::bristle_function::BristleFunction;
-use super::contact_query::{ContactPoint, ContactQuery};
-use super::dynamic::DynContactLaw;
-use super::moved::LiftedContact;
-use super::point::ContactKinematics;
+use crate::contact::bristle_function::BristleFunction;
+use crate::contact::contact_query::{ContactPoint, ContactQuery};
+use crate::contact::dynamic::DynContactLaw;
+use crate::contact::moved::LiftedContact;
+use crate::contact::point::ContactKinematics;
 use crate::shape::lifted::LiftedField;
 use crate::shape::solid::Sample;
 

@@ -2,11 +2,11 @@
 
 use prehend_autodiff::Scalar;
 
+use super::World;
+use super::contact_pair::ContactPair;
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::state::State;
-use crate::world::World;
-use crate::world::body_id::BodyId;
-use crate::world::contact_pair::ContactPair;
 
 impl<S: Scalar> World<S> {
     /// The error of `states` that led to `next`, not all finite, by `time` \[s\].

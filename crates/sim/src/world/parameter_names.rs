@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use prehend_autodiff::Scalar;
 
+use super::World;
 use crate::articulated::link::NUMBER_NAMES;
-use crate::world::World;
-use crate::world::body_id::BodyId;
+use crate::handle::BodyId;
 
 const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 const WRENCH: [&str; 6] = ["force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"];
@@ -93,10 +93,9 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use crate::articulated::{Joint, Link};
+    use crate::joint_law::JointSpring;
     use crate::scenes::{egg_on, floor, penalty};
-    use crate::{
-        Body, Bushing, BushingStiffness, ContactBodies, GapSmoothing, JointSpring, RigidBody, Shape,
-    };
+    use crate::{Body, Bushing, BushingStiffness, ContactBodies, GapSmoothing, RigidBody, Shape};
 
     #[test]
     fn every_parameter_has_a_name_of_its_own() {
