@@ -5,7 +5,7 @@ use std::sync::Arc;
 use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Adaptive, Body, ContactBodies, DynContactLaw, GapSmoothing, Integrator, RigidBody,
+    Adaptive, Body, BuildError, ContactBodies, DynContactLaw, GapSmoothing, Integrator, RigidBody,
     SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
 };
 
@@ -75,7 +75,7 @@ impl Specimen<'_> {
         depth: f64,
         velocity: Vector3<f64>,
     ) -> Result<(World, Vec<State>), SimulationError> {
-        let failed = |error| SimulationError::Body { body: "specimen".to_owned(), error };
+        let failed = |error| BuildError::Body { body: "specimen".to_owned(), error };
         // Nothing here turns it.
         let inertia = Matrix3::identity() * self.mass;
         let rigid = RigidBody::new(self.mass, inertia, Point3::origin()).map_err(failed)?;

@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::Scalar;
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody, SimulationError, State,
-    Surface, TimeSteps, World,
+    Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody, SimulationError,
+    State, Surface, TimeSteps, World,
 };
 
 use crate::law::CubeLaw;
@@ -47,7 +47,7 @@ pub(crate) fn path<S: Scalar>(
     let com = Point3::new(cx * size, cy * size, cz * size);
     let moments = Vector3::new(ix_to_z * iz, iy_to_z * iz, iz).map(|i| i.times(MASS) * size * size);
     let rigid = RigidBody::new(S::constant(MASS), Matrix3::from_diagonal(&moments), com)
-        .map_err(|error| SimulationError::Body { body: "cube".to_owned(), error })?;
+        .map_err(|error| BuildError::Body { body: "cube".to_owned(), error })?;
     let mut world = table((corner_radius * size).value())?.cast::<S>();
     world.gravity.z = -g * size;
     world.bodies[1].motion = Motion::Dynamic(rigid);
@@ -88,7 +88,7 @@ fn lean<S: Scalar>(along: S, across: S, velocity: &Vector3<S>) -> Vector3<S> {
 
 /// A cube with round corners above the board.
 fn table(radius: f64) -> Result<World, SimulationError> {
-    let failed = |error| SimulationError::Body { body: "cube".to_owned(), error };
+    let failed = |error| BuildError::Body { body: "cube".to_owned(), error };
     let side = |bit: usize, i: usize| if i >> bit & 1 == 0 { radius - HALF } else { HALF - radius };
     let corners: Vec<Point3<f64>> =
         (0..8).map(|i| Point3::new(side(0, i), side(1, i), side(2, i))).collect();

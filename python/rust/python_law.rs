@@ -43,7 +43,7 @@ pub(crate) struct PythonLaw {
     law: Py<PyAny>,
     names: Vec<&'static str>,
     values: Vec<f64>,
-    reach: f64,
+    cutoff: f64,
 }
 
 impl PythonLaw {
@@ -67,11 +67,11 @@ impl PythonLaw {
         if let Some(name) = given.keys().next() {
             return Err(wrong(format!("the law has no parameter '{name}'")));
         }
-        let reach = law.getattr_opt("reach")?.map_or(Ok(0.0), |reach| reach.extract())?;
+        let cutoff = law.getattr_opt("cutoff")?.map_or(Ok(0.0), |cutoff| cutoff.extract())?;
         let respond = law.py().import("prehend.laws")?.getattr("_respond")?.unbind();
         // Names of parameters live as long as the program; there are a few in each.
         let names = names.into_iter().map(|name| &*Box::leak(name.into_boxed_str())).collect();
-        Ok(Self { respond, law: law.clone().unbind(), names, values, reach })
+        Ok(Self { respond, law: law.clone().unbind(), names, values, cutoff })
     }
 
     /// The four numbers of a response, each with its derivatives by motion and parameters if asked for.
@@ -127,6 +127,6 @@ impl ContactLaw for PythonLaw {
     }
 
     fn cutoff(&self) -> f64 {
-        self.reach
+        self.cutoff
     }
 }

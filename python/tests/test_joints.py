@@ -75,7 +75,7 @@ def test_a_servo_holds_a_two_link_arm():
     assert np.arctan2(turn[1], turn[0]) == pytest.approx(-0.3, abs=1e-2)
 
 
-def test_tendons_couple_joints_and_welds_close_loops():
+def test_tendons_couple_joints_and_bushings_close_loops():
     world = prehend.World(gravity=[0, 0, 0])
     inertia = 3 * [1e-2]
     links = [

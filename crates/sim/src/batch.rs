@@ -56,7 +56,7 @@ pub struct Batch<I = Adaptive> {
 }
 
 impl Batch {
-    /// Of worlds like `world`, with [`Adaptive`] steps.
+    /// Batch of worlds like `world`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`Batch::with_integrator`].
@@ -66,7 +66,7 @@ impl Batch {
 }
 
 impl<I: Integrator + Send + 'static> Batch<I> {
-    /// Of worlds like `world`, with the steps of `integrator`.
+    /// Batch of worlds like `world`, with the steps of `integrator`.
     ///
     /// # Errors
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
@@ -77,7 +77,7 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
-    /// Where each of `variants`, a world and the states that it starts from, is after `time_steps`, as
+    /// States of each of `variants`, a world and the states that it starts from, after `time_steps`, as
     /// [`World::simulate_with`] finds it.
     ///
     /// Variants are taken one after the other, and only what they change is kept.
@@ -136,7 +136,7 @@ const FEW: usize = 2000;
 struct Run<I> {
     template: Arc<WorldTemplate<I>>,
     places: Box<[u32]>,
-    /// How many states it starts from.
+    /// Number of states that it starts from.
     states: usize,
     time_steps: TimeSteps,
 }

@@ -74,7 +74,7 @@ impl<S: Scalar> RigidBody<S> {
         Self::new(mass, Matrix3::from_diagonal_element(moment), Point3::origin())
     }
 
-    /// The same body moved in its model frame: what was at the origin is at `motion`.
+    /// Body moved in its model frame: what was at the origin is at `motion`.
     #[must_use]
     pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let rotation = motion.rotation.to_rotation_matrix().into_inner().map(S::constant);
@@ -88,7 +88,7 @@ impl<S: Scalar> RigidBody<S> {
         }
     }
 
-    /// The same body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
+    /// Body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
     ///
     /// # Errors
     /// Unless the mass is positive and finite.
@@ -188,7 +188,7 @@ impl<S: Scalar> RigidBody<S> {
         t_world_com * Translation3::from(-self.com.coords)
     }
 
-    /// The same body, each number through `f`.
+    /// Body, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> RigidBody<T> {
         RigidBody {
             mass: f(self.mass),
@@ -205,7 +205,7 @@ impl<S: Scalar> RigidBody<S> {
 }
 
 impl RigidBody {
-    /// The same body in constants of another scalar.
+    /// Body in constants of another scalar.
     pub fn cast<S: Scalar>(&self) -> RigidBody<S> {
         self.map(S::constant)
     }

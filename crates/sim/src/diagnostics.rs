@@ -1,4 +1,4 @@
-//! Whether the steps of a simulation were short enough.
+//! Tests whether the steps of a simulation were short enough.
 
 mod energy;
 mod step_resolution;
@@ -18,7 +18,7 @@ use step_resolution::StepResolution;
 /// Roughness up to which a simulation is resolved.
 const FINE: f64 = 0.1;
 
-/// How well the steps of a simulation resolved its contacts.
+/// Resolution of a simulation's contacts by its steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
     /// Steps that were asked for; an integrator may divide them.
@@ -32,7 +32,7 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    /// Whether the steps were short enough, for values and derivatives: a roughness of no more than 0.1.
+    /// True if the steps were short enough, for values and derivatives: a roughness of no more than 0.1.
     pub fn is_fine(&self) -> bool {
         self.roughness.is_none_or(|roughness| roughness <= FINE)
     }
@@ -64,7 +64,7 @@ pub(crate) struct Diagnostics<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> Diagnostics<'a, S> {
-    /// Of a simulation from `initial` by an integrator that `controls_error` or not.
+    /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not.
     pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
         let roughness = (!controls_error).then(|| StepResolution::new(world, initial));
         let energy = EnergyBalance::new(world, initial, controls_error);
@@ -82,7 +82,7 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
         self.energy.step(self.world, step, states)
     }
 
-    /// What is to be said of `time_steps` that have led to `states`.
+    /// Report on `time_steps` that have led to `states`.
     ///
     /// # Errors
     /// If contacts have made energy, or velocities are too large to be squared.

@@ -14,9 +14,9 @@ pub enum BuildError {
     /// A body is not of this world.
     #[error("there is no body {body}: the world has {bodies}")]
     NoBody {
-        /// Which body.
+        /// The body.
         body: BodyId,
-        /// How many there are.
+        /// Number of bodies.
         bodies: usize,
     },
     /// A body that should touch others has no samples.
@@ -59,7 +59,7 @@ pub enum BuildError {
     NoAxis {
         /// Its name.
         link: String,
-        /// Which axis, from 0.
+        /// Index of the axis, from 0.
         axis: usize,
     },
     /// A force along joints of several articulations.
@@ -73,7 +73,7 @@ pub enum BuildError {
     JointLaw {
         /// Its name.
         link: String,
-        /// What is wrong.
+        /// Cause.
         error: LawError,
     },
     /// A force along no joint.
@@ -82,9 +82,9 @@ pub enum BuildError {
     /// Parameters of a world that are too few or too many.
     #[error("{given} parameters for a world of {expected}")]
     Parameters {
-        /// How many were given.
+        /// Number given.
         given: usize,
-        /// How many it has.
+        /// Number that it has.
         expected: usize,
     },
     /// A body has an impossible mass, inertia or center of mass.
@@ -92,7 +92,7 @@ pub enum BuildError {
     Body {
         /// Its name.
         body: String,
-        /// What is wrong.
+        /// Cause.
         error: BodyError,
     },
     /// A body has impossible dimensions.
@@ -100,17 +100,17 @@ pub enum BuildError {
     Shape {
         /// Its name.
         body: String,
-        /// What is wrong.
+        /// Cause.
         error: ShapeError,
     },
     /// A robot, its shape and the trajectory of its joints do not belong together.
     #[error("{found} {what} for a robot that has {expected}")]
     Robot {
-        /// What was counted.
+        /// Name of what was counted.
         what: &'static str,
-        /// How many there were.
+        /// Number found.
         found: usize,
-        /// How many the robot has.
+        /// Number that the robot has.
         expected: usize,
     },
 
@@ -128,7 +128,7 @@ pub enum BuildError {
         "stiffness and damping of a bushing must be zero or positive, and finite, one is {value}"
     )]
     BushingStiffness {
-        /// What it is.
+        /// Its value.
         value: f64,
     },
 }
@@ -150,9 +150,9 @@ pub enum SimulationError {
     JointNumbers {
         /// Its name.
         link: String,
-        /// How many coordinates and velocities were given.
+        /// Numbers of coordinates and velocities given.
         given: [usize; 2],
-        /// How many it has.
+        /// Number that it has.
         expected: [usize; 2],
     },
     /// A rotation of a joint that is none.
@@ -182,13 +182,13 @@ pub enum SimulationError {
         "{states} states for {bodies} bodies, {joints} joints and {bristles} contacts with bristles"
     )]
     States {
-        /// How many states.
+        /// Number of states.
         states: usize,
-        /// How many bodies.
+        /// Number of bodies.
         bodies: usize,
-        /// How many joints of articulations, whose states follow those of the bodies.
+        /// Number of joints of articulations, whose states follow those of the bodies.
         joints: usize,
-        /// How many contacts have a deflection, whose states come last.
+        /// Number of contacts with a deflection, whose states come last.
         bristles: usize,
     },
     /// A number of an integrator is out of its range.
@@ -196,9 +196,9 @@ pub enum SimulationError {
     Setting {
         /// Type and field.
         setting: &'static str,
-        /// What it may be.
+        /// Range that it has to be in.
         range: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// A world has no parameter of that name, or it was named before.
@@ -224,11 +224,11 @@ pub enum SimulationError {
     /// Inputs of a function of numbers that are too few or too many.
     #[error("{given} {what}: {expected} are expected")]
     Inputs {
-        /// What was given.
+        /// Name of what was given.
         what: &'static str,
-        /// How many were given.
+        /// Number given.
         given: usize,
-        /// How many it takes.
+        /// Number expected.
         expected: usize,
     },
     /// A world that differs in more than parameters from the one its integrator was made for.
@@ -262,7 +262,7 @@ pub enum SimulationError {
         /// Time \[s\].
         time: f64,
     },
-    /// Contacts have made energy. Not asked in a world where a body is driven, or kinematic and given a velocity.
+    /// Contacts have made energy. Not asked in a world where a body is kinematic, or fixed and given a velocity.
     #[error(
         "contacts have made {energy:.3e} J by {time} s, most of it in body '{body}'{}: a time step too long for them, or a \
          law that is not passive",
@@ -275,7 +275,7 @@ pub enum SimulationError {
         contact: Option<String>,
         /// When it was noticed \[s\].
         time: f64,
-        /// How much \[J\].
+        /// Amount \[J\].
         energy: f64,
     },
     /// Forces change so fast that no step is short enough.

@@ -44,7 +44,7 @@
 //! ```
 //!
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same; of a link it is
+//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For fixed and kinematic bodies the two are the same; of a link it is
 //! the pose of its frame, wherever its center of mass is.
 //!
 //! Errors say in words what is wrong and where. A `main` that returns `anyhow::Result` prints them so; with
@@ -142,7 +142,7 @@
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
 //! felt, and faces where samples lie. Edges that cross are felt only at samples, too: their distances should be less than half of
 //! the smaller body's edges, or boxes turned against each other may fall through. Each direction is a contact of its own, whose
-//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both.
+//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both by their handle.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -171,7 +171,7 @@
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
 //! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)). Contacts
-//! that make energy are an error here as by default, but only while nothing is driven, or kinematic with a velocity.
+//! that make energy are an error here as by default, but only while no body is kinematic, or fixed with a velocity.
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
 //! every step, but for friction that sticks, and damps what is faster than it: with steps of a millisecond it simulates a stack at
 //! rest two to three times faster than the default; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
@@ -287,7 +287,7 @@
 //!     let mut world = world.cast::<S>();
 //!     if let Motion::Dynamic(body) = &mut world.bodies[0].motion {
 //!         *body = RigidBody::new(mass, *body.inertia(), *body.com())
-//!             .map_err(|error| SimulationError::Body { body: "ball".to_owned(), error })?;
+//!             .map_err(|error| BuildError::Body { body: "ball".to_owned(), error })?;
 //!     }
 //!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
 //!     start[0].linear.z = speed;
@@ -332,26 +332,26 @@
 //! # let bodies = ContactBodies { samples: block, field: floor };
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
-//! # world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
+//! let contact = world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
 //! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
 //! # let start = [State::at_rest(Isometry3::identity()), stands];
 //! // Where a block is every 20 ms, by its friction and its speed at the start.
 //! fn places<S: Scalar>(
 //!     world: &World,
 //!     start: &[State],
-//!     [block, floor]: [BodyId; 2],
+//!     (block, contact): (BodyId, ContactId),
 //!     [friction, speed]: [S; 2],
 //! ) -> Result<Vec<S>, SimulationError> {
 //!     let mut world = world.cast::<S>();
-//!     world.set_contact_param(block, floor, "friction", friction)?;
+//!     world.set_contact_param(contact, "friction", friction)?;
 //!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
 //!     start[block].linear.x = speed;
 //!     let run = world.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
 //!     Ok(run.iter().map(|states| states[block].pose.translation.x).collect())
 //! }
 //!
-//! let seen = places(&world, &start, [block, floor], [0.35, 0.6])?;
-//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, [block, floor], [x[0], x[1]]) {
+//! let seen = places(&world, &start, (block, contact), [0.35, 0.6])?;
+//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, (block, contact), [x[0], x[1]]) {
 //!     Ok(places) => places.iter().zip(&seen).map(|(place, seen)| place.plus(-seen)).collect(),
 //!     Err(_) => vec![Fwd::constant(f64::NAN); seen.len()],
 //! };

@@ -39,7 +39,7 @@ pub(crate) enum ContactPlace {
     Pairs {
         /// Index of the first.
         first: usize,
-        /// How many there are.
+        /// Number of them.
         count: usize,
     },
     /// One of [`World::contact_groups`](crate::World::contact_groups).

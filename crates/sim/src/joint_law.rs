@@ -1,4 +1,4 @@
-//! What acts along a joint: springs, dampers, friction, limits, motors and servos, one a file.
+//! Laws along a joint: springs, dampers, friction, limits, motors and servos, one a file.
 
 pub(crate) mod activation;
 pub(crate) mod affine_actuator;
@@ -73,13 +73,13 @@ pub trait JointLaw: Parameters + 'static {
     /// The effort \[N m or N\] at a position \[rad or m\] and velocity, with parameters `p`.
     fn effort<S: Scalar>(&self, p: Self::Params<S>, position: S, velocity: S) -> S;
 
-    /// Whether it takes energy or stores it, but brings none: a simulation in which all do checks that none appears.
+    /// True if it takes energy or stores it, but brings none: a simulation in which all do checks that none appears.
     fn is_passive(&self) -> bool {
         false
     }
 }
 
-/// Whether the ends of a range, the parameters `lower` and `upper`, are in order.
+/// Checks that the ends of a range, the parameters `lower` and `upper`, are in order.
 fn in_order(lower: f64, upper: f64) -> Result<(), LawError> {
     let (name, range) = ("upper", "no less than lower");
     if lower <= upper { Ok(()) } else { Err(LawError::Range { name, range, value: upper }) }

@@ -151,7 +151,7 @@ impl World {
         }
     }
 
-    /// Whether the closed form leaves out nothing that there is.
+    /// True if the closed form leaves out nothing that there is.
     fn has_closed_form(&self) -> bool {
         // The axes of laws along a spherical joint turn with it.
         let curved = |(axis, _): &(JointAxis, f64)| {

@@ -16,18 +16,18 @@ use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
 use crate::world::sample_culling::SampleCulling;
 
-/// What a simulation with an integrator of one's own choice led to.
+/// Result of a simulation with an integrator of one's own choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation<T> {
     /// The states: those at the end, or of every step.
     pub states: T,
-    /// Whether the steps were short enough.
+    /// Report on whether the steps were short enough.
     pub resolution: Resolution,
 }
 
-/// What a controller may return: nothing, whether to go on, or a result of either, whose error ends the simulation.
+/// Result of a controller: nothing, whether to go on, or a result of either, whose error ends the simulation.
 pub trait ControlResult {
-    /// Whether the simulation goes on.
+    /// Decision whether the simulation goes on.
     ///
     /// # Errors
     /// If the controller failed.
@@ -83,7 +83,7 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
+    /// The states of all bodies after `time` \[s\], from `initial`; kinematic bodies start where their trajectory does.
     ///
     /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts with bristles
     /// ([`Bristles`](crate::contact::Bristles)), if there are such. What goes on
@@ -121,7 +121,7 @@ impl<S: Scalar> World<S> {
     /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
     /// motion.
     ///
-    /// Contacts that make energy are an error unless a body is driven or moves as it is told: such a body may bring energy
+    /// Contacts that make energy are an error unless a body is kinematic, or fixed and moving: such a body may bring energy
     /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
     ///
     /// # Errors
@@ -174,7 +174,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
-    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of kinematic bodies, for
+    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of fixed bodies, for
     /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
     /// either, whose error ends it, too.
     ///
@@ -275,7 +275,7 @@ impl<S: Scalar> World<S> {
         Ok(states)
     }
 
-    /// One step: the integrator's, then that of driven bodies.
+    /// One step: the integrator's, then that of kinematic bodies.
     ///
     /// # Errors
     /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
@@ -302,7 +302,7 @@ impl<S: Scalar> World<S> {
         self.finish_step(states, next, step.end())
     }
 
-    /// `next` at `time` \[s\], with driven bodies and links where they are then, after a step from `states`.
+    /// `next` at `time` \[s\], with kinematic bodies and links where they are then, after a step from `states`.
     ///
     /// # Errors
     /// If one is not finite.
@@ -333,7 +333,7 @@ impl<S: Scalar> World<S> {
         integrator.step(&near, states, step)
     }
 
-    /// The states from which a rollout begins: `initial` with driven bodies where their trajectories start.
+    /// The states from which a rollout begins: `initial` with kinematic bodies where their trajectories start.
     ///
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
@@ -349,7 +349,7 @@ impl<S: Scalar> World<S> {
         Ok(states)
     }
 
-    /// Whether a rollout may begin.
+    /// Checks that a rollout may begin.
     pub(crate) fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {

@@ -53,10 +53,10 @@ pub struct RolloutFunction<I = Adaptive> {
     parameters: usize,
 }
 
-/// How far the length of a quaternion may be from 1: differences are taken about unit ones.
+/// Largest deviation of a quaternion's length from 1: differences are taken about unit ones.
 const UNIT: f64 = 1e-3;
 
-/// What a [`RolloutFunction`] is a function of.
+/// Inputs of a [`RolloutFunction`].
 #[derive(Clone, Copy, Debug)]
 pub struct RolloutInputs<'a, S: Scalar = f64> {
     /// The initial states, those of bodies or all, 13 numbers each.
@@ -79,7 +79,7 @@ pub struct RolloutGradient {
 }
 
 impl RolloutFunction {
-    /// Of `world`, with [`Adaptive`] steps.
+    /// Function of `world`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`RolloutFunction::with_integrator`].
@@ -94,7 +94,7 @@ impl RolloutFunction {
 }
 
 impl<I: Integrator> RolloutFunction<I> {
-    /// Of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
+    /// Function of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
     ///
     /// # Errors
     /// If there is no such parameter or one is named twice, there is no step or its time is not positive.
@@ -132,12 +132,12 @@ impl<I: Integrator> RolloutFunction<I> {
         self.time_steps
     }
 
-    /// How many parameters it takes, and how many controls a step.
+    /// Number of parameters that it takes, and of controls a step.
     pub fn inputs(&self) -> [usize; 2] {
         [self.parameters, self.places.len() - self.parameters]
     }
 
-    /// How many numbers all states are at one time: 13 for each body, joint and contact with bristles.
+    /// Length of a row of all states at one time: 13 for each body, joint and contact with bristles.
     pub fn width(&self) -> usize {
         STATE * self.world().state_count()
     }
@@ -208,7 +208,7 @@ impl<I: Integrator> RolloutFunction<I> {
         inputs.parameters.iter().chain(controls).copied().collect()
     }
 
-    /// Whether there are as many as it takes.
+    /// Checks that there are as many as it takes.
     fn check<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>) -> Result<(), SimulationError> {
         let [parameters, controls] = self.inputs();
         let expected = [

@@ -53,7 +53,7 @@ pub(crate) fn ellipsoid(count: usize, axes: [f64; 3]) -> Vec<Point3<f64>> {
     (0..count).map(point).collect()
 }
 
-/// A world of a kinematic body with `field`, and of `body`, which touches it.
+/// A world of a fixed body with `field`, and of `body`, which touches it.
 pub(crate) fn on_ground(
     gravity: Vector3<f64>,
     field: Arc<dyn DistanceField>,
@@ -68,7 +68,7 @@ pub(crate) fn on_ground(
     world
 }
 
-/// Body 0 is `field`, kinematic; body 1 an egg of 0.2 kg that spins and has just touched it.
+/// Body 0 is `field`, fixed; body 1 an egg of 0.2 kg that spins and has just touched it.
 pub(crate) fn egg_on(
     field: Arc<dyn DistanceField>,
     smoothing: GapSmoothing,

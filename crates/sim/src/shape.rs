@@ -74,7 +74,7 @@ pub struct Shape<S: Scalar = f64> {
     dimensions: Vec<S>,
 }
 
-/// What follows from the values of the dimensions.
+/// Samples and field that follow from the values of the dimensions.
 struct Built {
     kind: Arc<Kind>,
     values: Vec<f64>,
@@ -149,7 +149,7 @@ impl Shape {
         Ok(Self { built, dimensions: Vec::new() })
     }
 
-    /// The same shape in constants of another scalar.
+    /// Shape in constants of another scalar.
     pub fn cast<S: Scalar>(&self) -> Shape<S> {
         self.map(S::constant)
     }
@@ -177,7 +177,7 @@ impl<S: Scalar> Shape<S> {
         Ok(())
     }
 
-    /// The same shape with other dimensions, as many.
+    /// Shape with other dimensions, as many.
     pub(crate) fn with_dimensions(&self, dimensions: Vec<S>) -> Result<Self, ShapeError> {
         let values: Vec<f64> = dimensions.iter().map(|x| x.value()).collect();
         let built = match values == self.built.values {
@@ -230,7 +230,7 @@ impl<S: Scalar> Shape<S> {
         &self.dimensions
     }
 
-    /// The same shape, each dimension through `f`.
+    /// Shape, each dimension through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Shape<T> {
         Shape {
             built: Arc::clone(&self.built),

@@ -49,7 +49,7 @@ pub(crate) struct SpatialInertia<S: Scalar> {
 }
 
 impl<S: Scalar> SpatialInertia<S> {
-    /// Of a body with center of mass at `com` and `inertia` about it.
+    /// Inertia of a body with center of mass at `com` and `inertia` about it.
     #[inline]
     pub(crate) fn new(mass: S, com: &Vector3<S>, inertia: &Matrix3<S>) -> Self {
         let moment = com * mass;

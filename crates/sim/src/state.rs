@@ -6,7 +6,7 @@ use nalgebra::{
 use prehend_autodiff::lie::{lift, perturb_about, so3_exp};
 use prehend_autodiff::{Fwd, Scalar};
 
-/// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
+/// Pose and velocity of a body; plain numbers, or numbers that carry derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<S: Scalar = f64> {
     /// `t_world_com`: origin at the center of mass \[m\], axes of the model. Of a link it is that of its frame.
@@ -23,7 +23,7 @@ impl<S: Scalar> State<S> {
         Self { pose, linear: Vector3::zeros(), angular: Vector3::zeros() }
     }
 
-    /// The same numbers without derivatives.
+    /// Numbers without derivatives.
     #[inline]
     pub fn value(&self) -> State {
         let rotation =
@@ -36,7 +36,7 @@ impl<S: Scalar> State<S> {
         }
     }
 
-    /// Whether every coordinate is a finite number, and has finite derivatives; those of a recording are not known before its sweep.
+    /// True if every coordinate is a finite number, and has finite derivatives; those of a recording are not known before its sweep.
     pub fn is_finite(&self) -> bool {
         let parts = [&self.pose.translation.vector, &self.linear, &self.angular];
         parts.iter().flat_map(|v| v.iter()).all(is_finite)
@@ -53,7 +53,7 @@ impl<S: Scalar> State<S> {
         drifted
     }
 
-    /// What an observer in `frame` sees, who moves and turns with it: `self` along the axes of `frame`.
+    /// State relative to `frame`, as an observer sees it who moves and turns with it, along the axes of `frame`.
     #[inline]
     pub fn relative_to(&self, frame: &Self) -> Self {
         let to_frame = frame.pose.rotation.inverse();
@@ -79,7 +79,7 @@ impl<S: Scalar> State<S> {
         shifted
     }
 
-    /// Numbers that are zero and carry this state's derivatives, as a tangent vector: pose twist about the
+    /// Tangent of the state: zeros that carry this state's derivatives, as a tangent vector: pose twist about the
     /// center of mass (translation \[m\], rotation \[rad\]), then linear \[m/s\] and angular \[rad/s\]
     /// velocity, world frame. First derivatives only.
     #[inline]
@@ -96,7 +96,7 @@ impl<S: Scalar> State<S> {
     }
 }
 
-/// Whether a number and the derivatives that it carries are finite: only then is nothing left of them times zero.
+/// True if a number and the derivatives that it carries are finite: only then is nothing left of them times zero.
 #[inline]
 pub(crate) fn is_finite<S: Scalar>(x: &S) -> bool {
     x.value().is_finite() && (S::RECORDED || x.times(0.0).is_constant_zero())

@@ -89,7 +89,7 @@ impl Surface {
         Ok(Self { blocks, area, points, rounding })
     }
 
-    /// The same samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch
+    /// Samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch
     /// where the field is nearest, exactly, and roll.
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Surface {
         Ok(self)
     }
 
-    /// The same samples moved in the model frame: what was at the origin is at `motion`.
+    /// Samples moved in the model frame: what was at the origin is at `motion`.
     #[must_use]
     pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let mut moved = self.clone();
@@ -250,7 +250,7 @@ impl Surface {
 /// Samples that a lattice has at most.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// Whether lattices with distances of `spacing` \[m\] on the faces of a box fit into memory.
+/// Checks that lattices with distances of `spacing` \[m\] on the faces of a box fit into memory.
 pub(crate) fn check_spacing(half_extents: [f64; 3], spacing: f64) -> Result<(), BodyError> {
     check_lengths(&[spacing])?;
     let [x, y, z] = half_extents.map(|half| 2.0 * half / spacing + 1.0);

@@ -54,17 +54,17 @@ use transmission::Transmissions;
 pub struct World<S: Scalar = f64> {
     /// The bodies.
     pub bodies: Vec<Body<S>>,
-    /// What touches what.
+    /// Pairs of bodies that may touch.
     pub contacts: Vec<ContactPair<S>>,
     /// Bodies that may touch others of their group, wherever they meet.
     pub contact_groups: Vec<ContactGroup<S>>,
-    /// Which bodies are links that joints hold together.
+    /// Bodies that are links, held together by joints.
     pub articulations: Vec<ArticulatedBody<S>>,
-    /// What acts along joints.
+    /// Forces along joints.
     pub joint_forces: Vec<JointForce<S>>,
-    /// Which frames springs hold together.
+    /// Springs that hold frames together.
     pub bushings: Vec<Bushing<S>>,
-    /// What transmissions of robots do beyond forces along joints.
+    /// Effects of robots' transmissions beyond forces along joints.
     pub transmissions: Transmissions,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
@@ -154,7 +154,7 @@ impl World {
         Ok(ContactPair::new(bodies, law, smoothing))
     }
 
-    /// The same world in constants of another scalar.
+    /// World in constants of another scalar.
     pub fn cast<S: Scalar>(&self) -> World<S> {
         self.map(S::constant)
     }
@@ -249,7 +249,7 @@ impl<S: Scalar> World<S> {
         self.contacts.iter_mut().chain(groups)
     }
 
-    /// The same world, each number through `f`, but for trajectories, which become those of constants.
+    /// World, each number through `f`, but for trajectories, which become those of constants.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
         World {
             bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
@@ -263,7 +263,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
+    /// World as values alone: without derivatives, and without leaks, which are for derivatives.
     pub(crate) fn to_f64(&self) -> World {
         let mut plain = self.map(S::value);
         for pair in plain.contact_materials_mut() {

@@ -51,9 +51,9 @@ impl World {
     }
 
     /// What `change` makes of the world, with the parameters that are new since, each by its last name. If it fails, nothing has changed.
-    pub(crate) fn naming(
+    pub(crate) fn naming<T>(
         &mut self,
-        change: impl FnOnce(&mut prehend_sim::World) -> PyResult<()>,
+        change: impl FnOnce(&mut prehend_sim::World) -> PyResult<T>,
     ) -> PyResult<BTreeMap<String, String>> {
         let before: HashSet<String> = self.world.parameter_names().into_iter().collect();
         let mut grown = self.world.clone();

@@ -4,8 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::{
-    BodyId, Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Step, StepError,
-    TimeSteps, World,
+    BodyId, RigidBody, SemiImplicitEuler, SimulationError, State, Step, StepError, TimeSteps, World,
 };
 use rayon::prelude::*;
 
@@ -139,7 +138,7 @@ impl StabilityLoss {
     }
 
     /// Checks that the time step resolves the contacts with the object at rest at `pose`: for their
-    /// [`World::contact_frequency`] ω, dt·ω is at most four fifths of [`Integrator::stability_limit`].
+    /// [`World::contact_frequency`] ω, dt·ω is at most four fifths of [`Integrator::stability_limit`](prehend_sim::Integrator::stability_limit).
     ///
     /// # Errors
     /// With the longest step that does.

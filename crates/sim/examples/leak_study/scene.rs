@@ -91,7 +91,7 @@ impl DistanceField for Hand {
 /// Number of the object's body.
 pub(crate) const OBJECT: usize = 1;
 
-/// The hand, kinematic, and the object with `count` samples of one unit of area together.
+/// The hand, fixed, and the object with `count` samples of one unit of area together.
 pub(crate) fn world(
     count: usize,
     law: Arc<dyn DynContactLaw>,

@@ -6,11 +6,11 @@ use prehend_autodiff::Scalar;
 use super::kinematics::Kinematics;
 use crate::spatial::cross_force;
 
-/// What is left of the algorithm when accelerations are known: the factor of the mass matrix.
+/// Factor of the mass matrix, which is left of the algorithm when accelerations are known.
 pub(super) struct ArticulatedInertia<S: Scalar> {
-    /// Of each degree of freedom, the force of its acceleration on what hangs on it.
+    /// For each degree of freedom, the force of its acceleration on what hangs on it.
     pulls: Vec<Vector6<S>>,
-    /// Of each link, the inverse of the efforts that accelerations of its joint take.
+    /// For each link, the inverse of the efforts that accelerations of its joint take.
     inverses: Vec<DMatrix<S>>,
 }
 

@@ -10,7 +10,7 @@ use crate::spatial::{angular, cross_force, linear, spatial};
 pub(super) struct Effort<S: Scalar> {
     /// Spatial acceleration of each link, less that of free fall.
     pub(super) accelerations: Vec<Vector6<S>>,
-    /// What moves each link and all that hangs on it.
+    /// Force on each link and all that hangs on it.
     pub(super) forces: Vec<Vector6<S>>,
 }
 

@@ -1,4 +1,4 @@
-//! How a link may move with respect to its parent.
+//! Joints: motions that a link may make with respect to its parent.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub enum Joint {
 pub struct CustomJoint(pub(super) Arc<dyn DynJointModel>);
 
 impl PartialEq for CustomJoint {
-    /// Whether they are the same one.
+    /// True if they are the same one.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -76,7 +76,7 @@ impl Joint {
         }
     }
 
-    /// Whether a rotation is among its coordinates.
+    /// True if a rotation is among its coordinates.
     pub(crate) fn turns(&self) -> bool {
         matches!(self, Self::Spherical | Self::Floating)
     }
@@ -143,7 +143,7 @@ fn push<S: Scalar>(rotation: &UnitQuaternion<S>, coordinates: &mut Vec<S>) {
     coordinates.extend(rotation.coords.iter());
 }
 
-/// Of the first four of `q`.
+/// Quaternion of the first four of `q`.
 #[inline]
 pub(super) fn quaternion<S: Scalar>(q: &[S]) -> UnitQuaternion<S> {
     Unit::new_normalize(Quaternion::new(q[3], q[0], q[1], q[2]))

@@ -52,7 +52,7 @@ pub trait JointModel: fmt::Debug + Send + Sync + 'static {
 /// A [`JointModel`] behind a pointer.
 pub(super) trait DynJointModel: fmt::Debug + Send + Sync {
     fn nv(&self) -> usize;
-    /// What [`CustomMotion`] makes of coordinates and velocities, and its Jacobian.
+    /// Values of a [`CustomMotion`] at coordinates and velocities, and their Jacobian.
     fn motion(&self, x: [f64; 2 * MAX_NV]) -> [f64; MOTION];
     fn linearized(&self, x: [f64; 2 * MAX_NV]) -> ([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION]);
 }
@@ -84,7 +84,7 @@ pub(super) fn inputs<S: Scalar>(q: &[S], v: &[S]) -> [S; 2 * MAX_NV] {
 /// Numbers of a [`CustomMotion`].
 pub(super) const MOTION: usize = 12 + 6 * MAX_NV + 6;
 
-/// Where a link is in its joint's frame, and how it moves along its own axes.
+/// Pose of a link in its joint's frame, and its motion along its own axes.
 pub(super) struct CustomMotion<S: Scalar> {
     pub(super) rotation: Matrix3<S>,
     pub(super) place: Vector3<S>,
@@ -95,7 +95,7 @@ pub(super) struct CustomMotion<S: Scalar> {
 }
 
 impl<S: Scalar> CustomMotion<S> {
-    /// Of `model` at coordinates `q` with velocities `v`.
+    /// Motion of `model` at coordinates `q` with velocities `v`.
     pub(super) fn new(model: &Arc<dyn DynJointModel>, q: &[S], v: &[S]) -> Self {
         let x = inputs(q, v);
         let values = x.map(S::value);
@@ -107,7 +107,7 @@ impl<S: Scalar> CustomMotion<S> {
         Self::of(&S::local(&Linear { at: values, value, jacobian }, x))
     }
 
-    /// Of numbers in their order.
+    /// Motion of numbers in their order.
     pub(super) fn of(numbers: &[S; MOTION]) -> Self {
         let twist = |from: usize| Vector6::from_column_slice(&numbers[from..from + 6]);
         Self {

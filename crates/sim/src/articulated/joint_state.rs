@@ -73,7 +73,7 @@ impl Joint {
         rate.as_slice()[self.velocities()].to_vec()
     }
 
-    /// Which of a state's velocities, linear and angular, are its own.
+    /// Range of the joint's own velocities among a state's six, linear and angular.
     fn velocities(&self) -> std::ops::Range<usize> {
         let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
         first..first + self.nv()

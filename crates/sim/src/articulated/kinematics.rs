@@ -1,4 +1,4 @@
-//! Where links are, and how they move.
+//! Poses and velocities of links.
 
 use nalgebra::{
     Isometry3, Matrix3, Matrix6xX, Point3, Rotation3, UnitQuaternion, Vector3, Vector6,
@@ -23,7 +23,7 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     pub(crate) places: Vec<Vector3<S>>,
     /// Motion of each degree of freedom.
     pub(crate) axes: Vec<Vector6<S>>,
-    /// Of each link, that of its joint alone, and with its parent's.
+    /// For each link, that of its joint alone, and with its parent's.
     pub(crate) joint_velocities: Vec<Vector6<S>>,
     pub(crate) velocities: Vec<Vector6<S>>,
     /// Acceleration of each link at constant velocities of the joints.
@@ -35,7 +35,7 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     pub(crate) custom: Option<[Vec<S>; 2]>,
 }
 
-/// Whether inertias are needed.
+/// True if inertias are needed.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Scope {
     WithInertia,
@@ -136,7 +136,7 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
         at
     }
 
-    /// The same under another acceleration of free fall \[m/s²\].
+    /// Under another acceleration of free fall \[m/s²\].
     #[must_use]
     pub fn under(self, gravity: Vector3<S>) -> Self {
         Self { gravity, ..self }

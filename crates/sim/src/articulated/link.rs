@@ -11,13 +11,13 @@ use crate::body::RigidBody;
 /// A link and the joint that it hangs on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link<S: Scalar = f64> {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The link that it hangs on; none is the world.
     pub parent: Option<usize>,
     /// Joint frame → parent link's frame.
     pub t_parent_joint: Isometry3<S>,
-    /// How the link moves in the joint's frame.
+    /// Joint: the motion of the link in the joint's frame.
     pub joint: Joint,
     /// Mass \[kg\].
     pub mass: S,
@@ -29,10 +29,10 @@ pub struct Link<S: Scalar = f64> {
     pub armature: S,
 }
 
-/// How many numbers a link is made of.
+/// Number of a link's parameters.
 pub(crate) const NUMBERS: usize = 3 + 4 + 1 + 3 + 6 + 1;
 
-/// What they are called.
+/// Their names.
 pub(crate) const NUMBER_NAMES: [&str; NUMBERS] = [
     "joint_x",
     "joint_y",
@@ -55,7 +55,7 @@ pub(crate) const NUMBER_NAMES: [&str; NUMBERS] = [
 ];
 
 impl<S: Scalar> Link<S> {
-    /// Of `body` in the link's frame, hanging on the world by `joint` at its origin.
+    /// Link of `body` in the link's frame, hanging on the world by `joint` at its origin.
     pub fn new(name: impl Into<String>, joint: Joint, body: &RigidBody<S>) -> Self {
         let (mass, com, inertia) = (body.mass(), *body.com(), *body.inertia());
         Self { mass, com, inertia, ..Self::massless(name, joint) }
@@ -93,7 +93,7 @@ impl<S: Scalar> Link<S> {
         Self { armature, ..self }
     }
 
-    /// Whether its numbers are those of a link.
+    /// Checks that its numbers are those of a link.
     fn check_numbers(&self) -> Result<(), ArticulationError> {
         let wrong = |problem| ArticulationError::Mass { link: self.name.clone(), problem };
         if !(self.mass.value() >= 0.0 && self.armature.value() >= 0.0) {
@@ -150,7 +150,7 @@ impl<S: Scalar> Link<S> {
         self.inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
-    /// The same link, each number through `f`.
+    /// Link, each number through `f`.
     fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Link<T> {
         let Isometry3 { translation, rotation } = self.t_parent_joint;
         let rotation = Unit::new_unchecked(Quaternion::from(rotation.coords.map(&f)));
@@ -171,13 +171,13 @@ impl<S: Scalar> Link<S> {
 #[derive(Clone, Debug)]
 pub struct Articulation<S: Scalar = f64> {
     links: Vec<Link<S>>,
-    /// Of each link: the first coordinate and the first degree of freedom of its joint, and last how many there are.
+    /// For each link: the first coordinate and the first degree of freedom of its joint, and last how many there are.
     first: Vec<[usize; 2]>,
-    /// Of each degree of freedom: the link that it moves.
+    /// For each degree of freedom: the link that it moves.
     link_of: Vec<usize>,
-    /// Of each degree of freedom: the one that carries it, the last of those before it on the way to the world.
+    /// For each degree of freedom: the one that carries it, the last of those before it on the way to the world.
     carriers: Vec<Option<usize>>,
-    /// Of each link: the last degree of freedom that moves it.
+    /// For each link: the last degree of freedom that moves it.
     last: Vec<Option<usize>>,
     /// Acceleration of free fall \[m/s²\].
     gravity: Vector3<S>,
@@ -197,7 +197,7 @@ pub enum ArticulationError {
     DegreesOfFreedom {
         /// The link.
         link: String,
-        /// How many its joint has.
+        /// Number that its joint has.
         count: usize,
     },
     /// A link that could be accelerated without effort.
@@ -205,12 +205,12 @@ pub enum ArticulationError {
     Mass {
         /// The link.
         link: String,
-        /// What is wrong.
+        /// Cause.
         problem: &'static str,
     },
 }
 
-/// Whether every joint moves some mass, or has armature.
+/// Checks that every joint moves some mass, or has armature.
 fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
     let mut weighs: Vec<bool> = links
         .iter()
@@ -236,7 +236,7 @@ fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
 }
 
 impl<S: Scalar> Articulation<S> {
-    /// Of `links`, each after its parent, that fall with `gravity` \[m/s²\].
+    /// Articulation of `links`, each after its parent, that fall with `gravity` \[m/s²\].
     ///
     /// # Errors
     /// If a parent does not come before its link, a number is not finite, a mass or a principal moment negative, or a joint moves no mass.
@@ -276,7 +276,7 @@ impl<S: Scalar> Articulation<S> {
         &self.links
     }
 
-    /// Whether the numbers of all links are such.
+    /// Checks that the numbers of all links are such.
     pub(crate) fn check_numbers(&self) -> Result<(), ArticulationError> {
         self.links.iter().try_for_each(Link::check_numbers)
     }
@@ -302,7 +302,7 @@ impl<S: Scalar> Articulation<S> {
         self.link_of.len()
     }
 
-    /// Where the coordinates and the degrees of freedom of the joint of `link` are.
+    /// Ranges of the coordinates and of the degrees of freedom of the joint of `link`.
     pub fn range(&self, link: usize) -> [std::ops::Range<usize>; 2] {
         [0, 1].map(|k| self.first[link][k]..self.first[link + 1][k])
     }
@@ -317,7 +317,7 @@ impl<S: Scalar> Articulation<S> {
         std::iter::successors(self.last[link], |k| self.carriers[*k])
     }
 
-    /// Of each degree of freedom the one that carries it.
+    /// For each degree of freedom the one that carries it.
     pub(crate) fn carriers(&self) -> &[Option<usize>] {
         &self.carriers
     }
@@ -341,7 +341,7 @@ impl<S: Scalar> Articulation<S> {
         after
     }
 
-    /// Where the links are at coordinates `q`, and how they move with velocities `v`.
+    /// Kinematics of the links at coordinates `q` and velocities `v`.
     ///
     /// # Panics
     /// If there are not as many as there should be.
@@ -361,14 +361,14 @@ impl<S: Scalar> Articulation<S> {
 }
 
 impl Articulation {
-    /// The same in constants of another scalar.
+    /// In constants of another scalar.
     pub fn cast<S: Scalar>(&self) -> Articulation<S> {
         self.map(S::constant)
     }
 }
 
 impl<S: Scalar> Articulation<S> {
-    /// The same trees, each number through `f`.
+    /// Trees, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Articulation<T> {
         let (first, link_of) = (self.first.clone(), self.link_of.clone());
         let (carriers, last) = (self.carriers.clone(), self.last.clone());

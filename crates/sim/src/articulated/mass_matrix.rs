@@ -40,7 +40,7 @@ impl<S: Scalar> Kinematics<'_, S> {
         &root * root.transpose()
     }
 
-    /// Of each link the radius of gyration, about the link's origin, of it and all that hangs on it \[m\]: no number where that has no mass.
+    /// For each link the radius of gyration, about the link's origin, of it and all that hangs on it \[m\]: no number where that has no mass.
     pub(crate) fn radii(&self) -> Vec<f64> {
         let radius = |(composite, place): (SpatialInertia<S>, &Vector3<S>)| {
             let (mass, moment) = (composite.mass.value(), composite.moment.map(S::value));

@@ -28,7 +28,7 @@ pub struct Bristles {
 }
 
 impl Bristles {
-    /// Whether both numbers are positive.
+    /// Checks that both numbers are positive.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let range = ParameterRange::Positive;
         range.check("deflection of bristles", self.deflection)?;

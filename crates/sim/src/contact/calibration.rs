@@ -27,7 +27,7 @@ pub struct ContactCalibration {
     pub mass: f64,
     /// Gravity across the contact \[m/s²\].
     pub gravity: f64,
-    /// How deep the body sinks in \[m\], usually 0.2–1 mm.
+    /// Depth to which the body sinks in \[m\], usually 0.2–1 mm.
     pub penetration: f64,
     /// Area of the samples that touch \[m²\]: what [`Surface`](crate::Surface) says of those that carry the body at rest. A lattice
     /// on a box has that of the face, a single round sample, such as [`Surface::ball`](crate::Surface::ball), its own. A ball of
@@ -53,7 +53,7 @@ impl ContactCalibration {
         self.mass * self.gravity / (self.penetration.powf(exponent) * self.contact_area)
     }
 
-    /// How deep the body goes \[m\] that hits the contact with `speed` \[m/s\] on the same area, if a law whose pressure is K dⁿ
+    /// Depth \[m\] of a body that hits the contact with `speed` \[m/s\] on the same area, if a law whose pressure is K dⁿ
     /// does not damp it: ((n + 1) v² δⁿ/2g)^{1/(n+1)}, v√(δ/g) where pressure is linear. Gravity adds about δ, damping takes away.
     pub fn impact_depth(&self, speed: f64, exponent: f64) -> f64 {
         // m v²/2 = K A dⁿ⁺¹/(n + 1), and K A = m g/δⁿ.

@@ -26,7 +26,7 @@ pub struct ContactQuery<'a> {
     pub state: State,
     /// Whose surface is at distance zero.
     pub field: &'a dyn DistanceField,
-    /// How contact begins.
+    /// Smoothing of the gap where contact begins.
     pub smoothing: GapSmoothing,
 }
 
@@ -55,7 +55,7 @@ impl ContactQuery<'_> {
         cutoff + self.smoothing.band() + self.surface.rounding()
     }
 
-    /// Whether a point of `block` may be nearer to the field than `reach`.
+    /// True if a point of `block` may be nearer to the field than `reach`.
     #[inline]
     fn may_touch(&self, block: &Block, reach: f64) -> bool {
         let within = reach + self.field.lipschitz_bound() * block.radius;
@@ -67,7 +67,7 @@ impl ContactQuery<'_> {
         self.field.distance(&self.place(point), within).is_some()
     }
 
-    /// Where a point of the body's model frame is.
+    /// Position of a point of the body's model frame.
     #[inline]
     fn place(&self, point: &Point3<f64>) -> Point3<f64> {
         let State { pose, .. } = &self.state;
@@ -96,7 +96,7 @@ impl ContactQuery<'_> {
         })
     }
 
-    /// Whether a touching sample has come to another side of the field since its body was in `before`: not out of the solid again
+    /// True if a touching sample has come to another side of the field since its body was in `before`: not out of the solid again
     /// but through the middle of it.
     pub(crate) fn has_crossed(&self, before: State) -> bool {
         let reach = self.surface.rounding();
@@ -188,7 +188,7 @@ impl ContactQuery<'_> {
 }
 
 impl ContactPoint {
-    /// What the law sees.
+    /// Kinematics that the law sees.
     #[inline(always)]
     pub(crate) fn contact(&self, cutoff: f64) -> ContactKinematics<f64> {
         let speed = self.velocity.dot(&self.normal);
@@ -201,7 +201,7 @@ impl ContactPoint {
         }
     }
 
-    /// What the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
+    /// Kinematics that the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
     #[inline(always)]
     pub(crate) fn lifted(&self, cutoff: f64) -> ContactKinematics<Fwd<6>> {
         let gradient = self.normal * self.length;

@@ -1,4 +1,4 @@
-//! Whether a contact's force begins at zero.
+//! Tests whether a contact's force begins at zero.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ const DEPTHS: [f64; 2] = [1e-12, 1e-4];
 /// More of the force at the larger depth than this at the smaller one is a jump: even that of the root of the depth is less.
 const JUMP: f64 = 1e-3;
 
-/// Whether the force of `law` with parameters `p` jumps as a contact begins at 1 m/s, sliding as fast.
+/// True if the force of `law` with parameters `p` jumps as a contact begins at 1 m/s, sliding as fast.
 pub(crate) fn jumps(law: &dyn DynContactLaw, p: &[f64], smoothing: &GapSmoothing) -> bool {
     let [touch, pressed] = DEPTHS.map(|depth| {
         let activation = match *smoothing {

@@ -1,4 +1,4 @@
-//! What the author of a contact law writes.
+//! Interface that a contact law implements.
 
 use prehend_autodiff::Scalar;
 
@@ -43,7 +43,7 @@ pub trait ContactLaw: Send + Sync {
         &[]
     }
 
-    /// What the parameters are called, in the order of [`params`](Self::params): empty where they have no name.
+    /// Names of the parameters, in the order of [`params`](Self::params): empty where they have no name.
     fn param_names(&self) -> Vec<&'static str> {
         vec![""; self.params().len()]
     }

@@ -1,4 +1,4 @@
-//! What every contact law is held to in its tests.
+//! Checks of every contact law, for its tests.
 
 use nalgebra::Vector3;
 use prehend_autodiff::check::finite_difference_jacobian;
@@ -31,7 +31,7 @@ pub(crate) fn frictionless<N: NormalLaw>(normal: Result<N, LawError>) -> Law<N, 
     Law::new(normal.unwrap(), Coulomb { friction: 0.0, slip_scale: 1e-3 }).unwrap()
 }
 
-/// What a law claims of itself.
+/// Claims of a law.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Claims {
     /// Friction is at most this times the normal force.

@@ -3,7 +3,7 @@
 use super::error::LawError;
 use crate::magnitude::{LARGEST, SMALLEST};
 
-/// What a parameter may be. Infinity and NaN are in none, but where a range says so; nor is what is larger than 10⁶⁰, or positive
+/// Range of a parameter. Infinity and NaN are in none, but where a range says so; nor is what is larger than 10⁶⁰, or positive
 /// and less than 10⁻⁶⁰ where it is to be positive: laws square and divide by such numbers, and raise them to the fifth power.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum ParameterRange {

@@ -24,9 +24,9 @@ pub type LawConstructor = fn(&[f64]) -> Result<Box<dyn DynContactLaw>, LawError>
 /// A law as the registry knows it.
 #[derive(Clone, Debug)]
 pub struct LawEntry {
-    /// What the law is, in a line.
+    /// Summary of the law, in a line.
     pub summary: String,
-    /// What its constructor takes, in order. The law's own parameters, which may carry derivatives, come first.
+    /// Parameters of its constructor, in order. The law's own parameters, which may carry derivatives, come first.
     pub parameters: Vec<LawParameter>,
     /// Makes the law.
     pub constructor: LawConstructor,
@@ -141,7 +141,7 @@ impl LawRegistry {
         self.laws.iter().map(|(name, entry)| (name.as_str(), entry))
     }
 
-    /// What is known of the law called `name`.
+    /// Entry of the law called `name`.
     pub fn entry(&self, name: &str) -> Option<&LawEntry> {
         self.laws.get(name)
     }

@@ -128,7 +128,7 @@ pub(crate) fn wrench_along<L: ContactLaw>(
     [value, all.map(|x| x.derivative[0])]
 }
 
-/// What is added where the lever of a round sample turns with the normal. Never inlined: it is rare, and the rest then fits the
+/// Term of round samples, whose lever turns with the normal. Never inlined: it is rare, and the rest then fits the
 /// registers.
 #[cold]
 #[inline(never)]

@@ -1,4 +1,4 @@
-//! Whether contacts make energy.
+//! Tests whether contacts make energy.
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
@@ -40,7 +40,7 @@ const GAUSS: [(f64, f64); 5] = [
 
 /// The energy of a world in which nothing but gravity, constant wrenches and contacts acts.
 pub(super) struct EnergyBalance {
-    /// Whether it is such a world, and the work of torques is known: bodies on trajectories bring energy with them, and a body
+    /// True if it is such a world, and the work of torques is known: bodies on trajectories bring energy with them, and a body
     /// may have turned any way within steps of any length.
     closed: bool,
     initial: Vec<State>,
@@ -54,7 +54,7 @@ pub(super) struct EnergyBalance {
 }
 
 impl EnergyBalance {
-    /// Of a simulation from `initial` by an integrator that `controls_error`, with steps of any length, or not.
+    /// Balance of a simulation from `initial` by an integrator that `controls_error`, with steps of any length, or not.
     pub(super) fn new<S: Scalar>(
         world: &World<S>,
         initial: &[State<S>],
@@ -181,7 +181,7 @@ fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f
     0.5 * (rigid.mass().value() * state.linear.norm_squared() + spin.dot(&(inertia * spin)))
 }
 
-/// What springs along joints, and all else that acts there, have done while nothing moved fast \[J\].
+/// Work of springs along joints, and of all else that acts there, while nothing moved fast \[J\].
 fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
     let lifted: Vec<State<S>> = before.iter().map(State::cast).collect();
     let work = |force: &JointForce<S>| {
@@ -208,7 +208,7 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
     force.map(|x| x.value()).dot(&shift)
 }
 
-/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
+/// Energy that resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
 /// there is none, and that of bristles and bushings as they return.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
     let mut energy = energy_of_bristles(world, states) + world.energy_of_bushings(states);

@@ -1,4 +1,4 @@
-//! How much forces change from one step to the next.
+//! Change of forces from one step to the next.
 
 use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;

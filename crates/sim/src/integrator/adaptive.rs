@@ -36,7 +36,7 @@ use crate::world::World;
 /// sample moves by more than its clearance and either a fifth of its body's size or a quarter of the thickness of what it touches
 /// ([`DistanceField::thickness`]), whichever is less; nor does one that moves by more than a fiftieth of its body's size touch in
 /// between, as the cubic of its gap tells. What is pressed past the middle of a
-/// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of driven bodies are
+/// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of kinematic bodies are
 /// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///
 /// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::contact::LeakSteps::First)) leak in its first

@@ -34,9 +34,9 @@ pub(super) struct Stages<'a, S: Scalar> {
     free: Vec<Free<'a, S>>,
     /// Free bodies, joints and contacts with bristles.
     moving: usize,
-    /// Of each stage, those of the free bodies, then of the joints and of the contacts with bristles.
+    /// For each stage, those of the free bodies, then of the joints and of the contacts with bristles.
     slopes: Vec<Change<S>>,
-    /// What led to the last stage.
+    /// Wrenches that led to the last stage.
     change: Vec<Change<S>>,
 }
 
@@ -71,7 +71,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         stages
     }
 
-    /// The states at `fraction` of the step, which `weights` of the slopes lead to, driven bodies where they are then;
+    /// The states at `fraction` of the step, which `weights` of the slopes lead to, kinematic bodies where they are then;
     /// and the wrenches there, whose slope is that of the next stage.
     pub(super) fn stage(
         &mut self,
@@ -94,7 +94,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.moved(&self.combined(weights))
     }
 
-    /// Of each free body, joint and contact with bristles, the step's length times the sum of the slopes with `weights`.
+    /// For each free body, joint and contact with bristles, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
         let mut sums = vec![[Vector3::zeros(); 4]; self.moving];
         self.add_combined(weights, &mut sums);

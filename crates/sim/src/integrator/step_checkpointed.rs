@@ -16,7 +16,7 @@ use crate::world::World;
 /// An integrator each of whose steps [`Var`] records as one node.
 ///
 /// The node keeps the numbers that the step began with, and the sweep records the step again: some 540 bytes for a free
-/// body on a kinematic one, 1330 if every parameter of their world varies, where plain recording takes 10 kB. States, masses, centers
+/// body on a fixed one, 1330 if every parameter of their world varies, where plain recording takes 10 kB. States, masses, centers
 /// of mass, external wrenches, gravity and parameters of laws may come from anywhere on the tape and may be others at each step.
 /// Numbers without derivatives are simulated by `integrator` as it is.
 ///

@@ -17,7 +17,7 @@ use crate::world::body::Body;
 /// [`Integrator::stability_limit`] allows, with a margin of a fifth. A step whose equations an implicit integrator
 /// does not solve is divided into twice as many.
 ///
-/// Which division is chosen depends on values only: derivatives are exact for the steps that are taken, and ignore that
+/// The division is chosen by values only: derivatives are exact for the steps that are taken, and ignore that
 /// other steps might be. Contacts that leak in the first step of a rollout leak in the first part of it.
 ///
 /// ```
@@ -35,7 +35,7 @@ use crate::world::body::Body;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubStepped<I> {
-    /// What takes the steps.
+    /// Integrator of the substeps.
     pub integrator: I,
     /// Substeps of a step at most; 0 counts as 1.
     pub max_substeps: usize,
@@ -60,7 +60,7 @@ impl<I: Integrator> SubStepped<I> {
         Ok(states)
     }
 
-    /// How many parts the contacts demand.
+    /// Number of substeps that the contacts demand.
     fn demanded<S: Scalar>(&self, world: &World<S>, states: &[State<S>], dt: f64) -> f64 {
         let limit = self.integrator.stability_limit();
         if limit.is_infinite() {

@@ -48,7 +48,7 @@ impl<I: Integrator> WorldTemplate<I> {
         ParameterDelta { places: places.into(), values }
     }
 
-    /// Whether `world` differs in parameters only.
+    /// True if `world` differs in parameters only.
     pub(crate) fn is_of<S: Scalar>(&self, world: &World<S>) -> bool {
         has_parts_of(world, &self.world)
     }
@@ -70,7 +70,7 @@ impl<I: Integrator> WorldTemplate<I> {
     }
 }
 
-/// Whether `a` is made of the same surfaces, fields, laws and trajectories as `b`.
+/// True if `a` is made of the same surfaces, fields, laws and trajectories as `b`.
 fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     fn same<T: ?Sized>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
         match (a, b) {

@@ -15,7 +15,7 @@ use crate::world::joint_force::Along;
 
 /// Forces on free bodies and accelerations of joints, with derivatives by all coordinates.
 pub(super) struct Generalized {
-    /// How many coordinates there are, and the first of those of joints.
+    /// Number of coordinates, and the first of those of joints.
     pub(super) count: usize,
     pub(super) joints: usize,
     /// As [`World::wrenches`] has them.
@@ -225,7 +225,7 @@ struct Tree<'a> {
     at: Kinematics<'a>,
     /// The first of its coordinates.
     first: usize,
-    /// How many there are.
+    /// Number of them.
     dofs: usize,
 }
 
@@ -242,7 +242,7 @@ fn trees<'a>(world: &'a World, states: &[State]) -> Vec<Tree<'a>> {
     trees
 }
 
-/// What moves a body.
+/// Coordinates that move a body.
 #[derive(Clone, Copy)]
 enum Place {
     Fixed,

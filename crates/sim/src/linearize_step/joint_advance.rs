@@ -1,4 +1,4 @@
-//! Where a joint is after a step.
+//! Joint coordinates after a step.
 
 use nalgebra::{DMatrix, Matrix3};
 use prehend_autodiff::lie::{cross_matrix, so3_exp, so3_right_jacobian};
@@ -6,7 +6,7 @@ use prehend_autodiff::lie::{cross_matrix, so3_exp, so3_right_jacobian};
 use crate::articulated::Joint;
 use crate::state::State;
 
-/// How a joint's displacement after a step follows from that before it and from its velocity after it.
+/// Derivatives of a joint's displacement after a step by that before it and by its velocity after it.
 pub(super) struct JointAdvance {
     pub(super) of_place: DMatrix<f64>,
     pub(super) of_velocity: DMatrix<f64>,

@@ -1,4 +1,4 @@
-//! How the state of a body changes with the coordinates that move it.
+//! Changes of a body's state with the coordinates that move it.
 
 use nalgebra::{SVector, Vector6};
 
@@ -7,7 +7,7 @@ use crate::spatial::{angular, cross_motion, linear, spatial};
 
 /// Changes of a body's state, in the order of [`State::tangent`](crate::State::tangent), by one coordinate.
 pub(super) struct Motion {
-    /// Which coordinate.
+    /// Index of the coordinate.
     pub(super) dof: usize,
     /// By its displacement.
     pub(super) displaced: SVector<f64, 12>,
@@ -15,7 +15,7 @@ pub(super) struct Motion {
     pub(super) unit: Vector6<f64>,
 }
 
-/// Of a free body whose first coordinate is `first`.
+/// Motions of a free body whose first coordinate is `first`.
 pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
     let motion = |k: usize| Motion {
         dof: first + k,
@@ -25,7 +25,7 @@ pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
     (0..6).map(motion).collect()
 }
 
-/// Of a link of a tree whose first coordinate is `first`.
+/// Motions of a link of a tree whose first coordinate is `first`.
 pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Motion> {
     let place = at.places[link];
     let spin = angular(&at.velocities[link]);

@@ -22,7 +22,7 @@ pub(super) struct Between {
 }
 
 impl Between {
-    /// What a contact without a memory does; none where nothing touches.
+    /// Linearized force of a contact without a memory; none where nothing touches.
     pub(super) fn contact(
         world: &World,
         pair: &ContactPair,
@@ -67,7 +67,7 @@ impl Between {
         Some(Self::reacting(bodies, on[0], [own, other], &arm, place))
     }
 
-    /// What a bushing does.
+    /// Linearized force of a bushing.
     pub(super) fn bushing(world: &World, bushing: &Bushing, states: &[State]) -> Self {
         let inputs = Fwd::<24>::variables([0.0; 24]);
         let [a, b] = [0, 1].map(|end| {

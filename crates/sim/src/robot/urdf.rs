@@ -9,12 +9,12 @@ use crate::handle::BodyId;
 use crate::world::World;
 use crate::world::joint_force::JointAxis;
 
-/// How a robot in URDF that forces move becomes part of a world.
+/// Options of reading a robot in URDF that forces move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfOptions {
     /// Base → world.
     pub t_world_base: Isometry3<f64>,
-    /// How the base hangs on the world.
+    /// Joint between the world and the base.
     pub base: Joint,
     /// Time constant of limits and of joints that mimic others \[s\].
     pub time_constant: f64,

@@ -20,7 +20,7 @@ use super::polyhedron::{Polyhedron, flat_faces};
 use super::revolved::{Outline, Revolved};
 use crate::fields::HalfSpace;
 
-/// What a shape is, and its dimensions.
+/// Kind and dimensions of a shape.
 pub(super) fn read(
     shape: &dyn shape::Shape,
     options: &ShapeOptions,

@@ -1,4 +1,4 @@
-//! How contacts change with the dimensions of the shapes that touch.
+//! Derivatives of contacts by the dimensions of the shapes that touch.
 
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
@@ -43,7 +43,7 @@ impl VariableShapes<'_> {
         [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     }
 
-    /// The same of a contact with bristles, then the rate of its deflection.
+    /// Of a contact with bristles, then the rate of its deflection.
     pub(crate) fn bristles(&self, function: &BristleFunction<'_>) -> [Lane; 12] {
         function.wrench_by_dimensions(|touch, cutoff| self.lift(touch, cutoff))
     }

@@ -38,7 +38,7 @@ impl<S: Scalar> ArticulatedBody<S> {
         ArticulatedBody { tree: self.tree.map(f), bodies: Arc::clone(&self.bodies) }
     }
 
-    /// The same links as other bodies.
+    /// Links as other bodies.
     pub(crate) fn with_bodies(&self, body: impl Fn(BodyId) -> BodyId) -> Self {
         let bodies = self.bodies.iter().map(|id| body(*id)).collect();
         Self { tree: self.tree.clone(), bodies }
@@ -58,7 +58,7 @@ impl World {
     /// Adds links, each after its parent, as bodies named after them, and returns which, in the same order. Give them samples and fields as
     /// other bodies.
     ///
-    /// What is free to move are the joints, whose states follow those of the bodies: start from [`World::neutral_states`] and set them by
+    /// The joints are free to move, and their states follow those of the bodies: start from [`World::neutral_states`] and set them by
     /// [`World::set_joint`]. The state of a link, that of its frame, follows from its joints; what is written there is overwritten.
     ///
     /// ```
@@ -180,7 +180,7 @@ impl<S: Scalar> World<S> {
         Ok(joint.along(&states[place], index))
     }
 
-    /// Whether one body hangs on the other by a joint.
+    /// True if one body hangs on the other by a joint.
     pub(crate) fn share_joint(&self, a: BodyId, b: BodyId) -> bool {
         let (Ok((own, first)), Ok((other, second))) = (self.link_of(a), self.link_of(b)) else {
             return false;
@@ -232,7 +232,7 @@ impl<S: Scalar> World<S> {
         Ok((place, &self.articulations[articulation].tree.links()[link].joint))
     }
 
-    /// Where the states of an articulation's joints are.
+    /// Range of the states of an articulation's joints.
     pub(crate) fn joint_range(&self, articulation: usize) -> Range<usize> {
         let before = self.articulations[..articulation].iter().map(|own| own.bodies.len());
         let first = self.bodies.len() + before.sum::<usize>();
@@ -245,12 +245,12 @@ impl<S: Scalar> World<S> {
         Ok(&self.articulations[articulation].tree.links()[link])
     }
 
-    /// How many states joints have: one for each link.
+    /// Number of states of joints: one for each link.
     pub(crate) fn joint_count(&self) -> usize {
         self.articulations.iter().map(|own| own.bodies.len()).sum()
     }
 
-    /// Where the states of joints are.
+    /// Range of the states of joints.
     pub(crate) fn joint_places(&self) -> Range<usize> {
         self.bodies.len()..self.bodies.len() + self.joint_count()
     }

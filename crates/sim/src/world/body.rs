@@ -13,12 +13,12 @@ use crate::fields::Cuboid;
 use crate::shape::matter::Matter;
 use crate::surface::Surface;
 
-/// What a body is and how it touches others.
+/// Body of a world: what moves it, and its surface and field for contact.
 #[derive(Clone)]
 pub struct Body<S: Scalar = f64> {
     /// Name, for messages.
     pub name: String,
-    /// What moves it.
+    /// Kind of its motion.
     pub motion: Motion<S>,
     /// Samples of its surface, in its model frame: with them it touches the fields of others.
     pub surface: Option<Arc<Surface>>,
@@ -27,11 +27,11 @@ pub struct Body<S: Scalar = f64> {
     /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame; of a link about the origin of its
     /// frame.
     pub external_wrench: Vector6<S>,
-    /// What it is made of, where its surface and field come from a shape.
+    /// Shape and density, where its surface and field come from a shape.
     pub(crate) matter: Option<Matter<S>>,
 }
 
-/// What moves a body.
+/// Kind of a body's motion.
 #[derive(Clone)]
 pub enum Motion<S: Scalar = f64> {
     /// Forces, on a body with these mass properties.
@@ -78,26 +78,26 @@ impl<S: Scalar> Body<S> {
         Self::new(name, Motion::Link)
     }
 
-    /// Whether forces move it, alone or as a link.
+    /// True if forces move it, alone or as a link.
     pub(crate) fn feels_forces(&self) -> bool {
         matches!(self.motion, Motion::Dynamic(_) | Motion::Link)
     }
 
-    /// The same body with samples of its surface.
+    /// Body with samples of its surface.
     #[must_use]
     pub fn with_surface(mut self, surface: impl Into<Arc<Surface>>) -> Self {
         self.surface = Some(surface.into());
         self
     }
 
-    /// The same body with a distance field, in its model frame.
+    /// Body with a distance field, in its model frame.
     #[must_use]
     pub fn with_field(mut self, field: Arc<dyn DistanceField>) -> Self {
         self.field = Some(field);
         self
     }
 
-    /// The same body as a box around the origin of its model frame: its field, and samples at distances of `spacing` \[m\] at most.
+    /// Body as a box around the origin of its model frame: its field, and samples at distances of `spacing` \[m\] at most.
     ///
     /// # Errors
     /// See [`Cuboid::surface`].
@@ -120,7 +120,7 @@ impl<S: Scalar> Body<S> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())
     }
 
-    /// The same body, each number through `f`, but for a trajectory, which becomes one of constants.
+    /// Body, each number through `f`, but for a trajectory, which becomes one of constants.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Body<T> {
         Body {
             name: self.name.clone(),

@@ -34,12 +34,12 @@ impl<S: Scalar> World<S> {
         self.contacts.iter().filter_map(|pair| Some((pair, pair.law().bristles()?)))
     }
 
-    /// Whether the state at `index` is that of a free body, a joint or a contact with bristles.
+    /// True if the state at `index` is that of a free body, a joint or a contact with bristles.
     pub(crate) fn moves_by_forces(&self, index: usize) -> bool {
         self.bodies.get(index).is_none_or(|body| body.rigid().is_some())
     }
 
-    /// How many states there are.
+    /// Number of states.
     pub(crate) fn state_count(&self) -> usize {
         self.bodies.len() + self.joint_count() + self.bristle_contacts().count()
     }

@@ -1,4 +1,4 @@
-//! Which bodies of a group are near enough to touch.
+//! Broad phase: bodies of a group that are near enough to touch.
 
 use std::borrow::Cow;
 
@@ -16,9 +16,9 @@ use crate::handle::BodyId;
 use crate::state::State;
 use crate::time::Step;
 
-/// How far a body may be pushed within a step from where it would go, in parts of its size.
+/// Deviation from free motion to which a body may be pushed within a step, in fractions of its size.
 const SLACK: f64 = 0.05;
-/// How often trajectories are looked at \[s\], and how many times in a step at most.
+/// Interval at which trajectories are looked at \[s\], and largest number of looks in a step.
 const LOOK: f64 = 1e-3;
 const LOOKS: f64 = 1000.0;
 
@@ -36,7 +36,7 @@ pub(crate) struct BroadPhase<'a, S: Scalar> {
     /// For each body, the radius of a ball about its center of mass that holds its samples and the solid of its field \[m\]; none if
     /// that has no end.
     radii: Vec<Option<f64>>,
-    /// Whether a body is in a group.
+    /// True if a body is in a group.
     grouped: Vec<bool>,
 }
 
@@ -65,7 +65,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
         })
     }
 
-    /// How far each body's center may come in `step` from where it would be if it went on as it moves \[m\], if nothing pushes it by
+    /// Largest deviation of each body's center in `step` from constant velocity \[m\], if nothing pushes it by
     /// more than `slack` parts of its size.
     pub(crate) fn deviations(&self, step: Step, slack: f64) -> Vec<f64> {
         let mut deviations = vec![0.0; self.world.bodies.len()];
@@ -88,7 +88,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     }
 
     /// The contacts of groups whose samples may touch within `dt` \[s\] from `states` on, if no body's center comes farther than its
-    /// one of `deviations` \[m\] from where it would be if what is free went on as it moves and nothing else did, in an order that
+    /// one of `deviations` \[m\] from where constant velocity would bring it, others from where they are, in an order that
     /// depends on nothing but the bodies.
     pub(crate) fn find(
         &self,
@@ -156,7 +156,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
         pairs
     }
 
-    /// Whether samples of a body with this reach may touch a field that has no end, or is far from filling its ball.
+    /// True if samples of a body with this reach may touch a field that has no end, or is far from filling its ball.
     fn may_touch(
         &self,
         contact: &CandidateContact,
@@ -179,7 +179,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     }
 }
 
-/// How far from a surface a contact begins \[m\].
+/// Distance from a surface at which a contact begins \[m\].
 fn reach_of<S: Scalar>(contact: &ContactPair<S>) -> f64 {
     contact.law().cutoff() + contact.smoothing.band()
 }
@@ -193,7 +193,7 @@ fn radius<S: Scalar>(body: &Body<S>) -> Option<f64> {
     Some(samples.max((center - com).norm() + radius))
 }
 
-/// Where a body may be felt: within a radius \[m\] about its center that moves along a path \[m\], or anywhere.
+/// Swept ball of a body: a radius \[m\] about its center that moves along a path \[m\], or everything.
 struct Reach {
     center: Vector3<f64>,
     path: Vector3<f64>,
@@ -209,7 +209,7 @@ impl Reach {
         Aabb::from_half_extents(Vector::new(x, y, z), half + Vector::splat(radius))
     }
 
-    /// Whether it and another one are no farther apart than `margin` \[m\] at a time.
+    /// True if it and another one are no farther apart than `margin` \[m\] at a time.
     fn meets(&self, other: &Self, margin: f64) -> bool {
         let (Some(a), Some(b)) = (self.radius, other.radius) else { return true };
         let (from, path) = (self.center - other.center, self.path - other.path);
@@ -229,7 +229,7 @@ impl<S: Scalar> World<S> {
         contacts
     }
 
-    /// The same world with those contacts of its groups one by one that may touch in `step` from `states`.
+    /// World with those contacts of its groups one by one that may touch in `step` from `states`.
     pub(crate) fn with_candidates<T: Scalar>(
         &self,
         states: &[State<T>],
@@ -238,7 +238,7 @@ impl<S: Scalar> World<S> {
         self.with_contacts(states, step.dt, |search| search.deviations(step, SLACK))
     }
 
-    /// The same world with those contacts of its groups one by one that may touch within `dt` \[s\] from `states`, with such
+    /// World with those contacts of its groups one by one that may touch within `dt` \[s\] from `states`, with such
     /// `deviations` \[m\].
     fn with_contacts<T: Scalar>(
         &self,

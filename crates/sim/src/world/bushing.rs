@@ -19,7 +19,7 @@ pub struct Bushing<S: Scalar = f64> {
     pub bodies: [BodyId; 2],
     /// Their frames, each in its body's model frame \[m\].
     pub frames: [Isometry3<f64>; 2],
-    /// How stiff it is.
+    /// Stiffness and damping.
     pub stiffness: BushingStiffness<S>,
 }
 
@@ -74,7 +74,7 @@ impl<S: Scalar> Bushing<S> {
         }
     }
 
-    /// The same bushing of other bodies.
+    /// Bushing of other bodies.
     pub(crate) fn with_bodies(self, body: impl Fn(BodyId) -> BodyId) -> Self {
         Self { bodies: self.bodies.map(body), ..self }
     }
@@ -140,7 +140,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// What a bushing of this stiffness does to both bodies in these states.
+    /// Wrenches of a bushing of this stiffness on both bodies in these states.
     pub(crate) fn pull<T: Scalar>(
         &self,
         bushing: &Bushing<S>,
@@ -164,7 +164,7 @@ impl<S: Scalar> World<S> {
         })
     }
 
-    /// What the springs of bushings have stored at `states` \[J\].
+    /// Energy of the springs of bushings at `states` \[J\].
     pub(crate) fn energy_of_bushings(&self, states: &[State]) -> f64 {
         let energy = |bushing: &Bushing<S>| {
             let [a, b] = bushing.bodies.map(|body| states[body]);
@@ -179,7 +179,7 @@ impl<S: Scalar> World<S> {
 /// Two states and four numbers.
 const INPUTS: usize = 2 * STATE + 4;
 
-/// How far two frames are apart.
+/// Displacement between two frames.
 struct Gap<S: Scalar> {
     /// From the centers of mass to the origin of the first frame \[m\].
     arms: [Vector3<S>; 2],

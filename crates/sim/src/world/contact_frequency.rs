@@ -85,7 +85,7 @@ impl World {
         UnitMotions { motions, roots, size: first }
     }
 
-    /// Of each force along joints: the first of its articulation's motions of unit energy, what they are along it, and the slopes of its effort.
+    /// For each force along joints: the first of its articulation's motions of unit energy, what they are along it, and the slopes of its effort.
     fn slopes_along_joints(
         &self,
         states: &[State],
@@ -117,11 +117,11 @@ impl World {
 
 /// Motions of unit kinetic energy (½).
 struct UnitMotions {
-    /// Of each body that forces move.
+    /// For each body that forces move.
     motions: Vec<Motions>,
-    /// Of each articulation, the first of them, and the joints' velocities that they are.
+    /// For each articulation, the first of them, and the joints' velocities that they are.
     roots: Vec<(usize, DMatrix<f64>)>,
-    /// How many there are of all.
+    /// Number of all.
     size: usize,
 }
 

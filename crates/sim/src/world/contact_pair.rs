@@ -23,7 +23,7 @@ pub struct ContactBodies {
 }
 
 impl ContactBodies {
-    /// The same two with their sides exchanged.
+    /// Two with their sides exchanged.
     #[must_use]
     pub fn swapped(self) -> Self {
         Self { samples: self.field, field: self.samples }
@@ -33,11 +33,11 @@ impl ContactBodies {
 /// Samples of one body that touch the field of another.
 #[derive(Clone)]
 pub struct ContactPair<S: Scalar = f64> {
-    /// Which bodies.
+    /// The two bodies.
     pub bodies: ContactBodies,
     law: Arc<dyn DynContactLaw>,
     params: Vec<S>,
-    /// How contact begins.
+    /// Smoothing of the gap where contact begins.
     pub smoothing: GapSmoothing,
     /// Factor on the forces: a half where both bodies have samples and fields, so that together they count once.
     pub weight: f64,
@@ -112,7 +112,7 @@ impl<S: Scalar> ContactPair<S> {
         Ok(())
     }
 
-    /// Whether the law takes these parameters.
+    /// Checks that the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values = self.param_values();
         let finite = |value: &f64| ParameterRange::Finite.check("parameter of a contact", *value);
@@ -120,18 +120,18 @@ impl<S: Scalar> ContactPair<S> {
         self.law.check_all(&values)
     }
 
-    /// Whether `body` is one of the two.
+    /// True if `body` is one of the two.
     pub(crate) fn joins(&self, body: BodyId) -> bool {
         self.bodies.samples == body || self.bodies.field == body
     }
 
-    /// Whether the force jumps as a contact begins.
+    /// True if the force jumps as a contact begins.
     pub(crate) fn force_jumps(&self) -> bool {
         let values = self.param_values();
         jumps(self.law.as_ref(), &values, &self.smoothing)
     }
 
-    /// The same contact, each number through `f`.
+    /// Contact, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> ContactPair<T> {
         ContactPair {
             bodies: self.bodies,

@@ -1,4 +1,4 @@
-//! Which bodies of two lists touch, and by which of their sides.
+//! Contacts between two lists of bodies.
 
 use std::sync::Arc;
 
@@ -84,12 +84,12 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// Whether a force may move one of two bodies against the other; links that share a joint overlap there and do not count.
+    /// True if a force may move one of two bodies against the other; links that share a joint overlap there and do not count.
     pub(crate) fn moves_against(&self, a: BodyId, b: BodyId) -> bool {
         (self.bodies[a].feels_forces() || self.bodies[b].feels_forces()) && !self.share_joint(a, b)
     }
 
-    /// Which of two bodies brings the samples and which the field, with the weight of each contact.
+    /// Samples and fields by which two bodies touch, with the weight of each contact.
     pub(super) fn sides(
         &self,
         a: BodyId,
@@ -117,7 +117,7 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// Whether a body is one round sample.
+/// True if a body is one round sample.
 fn is_ball<S: Scalar>(body: &Body<S>) -> bool {
     let single = |surface: &Arc<Surface>| surface.points().len() == 1 && surface.rounding() > 0.0;
     body.surface.as_ref().is_some_and(single)

@@ -107,7 +107,7 @@ impl<S: Scalar> World<S> {
         if force.is_nan() { f64::INFINITY } else { force }
     }
 
-    /// Whether derivatives through the beginning of every contact are right.
+    /// Checks that derivatives through the beginning of every contact are right.
     pub(crate) fn check_onsets(&self) -> Result<(), SimulationError> {
         let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
         match self.contact_materials().find(jumps) {

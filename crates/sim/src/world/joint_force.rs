@@ -1,4 +1,4 @@
-//! What acts along the joints of a world.
+//! Forces along the joints of a world.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::state::State;
 pub struct JointAxis {
     /// The link that the joint moves.
     pub link: BodyId,
-    /// Which of its degrees of freedom, from 0.
+    /// Index among its degrees of freedom, from 0.
     pub index: usize,
 }
 
@@ -37,13 +37,13 @@ impl From<BodyId> for JointAxis {
 pub struct JointForce<S: Scalar = f64> {
     /// The axes of one articulation whose positions, times these factors, add up to that of the law, and that share its effort so.
     pub axes: Vec<(JointAxis, f64)>,
-    /// What it acts along beside the axes, in the articulation of the first.
+    /// Path that it acts along beside the axes, in the articulation of the first.
     pub(crate) path: Option<Arc<Path>>,
     /// The axis whose velocity is the first of its parameters, and how far ahead that is \[s\].
     pub(crate) input: Option<(JointAxis, f64)>,
     /// The number of a group whose sum of forces is bounded, and the bounds.
     pub(crate) bound: Option<(usize, [f64; 2])>,
-    /// Whether it counts where the sum of actuators is bounded.
+    /// True if it counts where the sum of actuators is bounded.
     pub(crate) is_actuator: bool,
     law: Arc<dyn DynJointLaw>,
     params: Vec<S>,
@@ -83,7 +83,7 @@ impl<S: Scalar> JointForce<S> {
         self.path.is_none() && matches!(self.axes[..], [(own, _)] if own == axis)
     }
 
-    /// Whether the law takes these parameters.
+    /// Checks that the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
         let finite =
@@ -92,7 +92,7 @@ impl<S: Scalar> JointForce<S> {
         self.law.check(&values)
     }
 
-    /// The same force, each number through `f`.
+    /// Force, each number through `f`.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> JointForce<T> {
         JointForce {
             axes: self.axes.clone(),
@@ -105,7 +105,7 @@ impl<S: Scalar> JointForce<S> {
         }
     }
 
-    /// The same force among other bodies.
+    /// Force among other bodies.
     pub(crate) fn with_bodies(&self, body: impl Fn(BodyId) -> BodyId) -> Self {
         let mut force = self.clone();
         let axes = force.axes.iter_mut().map(|(axis, _)| axis);
@@ -134,7 +134,7 @@ fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
     }
 }
 
-/// Where a force along joints acts.
+/// Degrees of freedom that a force acts along.
 pub(crate) struct Along<S> {
     pub(crate) articulation: usize,
     /// Degrees of freedom of the articulation, with the derivatives of the position by them.
@@ -182,7 +182,7 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// Whether the joint of a link has such an axis.
+    /// Checks that the joint of a link has such an axis.
     pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), BuildError> {
         let joint = &self.link(link)?.joint;
         match axis < joint.nv() && !matches!(joint, Joint::Floating) {
@@ -191,7 +191,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Whether a law takes its parameters.
+    /// Checks that a law takes its parameters.
     pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), BuildError> {
         let link = |(axis, _): &(JointAxis, f64)| self.bodies[axis.link].name.clone();
         let wrong = |error| {
@@ -289,7 +289,7 @@ impl<S: Scalar> World<S> {
         })
     }
 
-    /// Where a force acts.
+    /// Degrees of freedom that a force acts along.
     pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
         let mut places: Vec<_> = self.articulations.iter().map(|_| None).collect();
         self.along_at(force, states, &mut places)

@@ -1,4 +1,4 @@
-//! What contacts do, recorded as one node.
+//! Wrenches of contacts, recorded as one node.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
@@ -136,7 +136,7 @@ impl LinearContacts {
 /// The derivative of [`LinearContacts`].
 struct Node {
     contacts: Vec<LinearContact>,
-    /// Of each body that touches, and where its coordinates begin among the inputs, if they are inputs.
+    /// For each body that touches, and where its coordinates begin among the inputs, if they are inputs.
     states: Vec<(State, Option<usize>)>,
 }
 

@@ -1,4 +1,4 @@
-//! What contacts do.
+//! Wrenches of contacts.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use crate::shape::variable::{LANES, Lane, VariableShapes};
 use crate::spatial::spatial;
 use crate::state::State;
 
-/// What a contact does.
+/// Wrenches of a contact.
 pub(crate) struct PairWrench<S: Scalar> {
     /// Wrench on the body with the samples and on that with the field, each about its own center of mass.
     pub(crate) on_samples: Vector6<S>,
@@ -86,7 +86,7 @@ impl<S: Scalar> World<S> {
         wrenches
     }
 
-    /// What `pair` does with its `deflection`, if it sticks and has one.
+    /// Wrenches of `pair` with its `deflection`, if it has bristles.
     pub(crate) fn pair_wrench(
         &self,
         pair: &ContactPair<S>,
@@ -100,7 +100,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// How large the force of `pair` is without a memory \[N\].
+    /// Magnitude of the force of `pair` without a memory \[N\].
     pub(crate) fn force(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
         let Some(query) = &self.contact_query_at(pair, states, 1) else { return 0.0 };
         let (law, p) = (pair.law().as_ref(), &pair.param_values());
@@ -126,7 +126,7 @@ impl<S: Scalar> World<S> {
         Some(ContactQuery { smoothing: pair.smoothing.at_step(step), ..query })
     }
 
-    /// What `pair`, which sticks, does with its `deflection`.
+    /// Wrenches of `pair`, which has bristles, with its `deflection`.
     fn bristle_wrench(
         &self,
         pair: &ContactPair<S>,
@@ -151,7 +151,7 @@ impl<S: Scalar> World<S> {
         PairWrench { rate, ..self.pair_wrench_along(pair, states, &axes, wrench) }
     }
 
-    /// What `pair` does without a memory.
+    /// Wrenches of `pair` without a memory.
     fn memoryless_wrench(
         &self,
         pair: &ContactPair<S>,
@@ -198,7 +198,7 @@ impl<S: Scalar> World<S> {
         self.on_both(pair, states, force, torque)
     }
 
-    /// Of the `wrench` of `pair` along the `axes` of its field.
+    /// Wrenches of the `wrench` of `pair` along the `axes` of its field.
     fn pair_wrench_along(
         &self,
         pair: &ContactPair<S>,
@@ -210,7 +210,7 @@ impl<S: Scalar> World<S> {
         self.on_both(pair, states, axes * Vector3::new(fx, fy, fz), axes * Vector3::new(tx, ty, tz))
     }
 
-    /// Of a force and torque on the body with the samples, about its center of mass.
+    /// Wrenches of a force and torque on the body with the samples, about its center of mass.
     #[inline]
     fn on_both(
         &self,
@@ -281,8 +281,8 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// What `pair`, which is `query`, does without a memory, with derivatives by the state that the field sees; and what it changes with
-    /// parameters and dimensions, if any vary: zeros that carry derivatives, along the axes of the field.
+    /// Wrench of `pair`, which is `query`, without a memory, with derivatives by the relative state; and its change with
+    /// parameters and dimensions, if any vary: tangents, along the axes of the field.
     pub(super) fn linearized(
         &self,
         pair: &ContactPair<S>,
@@ -295,7 +295,7 @@ impl<S: Scalar> World<S> {
         (jacobian, slopes)
     }
 
-    /// What the wrench of `pair`, which has these derivatives by its parameters, changes with those and with dimensions, if any vary.
+    /// Change of the wrench of `pair`, which has these derivatives by its parameters, with those and with dimensions, if any vary.
     fn slopes(
         &self,
         pair: &ContactPair<S>,

@@ -1,4 +1,4 @@
-//! What the parameters of a world are called.
+//! Names of a world's parameters.
 
 use std::collections::HashMap;
 

@@ -44,7 +44,7 @@ impl<S: Scalar> World<S> {
         parameters
     }
 
-    /// The same bodies and contacts with other `parameters`, in the order of [`World::parameters`].
+    /// Bodies and contacts with other `parameters`, in the order of [`World::parameters`].
     ///
     /// # Errors
     /// If there are too few or too many, or a body of such a mass, inertia or center of mass is impossible; if a trajectory of this

@@ -42,7 +42,7 @@ pub(crate) enum PathPart {
     Straight { ends: [Anchor; 2], factor: f64 },
     /// The shortest way around an obstacle, or a straight line that does not meet it.
     Around { ends: [Anchor; 2], obstacle: Obstacle, factor: f64 },
-    /// What a force and torque along the axes of a frame move: a rate, but no length.
+    /// Direction of a force and torque along the axes of a frame: it has a rate, but no length.
     Twist { frame: Frame, gear: [f64; 6] },
     /// Place and turn of a frame in another, along the other's axes: links that carry both move neither.
     Relative { frame: Frame, reference: Frame, gear: [f64; 6] },

@@ -20,7 +20,7 @@ pub(super) struct RelativeState<S: Scalar> {
 }
 
 impl<S: Scalar> World<S> {
-    /// How the field of `pair` sees its samples.
+    /// State of the samples of `pair` relative to its field.
     #[inline]
     pub(super) fn relative_state(
         &self,
@@ -40,7 +40,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Where the center of mass of body `id` carries derivatives, the state of the point that has its value for coordinates, and from
+    /// State, where the center of mass of body `id` carries derivatives, of the point that has its value for coordinates, and from
     /// it to that point \[m\].
     #[inline]
     pub(super) fn shifted(

@@ -1,4 +1,4 @@
-//! Leaving out samples that cannot touch for a while.
+//! Culling of samples that cannot touch for a while (a Verlet list).
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::World;
 use super::contact_pair::ContactPair;
 use crate::state::State;
 
-/// How far samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
+/// Distance that samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
 /// that pays.
 const MARGIN: [f64; 2] = [1e-3, 4e-3];
 
@@ -25,7 +25,7 @@ pub(crate) struct SampleCulling<S: Scalar> {
     followed: Vec<(usize, f64)>,
     /// For each of those, the body with the samples as the field saw it when near ones were looked for.
     made_at: Vec<State>,
-    /// How far samples may move until the next search \[m\].
+    /// Distance that samples may move until the next search \[m\].
     margin: f64,
 }
 

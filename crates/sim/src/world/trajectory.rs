@@ -1,4 +1,4 @@
-//! Trajectories of driven bodies.
+//! Trajectories of kinematic bodies.
 
 use std::any::Any;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Which trajectories a simulation refuses.
+//! Checks of trajectories.
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
@@ -49,7 +49,7 @@ const SMOOTH: f64 = 0.1;
 /// Slower rates say nothing \[m/s\], \[rad/s\].
 const SLOWEST: f64 = 1e-6;
 
-/// Whether the velocity of `state` at `time` \[s\] is far from the rate of its pose, where that is the same over times up to `apart`
+/// True if the velocity of `state` at `time` \[s\] is far from the rate of its pose, where that is the same over times up to `apart`
 /// \[s\] before and after.
 fn contradicts(state: impl Fn(f64) -> State, time: f64, apart: f64) -> bool {
     let State { pose, linear, angular } = state(time);
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(lifted.with_parameters(&lifted.parameters()).unwrap_err(), error);
     }
 
-    /// What a rollout of a second says of a trajectory.
+    /// Result of a rollout of a second on a trajectory.
     fn refused(trajectory: impl Trajectory) -> Option<f64> {
         let mut world = World::new(Vector3::zeros());
         world.add(Body::kinematic("table", trajectory));

@@ -1,4 +1,4 @@
-//! What a robot's transmissions do beyond forces along single joints: bounds on what actuators do together, inertia that moves with a
+//! Effects of a robot's transmissions beyond forces along single joints: bounds on what actuators do together, inertia that moves with a
 //! length, weight that is carried, and inputs with a state of their own.
 
 use std::sync::Arc;

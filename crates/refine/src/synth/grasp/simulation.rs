@@ -7,9 +7,9 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, ContactBodies, ContactKinematics, DynContactLaw, GapSmoothing,
-    Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface,
-    World,
+    BackwardEuler, Body, BodyId, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
+    GapSmoothing, Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Step,
+    SubStepped, Surface, World,
 };
 
 use crate::scene::Hand;
@@ -233,7 +233,7 @@ impl<'a> Simulation<'a> {
             kept.extend(self.setup.samples.first());
         }
         let surface = Surface::new(&kept, &vec![self.setup.area; kept.len()])
-            .map_err(|error| SimulationError::Body { body: "object".to_owned(), error })?;
+            .map_err(|error| BuildError::Body { body: "object".to_owned(), error })?;
         self.world.bodies[self.object].surface = Some(Arc::new(surface));
         Ok(())
     }

@@ -9,7 +9,7 @@ use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
 use crate::spatial::{angular, cross_force, cross_motion, linear, spatial};
 
-/// What a tree's accelerations follow from.
+/// Inputs of a tree's accelerations.
 pub(crate) struct Acting<'a, S: Scalar> {
     /// Acceleration of free fall \[m/s²\].
     pub(crate) gravity: Vector3<S>,

@@ -1,4 +1,4 @@
-//! Which numbers a node is a function of, and their adjoints in a row.
+//! Inputs of a node, and their adjoints in a row.
 
 use nalgebra::{Matrix3, Quaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
@@ -20,13 +20,13 @@ pub(super) struct LinkAdjoint {
     pub(super) armature: f64,
 }
 
-/// What of a node's inputs varies, so that constants are not recorded.
+/// Inputs of a node that vary: constants are not recorded.
 pub(super) struct Inputs<S> {
     /// The numbers that vary.
     pub(super) varying: Vec<S>,
     /// Of all numbers in their order, whether they do.
     pub(super) varies: Vec<bool>,
-    /// Whether numbers of links are among them.
+    /// True if numbers of links are among them.
     pub(super) links: bool,
 }
 

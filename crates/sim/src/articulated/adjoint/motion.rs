@@ -1,4 +1,4 @@
-//! What adjoints of motions are summed of.
+//! Terms of adjoints of motions.
 
 use nalgebra::{Vector3, Vector6};
 

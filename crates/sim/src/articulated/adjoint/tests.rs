@@ -8,7 +8,7 @@ use crate::articulated::link::Articulation;
 use crate::articulated::tests::{random_state, random_tree};
 use crate::state::coordinates_of;
 
-/// How many numbers [`weighed`] is a function of.
+/// Number of inputs of [`weighed`].
 fn inputs(tree: &Articulation) -> usize {
     3 + tree.nq() + 2 * tree.nv() + 6 * tree.links().len() + 18 * tree.links().len()
 }

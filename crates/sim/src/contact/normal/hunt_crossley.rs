@@ -26,7 +26,7 @@ law_part! {
     }
 }
 
-/// How a body bounces off a contact whose restitution depends on the speed.
+/// Restitution of a contact at an impact speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounce {
     /// Coefficient of restitution, above 0 and at most 1.

@@ -1,4 +1,4 @@
-//! How large an error is.
+//! Norm of errors.
 
 use std::cell::LazyCell;
 
@@ -25,25 +25,25 @@ const SMALL: f64 = 0.1;
 /// is the onset of a contact that stiff.
 const SHARPEST_KINK: f64 = 1e-3;
 
-/// How far off a substep is: its states, and its sensitivity relative to that.
+/// Errors of a substep: of its states, and of its sensitivity relative to that.
 pub(super) struct Errors {
     state: f64,
     sensitivity: f64,
 }
 
-/// How large errors are.
+/// Norm of errors.
 pub(super) struct ErrorNorm {
     tolerance: f64,
     sensitivity_tolerance: f64,
-    /// How many bodies there are, whose states come first.
+    /// Number of bodies, whose states come first.
     bodies: usize,
-    /// Of each free body, then of each joint, with the place of its state.
+    /// For each free body, then of each joint, with the place of its state.
     scales: Vec<(usize, Scale)>,
-    /// Of each contact with bristles, the radius of gyration of its smaller body \[m\].
+    /// For each contact with bristles, the radius of gyration of its smaller body \[m\].
     deflections: Vec<f64>,
 }
 
-/// What counts as one for a body or joint.
+/// Units of the coordinates of a body or joint.
 #[derive(Clone, Copy)]
 struct Scale {
     /// By which angular momenta are those of angular velocities times the squared length; so 1/length² where they are such velocities.
@@ -54,7 +54,7 @@ struct Scale {
     speed: f64,
     /// Speed of a coordinate by that of the bodies: 1, or 1/radius \[1/m\] of an angle.
     per_meter: f64,
-    /// Which of its coordinates there are: places, rotations.
+    /// Presence of its coordinates: places, rotations.
     has: [bool; 2],
 }
 
@@ -180,14 +180,14 @@ impl ErrorNorm {
         max_or_nan(state / self.tolerance, sensitivity / self.sensitivity_tolerance)
     }
 
-    /// Whether `errors` of a substep that could not be shorter are those of a kink alone: a substep that short has no other of its
+    /// True if `errors` of a substep that could not be shorter are those of a kink alone: a substep that short has no other of its
     /// sensitivity.
     pub(super) fn only_kinks(&self, errors: &Errors) -> bool {
         errors.state <= self.tolerance && errors.sensitivity <= SHARPEST_KINK
     }
 }
 
-/// Of each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
+/// For each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
 /// the joint itself.
 fn joint_scales<'a>(
     world: &'a World,

@@ -22,7 +22,7 @@ pub(super) struct Island {
     deflections: Vec<usize>,
 }
 
-/// What tells one island from another.
+/// Key that tells one island from another.
 #[derive(Eq, Hash, PartialEq)]
 pub(super) struct Links {
     bodies: Vec<BodyId>,

@@ -22,7 +22,7 @@ pub(super) struct Schedule {
     pub(super) states: Vec<State<Tangent>>,
     /// Length of the substep that would come next \[s\].
     pub(super) next_substep: f64,
-    /// Of each of the bodies that were watched, how far its center came at most from where it would have been if it had gone on
+    /// For each of the bodies that were watched, how far its center came at most from where it would have been if it had gone on
     /// as it moved at the start \[m\].
     pub(super) deviations: Vec<f64>,
 }

@@ -1,4 +1,4 @@
-//! How far bodies may move before contacts could be passed over.
+//! Distances that bodies may move before contacts could be passed over.
 
 use std::cell::LazyCell;
 
@@ -20,7 +20,7 @@ const GRAZING: f64 = 1e-6;
 const FREE_THICKNESS: f64 = 0.25;
 /// Part of that by which a trajectory may always deviate from uniform motion.
 const FREE_DEVIATION: f64 = 0.05;
-/// How often trajectories are looked at \[s\].
+/// Interval at which trajectories are looked at \[s\].
 const LOOK: f64 = 1e-3;
 /// Looks ahead at most: no substep is longer.
 const LOOKS: usize = 1000;
@@ -28,19 +28,19 @@ const LOOKS: usize = 1000;
 /// For each contact, what its samples may do, if a force moves one of the bodies.
 pub(super) struct StepLimiter(Vec<Option<Limit>>);
 
-/// What the samples of a contact may do.
+/// Bounds on the motion of a contact's samples.
 struct Limit {
     /// Distance of the farthest one's center from the center of mass \[m\].
     radius: f64,
     /// Size of the body \[m\].
     size: f64,
-    /// How far they may always move \[m\].
+    /// Distance that they may always move \[m\].
     free: f64,
-    /// How far they may move whatever their gaps do meanwhile \[m\].
+    /// Distance that they may move whatever their gaps do meanwhile \[m\].
     short: f64,
-    /// Whether what they touch has an end.
+    /// True if what they touch has an end.
     thin: bool,
-    /// Whether one of the bodies is on a trajectory.
+    /// True if one of the bodies is on a trajectory.
     driven: bool,
 }
 
@@ -120,7 +120,7 @@ impl StepLimiter {
         })
     }
 
-    /// Whether a step of `dt` \[s\] from `states` through `stages` may have passed over a contact.
+    /// True if a step of `dt` \[s\] from `states` through `stages` may have passed over a contact.
     pub(super) fn passes_over(
         &self,
         world: &World,
@@ -144,15 +144,15 @@ impl StepLimiter {
 }
 
 impl Limit {
-    /// Whether samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
+    /// True if samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
     fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
         let near =
             |query: ContactQuery<'_>| query.each_near(pair.law().cutoff(), travel).next().is_some();
         world.contact_query(pair, state).is_some_and(near)
     }
 
-    /// How far the samples of `pair` have been at most \[m\] from where they would be if what is driven went on as in `states`,
-    /// or if it stayed there, whichever is less, as that of a belt is: at each look from `time` on for `dt` \[s\].
+    /// Largest distance \[m\] of the samples of `pair` from where they would be if kinematic bodies went on as in `states`,
+    /// or if they stayed there, whichever is less, as that of a belt is: at each look from `time` on for `dt` \[s\].
     fn deviations(
         &self,
         world: &World,

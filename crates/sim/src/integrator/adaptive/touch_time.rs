@@ -40,7 +40,7 @@ fn first_of(
     times.min_by(f64::total_cmp)
 }
 
-/// Whether a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
+/// True if a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
 pub(super) fn dips(
     world: &World,
     pair: &ContactPair,
@@ -65,7 +65,7 @@ struct Passage<'a> {
     /// At the start.
     query: ContactQuery<'a>,
     ends: [State; 2],
-    /// How far a sample moves at most \[m\].
+    /// Largest distance that a sample moves \[m\].
     travel: f64,
 }
 
@@ -120,7 +120,7 @@ fn least(from: [f64; 2], to: [f64; 2], dt: f64) -> f64 {
     inside.min(from[0]).min(to[0])
 }
 
-/// Where the cubic with a value and a slope at 0 and at `dt` changes its sign, if the values differ in theirs.
+/// Zero of the cubic with a value and a slope at 0 and at `dt`, if the values differ in their signs.
 fn crossing(from: [f64; 2], to: [f64; 2], dt: f64) -> Option<f64> {
     let a = from[0];
     if (a > 0.0) == (to[0] > 0.0) {

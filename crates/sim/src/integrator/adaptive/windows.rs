@@ -21,12 +21,12 @@ use crate::world::World;
 use crate::world::broad_phase::{BroadPhase, CandidateContact};
 use crate::world::contact_pair::ContactPair;
 
-/// How far the fastest body goes in a window, in fractions of its size.
+/// Distance that the fastest body goes in a window, in fractions of its size.
 const TRAVEL: f64 = 0.35;
-/// How far a body is first looked for from where it would be if nothing pushed it, in fractions of its size: where that is too little
+/// Deviation from free motion within which a body is first looked for, in fractions of its size: where that is too little
 /// it is seen, and costs less than an island that is too large.
 const SLACK: f64 = 1e-3;
-/// How much farther than it came a body is looked for.
+/// Factor on the deviation found, within which a body is looked for next.
 const MARGIN: f64 = 1.25;
 
 /// The states after `whole`.
@@ -92,7 +92,7 @@ pub(super) fn step<S: Scalar>(
 
 /// The states of each island after its schedule, with derivatives; `contacts` are those that they were found by.
 ///
-/// What is recorded is one node for all islands, which the sweep goes through side by side: it keeps the states that a window begins
+/// One node is recorded for all islands, which the sweep goes through side by side: it keeps the states that a window begins
 /// with, and the substeps.
 fn followed<S: Scalar>(
     world: &World<S>,
@@ -133,7 +133,7 @@ fn length(search: &BroadPhase<'_, f64>, states: &[State<Tangent>]) -> f64 {
     search.free().map(time).fold(f64::INFINITY, f64::min)
 }
 
-/// What happens in a window.
+/// Contacts and islands of a window.
 struct Window {
     /// The contacts of groups that may touch.
     candidates: Vec<CandidateContact>,

@@ -11,7 +11,7 @@ use super::laws::{G, Law, Spec};
 /// Number of the free body in [`on_floor`].
 pub(crate) const BODY: usize = 1;
 
-/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a kinematic floor.
+/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a fixed floor.
 pub(crate) fn on_floor(
     law: &Law,
     spec: &Spec,
