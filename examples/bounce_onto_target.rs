@@ -10,9 +10,11 @@ use nalgebra::{Isometry3, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, Bounce, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law, RigidBody,
-    SimulationError, State, StaticContactTarget, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody,
+    SimulationError, State, Surface, TimeSteps, World,
 };
 
 const RADIUS: f64 = 0.03;
@@ -26,13 +28,13 @@ fn ball_and_floor() -> anyhow::Result<(World, [State; 2])> {
     let mass = 0.06;
     let (rigid, surface) = (RigidBody::ball(mass, RADIUS)?, Surface::ball(RADIUS)?);
     let contact_area = surface.area();
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-5, contact_area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-5, contact_area };
     let bounce = Bounce { restitution: 0.8, impact_speed: 3.0 };
     let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    let samples = world.add(Body::free("ball", rigid).with_surface(surface));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
     world.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
     let hand = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.5));
     Ok((world, [State::at_rest(Isometry3::identity()), hand]))
@@ -45,10 +47,10 @@ fn thrown<S: Scalar>(
     velocity: &[S],
     points: usize,
 ) -> Result<Vec<Vector3<S>>, SimulationError> {
-    let mut start = states.each_ref().map(State::lift);
+    let mut start = states.each_ref().map(State::cast);
     start[1].linear = Vector3::from_column_slice(velocity);
     let time_steps = TimeSteps { dt: TIME / points as f64, steps: points };
-    let run = world.lift().rollout(&start, time_steps)?;
+    let run = world.cast().rollout(&start, time_steps)?;
     Ok(run.iter().map(|states| states[1].pose.translation.vector).collect())
 }
 

@@ -7,9 +7,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
+use prehend::sim::contact::regularized_coulomb;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Response, RigidBody,
-    SimulationError, State, Surface, World, regularized_coulomb,
+    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, RigidBody,
+    SimulationError, State, Surface, World,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -19,12 +21,12 @@ impl ContactLaw for Quadratic {
     fn params(&self) -> &[f64] {
         &self.0
     }
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
         let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
-        Response { normal, tangential }
+        ContactForce { normal, tangential }
     }
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }
@@ -40,9 +42,9 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
         surface_samples(&ball, 2000, 0).iter().map(|s| s.point).collect();
     let rigid = RigidBody::ball(mass, RADIUS)?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&points, ball.area())?;
-    let samples = world.add(Body::free("ball", rigid).with_surface(surface));
+    let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let resting = rigid.at_rest(&Isometry3::translation(0.0, 0.0, RADIUS));
@@ -55,9 +57,9 @@ fn height<S: Scalar>(
     states: &[State; 2],
     [drop, stiffness]: [S; 2],
 ) -> Result<S, SimulationError> {
-    let mut world = world.lift();
+    let mut world = world.cast();
     world.contacts[0].params_mut()[0] = stiffness;
-    let mut states = states.each_ref().map(|state| state.lift());
+    let mut states = states.each_ref().map(|state| state.cast());
     states[1].pose.translation.z += drop;
     Ok(world.simulate(&states, TIME)?[1].pose.translation.z)
 }

@@ -17,7 +17,7 @@ const GRAVITY: f64 = 9.81;
 struct Cycloid;
 
 impl JointModel for Cycloid {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         1
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -38,7 +38,7 @@ fn slide<S: Scalar>(
     q: S,
     time: f64,
 ) -> Result<S, SimulationError> {
-    let world = world.lift();
+    let world = world.cast();
     let mut states: Vec<State<S>> = world.neutral_states();
     world.set_joint(&mut states, *bead, &[q], &[S::zero()])?;
     let end = world.simulate(&states, time)?;

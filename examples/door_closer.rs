@@ -14,10 +14,12 @@ use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, forward_jacobian};
 use prehend::sim::articulated::{Joint, Link};
+use prehend::sim::contact::{Bounce, Parameters};
+use prehend::sim::fields::{Cuboid, Placed};
+use prehend::sim::joint_law::{JointLaw, JointLimits, JointSpring};
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, GapSmoothing, HuntCrossley, JointForceId,
-    JointLaw, JointLimits, JointSpring, Law, Parameters, Placed, RigidBody, SimulationError, State,
-    StaticContactTarget, Surface, TimeSteps, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    JointForceId, Law, RigidBody, SimulationError, State, Surface, TimeSteps, World,
 };
 
 /// Half of the door's width, thickness and height \[m\].
@@ -76,7 +78,7 @@ impl Doorway {
         // Weight does nothing to a door, and the ball has left before it falls far.
         let mut world = World::new(Vector3::zeros());
         let rigid = RigidBody::ball(BALL, RADIUS)?;
-        let ball = world.add(Body::free("ball", rigid).with_surface(Surface::ball(RADIUS)?));
+        let ball = world.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(RADIUS)?));
 
         // The frame of a link is where its joint is, that of a box in its middle.
         let pose = Isometry3::translation(HALF[0], HALF[1], HALF[2]);
@@ -88,7 +90,7 @@ impl Doorway {
 
         let contact_area = Surface::ball(RADIUS)?.area();
         let target =
-            StaticContactTarget { mass: BALL, gravity: 9.81, penetration: 1e-4, contact_area };
+            ContactCalibration { mass: BALL, gravity: 9.81, penetration: 1e-4, contact_area };
         let bounce = Bounce { restitution: 0.5, impact_speed: SPEED };
         let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
         let law = Arc::new(Law::new(normal, Coulomb { friction: 0.5, slip_scale: 2e-2 })?);
@@ -108,9 +110,9 @@ impl Doorway {
 
     /// Angle \[rad\] and speed \[rad/s\] of the door every [`DT`], with these dampings.
     fn swing<S: Scalar>(&self, dampings: &[S]) -> Result<Vec<[S; 2]>, SimulationError> {
-        let mut world = self.world.lift::<S>();
+        let mut world = self.world.cast::<S>();
         world.joint_force_mut(self.valves).params_mut().copy_from_slice(dampings);
-        let start: Vec<State<S>> = self.start.iter().map(State::lift).collect();
+        let start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
         let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
         run.iter().map(|states| world.joint_motion(states, self.leaf)).collect()
     }

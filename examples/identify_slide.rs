@@ -20,9 +20,10 @@ use prehend::autodiff::lie::lift;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley, KelvinVoigt, Law,
-    Motion, RigidBody, State, StaticContactTarget, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+    Motion, RigidBody, State, Surface, TimeSteps, World,
 };
 
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.
@@ -63,16 +64,15 @@ fn scene() -> anyhow::Result<World> {
     let bottom: Vec<_> = (-2..2).flat_map(row).collect();
     let area = 4.0 * HALF[0] * HALF[1];
     let sides = Cuboid { half_extents: HALF.into(), rounding: 1e-3 };
-    let parcel = Body::free("parcel", rigid).with_field(Arc::new(sides));
+    let parcel = Body::dynamic("parcel", rigid).with_field(Arc::new(sides));
     let tip = Surface::ball(TIP)?;
     let tip_area = tip.area();
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
+    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let parcel = world.add(parcel.with_surface(Surface::uniform(&bottom, area)?));
-    let plunger = world.add(Body::driven("plunger", plunger).with_surface(tip));
+    let plunger = world.add(Body::kinematic("plunger", plunger).with_surface(tip));
 
-    let target =
-        StaticContactTarget { mass, gravity: 9.81, penetration: DEPTH, contact_area: area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: DEPTH, contact_area: area };
     let floor = KelvinVoigt::from_target(&target, 0.3)?;
     let law = Law::new(floor, Coulomb { friction: GUESS[0], slip_scale: 5e-3 })?;
     let smoothing = GapSmoothing::Softplus { width: 0.1 * DEPTH };
@@ -92,11 +92,11 @@ fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> 
     let [a, b, c] = HALF.map(|half| half * half / 3.0);
     let inertia = Vector3::new(mass.times(b + c), mass.times(a + c), mass * gyration * gyration);
     let rigid = RigidBody::new(mass, Matrix3::from_diagonal(&inertia), Point3::new(x, y, z))?;
-    let mut world = scene.lift::<S>();
-    world.bodies[1].motion = Motion::Free(rigid);
+    let mut world = scene.cast::<S>();
+    world.bodies[1].motion = Motion::Dynamic(rigid);
     *world.contacts[0].param_mut("friction")? = friction;
     let parcel = rigid.at_rest(&lift(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH)));
-    let still = State::at_rest(Isometry3::identity()).lift();
+    let still = State::at_rest(Isometry3::identity()).cast();
     let run = world.rollout(&[still, parcel, still], FRAMES)?;
     let seen = |states: &Vec<State<S>>| {
         let pose = rigid.model_pose(&states[1].pose);

@@ -17,9 +17,10 @@ use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Batch, Body, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, Shape, SimulationError, State,
-    StaticContactTarget, TimeSteps, World,
+    Batch, Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    SimulationError, State, TimeSteps, World,
 };
 
 const THROWS: usize = 1024;
@@ -42,7 +43,7 @@ fn world() -> anyhow::Result<World> {
     let mass = DENSITY * 4.0 / 3.0 * PI * RADIUS.powi(3);
     let contact_area = PI * RADIUS * RADIUS;
     let ball = world.add(ball);
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-4, contact_area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area };
     let normal =
         HuntCrossley::from_target(&target, 1.0, Bounce { restitution: 0.3, impact_speed: 0.5 })?;
     let law = Law::new(normal, Coulomb { friction: GUESS, slip_scale: 2e-2 })?;
@@ -66,12 +67,12 @@ fn ends<S: Scalar>(
     throws: &[State],
     friction: S,
 ) -> Result<Vec<[S; 2]>, SimulationError> {
-    let mut world = world.lift::<S>();
+    let mut world = world.cast::<S>();
     for group in &mut world.contact_groups {
         *group.contact.param_mut("friction")? = friction;
     }
-    let floor = State::at_rest(Isometry3::identity()).lift();
-    let variants = throws.iter().map(|throw| (world.clone(), vec![floor, throw.lift()]));
+    let floor = State::at_rest(Isometry3::identity()).cast();
+    let variants = throws.iter().map(|throw| (world.clone(), vec![floor, throw.cast()]));
     let ends = batch.simulate(variants, TIME_STEPS).into_iter();
     ends.map(|end| end.map(|states| states[1].pose.translation).map(|at| [at.x, at.z])).collect()
 }

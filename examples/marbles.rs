@@ -14,9 +14,10 @@ use parry3d_f64::shape::{Ball, HeightField};
 use parry3d_f64::utils::Array2;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Adaptive, Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
-    SimulationError, State, StaticContactTarget, TimeSteps, World,
+    Adaptive, Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    SimulationError, State, TimeSteps, World,
 };
 
 /// Radius \[m\] and density \[kg/m³\] of a marble.
@@ -58,7 +59,7 @@ fn marbles() -> anyhow::Result<(World, Vec<State>)> {
     }
     let mass = DENSITY * 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 2e-4, contact_area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 2e-4, contact_area };
     let normal =
         HuntCrossley::from_target(&target, 1.5, Bounce { restitution: 0.5, impact_speed: 0.5 })?;
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 })?);
@@ -75,11 +76,11 @@ fn run<S: Scalar>(
     by: [S; 2],
     steps: usize,
 ) -> Result<Vec<Vec<Vector3<S>>>, SimulationError> {
-    let mut start: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
     let place = &mut start[1 + moved].pose.translation;
     (place.x, place.z) = (place.x + by[0], place.z + by[1]);
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.lift().rollout_with(integrator, &start, time_steps)?.states;
+    let run = world.cast().rollout_with(integrator, &start, time_steps)?.states;
     let places =
         |states: &Vec<State<S>>| states[1..].iter().map(|s| s.pose.translation.vector).collect();
     Ok(run.iter().map(places).collect())

@@ -18,9 +18,10 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::TriMesh;
 use prehend::geometry::shapes::{Mug, tube};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, look_at};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape, ShapeOptions,
-    SimulationError, State, StaticContactTarget, TimeSteps, World,
+    Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape,
+    ShapeOptions, SimulationError, State, TimeSteps, World,
 };
 
 /// Radius of the hook's rod, and where along it the mug is to hang \[m\].
@@ -73,7 +74,7 @@ impl Throw {
         let rigid = *body.rigid().context("a mug has a mass")?;
         let thrown = world.add(body);
         let (mass, contact_area) = (rigid.mass(), 2e-5);
-        let target = StaticContactTarget { mass, gravity: 9.81, penetration: 3e-4, contact_area };
+        let target = ContactCalibration { mass, gravity: 9.81, penetration: 3e-4, contact_area };
         let bounce = Bounce { restitution: 0.2, impact_speed: 0.5 };
         let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
         let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 2e-2 })?;
@@ -98,14 +99,14 @@ impl Throw {
         time: f64,
         steps: usize,
     ) -> Result<Vec<Isometry3<S>>, SimulationError> {
-        let mut start = self.mug.at_rest(&self.hand).lift::<S>();
+        let mut start = self.mug.at_rest(&self.hand).cast::<S>();
         let unit = |i: usize| x[i].times(UNITS[i]);
         start.linear = Vector3::new(unit(0), unit(1), unit(2));
         start.angular = Vector3::new(unit(3), unit(4), unit(5));
-        let start = [State::at_rest(Isometry3::identity()).lift(), start];
+        let start = [State::at_rest(Isometry3::identity()).cast(), start];
         let time_steps = TimeSteps { dt: time / steps as f64, steps };
-        let run = self.world.lift().rollout(&start, time_steps)?;
-        let mug = self.mug.lift::<S>();
+        let run = self.world.cast().rollout(&start, time_steps)?;
+        let mug = self.mug.cast::<S>();
         Ok(run.iter().map(|states| mug.model_pose(&states[1].pose)).collect())
     }
 

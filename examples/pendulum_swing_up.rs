@@ -15,9 +15,10 @@ use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::sim::articulated::{Joint, Link};
+use prehend::sim::joint_law::Motor;
 use prehend::sim::{
-    Adaptive, BodyId, Integrator, JointForceId, Motor, RigidBody, RungeKutta4, SimulationError,
-    State, Step, StepCheckpointed, TimeSteps, World,
+    Adaptive, BodyId, Integrator, JointForceId, RigidBody, RungeKutta4, SimulationError, State,
+    Step, StepCheckpointed, TimeSteps, World,
 };
 
 /// Length of the rod \[m\], and mass of the ball at its end \[kg\].
@@ -56,7 +57,7 @@ impl Pendulum {
         efforts: &[S],
         parts: usize,
     ) -> Result<Vec<[S; 2]>, SimulationError> {
-        let world = self.world.lift::<S>();
+        let world = self.world.cast::<S>();
         let start = world.neutral_states();
         let control = |step: Step, world: &mut World<S>, _: &mut [State<S>]| {
             world.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])

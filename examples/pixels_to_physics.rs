@@ -13,9 +13,10 @@ use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, SceneVars};
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SimulationError, State, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError,
+    State, Surface, TimeSteps, World,
 };
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };
@@ -40,9 +41,9 @@ fn world() -> anyhow::Result<World> {
     let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
         .map(|(x, y)| Point3::new(0.03 * x, 0.02 * y, -HALF[2]));
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&feet, 4e-4)?;
-    let samples = world.add(Body::free("block", rigid).with_surface(surface));
+    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
     let spring = KelvinVoigt { stiffness: 4e7, damping: 4e5 };
     let law = Law::new(spring, Coulomb { friction: 0.3, slip_scale: 1e-2 })?;
     let smoothing = GapSmoothing::Softplus { width: 5e-5 };
@@ -53,11 +54,11 @@ fn world() -> anyhow::Result<World> {
 /// Where the block is in each picture.
 fn slide<S: Scalar>(world: &World, x: &[S]) -> Result<Vec<Isometry3<S>>, SimulationError> {
     let [vx, vy, spin, friction] = std::array::from_fn(|i| x[i].times(UNITS[i]));
-    let mut world = world.lift::<S>();
+    let mut world = world.cast::<S>();
     *world.contacts[0].param_mut("friction")? = friction;
-    let mut start = State::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).lift();
+    let mut start = State::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).cast();
     (start.linear.x, start.linear.y, start.angular.z) = (vx, vy, spin);
-    let run = world.rollout(&[State::at_rest(Isometry3::identity()).lift(), start], PICTURES)?;
+    let run = world.rollout(&[State::at_rest(Isometry3::identity()).cast(), start], PICTURES)?;
     Ok(run[1..].iter().map(|states| states[1].pose).collect())
 }
 

@@ -12,10 +12,11 @@ use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector2, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, Bounce, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley, Law,
-    Motion, RigidBody, SimulationError, State, StaticContactTarget, Sticking, Surface, TimeSteps,
-    Trajectory, World,
+    Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Law, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, Trajectory, World,
 };
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].
@@ -70,18 +71,18 @@ fn scene() -> anyhow::Result<(World, [State; 3])> {
     let bottom: Vec<_> = (-2..=2).flat_map(|i| row(f64::from(i))).collect();
     let area = 4.0 * HALF[0] * HALF[1];
     let sides = Cuboid { half_extents: HALF.into(), rounding: 2e-3 };
-    let pushed = Body::free("box", rigid).with_field(Arc::new(sides));
+    let pushed = Body::dynamic("box", rigid).with_field(Arc::new(sides));
     let tip = Surface::ball(FINGER)?;
     let tip_area = tip.area();
     let still = State::at_rest(Isometry3::identity());
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
+    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
-    let finger = world.add(Body::driven("finger", move |_: f64| still).with_surface(tip));
+    let finger = world.add(Body::kinematic("finger", move |_: f64| still).with_surface(tip));
 
     let friction = Coulomb { friction: 0.35, slip_scale: 5e-3 };
     let normal = |penetration: f64, contact_area: f64| {
-        let target = StaticContactTarget { mass, gravity: 9.81, penetration, contact_area };
+        let target = ContactCalibration { mass, gravity: 9.81, penetration, contact_area };
         let bounce = Bounce { restitution: 0.2, impact_speed: 0.1 };
         HuntCrossley::from_target(&target, 1.0, bounce)
     };
@@ -89,7 +90,7 @@ fn scene() -> anyhow::Result<(World, [State; 3])> {
     let bodies = ContactBodies { samples: pushed, field: table };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     // The finger must not creep along the box in the seconds of the push.
-    let law = Law::new(normal(5e-4, tip_area)?, Sticking { friction, deflection: 5e-4 })?;
+    let law = Law::new(normal(5e-4, tip_area)?, BristleFriction { friction, deflection: 5e-4 })?;
     let bodies = ContactBodies { samples: finger, field: pushed };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH));
@@ -102,9 +103,9 @@ fn push<S: Scalar>(
     parameters: &[S],
     steps: usize,
 ) -> Result<Vec<[S; 3]>, SimulationError> {
-    let mut world = world.lift::<S>();
-    world.bodies[2].motion = Motion::Driven(Arc::new(spline(points(parameters))));
-    let start = start.each_ref().map(State::lift);
+    let mut world = world.cast::<S>();
+    world.bodies[2].motion = Motion::Kinematic(Arc::new(spline(points(parameters))));
+    let start = start.each_ref().map(State::cast);
     let run = world.rollout(&start, TimeSteps { dt: TIME / steps as f64, steps })?;
     let seen = |states: &Vec<State<S>>| {
         let pose = &states[1].pose;

@@ -11,9 +11,10 @@ use parry3d_f64::shape::{Ball, Cuboid, HalfSpace, RoundCuboid};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, Shape,
-    SimulationError, State, StaticContactTarget, Sticking, TimeSteps, World,
+    Body, BodyId, BristleFriction, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    KelvinVoigt, Law, Shape, SimulationError, State, TimeSteps, World,
 };
 
 /// Half of a box's edge without, and the radius of, the rounding \[m\].
@@ -43,7 +44,7 @@ fn stack() -> anyhow::Result<(World, Vec<State>)> {
     // 20 µm deep under a box, and critically damped.
     let normal = KelvinVoigt { stiffness: 2.5e7, damping: 7e4 };
     let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
-    let law = Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 })?);
+    let law = Arc::new(Law::new(normal, BristleFriction { friction, deflection: 1e-4 })?);
     let smoothing = GapSmoothing::Softplus { width: 5e-6 };
     world.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
     world.add_contacts_between(&boxes, &boxes, law, smoothing)?;
@@ -64,7 +65,7 @@ fn cradle() -> anyhow::Result<(World, Vec<State>)> {
     }
     let mass = world.bodies[balls[0]].rigid().map_or(0.0, |rigid| rigid.mass());
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 1e-7, contact_area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 1e-7, contact_area };
     let bounce = Bounce { restitution: 0.98, impact_speed: 0.5 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.1, slip_scale: 1e-2 })?;
@@ -78,9 +79,9 @@ fn strike<S: Scalar>(
     speed: S,
     steps: usize,
 ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-    let mut start: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
     start[0].linear.x = speed;
-    world.lift().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
+    world.cast().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
 }
 
 fn main() -> anyhow::Result<()> {

@@ -10,9 +10,10 @@ use prehend::autodiff::lie::lift;
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
-    SemiImplicitEuler, State, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SemiImplicitEuler,
+    State, Surface, TimeSteps, World,
 };
 
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
@@ -28,9 +29,9 @@ fn block() -> TriMesh {
 fn world(mesh: &TriMesh) -> World {
     let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin()).unwrap();
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
-    let samples = world.add(Body::free("block", rigid).with_surface(surface));
+    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
     let spring = KelvinVoigt { stiffness: 2e6, damping: 1e3 };
     let law = Law::new(spring, Coulomb { friction: 0.4, slip_scale: 5e-2 }).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 5e-4 };
@@ -43,10 +44,10 @@ fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
     let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
-    let still = State::at_rest(Isometry3::identity()).lift();
+    let still = State::at_rest(Isometry3::identity()).cast();
     let thrown = start.retract(&std::array::from_fn(|i| tangent[i]));
     let states =
-        world.lift().simulate_with(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
+        world.cast().simulate_with(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
     states.unwrap().states[1].pose
 }
 

@@ -55,7 +55,7 @@ fn push<S: Scalar>(
     plan: &[S],
     parts: usize,
 ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-    let start: Vec<State<S>> = scene.start.iter().map(State::lift).collect();
+    let start: Vec<State<S>> = scene.start.iter().map(State::cast).collect();
     let ticks = (TIME / TICK).round() as usize;
     let mut run = Vec::with_capacity(ticks + 1);
     let control = |step: Step, world: &mut World<S>, states: &mut [State<S>]| {
@@ -68,7 +68,7 @@ fn push<S: Scalar>(
         }
     };
     let time_steps = TimeSteps { dt: TICK / parts as f64, steps: parts * ticks };
-    let end = scene.world.lift().simulate_controlled(integrator, &start, time_steps, control)?;
+    let end = scene.world.cast().simulate_controlled(integrator, &start, time_steps, control)?;
     run.push(end);
     Ok(run)
 }

@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::sim::articulated::{Joint, Link};
+use prehend::sim::contact::Bounce;
+use prehend::sim::fields::{Cuboid, HalfSpace};
+use prehend::sim::joint_law::PositionServo;
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley,
-    JointForceId, Law, PositionServo, RigidBody, State, StaticContactTarget, Surface, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    JointForceId, Law, RigidBody, State, Surface, World,
 };
 
 /// Lengths of upper arm and forearm, and the height at which they turn above the table \[m\].
@@ -34,7 +37,7 @@ pub(crate) struct Scene {
 impl Scene {
     pub(crate) fn new() -> anyhow::Result<Self> {
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
+        let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
 
         let mass = 0.5;
         let rigid = RigidBody::cuboid(mass, HALF)?;
@@ -44,7 +47,7 @@ impl Scene {
         let bottom: Vec<_> = (-2..=2).flat_map(|i| row(f64::from(i))).collect();
         let area = 4.0 * HALF[0] * HALF[1];
         let sides = Cuboid { half_extents: HALF.into(), rounding: 2e-3 };
-        let pushed = Body::free("box", rigid).with_field(Arc::new(sides));
+        let pushed = Body::dynamic("box", rigid).with_field(Arc::new(sides));
         let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
 
         let rod = |name, length: f64| -> anyhow::Result<Link> {
@@ -65,7 +68,7 @@ impl Scene {
         let servos = [world.add_joint_force(arm[0], servo)?, world.add_joint_force(arm[1], servo)?];
 
         let normal = |penetration: f64, contact_area: f64| {
-            let target = StaticContactTarget { mass, gravity: 9.81, penetration, contact_area };
+            let target = ContactCalibration { mass, gravity: 9.81, penetration, contact_area };
             HuntCrossley::from_target(&target, 1.0, Bounce { restitution: 0.2, impact_speed: 0.1 })
         };
         for (samples, field, normal, friction) in [

@@ -7,9 +7,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::geometry::mjcf::Model;
 use prehend::geometry::robot::{KinematicTree, RobotShape};
 use prehend::sim::articulated::Joint;
-use prehend::sim::{
-    BodyId, JointForceId, LawError, MjcfOptions, PositionServo, UrdfOptions, World,
-};
+use prehend::sim::contact::LawError;
+use prehend::sim::joint_law::PositionServo;
+use prehend::sim::robot::{MjcfOptions, UrdfOptions};
+use prehend::sim::{BodyId, JointForceId, World};
 
 /// Two fingers that slide towards each other under a plate.
 const URDF: &str = r#"<robot name="slides">

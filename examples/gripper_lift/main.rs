@@ -10,10 +10,10 @@ mod hull;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Adaptive, Body, ContactBodies, Coulomb, Cuboid, DynContactLaw, GapSmoothing, HalfSpace,
-    KelvinVoigt, Law, RigidBody, SimulationError, State, StaticContactTarget, Step, Sticking,
-    TimeSteps, World,
+    Adaptive, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, DynContactLaw,
+    GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError, State, Step, TimeSteps, World,
 };
 
 use gripper::Gripper;
@@ -33,11 +33,11 @@ fn main() -> anyhow::Result<()> {
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let gripper = Gripper::add(&mut world)?;
     println!("{}", gripper.name);
-    let floor = Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor()));
+    let floor = Body::fixed("floor").with_field(Arc::new(HalfSpace::floor()));
     let floor = world.add(floor);
     let rigid = RigidBody::cuboid(MASS, HALF)?;
     let shape = Cuboid { half_extents: HALF.into(), rounding: 1e-3 };
-    let lifted = world.add(Body::free("box", rigid).with_cuboid(shape, 0.01)?);
+    let lifted = world.add(Body::dynamic("box", rigid).with_cuboid(shape, 0.01)?);
 
     let law: Arc<dyn DynContactLaw> = Arc::new(law()?);
     let smoothing = GapSmoothing::Softplus { width: 2e-5 };
@@ -93,10 +93,10 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Rubber pads: a side of the box sinks in by 0.1 mm under 20 N, and what sticks stays.
-fn law() -> anyhow::Result<Law<KelvinVoigt, Sticking<Coulomb>>> {
+fn law() -> anyhow::Result<Law<KelvinVoigt, BristleFriction<Coulomb>>> {
     let contact_area = 4.0 * HALF[0] * HALF[2];
-    let target = StaticContactTarget { mass: 2.0, gravity: 9.81, penetration: 1e-4, contact_area };
+    let target = ContactCalibration { mass: 2.0, gravity: 9.81, penetration: 1e-4, contact_area };
     let friction =
-        Sticking { friction: Coulomb { friction: 0.8, slip_scale: 1e-2 }, deflection: 1e-4 };
+        BristleFriction { friction: Coulomb { friction: 0.8, slip_scale: 1e-2 }, deflection: 1e-4 };
     Ok(Law::new(KelvinVoigt::from_target(&target, 0.3)?, friction)?)
 }

@@ -13,9 +13,12 @@ use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::geometry::hand::{allegro_xela_urdf, default_grasp};
 use prehend::geometry::robot::{KinematicTree, RobotShape};
+use prehend::sim::contact::Bounce;
+use prehend::sim::joint_law::PositionServo;
+use prehend::sim::robot::UrdfOptions;
 use prehend::sim::{
-    Body, BodyId, Bounce, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, Law,
-    PositionServo, RigidBody, State, StaticContactTarget, Surface, TimeSteps, UrdfOptions, World,
+    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing,
+    HuntCrossley, Law, RigidBody, State, Surface, TimeSteps, World,
 };
 
 /// The ball: radius \[m\], mass \[kg\], and how high over the base of the hand it starts \[m\].
@@ -49,7 +52,7 @@ fn main() -> anyhow::Result<()> {
     let ball = RigidBody::ball(MASS, RADIUS)?;
     let area = 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
     let surface = Surface::uniform(&sphere(600), area)?;
-    let id = world.add(Body::free("ball", ball).with_surface(surface));
+    let id = world.add(Body::dynamic("ball", ball).with_surface(surface));
     let law: Arc<dyn DynContactLaw> = Arc::new(rubber()?);
     for (link, shape) in links.iter().zip(shape.links()) {
         if shape.grid().is_some() {
@@ -119,7 +122,7 @@ fn sphere(count: usize) -> Vec<Point3<f64>> {
 /// A ball that sinks in by half a millimeter where it rests, and bounces with a third of its speed.
 fn rubber() -> anyhow::Result<Law<HuntCrossley, Coulomb>> {
     let target =
-        StaticContactTarget { mass: MASS, gravity: 9.81, penetration: 5e-4, contact_area: 1e-4 };
+        ContactCalibration { mass: MASS, gravity: 9.81, penetration: 5e-4, contact_area: 1e-4 };
     let bounce = Bounce { restitution: 0.3, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     Ok(Law::new(normal, Coulomb { friction: 0.6, slip_scale: 1e-2 })?)

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::Scalar;
+use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, GapSmoothing, HalfSpace, Integrator, Motion, RigidBody, SimulationError,
+    Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody, SimulationError,
     State, Surface, TimeSteps, World,
 };
 
@@ -46,10 +47,10 @@ pub(crate) fn path<S: Scalar>(
     let com = Point3::new(cx * size, cy * size, cz * size);
     let moments = Vector3::new(ix_to_z * iz, iy_to_z * iz, iz).map(|i| i.times(MASS) * size * size);
     let rigid = RigidBody::new(S::constant(MASS), Matrix3::from_diagonal(&moments), com)
-        .map_err(|error| SimulationError::Body { body: "cube".to_owned(), error })?;
-    let mut world = table((corner_radius * size).value())?.lift::<S>();
+        .map_err(|error| BuildError::Body { body: "cube".to_owned(), error })?;
+    let mut world = table((corner_radius * size).value())?.cast::<S>();
     world.gravity.z = -g * size;
-    world.bodies[1].motion = Motion::Free(rigid);
+    world.bodies[1].motion = Motion::Dynamic(rigid);
     // Four corners carry the cube at the depth.
     let stiffness = g.times(0.25 * MASS) * size / (depth * size).powf(n);
     let law = [stiffness, n, c, s * size, mu0, mu1, u1 * size, v0 * size, v1 * size, a, n1 * size];
@@ -87,7 +88,7 @@ fn lean<S: Scalar>(along: S, across: S, velocity: &Vector3<S>) -> Vector3<S> {
 
 /// A cube with round corners above the board.
 fn table(radius: f64) -> Result<World, SimulationError> {
-    let failed = |error| SimulationError::Body { body: "cube".to_owned(), error };
+    let failed = |error| BuildError::Body { body: "cube".to_owned(), error };
     let side = |bit: usize, i: usize| if i >> bit & 1 == 0 { radius - HALF } else { HALF - radius };
     let corners: Vec<Point3<f64>> =
         (0..8).map(|i| Point3::new(side(0, i), side(1, i), side(2, i))).collect();
@@ -96,8 +97,8 @@ fn table(radius: f64) -> Result<World, SimulationError> {
     let rigid =
         RigidBody::new(MASS, Matrix3::identity() * 1e-3, Point3::origin()).map_err(failed)?;
     let mut world = World::new(Vector3::zeros());
-    let field = world.add(Body::kinematic("board").with_field(Arc::new(HalfSpace::floor())));
-    let samples = world.add(Body::free("cube", rigid).with_surface(surface));
+    let field = world.add(Body::fixed("board").with_field(Arc::new(HalfSpace::floor())));
+    let samples = world.add(Body::dynamic("cube", rigid).with_surface(surface));
     let law = Arc::new(CubeLaw([0.0; 11]));
     world.add_contact(ContactBodies { samples, field }, law, GapSmoothing::Hard)?;
     Ok(world)

@@ -66,7 +66,7 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
 }
 
 fn in_contact(target: &Target<'_>, x: &[f64; COUNT]) -> Option<Part> {
-    Some(target.linearized(x, &CONTACT, &target.start.lift())?.part())
+    Some(target.linearized(x, &CONTACT, &target.start.cast())?.part())
 }
 
 /// Brings the coordinates `free` of `x` to where `targets` are explained best.
@@ -130,7 +130,7 @@ fn covariance<'a>(
     let flight = |target: &Target<'a>| Some((target.toss.id, in_flight(target, x)?));
     let contact = |target: &Target<'a>| {
         let by_flight = target.linearized(x, &FLIGHT, &target.start_by(x, &FLIGHT)?)?;
-        let by_contact = target.linearized(x, &CONTACT, &target.start.lift())?;
+        let by_contact = target.linearized(x, &CONTACT, &target.start.cast())?;
         let mut part = by_contact.part();
         part.matrix += by_contact.weight() * by_contact.slopes().tr_mul(by_flight.slopes());
         Some((target.toss.id, part))

@@ -67,7 +67,7 @@ pub(crate) fn begin(toss: &Toss, values: &[Fwd<LANES>; COUNT]) -> Option<Start<F
 /// A start by a little of everything: position \[mm\], attitude \[mrad\], velocity \[cm/s\] and spin \[0.1 rad/s\].
 pub(crate) fn moved<S: Scalar>(start: &Start, x: &[S]) -> Start<S> {
     let part = |k: usize, unit: f64| Vector3::from_fn(|i, _| x[3 * k + i].times(unit));
-    let mut moved = start.lift();
+    let mut moved = start.cast();
     moved.pose.translation.vector += part(0, 1e-3);
     moved.pose.rotation *= so3_exp(&part(1, 1e-3));
     moved.velocity += part(2, 1e-2);

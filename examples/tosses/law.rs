@@ -1,7 +1,7 @@
 //! A contact law made for the cube: every number of it may be identified.
 
 use prehend::autodiff::Scalar;
-use prehend::sim::{Contact, ContactLaw, Response};
+use prehend::sim::{ContactForce, ContactKinematics, ContactLaw};
 
 /// A normal force with hysteresis, N = k dⁿ (1 − c ḋ/√(ḋ² + s²)) for the depth d that falls at ḋ, so that restitution is the
 /// same at all speeds above s, and friction whose coefficient changes with slip u and falls with load:
@@ -19,10 +19,10 @@ impl ContactLaw for CubeLaw {
         &self.0
     }
 
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let depth = -contact.gap;
         if depth.value() <= 0.0 {
-            return Response::zero();
+            return ContactForce::zero();
         }
         let speed = contact.normal_speed;
         let damped = S::one() - p[2] * speed / (speed * speed + p[3] * p[3]).sqrt();
@@ -34,10 +34,10 @@ impl ContactLaw for CubeLaw {
         let slip_scale = p[7] + p[8] * load;
         let coefficient = grown * (S::one() - p[9] * load);
         let scale = -(coefficient * normal) / (slip2 + slip_scale * slip_scale).sqrt();
-        Response { normal, tangential: contact.slip * scale }
+        ContactForce { normal, tangential: contact.slip * scale }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

@@ -59,7 +59,7 @@ impl<S: Scalar> Start<S> {
 
 impl Start {
     /// Constants of another scalar.
-    pub(crate) fn lift<S: Scalar>(&self) -> Start<S> {
+    pub(crate) fn cast<S: Scalar>(&self) -> Start<S> {
         let [velocity, spin] = [self.velocity, self.spin].map(|v| v.map(S::constant));
         Start { pose: lift(&self.pose), velocity, spin }
     }

@@ -84,7 +84,7 @@ impl<'a> Target<'a> {
     ) -> Option<Start<Fwd<LANES>>> {
         match self.first {
             0 => flight::begin(self.toss, &parameters::seeded(x, free)),
-            _ => Some(self.start.lift()),
+            _ => Some(self.start.cast()),
         }
     }
 

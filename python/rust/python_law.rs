@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
-use prehend_sim::{Contact, ContactLaw, Response};
+use prehend_sim::{ContactForce, ContactKinematics, ContactLaw};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -43,7 +43,7 @@ pub(crate) struct PythonLaw {
     law: Py<PyAny>,
     names: Vec<&'static str>,
     values: Vec<f64>,
-    reach: f64,
+    cutoff: f64,
 }
 
 impl PythonLaw {
@@ -67,11 +67,11 @@ impl PythonLaw {
         if let Some(name) = given.keys().next() {
             return Err(wrong(format!("the law has no parameter '{name}'")));
         }
-        let reach = law.getattr_opt("reach")?.map_or(Ok(0.0), |reach| reach.extract())?;
+        let cutoff = law.getattr_opt("cutoff")?.map_or(Ok(0.0), |cutoff| cutoff.extract())?;
         let respond = law.py().import("prehend.laws")?.getattr("_respond")?.unbind();
         // Names of parameters live as long as the program; there are a few in each.
         let names = names.into_iter().map(|name| &*Box::leak(name.into_boxed_str())).collect();
-        Ok(Self { respond, law: law.clone().unbind(), names, values, reach })
+        Ok(Self { respond, law: law.clone().unbind(), names, values, cutoff })
     }
 
     /// The four numbers of a response, each with its derivatives by motion and parameters if asked for.
@@ -97,7 +97,7 @@ impl ContactLaw for PythonLaw {
         self.names.clone()
     }
 
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let mut inputs: Vec<S> = Vec::with_capacity(MOTION + p.len());
         inputs.extend([contact.gap, contact.normal_speed]);
         inputs.extend(contact.slip.iter().chain(contact.normal.iter()));
@@ -109,11 +109,11 @@ impl ContactLaw for PythonLaw {
                 LawFailure::keep(wrong(
                     "a contact law returns the force along the normal, and three components of that across it",
                 ));
-                return Response::nan();
+                return ContactForce::nan();
             }
             Err(error) => {
                 LawFailure::keep(error);
-                return Response::nan();
+                return ContactForce::nan();
             }
         };
         let [normal, x, y, z] = std::array::from_fn(|k| {
@@ -123,10 +123,10 @@ impl ContactLaw for PythonLaw {
                 sum + (*input - S::constant(input.value())).times(*slope)
             })
         });
-        Response { normal, tangential: Vector3::new(x, y, z) }
+        ContactForce { normal, tangential: Vector3::new(x, y, z) }
     }
 
-    fn reach(&self) -> f64 {
-        self.reach
+    fn cutoff(&self) -> f64 {
+        self.cutoff
     }
 }

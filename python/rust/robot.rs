@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::{KinematicTree, Motion};
-use prehend_sim::{BodyId, MjcfRobot};
+use prehend_sim::BodyId;
+use prehend_sim::robot::MjcfRobot;
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, in_order};

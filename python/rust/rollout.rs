@@ -23,7 +23,7 @@ pub(crate) const STATE: usize = 13;
 /// end alone, (rows, 13). `parameters` are as many as their names, those of the world if left out; `controls` are (steps, names).
 ///
 /// A row of states is position [m], unit quaternion (x, y, z, w), velocity [m/s] and angular velocity [rad/s] of the center of mass, world frame; of a link or
-/// a fixed body, of the origin of its frame. Rows are bodies, then joints and contacts that stick; those of links follow from their joints, whose columns
+/// a fixed body, of the origin of its frame. Rows are bodies, then joints and contacts with bristles; those of links follow from their joints, whose columns
 /// `World.joint_row` tells. With one more dimension in front, inputs are a batch: those without are the same for all, and worlds are simulated side by
 /// side on all cores.
 #[pyclass(frozen, module = "prehend")]
@@ -338,7 +338,7 @@ impl Rollout {
         self.function.time_steps().dt
     }
 
-    /// Rows of states: bodies, joints and contacts that stick.
+    /// Rows of states: bodies, joints and contacts with bristles.
     #[getter(rows)]
     fn number_of_rows(&self) -> usize {
         self.rows()

@@ -75,7 +75,7 @@ def test_a_servo_holds_a_two_link_arm():
     assert np.arctan2(turn[1], turn[0]) == pytest.approx(-0.3, abs=1e-2)
 
 
-def test_tendons_couple_joints_and_welds_close_loops():
+def test_tendons_couple_joints_and_bushings_close_loops():
     world = prehend.World(gravity=[0, 0, 0])
     inertia = 3 * [1e-2]
     links = [
@@ -90,7 +90,7 @@ def test_tendons_couple_joints_and_welds_close_loops():
     end = world.rollout(2.0, 1)(world.neutral_states(), end=True)
     angles = [world.joint(end, link)[0][0] for link in (left, right)]
     assert sum(angles) == pytest.approx(0.4, abs=1e-3) and angles[0] == pytest.approx(angles[1], abs=1e-6)
-    names = world.add_weld(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
+    names = world.add_bushing(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
     assert names["linear_stiffness"] == "left-right.linear_stiffness"
 
 

@@ -7,9 +7,10 @@ use std::time::Instant;
 
 use nalgebra::{DVector, Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    SemiImplicitEuler, State, Step, Surface, TimeSteps, World,
+    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler,
+    State, Step, Surface, TimeSteps, World,
 };
 
 /// Evaluations in a row, and how often; the fastest counts.
@@ -53,8 +54,8 @@ fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, 
     let ranges: Vec<_> = (0..tree.links().len()).map(|link| tree.range(link)).collect();
     let bodies = world.add_articulation(tree.links().to_vec())?;
     let mut states = world.neutral_states();
-    for (body, [coordinates, freedoms]) in bodies.iter().zip(ranges) {
-        world.set_joint(&mut states, *body, &q[coordinates], &v[freedoms])?;
+    for (body, [coordinates, dofs]) in bodies.iter().zip(ranges) {
+        world.set_joint(&mut states, *body, &q[coordinates], &v[dofs])?;
     }
     let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
     let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
@@ -63,7 +64,7 @@ fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, 
         world.bodies[bodies[end]].surface = Some(Arc::new(Surface::ball(0.03)?));
         let height = states[bodies[end]].pose.translation.z - 0.029;
         let field = HalfSpace { height, ..HalfSpace::floor() };
-        let floor = world.add(Body::kinematic("floor").with_field(Arc::new(field)));
+        let floor = world.add(Body::fixed("floor").with_field(Arc::new(field)));
         let bodies = ContactBodies { samples: bodies[end], field: floor };
         world.add_contact(bodies, law.clone(), GapSmoothing::Softplus { width: 1e-4 })?;
     }
@@ -86,7 +87,7 @@ fn time(name: &str, mut evaluate: impl FnMut()) {
 
 fn main() -> anyhow::Result<()> {
     for (name, tree) in [("7", tree(7, false)?), ("36", tree(30, true)?)] {
-        let n = tree.freedoms();
+        let n = tree.nv();
         let vector = |phase: f64| (0..n).map(|k| (k as f64 + phase).sin()).collect::<Vec<f64>>();
         let (q, v, tau) = (tree.moved(&tree.neutral(), &vector(0.3)), vector(0.7), vector(1.1));
         let of = |what: &str| format!("{what}, {name} degrees of freedom");
@@ -120,7 +121,7 @@ fn main() -> anyhow::Result<()> {
             black_box(world.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
         });
         time(&of("step with contacts and its Jacobian"), || {
-            black_box(world.linear_step(black_box(&states), step).is_ok());
+            black_box(world.linearize_step(black_box(&states), step).is_ok());
         });
     }
     Ok(())

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Recording, Scalar, Var};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Batch, Body, Bounce, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law,
-    RigidBody, SemiImplicitEuler, SimulationError, State, StaticContactTarget, Surface, TimeSteps,
-    World,
+    Batch, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 
 /// Balls of a world, each with a contact of its own.
@@ -22,16 +23,16 @@ const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-3, steps: 100 };
 /// Balls that slide and roll on a floor, one beside the other.
 fn balls() -> anyhow::Result<(World, Vec<State>)> {
     let mut world = World::new(Vector3::z() * -9.81);
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let mut states = vec![State::at_rest(Isometry3::identity())];
     let (rigid, surface) = (RigidBody::ball(MASS, RADIUS)?, Arc::new(Surface::ball(RADIUS)?));
     let contact_area = surface.area();
-    let target = StaticContactTarget { mass: MASS, gravity: 9.81, penetration: 1e-3, contact_area };
+    let target = ContactCalibration { mass: MASS, gravity: 9.81, penetration: 1e-3, contact_area };
     let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-1 })?);
     for i in 0..BALLS {
-        let ball = Body::free(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
+        let ball = Body::dynamic(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
         let samples = world.add(ball);
         let bodies = ContactBodies { samples, field };
         world.add_contact(bodies, law.clone(), GapSmoothing::Hard)?;
@@ -48,11 +49,11 @@ fn variant<S: Scalar>(
     index: usize,
     faster: &[S; BALLS],
 ) -> (World<S>, Vec<State<S>>) {
-    let mut states: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut states: Vec<State<S>> = states.iter().map(State::cast).collect();
     for (i, faster) in faster.iter().enumerate() {
         states[i + 1].linear.x = faster.plus(0.2 + 1e-4 * (index % 997) as f64 + 0.01 * i as f64);
     }
-    (world.lift(), states)
+    (world.cast(), states)
 }
 
 fn far<S: Scalar>(ends: &[Result<Vec<State<S>>, SimulationError>]) -> anyhow::Result<S> {

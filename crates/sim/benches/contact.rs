@@ -10,7 +10,8 @@ use std::time::Instant;
 
 use grasp::{Derivatives, FirstOrder, Grasp, loss, start, time_steps};
 use prehend_autodiff::{Fwd, Scalar, gradient};
-use prehend_sim::{GapSmoothing, LeakSteps, State, World};
+use prehend_sim::contact::LeakSteps;
+use prehend_sim::{GapSmoothing, State, World};
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();
@@ -58,9 +59,9 @@ fn value(world: &World, steps: usize) -> anyhow::Result<f64> {
 
 fn forward_mode(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
-    let states = [hand.lift(), ellipsoid.pose_variables()];
+    let states = [hand.cast(), ellipsoid.pose_variables()];
     let end = world
-        .lift::<Fwd<6>>()
+        .cast::<Fwd<6>>()
         .simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ())?
         .states;
     let Fwd { value, derivative } = loss(&end[1]);
@@ -74,8 +75,8 @@ fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
         |x| {
             let mut tangent = [Scalar::constant(0.0); 12];
             tangent[..6].copy_from_slice(x);
-            let states: [State<_>; 2] = [hand.lift(), ellipsoid.retract(&tangent)];
-            match world.lift().simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
+            let states: [State<_>; 2] = [hand.cast(), ellipsoid.retract(&tangent)];
+            match world.cast().simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
                 Ok(run) => loss(&run.states[1]),
                 Err(error) => {
                     failure = Some(error);

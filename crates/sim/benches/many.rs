@@ -9,10 +9,10 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{Ball, HalfSpace, HeightField};
 use parry3d_f64::utils::Array2;
 use prehend_autodiff::{Recording, Var};
+use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Bounce, ContactBodies, Coulomb, GapSmoothing, HuntCrossley,
-    Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State, StaticContactTarget, TimeSteps,
-    World,
+    BackwardEuler, Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State, TimeSteps, World,
 };
 
 /// Radius of the balls \[m\].
@@ -59,7 +59,7 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     }
     let mass = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3) * 1e3;
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 1e-3, contact_area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 1e-3, contact_area };
     let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 3e-2 })?);
@@ -111,7 +111,7 @@ fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
     let reverse = median(9, || {
         let recording = Recording::start();
         let start = with_velocities(&recording, states);
-        let end = world.lift().simulate_with(&integrator, &start, steps, |_, _| ())?.states;
+        let end = world.cast().simulate_with(&integrator, &start, steps, |_, _| ())?.states;
         Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
     })?;
     let [forward, reverse] = [forward, reverse].map(|time| 1e3 * time / steps.steps as f64);
@@ -124,7 +124,7 @@ fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
 
 /// `states` with all velocities of balls as variables.
 fn with_velocities(recording: &Recording, states: &[State]) -> Vec<State<Var>> {
-    let mut start: Vec<State<Var>> = states.iter().map(State::lift).collect();
+    let mut start: Vec<State<Var>> = states.iter().map(State::cast).collect();
     for state in &mut start[1..] {
         state.linear = state.linear.map(|v| recording.variable(v.value()));
         state.angular = state.angular.map(|v| recording.variable(v.value()));
@@ -182,7 +182,7 @@ fn main() -> anyhow::Result<()> {
         let reverse = median(runs, || {
             let recording = Recording::start();
             let start = with_velocities(&recording, &states);
-            let end = world.lift().simulate(&start, 2.0)?;
+            let end = world.cast().simulate(&start, 2.0)?;
             Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
         })?;
         println!("| {count} | {forward:.3} s | {reverse:.3} s | {:.1} |", reverse / forward);

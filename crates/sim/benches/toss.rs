@@ -7,10 +7,11 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Body, Bounce, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley,
-    Integrator, Law, RigidBody, SemiImplicitEuler, State, StaticContactTarget, Surface, TimeSteps,
-    World,
+    Adaptive, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
 /// Free fall, impact and slide \[s\].
@@ -26,10 +27,10 @@ fn cube() -> anyhow::Result<(World, [State; 2])> {
     let corners: Vec<Point3<f64>> =
         (0..8).map(|i| Point3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let samples =
-        world.add(Body::free("cube", rigid).with_surface(Surface::uniform(&corners, 8e-4)?));
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+        world.add(Body::dynamic("cube", rigid).with_surface(Surface::uniform(&corners, 8e-4)?));
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 })?;
@@ -50,9 +51,9 @@ fn end<const N: usize>(
 ) -> anyhow::Result<Fwd<N>> {
     let mut tangent = [Fwd::<N>::constant(0.0); 12];
     (0..N).for_each(|i| tangent[6 + i] = Fwd::variable(0.0, i));
-    let states = [start[0].lift(), start[1].retract(&tangent)];
+    let states = [start[0].cast(), start[1].retract(&tangent)];
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.lift().simulate_with(integrator, &states, time_steps, |_, _| ())?;
+    let run = world.cast().simulate_with(integrator, &states, time_steps, |_, _| ())?;
     Ok(run.states[1].pose.translation.x)
 }
 

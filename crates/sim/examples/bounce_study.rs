@@ -11,8 +11,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Integrator, Response,
+    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, Integrator,
     RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
@@ -45,12 +46,12 @@ impl ContactLaw for Power {
         &self.stiffness
     }
 
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let normal = p[0] * (-contact.gap).powf(S::constant(self.exponent));
-        Response { normal, tangential: Vector3::zeros() }
+        ContactForce { normal, tangential: Vector3::zeros() }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }
@@ -71,25 +72,25 @@ fn study(
     steps_per_contact: f64,
 ) -> Result<Errors, Box<dyn Error>> {
     let mut world = World::new(Vector3::zeros());
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
     let surface = Surface::new(&[Point3::origin()], &[1.0])?;
-    let point = world.add(Body::free("point", rigid).with_surface(surface));
+    let point = world.add(Body::dynamic("point", rigid).with_surface(surface));
     world.add_contact(
         ContactBodies { samples: point, field },
         Arc::new(Power::new(exponent)),
         smoothing,
     )?;
-    let world = world.lift::<Fwd<1>>();
+    let world = world.cast::<Fwd<1>>();
 
     let dt = std::f64::consts::PI * DEPTH / SPEED / steps_per_contact;
     let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
     let bounce = |phase: usize| {
         let height = 1.0 + SPEED * dt * phase as f64 / PHASES as f64;
-        let mut start = State::at_rest(Isometry3::identity()).lift::<Fwd<1>>();
+        let mut start = State::at_rest(Isometry3::identity()).cast::<Fwd<1>>();
         start.pose.translation.z = Fwd::variable(height, 0);
         start.linear.z = Fwd::constant(-SPEED);
-        let still = State::at_rest(Isometry3::identity()).lift();
+        let still = State::at_rest(Isometry3::identity()).cast();
         let end = world.simulate_with(integrator, &[still, start], time_steps, |_, _| ())?.states;
         let slope = end[point].pose.translation.z.derivative[0];
         Ok([(slope + 1.0).abs(), (end[point].linear.z.value - SPEED).abs()])

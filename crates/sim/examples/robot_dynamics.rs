@@ -15,7 +15,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use prehend_geometry::mjcf::{EqualityKind, Model, Transmission};
 use prehend_geometry::robot::{Drive, KinematicTree, Motion};
 use prehend_geometry::{Inertial, ReadOptions};
-use prehend_sim::{BodyId, MjcfOptions, MjcfRobot, State, UrdfOptions, World};
+use prehend_sim::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
+use prehend_sim::{BodyId, State, World};
 use serde_json::{Value, json};
 
 /// Degrees of freedom up to which mass matrices are printed.
@@ -163,18 +164,17 @@ impl Robot for Urdf {
     fn at(&self, state: &Value) -> anyhow::Result<Value> {
         let mut states = self.world.neutral_states();
         let own = &self.world.articulations[0];
-        let (n, mut order) = (own.tree.freedoms(), Vec::new());
+        let (n, mut order) = (own.tree.nv(), Vec::new());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
         for joint in self.tree.joints().iter().filter(|j| j.motion != Motion::Fixed) {
             let body = self.bodies[joint.child];
             let place = own.bodies().iter().position(|link| *link == body).context("no link")?;
-            let freedom = own.tree.range(place)[1].start;
+            let dof = own.tree.range(place)[1].start;
             for (to, key) in [(&mut q, "q"), (&mut v, "v"), (&mut a, "a")] {
-                to[freedom] =
-                    state[key][&joint.name].as_f64().context("a joint without a value")?;
+                to[dof] = state[key][&joint.name].as_f64().context("a joint without a value")?;
             }
-            order.push((joint.name.clone(), freedom));
-            self.world.set_joint(&mut states, body, &[q[freedom]], &[v[freedom]])?;
+            order.push((joint.name.clone(), dof));
+            self.world.set_joint(&mut states, body, &[q[dof]], &[v[dof]])?;
         }
         let at = own.tree.kinematics(&q, &v).under(self.world.gravity);
         let (mass, effort) = (at.mass_matrix(), at.inverse_dynamics(&a));

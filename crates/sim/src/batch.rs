@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Recompute, Scalar};
 
-use crate::adjoint::{Changes, Scene, StepCheckpointed};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::integrator::step_checkpointed::StepCheckpointed;
+use crate::integrator::world_template::{ParameterDelta, WorldTemplate};
+use crate::state::{STATE, State, coordinates_of, states_of};
 use crate::time::TimeSteps;
 use crate::world::World;
 
@@ -29,16 +29,16 @@ use crate::world::World;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// let id = world.add(Body::free("stone", stone));
+/// let id = world.add(Body::dynamic("stone", stone));
 /// let batch = Batch::new(&world)?;
 ///
 /// // By how much does the mean height of 100 throws change with gravity?
 /// let recording = Recording::start();
 /// let gravity = recording.variable(-9.81);
 /// let throws = (0..100).map(|i| {
-///     let mut lifted = world.lift();
+///     let mut lifted = world.cast();
 ///     lifted.gravity.z = gravity;
-///     let mut start = stone.at_rest(&Isometry3::identity()).lift();
+///     let mut start = stone.at_rest(&Isometry3::identity()).cast();
 ///     start.linear.z = Scalar::constant(0.1 * f64::from(i));
 ///     (lifted, vec![start])
 /// });
@@ -52,11 +52,11 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct Batch<I = Adaptive> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
 }
 
 impl Batch {
-    /// Of worlds like `world`, with [`Adaptive`] steps.
+    /// Batch of worlds like `world`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`Batch::with_integrator`].
@@ -66,7 +66,7 @@ impl Batch {
 }
 
 impl<I: Integrator + Send + 'static> Batch<I> {
-    /// Of worlds like `world`, with the steps of `integrator`.
+    /// Batch of worlds like `world`, with the steps of `integrator`.
     ///
     /// # Errors
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
@@ -74,10 +74,10 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         integrator: I,
         world: &World<S>,
     ) -> Result<Self, SimulationError> {
-        Ok(Self { scene: Scene::new(integrator, world)? })
+        Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
-    /// Where each of `variants`, a world and the states that it starts from, is after `time_steps`, as
+    /// States of each of `variants`, a world and the states that it starts from, after `time_steps`, as
     /// [`World::simulate_with`] finds it.
     ///
     /// Variants are taken one after the other, and only what they change is kept.
@@ -115,15 +115,16 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         time_steps: TimeSteps,
     ) -> Result<(Run<I>, Vec<S>), SimulationError> {
         world.check_trajectories()?;
-        if !self.scene.is_of(world) {
+        if !self.template.is_of(world) {
             return Err(SimulationError::AnotherWorld);
         }
         if S::ORDER > 0 {
-            self.scene.integrator.check_differentiable(world)?;
+            self.template.integrator.check_differentiable(world)?;
         }
-        let Changes { places, values } = self.scene.changes(world);
+        let ParameterDelta { places, values } = self.template.changes(world);
         let numbers = coordinates_of(states).chain(values).collect();
-        let run = Run { scene: Arc::clone(&self.scene), places, states: states.len(), time_steps };
+        let run =
+            Run { template: Arc::clone(&self.template), places, states: states.len(), time_steps };
         Ok((run, numbers))
     }
 }
@@ -133,9 +134,9 @@ const FEW: usize = 2000;
 
 /// A simulation as a function of the states' coordinates and of the world's parameters at `places`, to the states at its end.
 struct Run<I> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
     places: Box<[u32]>,
-    /// How many states it starts from.
+    /// Number of states that it starts from.
     states: usize,
     time_steps: TimeSteps,
 }
@@ -145,19 +146,20 @@ impl<I: Integrator + Send + 'static> Recompute for Run<I> {
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
         let (states, values) = x.split_at(STATE * self.states);
-        let world = self.scene.world(&self.places, values)?;
+        let world = self.template.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
         // Few steps are recorded as they are, of many one at a time.
         let TimeSteps { steps, .. } = self.time_steps;
         let few = steps == 1
-            || steps.saturating_mul(states.len()) <= FEW && !self.scene.integrator.controls_error();
+            || steps.saturating_mul(states.len()) <= FEW
+                && !self.template.integrator.controls_error();
         let end = match S::RECORDED && !few {
             true => {
-                let steps = StepCheckpointed::of(&self.scene);
+                let steps = StepCheckpointed::of(&self.template);
                 world.simulate_with(&steps, &states, self.time_steps, |_, _| ())
             }
             false => {
-                let integrator = &self.scene.integrator;
+                let integrator = &self.template.integrator;
                 world.simulate_with(integrator, &states, self.time_steps, |_, _| ())
             }
         };

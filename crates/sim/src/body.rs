@@ -74,7 +74,7 @@ impl<S: Scalar> RigidBody<S> {
         Self::new(mass, Matrix3::from_diagonal_element(moment), Point3::origin())
     }
 
-    /// The same body moved in its model frame: what was at the origin is at `motion`.
+    /// Body moved in its model frame: what was at the origin is at `motion`.
     #[must_use]
     pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let rotation = motion.rotation.to_rotation_matrix().into_inner().map(S::constant);
@@ -88,7 +88,7 @@ impl<S: Scalar> RigidBody<S> {
         }
     }
 
-    /// The same body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
+    /// Body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
     ///
     /// # Errors
     /// Unless the mass is positive and finite.
@@ -164,7 +164,7 @@ impl<S: Scalar> RigidBody<S> {
     /// Velocity of the center of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
     /// center of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
     #[inline]
-    pub(crate) fn kicked(
+    pub(crate) fn apply_impulse(
         &self,
         state: &State<S>,
         wrench: &Vector6<S>,
@@ -188,7 +188,7 @@ impl<S: Scalar> RigidBody<S> {
         t_world_com * Translation3::from(-self.com.coords)
     }
 
-    /// The same body, each number through `f`.
+    /// Body, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> RigidBody<T> {
         RigidBody {
             mass: f(self.mass),
@@ -205,8 +205,8 @@ impl<S: Scalar> RigidBody<S> {
 }
 
 impl RigidBody {
-    /// The same body in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
+    /// Body in constants of another scalar.
+    pub fn cast<S: Scalar>(&self) -> RigidBody<S> {
         self.map(S::constant)
     }
 }
@@ -266,7 +266,7 @@ mod tests {
     fn a_heavier_body_turns_as_slowly() {
         let body = RigidBody::new(2.0, Matrix3::identity() * 0.4, Point3::origin()).unwrap();
         let [mass] = Fwd::<1>::variables([3.0]);
-        let heavier = body.lift().with_mass(mass).unwrap();
+        let heavier = body.cast().with_mass(mass).unwrap();
         assert!((heavier.inertia()[(0, 0)].value - 0.6).abs() < 1e-15);
         assert!((heavier.inertia()[(0, 0)].derivative[0] - 0.2).abs() < 1e-15);
         assert_eq!(body.with_mass(0.0), Err(BodyError::Mass(0.0)));

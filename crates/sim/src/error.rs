@@ -1,22 +1,22 @@
-//! Why a simulation cannot be set up or cannot go on.
+//! Errors of building a world, and of simulating it.
 
 use thiserror::Error;
 
 use crate::articulated::ArticulationError;
 use crate::body::error::BodyError;
 use crate::contact::error::LawError;
+use crate::handle::BodyId;
 use crate::shape::error::ShapeError;
-use crate::world::body_id::BodyId;
 
-/// Why a simulation cannot be set up or cannot go on.
+/// Error of building or changing a world.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum SimulationError {
+pub enum BuildError {
     /// A body is not of this world.
     #[error("there is no body {body}: the world has {bodies}")]
     NoBody {
-        /// Which body.
+        /// The body.
         body: BodyId,
-        /// How many there are.
+        /// Number of bodies.
         bodies: usize,
     },
     /// A body that should touch others has no samples.
@@ -31,12 +31,6 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
-    /// Two bodies have no contact.
-    #[error("bodies '{}' and '{}' have no contact", .bodies[0], .bodies[1])]
-    NoContact {
-        /// Their names.
-        bodies: [String; 2],
-    },
     /// Lists of bodies of which no two can move against each other.
     #[error("no two of these bodies can move against each other")]
     NoContacts,
@@ -49,12 +43,6 @@ pub enum SimulationError {
     /// A parameter of a contact is out of its range.
     #[error(transparent)]
     Law(#[from] LawError),
-    /// A body that forces should move is kinematic or driven.
-    #[error("body '{body}' is not free to move")]
-    NotFree {
-        /// Its name.
-        body: String,
-    },
     /// Links are no articulation.
     #[error(transparent)]
     Articulation(#[from] ArticulationError),
@@ -71,7 +59,7 @@ pub enum SimulationError {
     NoAxis {
         /// Its name.
         link: String,
-        /// Which axis, from 0.
+        /// Index of the axis, from 0.
         axis: usize,
     },
     /// A force along joints of several articulations.
@@ -85,12 +73,75 @@ pub enum SimulationError {
     JointLaw {
         /// Its name.
         link: String,
-        /// What is wrong.
+        /// Cause.
         error: LawError,
     },
     /// A force along no joint.
     #[error("a force along joints needs an axis to act along")]
     NoAxes,
+    /// Parameters of a world that are too few or too many.
+    #[error("{given} parameters for a world of {expected}")]
+    Parameters {
+        /// Number given.
+        given: usize,
+        /// Number that it has.
+        expected: usize,
+    },
+    /// A body has an impossible mass, inertia or center of mass.
+    #[error("body '{body}': {error}")]
+    Body {
+        /// Its name.
+        body: String,
+        /// Cause.
+        error: BodyError,
+    },
+    /// A body has impossible dimensions.
+    #[error("body '{body}': {error}")]
+    Shape {
+        /// Its name.
+        body: String,
+        /// Cause.
+        error: ShapeError,
+    },
+    /// A robot, its shape and the trajectory of its joints do not belong together.
+    #[error("{found} {what} for a robot that has {expected}")]
+    Robot {
+        /// Name of what was counted.
+        what: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number that the robot has.
+        expected: usize,
+    },
+
+    /// A trajectory that carries derivatives, where only values of it would be kept.
+    #[error(
+        "body '{body}' is driven by a trajectory that carries derivatives: checkpoints and parameters in a row know its values \
+         only, so record the simulation as it is"
+    )]
+    TrajectoryDerivatives {
+        /// Its name.
+        body: String,
+    },
+    /// A stiffness or damping of a bushing is negative or not finite.
+    #[error(
+        "stiffness and damping of a bushing must be zero or positive, and finite, one is {value}"
+    )]
+    BushingStiffness {
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Error of a simulation.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SimulationError {
+    /// The world is none that can be simulated.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A parameter of a contact is out of its range.
+    #[error(transparent)]
+    Law(#[from] LawError),
     /// Coordinates and velocities of a joint that are too few or too many.
     #[error(
         "{} coordinates and {} velocities for the joint of link '{link}', which has {} and {}", .given[0], .given[1], .expected[0],
@@ -99,9 +150,9 @@ pub enum SimulationError {
     JointNumbers {
         /// Its name.
         link: String,
-        /// How many coordinates and velocities were given.
+        /// Numbers of coordinates and velocities given.
         given: [usize; 2],
-        /// How many it has.
+        /// Number that it has.
         expected: [usize; 2],
     },
     /// A rotation of a joint that is none.
@@ -120,46 +171,35 @@ pub enum SimulationError {
         /// Its name.
         integrator: &'static str,
     },
-    /// An integrator that knows no welds.
-    #[error("{integrator} knows nothing of welds")]
-    Welds {
+    /// An integrator that knows no bushings.
+    #[error("{integrator} knows nothing of bushings")]
+    Bushings {
         /// Its name.
         integrator: &'static str,
     },
-    /// A stability loss without a start to measure from.
-    #[error("no perturbation to measure stability with: rest is one")]
-    NoPerturbations,
     /// States and bodies differ in number.
     #[error(
-        "{states} states for {bodies} bodies, {joints} joints and {sticking} contacts that stick"
+        "{states} states for {bodies} bodies, {joints} joints and {bristles} contacts with bristles"
     )]
     States {
-        /// How many states.
+        /// Number of states.
         states: usize,
-        /// How many bodies.
+        /// Number of bodies.
         bodies: usize,
-        /// How many joints of articulations, whose states follow those of the bodies.
+        /// Number of joints of articulations, whose states follow those of the bodies.
         joints: usize,
-        /// How many contacts have a deflection, whose states come last.
-        sticking: usize,
+        /// Number of contacts with a deflection, whose states come last.
+        bristles: usize,
     },
     /// A number of an integrator is out of its range.
     #[error("{setting} must be {range}, is {value}")]
     Setting {
         /// Type and field.
         setting: &'static str,
-        /// What it may be.
+        /// Range that it has to be in.
         range: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-    },
-    /// Parameters of a world that are too few or too many.
-    #[error("{given} parameters for a world of {expected}")]
-    Parameters {
-        /// How many were given.
-        given: usize,
-        /// How many it has.
-        expected: usize,
     },
     /// A world has no parameter of that name, or it was named before.
     #[error("the world has no parameter called '{name}', or it was named twice: see its names")]
@@ -184,41 +224,16 @@ pub enum SimulationError {
     /// Inputs of a function of numbers that are too few or too many.
     #[error("{given} {what}: {expected} are expected")]
     Inputs {
-        /// What was given.
+        /// Name of what was given.
         what: &'static str,
-        /// How many were given.
+        /// Number given.
         given: usize,
-        /// How many it takes.
+        /// Number expected.
         expected: usize,
-    },
-    /// A body has an impossible mass, inertia or center of mass.
-    #[error("body '{body}': {error}")]
-    Body {
-        /// Its name.
-        body: String,
-        /// What is wrong.
-        error: BodyError,
-    },
-    /// A body has impossible dimensions.
-    #[error("body '{body}': {error}")]
-    Shape {
-        /// Its name.
-        body: String,
-        /// What is wrong.
-        error: ShapeError,
     },
     /// A world that differs in more than parameters from the one its integrator was made for.
     #[error("the integrator was made for a world of other bodies or contacts")]
     AnotherWorld,
-    /// A trajectory that carries derivatives, where only values of it would be kept.
-    #[error(
-        "body '{body}' is driven by a trajectory that carries derivatives: checkpoints and parameters in a row know its values \
-         only, so record the simulation as it is"
-    )]
-    TrajectoryDerivatives {
-        /// Its name.
-        body: String,
-    },
     /// The velocity of a trajectory is not the rate of its pose.
     #[error(
         "body '{body}' is driven by a trajectory whose velocity at {time} s is far from the rate of its pose, which what touches it \
@@ -247,7 +262,7 @@ pub enum SimulationError {
         /// Time \[s\].
         time: f64,
     },
-    /// Contacts have made energy. Not asked in a world where a body is driven, or kinematic and given a velocity.
+    /// Contacts have made energy. Not asked in a world where a body is kinematic, or fixed and given a velocity.
     #[error(
         "contacts have made {energy:.3e} J by {time} s, most of it in body '{body}'{}: a time step too long for them, or a \
          law that is not passive",
@@ -260,7 +275,7 @@ pub enum SimulationError {
         contact: Option<String>,
         /// When it was noticed \[s\].
         time: f64,
-        /// How much \[J\].
+        /// Amount \[J\].
         energy: f64,
     },
     /// Forces change so fast that no step is short enough.
@@ -281,7 +296,7 @@ pub enum SimulationError {
     /// A body was pressed past the middle of another, which would push it out on the other side.
     #[error(
         "body '{body}' passes through '{contact}' at {time} s: contacts too soft for such an impact or load (see \
-         StaticContactTarget::impact_depth)"
+         ContactCalibration::impact_depth)"
     )]
     PassedThrough {
         /// The body with the samples.
@@ -293,17 +308,17 @@ pub enum SimulationError {
     },
     /// A step had to be divided into too many parts.
     #[error(
-        "a step took more than {max_parts} parts by {time} s, body '{body}' accelerated most{}: contacts too stiff for so long a \
-         time, or `Adaptive::max_parts` too small",
+        "a step took more than {max_substeps} parts by {time} s, body '{body}' accelerated most{}: contacts too stiff for so long a \
+         time, or `Adaptive::max_substeps` too small",
         touching(contact)
     )]
-    TooManyParts {
+    TooManySubsteps {
         /// The body that is accelerated most.
         body: String,
         /// The body that presses hardest on it.
         contact: Option<String>,
         /// Parts that are allowed.
-        max_parts: usize,
+        max_substeps: usize,
         /// Time that they have led to \[s\].
         time: f64,
     },
@@ -358,16 +373,6 @@ pub enum SimulationError {
         needed: f64,
         /// Parts that are allowed.
         max_substeps: usize,
-    },
-    /// A robot, its shape and the trajectory of its joints do not belong together.
-    #[error("{found} {what} for a robot that has {expected}")]
-    Robot {
-        /// What was counted.
-        what: &'static str,
-        /// How many there were.
-        found: usize,
-        /// How many the robot has.
-        expected: usize,
     },
 }
 

@@ -12,7 +12,7 @@ use crate::surface::Surface;
 pub struct Placed<F> {
     /// The field.
     pub field: F,
-    /// Where it is \[m\].
+    /// Center \[m\].
     pub pose: Isometry3<f64>,
 }
 
@@ -129,7 +129,7 @@ pub struct Cuboid {
     pub rounding: f64,
 }
 
-/// How far from the edges samples begin, in multiples of the rounding. Where flat turns into round the curvature jumps: samples
+/// Distance from the edges at which samples begin, in multiples of the rounding. Where flat turns into round the curvature jumps: samples
 /// of a box that lies just there on an equal one would cross it with every tremor, and take twenty times as many steps.
 pub(crate) const INSET: f64 = 1.25;
 
@@ -149,7 +149,7 @@ impl Cuboid {
     }
 }
 
-/// How far a point is beyond the faces of a box around the origin.
+/// Excess of a point over the faces of a box around the origin.
 pub(crate) struct BeyondBox<T: Scalar> {
     beyond: Vector3<T>,
     outside: Vector3<T>,

@@ -5,7 +5,7 @@ use prehend_autodiff::{Fwd, Scalar};
 /// A function of `N` numbers at a place: its `M` results, and a row of derivatives for each.
 pub(crate) type Linearized<const N: usize, const M: usize> = ([f64; M], [[f64; N]; M]);
 
-/// What has been evaluated in forward mode at the values of its variables.
+/// Values and derivatives of a forward-mode evaluation at the values of its variables.
 pub(crate) fn linearized<const N: usize, const M: usize>(results: [Fwd<N>; M]) -> Linearized<N, M> {
     (results.map(|y| y.value), results.map(|y| y.derivative))
 }

@@ -9,10 +9,8 @@
 //! use std::sync::Arc;
 //!
 //! use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-//! use prehend_sim::{
-//!     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody, State,
-//!     Surface, World,
-//! };
+//! use prehend_sim::fields::HalfSpace;
+//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // 200 g; inertia in kg m², center of mass in m.
@@ -22,10 +20,10 @@
 //! let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //!
 //! let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! // Four feet of 1 cm² each.
 //! let surface = Surface::uniform(&feet, 4e-4)?;
-//! let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! // Pressure per depth [N/m³] and per speed [N s/m³]: the stool sinks in by half a millimeter.
 //! // What sticks creeps below 1 cm/s.
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
@@ -46,7 +44,7 @@
 //! ```
 //!
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same; of a link it is
+//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For fixed and kinematic bodies the two are the same; of a link it is
 //! the pose of its frame, wherever its center of mass is.
 //!
 //! Errors say in words what is wrong and where. A `main` that returns `anyhow::Result` prints them so; with
@@ -54,10 +52,10 @@
 //!
 //! [`World::simulate`] chooses its steps by the error of values and derivatives, whatever the stiffness of the contacts,
 //! and is an error where no step is short enough ([`Adaptive`](crate::Adaptive)). [`World::rollout`] gives the states in
-//! between too. Stiffness and damping from what you know of a contact: [`StaticContactTarget`](crate::StaticContactTarget).
+//! between too. Stiffness and damping from what you know of a contact: [`ContactCalibration`](crate::ContactCalibration).
 //!
 //! # Bodies on a trajectory
-//! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
+//! [`Body::kinematic`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
 //! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
 //! which its pose changes; one that forgets them is refused. Their derivatives are not checked: a pose by a variable speed with a
 //! constant velocity leads to wrong derivatives of all that it touches. It is looked at every millisecond at least, so motions should take
@@ -67,10 +65,10 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
-//! let table = world.add(Body::driven("table", |time: f64| {
+//! let table = world.add(Body::kinematic("table", |time: f64| {
 //!     let mut state = State::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
 //!     state.linear.x = 0.1; // What touches it feels this velocity.
 //!     state
@@ -81,13 +79,13 @@
 //!
 //! // By its speed: over numbers that carry derivatives, the same for all that it touches.
 //! let speed = Fwd::<1>::variable(0.1, 0);
-//! let mut lifted = world.lift();
-//! lifted.bodies[table].motion = Motion::Driven(Arc::new(move |time: f64| {
+//! let mut lifted = world.cast();
+//! lifted.bodies[table].motion = Motion::Kinematic(Arc::new(move |time: f64| {
 //!     let mut state = State::at_rest(Isometry3::identity());
 //!     (state.pose.translation.x, state.linear.x) = (speed.times(time), speed);
 //!     state
 //! }));
-//! let end = lifted.simulate(&start.map(|state| state.lift()), 0.5)?;
+//! let end = lifted.simulate(&start.map(|state| state.cast()), 0.5)?;
 //! assert!((end[table].pose.translation.x.derivative[0] - 0.5).abs() < 1e-12);
 //! # Ok(())
 //! # }
@@ -95,7 +93,7 @@
 //!
 //! # Contacts that hold
 //! Friction that knows only the slip of the moment lets everything creep, slowly, at a part of its slip scale. What has to stay
-//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). It costs
+//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`BristleFriction`](crate::BristleFriction)). It costs
 //! five to ten times as much with derivatives: what only slides or bounces is better off with [`Coulomb`](crate::Coulomb) alone, whose
 //! documentation says how to choose a slip scale. Springs hold what presses deeper than a thousandth of their deflection.
 //!
@@ -106,23 +104,23 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Vector3};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A slope of 6°.
 //! let mut world = World::new(Vector3::new(1.0, 0.0, -9.75));
-//! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! // Two boxes of 4 cm and 200 g with edges of 1 mm; samples 1 cm apart.
 //! let (half, mass) = (0.02, 0.2);
 //! let rigid = RigidBody::cuboid(mass, [half; 3])?;
 //! let shape = Cuboid { half_extents: Vector3::repeat(half), rounding: 1e-3 };
-//! let lower = world.add(Body::free("lower", rigid).with_cuboid(shape, 0.01)?);
-//! let upper = world.add(Body::free("upper", rigid).with_cuboid(shape, 0.01)?);
+//! let lower = world.add(Body::dynamic("lower", rigid).with_cuboid(shape, 0.01)?);
+//! let upper = world.add(Body::dynamic("upper", rigid).with_cuboid(shape, 0.01)?);
 //!
 //! // Both weigh on the floor: a face of the lower one sinks in by a tenth of a millimeter.
 //! let contact_area = 4.0 * half * half;
-//! let target = StaticContactTarget { mass: 2.0 * mass, gravity: 9.75, penetration: 1e-4, contact_area };
+//! let target = ContactCalibration { mass: 2.0 * mass, gravity: 9.75, penetration: 1e-4, contact_area };
 //! let normal = KelvinVoigt::from_target(&target, 0.3)?;
-//! let friction = Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
+//! let friction = BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 //! let law = Arc::new(Law::new(normal, friction)?);
 //! let smoothing = GapSmoothing::Softplus { width: 1e-5 };
 //! world.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
@@ -144,19 +142,19 @@
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
 //! felt, and faces where samples lie. Edges that cross are felt only at samples, too: their distances should be less than half of
 //! the smaller body's edges, or boxes turned against each other may fall through. Each direction is a contact of its own, whose
-//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both.
+//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both by their handle.
 //!
 //! ```
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let surface = Arc::new(Surface::uniform(&[Point3::origin()], 1e-4)?);
 //! # let mut world = World::new(Vector3::zeros());
 //! // Half-spaces, for brevity, the upper one upside down.
-//! let body = |name| Body::free(name, rigid).with_surface(surface.clone()).with_field(Arc::new(HalfSpace::floor()));
+//! let body = |name| Body::dynamic(name, rigid).with_surface(surface.clone()).with_field(Arc::new(HalfSpace::floor()));
 //! let (lower, upper) = (world.add(body("lower")), world.add(body("upper")));
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
@@ -173,7 +171,7 @@
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
 //! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)). Contacts
-//! that make energy are an error here as by default, but only while nothing is driven, or kinematic with a velocity.
+//! that make energy are an error here as by default, but only while no body is kinematic, or fixed with a velocity.
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
 //! every step, but for friction that sticks, and damps what is faster than it: with steps of a millisecond it simulates a stack at
 //! rest two to three times faster than the default; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
@@ -184,15 +182,15 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //! # let surface = Surface::uniform(&feet, 4e-4)?;
-//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! # let bodies = ContactBodies { samples: stool, field: floor };
@@ -213,40 +211,6 @@
 //! # }
 //! ```
 //!
-//! # Could it rest?
-//! [`World::equilibrium`] asks whether forces within friction cones could hold a body where it is, whatever the laws
-//! say, and how much friction that takes.
-//!
-//! ```
-//! # use std::sync::Arc;
-//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
-//! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
-//! # let surface = Surface::uniform(&feet, 4e-4)?;
-//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
-//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-//! # let bodies = ContactBodies { samples: stool, field: floor };
-//! # world.add_contact(bodies, law, GapSmoothing::Hard)?;
-//! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
-//! # let states = [State::at_rest(Isometry3::identity()), stands];
-//! // Friction coefficient 0.5; samples within 0.1 mm are in contact.
-//! assert!(world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
-//! // Or one for each body that it touches.
-//! let friction = |other: BodyId| if other == floor { 0.5 } else { 1.0 };
-//! assert!(world.equilibrium(stool, &states, friction, 1e-4)?.is_possible());
-//! world.bodies[stool].external_wrench.x = 2.0; // More than μ m g.
-//! assert!(!world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
-//! # Ok(())
-//! # }
-//! ```
-//!
 //! # A law of your own
 //! One function over the scalar, from gap and velocity to force ([`ContactLaw`](crate::ContactLaw)), along the axes of
 //! the body with the field. What it calls its parameters can carry derivatives:
@@ -255,7 +219,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! /// Pressure by the square of the depth, and a film whose drag grows with slip.
 //! struct Wet([f64; 2]);
 //!
@@ -263,29 +227,29 @@
 //!     fn params(&self) -> &[f64] {
 //!         &self.0
 //!     }
-//!     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+//!     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
 //!         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
-//!         Response { normal, tangential: contact.slip * -(p[1] * normal) }
+//!         ContactForce { normal, tangential: contact.slip * -(p[1] * normal) }
 //!     }
-//!     fn reach(&self) -> f64 {
+//!     fn cutoff(&self) -> f64 {
 //!         0.0
 //!     }
 //! }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 1e-4)?;
-//! # let puck = world.add(Body::free("puck", rigid).with_surface(surface));
+//! # let puck = world.add(Body::dynamic("puck", rigid).with_surface(surface));
 //! # let below = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
 //! # let mut start = vec![State::at_rest(Isometry3::identity()), below];
 //! # start[puck].linear.x = 0.3;
 //!
 //! let bodies = ContactBodies { samples: puck, field: floor };
 //! world.add_contact(bodies, Arc::new(Wet([1.962e10, 0.5])), GapSmoothing::Hard)?;
-//! let mut lifted = world.lift::<Fwd<1>>();
+//! let mut lifted = world.cast::<Fwd<1>>();
 //! lifted.contacts[0].params_mut()[1].derivative = [1.0]; // Of the only contact.
-//! let start: Vec<_> = start.iter().map(State::lift).collect();
+//! let start: Vec<_> = start.iter().map(State::cast).collect();
 //! let end = lifted.simulate(&start, 0.2)?;
 //! // v = v₀ exp(−c g t), by c:
 //! let speed = end[puck].linear.x;
@@ -297,7 +261,7 @@
 //! The example `custom_contact_law` does this at length, and what follows.
 //!
 //! # Gradients, forward
-//! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may
+//! Write what you want to know once over the scalar: [`World::cast`] makes constants of a world, and any of its numbers may
 //! then be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass, an
 //! inertia or a center of mass is replaced together with its body: [`RigidBody::new`]. All of them in a row:
 //! [`World::parameters`]. Where the model's pose is given, a center of mass is in the start, too: [`RigidBody::at_rest`].
@@ -311,7 +275,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let ball = world.add(Body::free("ball", rigid));
+//! # let ball = world.add(Body::dynamic("ball", rigid));
 //! # world.bodies[ball].external_wrench.z = 1.0;
 //! # let start = [rigid.at_rest(&Isometry3::identity())];
 //! // Height after a while, by the speed at the start and the mass.
@@ -320,12 +284,12 @@
 //!     start: &[State],
 //!     [speed, mass]: [S; 2],
 //! ) -> Result<S, SimulationError> {
-//!     let mut world = world.lift::<S>();
-//!     if let Motion::Free(body) = &mut world.bodies[0].motion {
+//!     let mut world = world.cast::<S>();
+//!     if let Motion::Dynamic(body) = &mut world.bodies[0].motion {
 //!         *body = RigidBody::new(mass, *body.inertia(), *body.com())
-//!             .map_err(|error| SimulationError::Body { body: "ball".to_owned(), error })?;
+//!             .map_err(|error| BuildError::Body { body: "ball".to_owned(), error })?;
 //!     }
-//!     let mut start: Vec<State<S>> = start.iter().map(State::lift).collect();
+//!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
 //!     start[0].linear.z = speed;
 //!     Ok(world.simulate(&start, 0.1)?[0].pose.translation.z)
 //! }
@@ -344,8 +308,7 @@
 //!
 //! A rollout over [`Var`](prehend_autodiff::Var) records every operation. [`StepCheckpointed`](crate::StepCheckpointed),
 //! around any integrator, keeps a few hundred bytes a step instead; steps of [`Adaptive`](crate::Adaptive) are those of the
-//! rollout, not its parts, so give it many. For rollouts too long even for that, [`World::simulate_checkpointed`] is one
-//! node that holds as many states as you allow.
+//! rollout, not its parts, so give it many. For rollouts too long even for that, [`RolloutFunction`](crate::RolloutFunction) keeps the states alone.
 //!
 //! # Identification
 //! What a world is made of, from what was seen of it: parameters have names, and least squares take residuals over the scalar as they
@@ -359,36 +322,36 @@
 //! # use nalgebra::{Isometry3, Vector3};
 //! use prehend_autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 //! use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let rigid = RigidBody::cuboid(0.2, [0.02; 3])?;
-//! # let block = Body::free("block", rigid).with_surface(Surface::cuboid([0.02; 3], 0.02)?);
+//! # let block = Body::dynamic("block", rigid).with_surface(Surface::cuboid([0.02; 3], 0.02)?);
 //! # let block = world.add(block);
 //! # let bodies = ContactBodies { samples: block, field: floor };
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
-//! # world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
+//! let contact = world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
 //! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
 //! # let start = [State::at_rest(Isometry3::identity()), stands];
 //! // Where a block is every 20 ms, by its friction and its speed at the start.
 //! fn places<S: Scalar>(
 //!     world: &World,
 //!     start: &[State],
-//!     [block, floor]: [BodyId; 2],
+//!     (block, contact): (BodyId, ContactId),
 //!     [friction, speed]: [S; 2],
 //! ) -> Result<Vec<S>, SimulationError> {
-//!     let mut world = world.lift::<S>();
-//!     world.set_contact_param(block, floor, "friction", friction)?;
-//!     let mut start: Vec<State<S>> = start.iter().map(State::lift).collect();
+//!     let mut world = world.cast::<S>();
+//!     world.set_contact_param(contact, "friction", friction)?;
+//!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
 //!     start[block].linear.x = speed;
 //!     let run = world.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
 //!     Ok(run.iter().map(|states| states[block].pose.translation.x).collect())
 //! }
 //!
-//! let seen = places(&world, &start, [block, floor], [0.35, 0.6])?;
-//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, [block, floor], [x[0], x[1]]) {
+//! let seen = places(&world, &start, (block, contact), [0.35, 0.6])?;
+//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, (block, contact), [x[0], x[1]]) {
 //!     Ok(places) => places.iter().zip(&seen).map(|(place, seen)| place.plus(-seen)).collect(),
 //!     Err(_) => vec![Fwd::constant(f64::NAN); seen.len()],
 //! };
@@ -410,14 +373,14 @@
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! # use prehend_autodiff::{Recording, Var};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let ball = world.add(Body::free("ball", rigid));
+//! # let ball = world.add(Body::dynamic("ball", rigid));
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
-//! let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+//! let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).cast()];
 //! let mut loss = Var::from(0.0);
 //! let control = |step: Step, world: &mut World<Var>, states: &mut [State<Var>]| {
 //!     if step.start >= 0.1 {
@@ -426,7 +389,7 @@
 //!     loss += states[ball].pose.translation.vector.norm_squared();
 //! };
 //! let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
-//! world.lift().simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+//! world.cast().simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
 //! // A stiffer spring brings it back sooner.
 //! assert!(recording.gradient(loss).wrt(gain) < 0.0);
 //! # Ok(())
@@ -440,22 +403,22 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
-//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! let smoothing = GapSmoothing::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
 //! world.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
 //! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 1e-3));
 //! # let states = [State::at_rest(Isometry3::identity()), above];
-//! let mut lifted: Vec<State<Fwd<1>>> = states.iter().map(State::lift).collect();
+//! let mut lifted: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
 //! lifted[stool].pose.translation.z.derivative = [1.0];
-//! let force = world.lift().wrenches(&lifted, 0)[stool].z;
+//! let force = world.cast().wrenches(&lifted, 0)[stool].z;
 //! assert!(force.value == 0.0 && force.derivative[0] < 0.0);
 //! # Ok(())
 //! # }
@@ -467,13 +430,13 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::*;
+//! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
-//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! # let bodies = ContactBodies { samples: stool, field: floor };

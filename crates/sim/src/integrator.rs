@@ -1,11 +1,12 @@
-//! How states advance in time.
+//! Integrators: schemes that advance states in time.
 
 pub(crate) mod adaptive;
 pub(crate) mod backward_euler;
 pub(crate) mod runge_kutta;
 pub(crate) mod semi_implicit;
+pub(crate) mod step_checkpointed;
 pub(crate) mod sub_stepped;
-pub(crate) mod velocity_verlet;
+pub(crate) mod world_template;
 
 use prehend_autodiff::Scalar;
 
@@ -41,7 +42,7 @@ use crate::world::World;
 /// ```
 pub trait Integrator: Sync {
     /// The states of all bodies one time step later. Bodies that forces do not move are left to
-    /// [`World::drive`], which follows every step.
+    /// [`World::update_kinematics`], which follows every step.
     ///
     /// # Errors
     /// If the scheme solves equations and they were not solved.
@@ -60,18 +61,18 @@ pub trait Integrator: Sync {
         1.0
     }
 
-    /// Whether a step evaluates forces once, at its start. Then samples that are out of reach there may be left out.
+    /// True if a step evaluates forces once, at its start. Then samples that are out of reach there may be left out.
     fn evaluates_forces_once(&self) -> bool {
         false
     }
 
-    /// Whether it looks for the contacts of [`World::contact_groups`] itself. Others are given a world in which those that may
+    /// True if it looks for the contacts of [`World::contact_groups`] itself. Others are given a world in which those that may
     /// touch within the step are [`contacts`](World::contacts).
     fn finds_contacts(&self) -> bool {
         false
     }
 
-    /// Whether derivatives of its steps in `world` are those of the motion. What takes steps by values first asks here.
+    /// Checks that derivatives of its steps in `world` are those of the motion. What takes steps by values first asks here.
     ///
     /// # Errors
     /// If they are not.
@@ -79,7 +80,7 @@ pub trait Integrator: Sync {
         Ok(())
     }
 
-    /// Whether the scheme holds its error itself, whatever the step.
+    /// True if the scheme holds its error itself, whatever the step.
     fn controls_error(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! What acts along a joint: springs, dampers, friction, limits, motors and servos, one a file.
+//! Laws along a joint: springs, dampers, friction, limits, motors and servos, one a file.
 
 pub(crate) mod activation;
 pub(crate) mod affine_actuator;
@@ -16,6 +16,20 @@ pub(crate) mod spring;
 mod tests;
 pub(crate) mod velocity_servo;
 
+pub use self::activation::Activation;
+pub use self::affine_actuator::AffineActuator;
+pub use self::damper::JointDamper;
+pub use self::dynamic::DynJointLaw;
+pub use self::friction::JointFriction;
+pub use self::limits::JointLimits;
+pub use self::motor::Motor;
+pub use self::polynomial::{PolynomialDamper, PolynomialSpring};
+pub use self::position_servo::PositionServo;
+pub use self::registry::{JointLawEntry, joint_laws};
+pub use self::slack_spring::SlackSpring;
+pub use self::spring::JointSpring;
+pub use self::velocity_servo::VelocityServo;
+
 use prehend_autodiff::Scalar;
 
 use crate::contact::error::LawError;
@@ -26,7 +40,8 @@ use crate::contact::parameters::Parameters;
 ///
 /// ```
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{JointLaw, Parameters};
+/// use prehend_sim::contact::Parameters;
+/// use prehend_sim::joint_law::JointLaw;
 ///
 /// /// A spring that hardens with the cube of its deflection.
 /// struct Hardening {
@@ -58,13 +73,13 @@ pub trait JointLaw: Parameters + 'static {
     /// The effort \[N m or N\] at a position \[rad or m\] and velocity, with parameters `p`.
     fn effort<S: Scalar>(&self, p: Self::Params<S>, position: S, velocity: S) -> S;
 
-    /// Whether it takes energy or stores it, but brings none: a simulation in which all do checks that none appears.
+    /// True if it takes energy or stores it, but brings none: a simulation in which all do checks that none appears.
     fn is_passive(&self) -> bool {
         false
     }
 }
 
-/// Whether the ends of a range, the parameters `lower` and `upper`, are in order.
+/// Checks that the ends of a range, the parameters `lower` and `upper`, are in order.
 fn in_order(lower: f64, upper: f64) -> Result<(), LawError> {
     let (name, range) = ("upper", "no less than lower");
     if lower <= upper { Ok(()) } else { Err(LawError::Range { name, range, value: upper }) }

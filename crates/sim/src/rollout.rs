@@ -3,29 +3,31 @@
 use std::ops::ControlFlow;
 
 use prehend_autodiff::Scalar;
+use thiserror::Error;
 
-use crate::audit::{Audit, Resolution};
-use crate::broad_phase::BroadPhase;
+use crate::diagnostics::{Diagnostics, Resolution};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
+use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
+use crate::world::sample_culling::SampleCulling;
 
-/// What a simulation with an integrator of one's own choice led to.
+/// Result of a simulation with an integrator of one's own choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation<T> {
     /// The states: those at the end, or of every step.
     pub states: T,
-    /// Whether the steps were short enough.
+    /// Report on whether the steps were short enough.
     pub resolution: Resolution,
 }
 
-/// What a controller may return: nothing, whether to go on, or a result of either, whose error ends the simulation.
+/// Result of a controller: nothing, whether to go on, or a result of either, whose error ends the simulation.
 pub trait ControlResult {
-    /// Whether the simulation goes on.
+    /// Decision whether the simulation goes on.
     ///
     /// # Errors
     /// If the controller failed.
@@ -50,11 +52,41 @@ impl<C: ControlResult, E: Into<SimulationError>> ControlResult for Result<C, E> 
     }
 }
 
-impl<S: Scalar> World<S> {
-    /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
+/// Error of a time step too long for the stiffness or damping of the contacts.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("time step {dt} s is too long for these contacts: at most {limit} s")]
+pub struct StepError {
+    /// The time step \[s\].
+    pub dt: f64,
+    /// The longest step that passes \[s\].
+    pub limit: f64,
+}
+
+impl World {
+    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`: dt·ω ≤
+    /// [`Integrator::stability_limit`] for their [`World::contact_frequency`] ω. Impacts to come are not among them.
     ///
-    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts that stick
-    /// ([`Bristles`](crate::Bristles)), if there are such. What goes on
+    /// # Errors
+    /// With the longest step that passes.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies.
+    pub fn check_time_step(
+        &self,
+        integrator: &impl Integrator,
+        states: &[State],
+        dt: f64,
+    ) -> Result<(), StepError> {
+        let limit = integrator.stability_limit() / self.contact_frequency(states);
+        if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The states of all bodies after `time` \[s\], from `initial`; kinematic bodies start where their trajectory does.
+    ///
+    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts with bristles
+    /// ([`Bristles`](crate::contact::Bristles)), if there are such. What goes on
     /// from there remembers them; with the states of the bodies alone it starts without deflection.
     ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
@@ -89,7 +121,7 @@ impl<S: Scalar> World<S> {
     /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
     /// motion.
     ///
-    /// Contacts that make energy are an error unless a body is driven or moves as it is told: such a body may bring energy
+    /// Contacts that make energy are an error unless a body is kinematic, or fixed and moving: such a body may bring energy
     /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
     ///
     /// # Errors
@@ -102,23 +134,23 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
         visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        self.audited(integrator, self.begin(initial, time_steps)?, time_steps, visit)
+        self.run_checked(integrator, self.initialize(initial, time_steps)?, time_steps, visit)
     }
 
     /// [`World::simulate_with`] of what has begun.
-    pub(crate) fn audited(
+    pub(crate) fn run_checked(
         &self,
         integrator: &impl Integrator,
         initial: Vec<State<S>>,
         time_steps: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        let mut audit = Audit::new(self, &initial, integrator.controls_error());
-        let states = self.march(integrator, initial, time_steps, |step, states| {
+        let mut diagnostics = Diagnostics::new(self, &initial, integrator.controls_error());
+        let states = self.run_steps(integrator, initial, time_steps, |step, states| {
             visit(step, states);
-            audit.step(step, states)
+            diagnostics.step(step, states)
         })?;
-        let resolution = audit.finish(time_steps, &states)?;
+        let resolution = diagnostics.finish(time_steps, &states)?;
         Ok(Simulation { states, resolution })
     }
 
@@ -132,16 +164,17 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
-        let initial = self.begin(initial, time_steps)?;
+        let initial = self.initialize(initial, time_steps)?;
         let mut states = room_for(time_steps.steps)?;
         states.push(initial.clone());
         let keep = |_, next: &[State<S>]| states.push(next.to_vec());
-        let Simulation { resolution, .. } = self.audited(integrator, initial, time_steps, keep)?;
+        let Simulation { resolution, .. } =
+            self.run_checked(integrator, initial, time_steps, keep)?;
         Ok(Simulation { states, resolution })
     }
 
     /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
-    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of kinematic bodies, for
+    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of fixed bodies, for
     /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
     /// either, whose error ends it, too.
     ///
@@ -152,19 +185,19 @@ impl<S: Scalar> World<S> {
     /// ```
     /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
     /// # use prehend_autodiff::Fwd;
-    /// # use prehend_sim::*;
+    /// # use prehend_sim::prelude::*;
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::zeros());
     /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-    /// # let ball = world.add(Body::free("ball", rigid));
-    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+    /// # let ball = world.add(Body::dynamic("ball", rigid));
+    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).cast()];
     /// // A spring of 2 N/m pulls the ball back; how far, by its stiffness?
     /// let stiffness = Fwd::<1>::variable(2.0, 0);
     /// let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
     /// let control = |_, world: &mut World<_>, states: &mut [State<_>]| {
     ///     world.bodies[ball].external_wrench.x = -stiffness * states[ball].pose.translation.x;
     /// };
-    /// let lifted = world.lift();
+    /// let lifted = world.cast();
     /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
     /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
     /// # Ok(())
@@ -209,7 +242,7 @@ impl<S: Scalar> World<S> {
         mut control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
         mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let (mut states, mut world) = (self.begin(initial, time_steps)?, self.clone());
+        let (mut states, mut world) = (self.initialize(initial, time_steps)?, self.clone());
         let TimeSteps { dt, steps } = time_steps;
         for index in 0..steps {
             let step = Step::new(index, dt);
@@ -224,14 +257,14 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::simulate_with`] of what has begun, without the report; an error of `visit` ends it.
-    pub(crate) fn march(
+    pub(crate) fn run_steps(
         &self,
         integrator: &impl Integrator,
         mut states: Vec<State<S>>,
         TimeSteps { dt, steps }: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]) -> Result<(), SimulationError>,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut near = BroadPhase::new(self);
+        let mut near = SampleCulling::new(self);
         for index in 0..steps {
             let step = Step::new(index, dt);
             let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
@@ -242,7 +275,7 @@ impl<S: Scalar> World<S> {
         Ok(states)
     }
 
-    /// One step: the integrator's, then that of driven bodies.
+    /// One step: the integrator's, then that of kinematic bodies.
     ///
     /// # Errors
     /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
@@ -254,7 +287,7 @@ impl<S: Scalar> World<S> {
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut states = self.with_deflections(states);
         self.check(&states, step)?;
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         self.advance(integrator, &states, step)
     }
 
@@ -265,21 +298,21 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let next = self.stepped(integrator, states, step)?;
-        self.arrived(states, next, step.end())
+        let next = self.integrate(integrator, states, step)?;
+        self.finish_step(states, next, step.end())
     }
 
-    /// `next` at `time` \[s\], with driven bodies and links where they are then, after a step from `states`.
+    /// `next` at `time` \[s\], with kinematic bodies and links where they are then, after a step from `states`.
     ///
     /// # Errors
     /// If one is not finite.
-    pub(crate) fn arrived(
+    pub(crate) fn finish_step(
         &self,
         states: &[State<S>],
         mut next: Vec<State<S>>,
         time: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.drive(&mut next, time);
+        self.update_kinematics(&mut next, time);
         match next.iter().all(State::is_finite) {
             true => Ok(next),
             false => Err(self.not_finite(states, &next, time)),
@@ -287,7 +320,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The integrator's step, among the contacts of groups that may touch within it.
-    pub(crate) fn stepped(
+    pub(crate) fn integrate(
         &self,
         integrator: &impl Integrator,
         states: &[State<S>],
@@ -296,15 +329,15 @@ impl<S: Scalar> World<S> {
         if self.contact_groups.is_empty() || integrator.finds_contacts() {
             return integrator.step(self, states, step);
         }
-        let near = self.with_neighbors(states, step);
+        let near = self.with_candidates(states, step);
         integrator.step(&near, states, step)
     }
 
-    /// The states from which a rollout begins: `initial` with driven bodies where their trajectories start.
+    /// The states from which a rollout begins: `initial` with kinematic bodies where their trajectories start.
     ///
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
-    pub(crate) fn begin(
+    pub(crate) fn initialize(
         &self,
         initial: &[State<S>],
         TimeSteps { dt, steps }: TimeSteps,
@@ -312,11 +345,11 @@ impl<S: Scalar> World<S> {
         let mut states = self.with_deflections(initial);
         self.check(&states, Step::new(0, dt))?;
         self.check_velocities(dt * steps as f64)?;
-        self.drive(&mut states, 0.0);
+        self.update_kinematics(&mut states, 0.0);
         Ok(states)
     }
 
-    /// Whether a rollout may begin.
+    /// Checks that a rollout may begin.
     pub(crate) fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
@@ -325,9 +358,9 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        self.kinds_of_contact().try_for_each(ContactPair::check)?;
+        self.contact_materials().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
-        self.check_welds()?;
+        self.bushings.iter().try_for_each(Bushing::check)?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),
@@ -352,8 +385,9 @@ mod tests {
     use prehend_autodiff::Fwd;
 
     use super::*;
+    use crate::contact::{LawError, LawRegistry};
     use crate::scenes::{bowl, egg_on};
-    use crate::{GapSmoothing, LawError, LawRegistry, Motion, SemiImplicitEuler};
+    use crate::{GapSmoothing, Motion, SemiImplicitEuler};
 
     #[test]
     fn parameters_out_of_range_and_missing_states_are_refused() {
@@ -363,7 +397,7 @@ mod tests {
         };
         assert_eq!(
             step(&world, &states[..1], 1e-3),
-            SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 }
+            SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 }
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
@@ -398,9 +432,9 @@ mod tests {
                 assert!(
                     matches!(&refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
                 );
-                let mut lifted = world.lift::<Fwd<1>>();
+                let mut lifted = world.cast::<Fwd<1>>();
                 lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);
-                let states: Vec<_> = states.iter().map(State::lift).collect();
+                let states: Vec<_> = states.iter().map(State::cast).collect();
                 assert_eq!(lifted.step(&SemiImplicitEuler, &states, step).unwrap_err(), refused);
             }
         }
@@ -413,7 +447,7 @@ mod tests {
             linear: Vector3::z(),
             ..State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
         };
-        world.bodies[0].motion = Motion::Driven(Arc::new(rising));
+        world.bodies[0].motion = Motion::Kinematic(Arc::new(rising));
         let run = world
             .rollout_with(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 })
             .unwrap()
@@ -454,7 +488,7 @@ mod tests {
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();
-        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 });
+        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 });
         let mut lost = states.clone();
         lost[1].linear = Vector3::repeat(f64::NAN);
         let error = roll(&lost, 1e-3).unwrap_err();

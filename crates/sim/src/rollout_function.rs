@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
-use crate::adjoint::Scene;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::integrator::world_template::WorldTemplate;
+use crate::state::{STATE, State, coordinates_of, states_of};
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 
@@ -18,7 +17,7 @@ use crate::world::World;
 /// [parameters](World::parameters), and of others that a controller sets before each step.
 ///
 /// A state is a row of 13 numbers: position x, y, z \[m\], unit quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
-/// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts that stick, as in
+/// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts with bristles, as in
 /// [`World::neutral_states`]. The rows of links follow from those of joints.
 ///
 /// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
@@ -28,7 +27,7 @@ use crate::world::World;
 /// use prehend_sim::{Body, RigidBody, RolloutFunction, RolloutInputs, TimeSteps, World};
 ///
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", RigidBody::ball(1.0, 0.05)?));
+/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
 /// let time_steps = TimeSteps { dt: 0.1, steps: 5 };
 /// // By gravity, and by a push that changes from step to step.
 /// let throw = RolloutFunction::new(&world, time_steps, &["gravity.z"], &["stone.force_x"])?;
@@ -47,17 +46,17 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct RolloutFunction<I = Adaptive> {
-    scene: Arc<Scene<I>>,
+    template: Arc<WorldTemplate<I>>,
     time_steps: TimeSteps,
     /// Places of the parameters among all, then of the controls.
     places: Box<[u32]>,
     parameters: usize,
 }
 
-/// How far the length of a quaternion may be from 1: differences are taken about unit ones.
+/// Largest deviation of a quaternion's length from 1: differences are taken about unit ones.
 const UNIT: f64 = 1e-3;
 
-/// What a [`RolloutFunction`] is a function of.
+/// Inputs of a [`RolloutFunction`].
 #[derive(Clone, Copy, Debug)]
 pub struct RolloutInputs<'a, S: Scalar = f64> {
     /// The initial states, those of bodies or all, 13 numbers each.
@@ -80,7 +79,7 @@ pub struct RolloutGradient {
 }
 
 impl RolloutFunction {
-    /// Of `world`, with [`Adaptive`] steps.
+    /// Function of `world`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`RolloutFunction::with_integrator`].
@@ -95,7 +94,7 @@ impl RolloutFunction {
 }
 
 impl<I: Integrator> RolloutFunction<I> {
-    /// Of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
+    /// Function of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
     ///
     /// # Errors
     /// If there is no such parameter or one is named twice, there is no step or its time is not positive.
@@ -119,13 +118,13 @@ impl<I: Integrator> RolloutFunction<I> {
         if time_steps.steps == 0 {
             return Err(SimulationError::Inputs { what: "steps", given: 0, expected: 1 });
         }
-        let scene = Scene::new(integrator, world)?;
-        Ok(Self { scene, time_steps, places: places.into(), parameters: parameters.len() })
+        let template = WorldTemplate::new(integrator, world)?;
+        Ok(Self { template, time_steps, places: places.into(), parameters: parameters.len() })
     }
 
     /// The world as it was given.
     pub fn world(&self) -> &World {
-        self.scene.plain_world()
+        self.template.world_values()
     }
 
     /// The steps.
@@ -133,12 +132,12 @@ impl<I: Integrator> RolloutFunction<I> {
         self.time_steps
     }
 
-    /// How many parameters it takes, and how many controls a step.
+    /// Number of parameters that it takes, and of controls a step.
     pub fn inputs(&self) -> [usize; 2] {
         [self.parameters, self.places.len() - self.parameters]
     }
 
-    /// How many numbers all states are at one time: 13 for each body, joint and contact that sticks.
+    /// Length of a row of all states at one time: 13 for each body, joint and contact with bristles.
     pub fn width(&self) -> usize {
         STATE * self.world().state_count()
     }
@@ -159,7 +158,7 @@ impl<I: Integrator> RolloutFunction<I> {
         if !reserved {
             return Err(SimulationError::Memory { steps: self.time_steps.steps });
         }
-        self.march(inputs, |states| run.extend(coordinates_of(states)))?;
+        self.run_steps(inputs, |states| run.extend(coordinates_of(states)))?;
         Ok(run)
     }
 
@@ -168,28 +167,28 @@ impl<I: Integrator> RolloutFunction<I> {
     /// # Errors
     /// See [`RolloutFunction::evaluate`].
     pub fn end<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>, SimulationError> {
-        Ok(coordinates_of(&self.march(inputs, |_| ())?).collect())
+        Ok(coordinates_of(&self.run_steps(inputs, |_| ())?).collect())
     }
 
     /// The states at the end; those at the start and after each step go to `visit`.
-    fn march<S: Scalar>(
+    fn run_steps<S: Scalar>(
         &self,
         inputs: RolloutInputs<'_, S>,
         mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
         self.check(&inputs)?;
-        let (integrator, time_steps) = (&self.scene.integrator, self.time_steps);
+        let (integrator, time_steps) = (&self.template.integrator, self.time_steps);
         let initial: Vec<State<S>> = states_of(inputs.states).collect();
-        let world = self.scene.world(&self.places, &self.values_at(&inputs, 0))?;
-        let mut states = world.begin(&initial, time_steps)?;
+        let world = self.template.world(&self.places, &self.values_at(&inputs, 0))?;
+        let mut states = world.initialize(&initial, time_steps)?;
         visit(&states);
         let [_, controls] = self.inputs();
         if controls == 0 {
             let follow = |_, states: &[State<S>]| visit(states);
-            return Ok(world.audited(integrator, states, time_steps, follow)?.states);
+            return Ok(world.run_checked(integrator, states, time_steps, follow)?.states);
         }
         for step in self.steps() {
-            let world = self.scene.world(&self.places, &self.values_at(&inputs, step.index))?;
+            let world = self.template.world(&self.places, &self.values_at(&inputs, step.index))?;
             world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
             visit(&states);
@@ -209,7 +208,7 @@ impl<I: Integrator> RolloutFunction<I> {
         inputs.parameters.iter().chain(controls).copied().collect()
     }
 
-    /// Whether there are as many as it takes.
+    /// Checks that there are as many as it takes.
     fn check<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>) -> Result<(), SimulationError> {
         let [parameters, controls] = self.inputs();
         let expected = [
@@ -250,7 +249,7 @@ impl<I: Integrator> RolloutFunction<I> {
         adjoints: &[f64],
     ) -> Result<RolloutGradient, SimulationError> {
         self.check(&inputs)?;
-        self.scene.integrator.check_differentiable(self.world())?;
+        self.template.integrator.check_differentiable(self.world())?;
         let (width, steps) = (self.width(), self.time_steps.steps);
         let expected = width * (steps + 1);
         for (what, given) in [("numbers of a run", run.len()), ("adjoints", adjoints.len())] {
@@ -271,14 +270,14 @@ impl<I: Integrator> RolloutFunction<I> {
             let states = &run[before.clone()];
             let [by_before, by_values] =
                 self.pull_back(&inputs, step.index, states, &by_states, |world, states| {
-                    world.advance(&self.scene.integrator, states, step)
+                    world.advance(&self.template.integrator, states, step)
                 })?;
             add(step.index, &by_values);
             by_states = by_before;
             by_states.iter_mut().zip(&adjoints[before]).for_each(|(by, own)| *by += own);
         }
         let begin =
-            |world: &World<Var>, states: &[State<Var>]| world.begin(states, self.time_steps);
+            |world: &World<Var>, states: &[State<Var>]| world.initialize(states, self.time_steps);
         let [states, by_values] = self.pull_back(&inputs, 0, inputs.states, &by_states, begin)?;
         add(0, &by_values);
         Ok(RolloutGradient { states, parameters: by_parameters, controls: by_controls })
@@ -302,7 +301,7 @@ impl<I: Integrator> RolloutFunction<I> {
         let recording = Recording::start();
         let states = recording.variables_of(before);
         let values = recording.variables_of(&values);
-        let world = self.scene.world(&self.places, &values)?;
+        let world = self.template.world(&self.places, &values)?;
         let after = change(&world, &states_of(&states).collect::<Vec<_>>())?;
         let seeds = coordinates_of(&after).zip(adjoints.iter().copied());
         let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::DistanceField;
 
+use crate::fields::{HalfSpace, SphereCavity};
 use crate::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    RigidBody, SphereCavity, State, Sticking, Surface, World,
+    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
+    RigidBody, State, Surface, World,
 };
 
 /// Kelvin and Voigt's normal law with Coulomb friction, the law of most tests.
@@ -26,10 +27,10 @@ pub(crate) fn sticking(
     damping: f64,
     friction: f64,
     slip_scale: f64,
-) -> Law<KelvinVoigt, Sticking<Coulomb>> {
+) -> Law<KelvinVoigt, BristleFriction<Coulomb>> {
     let friction = Coulomb { friction, slip_scale };
     let normal = KelvinVoigt { stiffness, damping };
-    Law::new(normal, Sticking { friction, deflection: 1e-3 }).unwrap()
+    Law::new(normal, BristleFriction { friction, deflection: 1e-3 }).unwrap()
 }
 
 /// The half-space z < 0.
@@ -52,7 +53,7 @@ pub(crate) fn ellipsoid(count: usize, axes: [f64; 3]) -> Vec<Point3<f64>> {
     (0..count).map(point).collect()
 }
 
-/// A world of a kinematic body with `field`, and of `body`, which touches it.
+/// A world of a fixed body with `field`, and of `body`, which touches it.
 pub(crate) fn on_ground(
     gravity: Vector3<f64>,
     field: Arc<dyn DistanceField>,
@@ -61,13 +62,13 @@ pub(crate) fn on_ground(
     smoothing: GapSmoothing,
 ) -> World {
     let mut world = World::new(gravity);
-    let field = world.add(Body::kinematic("ground").with_field(field));
+    let field = world.add(Body::fixed("ground").with_field(field));
     let samples = world.add(body);
     world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
     world
 }
 
-/// Body 0 is `field`, kinematic; body 1 an egg of 0.2 kg that spins and has just touched it.
+/// Body 0 is `field`, fixed; body 1 an egg of 0.2 kg that spins and has just touched it.
 pub(crate) fn egg_on(
     field: Arc<dyn DistanceField>,
     smoothing: GapSmoothing,
@@ -75,7 +76,7 @@ pub(crate) fn egg_on(
     let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
     let rigid = RigidBody::new(0.2, inertia, Point3::new(1e-3, -2e-3, 3e-3)).unwrap();
     let surface = Surface::uniform(&ellipsoid(60, [0.03, 0.025, 0.02]), 6e-3).unwrap();
-    let egg = Body::free("egg", rigid).with_surface(surface);
+    let egg = Body::dynamic("egg", rigid).with_surface(surface);
     let law = Arc::new(penalty(5e6, 2e4, 0.6, 2e-2));
     let world = on_ground(Vector3::new(0.3, -0.2, -9.81), field, egg, law, smoothing);
     let pose = Isometry3::new(Vector3::new(0.002, 0.001, 0.0195), Vector3::new(0.1, 0.2, 0.3));

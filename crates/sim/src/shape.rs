@@ -1,7 +1,6 @@
 //! Shapes of bodies: mass properties, samples and a distance field from one description.
 
 mod ball;
-pub(crate) mod body;
 mod border;
 mod capsule;
 mod compound;
@@ -24,13 +23,15 @@ mod revolved;
 mod round;
 mod rows;
 pub(crate) mod solid;
+pub(crate) mod variable;
 
 use std::fmt;
 use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
-use prehend_geometry::{DistanceField, Moments};
+use prehend_geometry::{DistanceField, Moments, TriMesh};
 
+use crate::body::RigidBody;
 use crate::surface::Surface;
 use error::ShapeError;
 use kind::Kind;
@@ -60,7 +61,7 @@ use solid::Sample;
 /// let brick = Body::from_shape("brick", &shape, 1e3)?;
 /// assert!((brick.rigid().map_or(0.0, |rigid| rigid.mass()) - 0.24).abs() < 1e-12);
 /// // Mass by half an edge.
-/// let mut lifted = shape.lift::<Fwd<1>>();
+/// let mut lifted = shape.cast::<Fwd<1>>();
 /// lifted.set_dimension("half_extent_x", Fwd::variable(0.02, 0))?;
 /// let volume = lifted.moments().map_or(0.0, |moments| moments.volume.derivative[0]);
 /// assert!((volume - 8.0 * 0.03 * 0.05).abs() < 1e-15);
@@ -73,7 +74,7 @@ pub struct Shape<S: Scalar = f64> {
     dimensions: Vec<S>,
 }
 
-/// What follows from the values of the dimensions.
+/// Samples and field that follow from the values of the dimensions.
 struct Built {
     kind: Arc<Kind>,
     values: Vec<f64>,
@@ -121,8 +122,35 @@ impl Shape {
         Ok(Self { built, dimensions })
     }
 
-    /// The same shape in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> Shape<S> {
+    /// The shape of a closed mesh \[m\], whose distance is a C² grid; of an open one, or one that faces inward, only a fixed body.
+    ///
+    /// ```
+    /// use prehend_geometry::shapes::sphere;
+    /// use prehend_sim::{Body, Shape};
+    ///
+    /// let shape = Shape::from_mesh(&sphere(0.03, 24))?;
+    /// let ball = Body::from_shape("ball", &shape, 1e3)?;
+    /// # Ok::<(), prehend_sim::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the mesh has no faces or its numbers are not finite.
+    pub fn from_mesh(mesh: &TriMesh) -> Result<Self, ShapeError> {
+        Self::from_mesh_with(mesh, &ShapeOptions::default())
+    }
+
+    /// [`Shape::from_mesh`] with lengths of one's own.
+    ///
+    /// # Errors
+    /// See there, and for lengths that are not positive and finite.
+    pub fn from_mesh_with(mesh: &TriMesh, options: &ShapeOptions) -> Result<Self, ShapeError> {
+        let ground = mesh::mesh(mesh, options)?;
+        let built = Arc::new(Built::new(Arc::new(Kind::Ground(ground)), Vec::new())?);
+        Ok(Self { built, dimensions: Vec::new() })
+    }
+
+    /// Shape in constants of another scalar.
+    pub fn cast<S: Scalar>(&self) -> Shape<S> {
         self.map(S::constant)
     }
 }
@@ -149,8 +177,8 @@ impl<S: Scalar> Shape<S> {
         Ok(())
     }
 
-    /// The same shape with other dimensions, as many.
-    fn with_dimensions(&self, dimensions: Vec<S>) -> Result<Self, ShapeError> {
+    /// Shape with other dimensions, as many.
+    pub(crate) fn with_dimensions(&self, dimensions: Vec<S>) -> Result<Self, ShapeError> {
         let values: Vec<f64> = dimensions.iter().map(|x| x.value()).collect();
         let built = match values == self.built.values {
             true => Arc::clone(&self.built),
@@ -162,6 +190,19 @@ impl<S: Scalar> Shape<S> {
     /// Volume \[m³\] and the first two moments about the origin; none of what is a fixed body only.
     pub fn moments(&self) -> Option<Moments<S>> {
         self.built.kind.moments(&self.dimensions)
+    }
+
+    /// Mass properties at a uniform `density` \[kg/m³\].
+    ///
+    /// # Errors
+    /// If it has no mass, as a half-space, or the density is not positive and finite.
+    pub(crate) fn rigid(&self, density: S) -> Result<RigidBody<S>, ShapeError> {
+        if let Some(kind) = self.built.kind.fixed_only() {
+            return Err(ShapeError::FixedOnly { kind });
+        }
+        let (mass, com, inertia) =
+            self.moments().ok_or(ShapeError::FixedOnly { kind: "shape" })?.of_density(density);
+        Ok(RigidBody::new(mass, inertia, com)?)
     }
 
     /// Samples of its surface; none of what has no mass.
@@ -184,7 +225,12 @@ impl<S: Scalar> Shape<S> {
         self.built.kind.samples(dimensions)
     }
 
-    /// The same shape, each dimension through `f`.
+    /// Values of its dimensions, in the order of [`Shape::dimensions`].
+    pub(crate) fn dimension_values(&self) -> &[S] {
+        &self.dimensions
+    }
+
+    /// Shape, each dimension through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Shape<T> {
         Shape {
             built: Arc::clone(&self.built),

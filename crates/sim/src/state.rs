@@ -1,10 +1,12 @@
 //! Pose and velocity of a body.
 
-use nalgebra::{Isometry3, Quaternion, SMatrix, Translation3, Unit, Vector3, Vector6};
+use nalgebra::{
+    Isometry3, Quaternion, SMatrix, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
+};
 use prehend_autodiff::lie::{lift, perturb_about, so3_exp};
 use prehend_autodiff::{Fwd, Scalar};
 
-/// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
+/// Pose and velocity of a body; plain numbers, or numbers that carry derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<S: Scalar = f64> {
     /// `t_world_com`: origin at the center of mass \[m\], axes of the model. Of a link it is that of its frame.
@@ -21,7 +23,7 @@ impl<S: Scalar> State<S> {
         Self { pose, linear: Vector3::zeros(), angular: Vector3::zeros() }
     }
 
-    /// The same numbers without derivatives.
+    /// Numbers without derivatives.
     #[inline]
     pub fn value(&self) -> State {
         let rotation =
@@ -34,7 +36,7 @@ impl<S: Scalar> State<S> {
         }
     }
 
-    /// Whether every coordinate is a finite number, and has finite derivatives; those of a recording are not known before its sweep.
+    /// True if every coordinate is a finite number, and has finite derivatives; those of a recording are not known before its sweep.
     pub fn is_finite(&self) -> bool {
         let parts = [&self.pose.translation.vector, &self.linear, &self.angular];
         parts.iter().flat_map(|v| v.iter()).all(is_finite)
@@ -51,9 +53,9 @@ impl<S: Scalar> State<S> {
         drifted
     }
 
-    /// What an observer in `frame` sees, who moves and turns with it: `self` along the axes of `frame`.
+    /// State relative to `frame`, as an observer sees it who moves and turns with it, along the axes of `frame`.
     #[inline]
-    pub fn seen_from(&self, frame: &Self) -> Self {
+    pub fn relative_to(&self, frame: &Self) -> Self {
         let to_frame = frame.pose.rotation.inverse();
         let offset = self.pose.translation.vector - frame.pose.translation.vector;
         let linear = self.linear - frame.linear - frame.angular.cross(&offset);
@@ -77,7 +79,7 @@ impl<S: Scalar> State<S> {
         shifted
     }
 
-    /// Numbers that are zero and carry this state's derivatives, as a tangent vector: pose twist about the
+    /// Tangent of the state: zeros that carry this state's derivatives, as a tangent vector: pose twist about the
     /// center of mass (translation \[m\], rotation \[rad\]), then linear \[m/s\] and angular \[rad/s\]
     /// velocity, world frame. First derivatives only.
     #[inline]
@@ -94,7 +96,7 @@ impl<S: Scalar> State<S> {
     }
 }
 
-/// Whether a number and the derivatives that it carries are finite: only then is nothing left of them times zero.
+/// True if a number and the derivatives that it carries are finite: only then is nothing left of them times zero.
 #[inline]
 pub(crate) fn is_finite<S: Scalar>(x: &S) -> bool {
     x.value().is_finite() && (S::RECORDED || x.times(0.0).is_constant_zero())
@@ -116,7 +118,7 @@ impl State {
     /// The state `tangent` away (the retraction of the manifold of states), in the order of [`State::tangent`].
     pub fn retract<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;
-        let State { pose, linear, angular } = self.lift::<S>();
+        let State { pose, linear, angular } = self.cast::<S>();
         let center = pose.translation.vector;
         State {
             pose: perturb_about(&pose, &center, &Vector6::new(x, y, z, rx, ry, rz)),
@@ -126,7 +128,7 @@ impl State {
     }
 
     /// Constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> State<S> {
+    pub fn cast<S: Scalar>(&self) -> State<S> {
         State {
             pose: lift(&self.pose),
             linear: self.linear.map(S::constant),
@@ -153,6 +155,41 @@ impl<const M: usize> State<Fwd<M>> {
         let tangent = self.tangent();
         SMatrix::from_fn(|row, column| tangent[row].derivative[column])
     }
+}
+
+/// Number of coordinates of a state.
+pub(crate) const STATE: usize = 13;
+
+impl<S: Scalar> State<S> {
+    /// The state as a row of numbers: translation \[m\], rotation as a quaternion i, j, k, w, linear \[m/s\] and angular \[rad/s\] velocity.
+    pub fn coordinates(&self) -> [S; STATE] {
+        let [x, y, z] = self.pose.translation.vector.into();
+        let [qx, qy, qz, qw] = self.pose.rotation.coords.into();
+        let [vx, vy, vz] = self.linear.into();
+        let [wx, wy, wz] = self.angular.into();
+        [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz]
+    }
+
+    /// The state of [`State::coordinates`]. The quaternion is taken as it is.
+    pub fn from_coordinates(coordinates: &[S; STATE]) -> Self {
+        let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz] = *coordinates;
+        let rotation: UnitQuaternion<S> = Unit::new_unchecked(Quaternion::new(qw, qx, qy, qz));
+        State {
+            pose: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
+            linear: Vector3::new(vx, vy, vz),
+            angular: Vector3::new(wx, wy, wz),
+        }
+    }
+}
+
+/// The coordinates of several states, one state after the other.
+pub(crate) fn coordinates_of<S: Scalar>(states: &[State<S>]) -> impl Iterator<Item = S> {
+    states.iter().flat_map(State::coordinates)
+}
+
+/// The states of [`coordinates_of`].
+pub(crate) fn states_of<S: Scalar>(coordinates: &[S]) -> impl Iterator<Item = State<S>> {
+    coordinates.as_chunks().0.iter().map(State::from_coordinates)
 }
 
 #[cfg(test)]
@@ -189,7 +226,7 @@ mod tests {
     #[test]
     fn the_view_from_a_moving_frame_is_the_derivative_of_the_relative_pose() {
         let (body, frame) = (state(0.7), state(-0.4));
-        let seen = body.seen_from(&frame);
+        let seen = body.relative_to(&frame);
         // Both move on for a moment: where the body's points go in the frame is what the view says.
         let point = Vector3::new(0.2, -0.1, 0.3);
         let position = |time: f64| {
@@ -213,12 +250,12 @@ mod tests {
     #[test]
     fn derivatives_of_the_view_match_differences() {
         let (body, frame) = (state(0.7), state(-0.4));
-        let seen = body.variables().seen_from(&frame.lift()).sensitivity();
-        let value = body.seen_from(&frame);
+        let seen = body.variables().relative_to(&frame.cast()).sensitivity();
+        let value = body.relative_to(&frame);
         let differences = finite_difference_jacobian(
             |x| {
                 let moved =
-                    body.retract(&std::array::from_fn::<f64, 12, _>(|i| x[i])).seen_from(&frame);
+                    body.retract(&std::array::from_fn::<f64, 12, _>(|i| x[i])).relative_to(&frame);
                 let turn = prehend_autodiff::lie::so3_log(
                     &(moved.pose.rotation * value.pose.rotation.inverse()),
                 );
@@ -233,5 +270,12 @@ mod tests {
                 assert!((seen[(row, column)] - d).abs() < 1e-8, "{row} {column}");
             }
         }
+    }
+
+    #[test]
+    fn coordinates_come_back() {
+        let (_, states) = crate::scenes::egg_on(crate::scenes::floor(), crate::GapSmoothing::Hard);
+        let numbers: Vec<f64> = coordinates_of(&states).collect();
+        assert!(states_of(&numbers).eq(states));
     }
 }

@@ -41,7 +41,7 @@ pub struct TimeSteps {
 }
 
 impl TimeSteps {
-    /// The same time in steps no longer than `limit` \[s\], but no more than `max_steps` of them.
+    /// Time in steps no longer than `limit` \[s\], but no more than `max_steps` of them.
     #[must_use]
     pub fn refined(self, limit: f64, max_steps: usize) -> Self {
         let time = self.dt * self.steps as f64;

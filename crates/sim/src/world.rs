@@ -2,24 +2,29 @@
 
 pub(crate) mod articulated_body;
 pub(crate) mod body;
-pub(crate) mod body_id;
+pub(crate) mod bristle_states;
+pub(crate) mod broad_phase;
+pub(crate) mod bushing;
+mod contact_frequency;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 mod contacts_between;
-pub(crate) mod deflection;
-mod effect;
+mod failure;
 pub(crate) mod joint_force;
 mod linear_contacts;
 mod matter;
-pub(crate) mod neighbors;
 mod pair_function;
+mod pair_wrench;
+mod parameter_names;
+mod parameters;
 pub(crate) mod path;
-mod seen;
+mod relative_state;
+pub(crate) mod sample_culling;
 mod sensors;
+mod shaped_body;
 pub(crate) mod trajectory;
 mod trajectory_checks;
 pub(crate) mod transmission;
-pub(crate) mod weld;
 
 use std::fmt;
 use std::sync::Arc;
@@ -28,37 +33,38 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use crate::contact::dynamic::DynContactLaw;
+use crate::contact::error::LawError;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, ContactId, ContactPlace};
 use crate::state::State;
 use articulated_body::ArticulatedBody;
 use body::{Body, Motion};
-use body_id::BodyId;
+use bushing::Bushing;
 use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
 use joint_force::JointForce;
 use transmission::Transmissions;
-use weld::Weld;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
-/// To differentiate by a mass, a friction coefficient or gravity, [`lift`](World::lift) the world to the scalar and put
+/// To differentiate by a mass, a friction coefficient or gravity, [`cast`](World::cast) the world to the scalar and put
 /// the variable in its place. States come in the order of the bodies; then those of the joints of [articulations](World::add_articulation).
 #[derive(Clone)]
 pub struct World<S: Scalar = f64> {
     /// The bodies.
     pub bodies: Vec<Body<S>>,
-    /// What touches what.
+    /// Pairs of bodies that may touch.
     pub contacts: Vec<ContactPair<S>>,
     /// Bodies that may touch others of their group, wherever they meet.
     pub contact_groups: Vec<ContactGroup<S>>,
-    /// Which bodies are links that joints hold together.
+    /// Bodies that are links, held together by joints.
     pub articulations: Vec<ArticulatedBody<S>>,
-    /// What acts along joints.
+    /// Forces along joints.
     pub joint_forces: Vec<JointForce<S>>,
-    /// Which frames springs hold together.
-    pub welds: Vec<Weld<S>>,
-    /// What transmissions of robots do beyond forces along joints.
+    /// Springs that hold frames together.
+    pub bushings: Vec<Bushing<S>>,
+    /// Effects of robots' transmissions beyond forces along joints.
     pub transmissions: Transmissions,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
@@ -73,7 +79,7 @@ impl World {
             contact_groups: Vec::new(),
             articulations: Vec::new(),
             joint_forces: Vec::new(),
-            welds: Vec::new(),
+            bushings: Vec::new(),
             transmissions: Transmissions::default(),
             gravity,
         }
@@ -95,10 +101,9 @@ impl World {
         bodies: ContactBodies,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         let pair = self.pair(bodies, law, smoothing)?;
-        self.contacts.push(pair);
-        Ok(())
+        Ok(self.push_contacts([pair]))
     }
 
     /// Lets two bodies touch both ways, samples on field, each with half of the force: two entries of
@@ -114,13 +119,19 @@ impl World {
         b: BodyId,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         let there = ContactBodies { samples: a, field: b };
         let pair = |bodies| self.pair(bodies, Arc::clone(&law), smoothing);
         let mut both = [pair(there)?, pair(there.swapped())?];
         both.iter_mut().for_each(|pair| pair.weight = 0.5);
-        self.contacts.extend(both);
-        Ok(())
+        Ok(self.push_contacts(both))
+    }
+
+    /// Adds contacts that one handle stands for.
+    fn push_contacts(&mut self, contacts: impl IntoIterator<Item = ContactPair>) -> ContactId {
+        let first = self.contacts.len();
+        self.contacts.extend(contacts);
+        ContactId(ContactPlace::Pairs { first, count: self.contacts.len() - first })
     }
 
     fn pair(
@@ -128,31 +139,31 @@ impl World {
         bodies: ContactBodies,
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<ContactPair, SimulationError> {
+    ) -> Result<ContactPair, BuildError> {
         let (samples, field) = (self.body(bodies.samples)?, self.body(bodies.field)?);
         if bodies.samples == bodies.field {
-            return Err(SimulationError::Itself { body: samples.name.clone() });
+            return Err(BuildError::Itself { body: samples.name.clone() });
         }
         if samples.surface.is_none() {
-            return Err(SimulationError::NoSamples { body: samples.name.clone() });
+            return Err(BuildError::NoSamples { body: samples.name.clone() });
         }
         if field.field.is_none() {
-            return Err(SimulationError::NoField { body: field.name.clone() });
+            return Err(BuildError::NoField { body: field.name.clone() });
         }
         smoothing.check()?;
         Ok(ContactPair::new(bodies, law, smoothing))
     }
 
-    /// The same world in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> World<S> {
+    /// World in constants of another scalar.
+    pub fn cast<S: Scalar>(&self) -> World<S> {
         self.map(S::constant)
     }
 }
 
 impl<S: Scalar> World<S> {
     /// The body `id`, if it is of this world.
-    pub(crate) fn body(&self, id: BodyId) -> Result<&Body<S>, SimulationError> {
-        let no_body = SimulationError::NoBody { body: id, bodies: self.bodies.len() };
+    pub(crate) fn body(&self, id: BodyId) -> Result<&Body<S>, BuildError> {
+        let no_body = BuildError::NoBody { body: id, bodies: self.bodies.len() };
         self.bodies.get(id.index()).ok_or(no_body)
     }
 
@@ -178,63 +189,67 @@ impl<S: Scalar> World<S> {
         self.body_ids().filter(free).collect()
     }
 
-    /// Sets the parameter called `name`, such as `"friction"`, of every contact between two bodies: to differentiate by it, put in a
-    /// variable. That of a group is in [`contact_groups`](World::contact_groups), for all of its contacts.
+    /// Sets the parameter called `name`, such as `"friction"`, of contacts that were added together: to differentiate by it, put in a
+    /// variable.
     ///
     /// ```
     /// # use std::sync::Arc;
     /// # use nalgebra::Vector3;
     /// use prehend_autodiff::Fwd;
-    /// # use prehend_sim::*;
+    /// # use prehend_sim::prelude::*;
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    /// # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    /// # let ball = Body::free("ball", RigidBody::ball(0.1, 0.03)?);
+    /// # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    /// # let ball = Body::dynamic("ball", RigidBody::ball(0.1, 0.03)?);
     /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
     /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
     /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-    /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
-    /// let mut lifted = world.lift::<Fwd<1>>();
-    /// lifted.set_contact_param(ball, floor, "friction", Fwd::variable(0.4, 0))?;
-    /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
+    /// # let bodies = ContactBodies { samples: ball, field: floor };
+    /// let contact = world.add_contact(bodies, law, GapSmoothing::Hard)?;
+    /// let mut dual = world.cast::<Fwd<1>>();
+    /// dual.set_contact_param(contact, "friction", Fwd::variable(0.4, 0))?;
+    /// # assert_eq!(dual.contacts[0].params()[3].value, 0.4);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// If the two have no contact, or its law no parameter of that name.
+    /// If their law has no parameter of that name.
+    ///
+    /// # Panics
+    /// If they are of another world.
     pub fn set_contact_param(
         &mut self,
-        a: BodyId,
-        b: BodyId,
+        contact: ContactId,
         name: &str,
         value: S,
-    ) -> Result<(), SimulationError> {
-        let between = |pair: &ContactPair<S>| a != b && pair.joins(a) && pair.joins(b);
-        if !self.contacts.iter().any(between) {
-            let bodies = [self.body(a)?.name.clone(), self.body(b)?.name.clone()];
-            return Err(SimulationError::NoContact { bodies });
-        }
-        for pair in self.contacts.iter_mut().filter(|pair| between(pair)) {
+    ) -> Result<(), LawError> {
+        let pairs = match contact.0 {
+            ContactPlace::Pairs { first, count } => &mut self.contacts[first..first + count],
+            ContactPlace::Group(group) => {
+                std::slice::from_mut(&mut self.contact_groups[group].contact)
+            }
+        };
+        for pair in pairs {
             *pair.param_mut(name)? = value;
         }
         Ok(())
     }
 
     /// The contacts, and what those of each group are like.
-    pub(crate) fn kinds_of_contact(&self) -> impl Iterator<Item = &ContactPair<S>> {
+    pub(crate) fn contact_materials(&self) -> impl Iterator<Item = &ContactPair<S>> {
         let groups = self.contact_groups.iter().map(|group| &group.contact);
         self.contacts.iter().chain(groups)
     }
 
-    /// [`World::kinds_of_contact`], to be changed.
-    pub(crate) fn kinds_of_contact_mut(&mut self) -> impl Iterator<Item = &mut ContactPair<S>> {
+    /// [`World::contact_materials`], to be changed.
+    pub(crate) fn contact_materials_mut(&mut self) -> impl Iterator<Item = &mut ContactPair<S>> {
         let groups = self.contact_groups.iter_mut().map(|group| &mut group.contact);
         self.contacts.iter_mut().chain(groups)
     }
 
-    /// The same world, each number through `f`, but for trajectories, which become those of constants.
+    /// World, each number through `f`, but for trajectories, which become those of constants.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
         World {
             bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
@@ -242,16 +257,16 @@ impl<S: Scalar> World<S> {
             contact_groups: self.contact_groups.iter().map(|group| group.map(&f)).collect(),
             articulations: self.articulations.iter().map(|own| own.map(&f)).collect(),
             joint_forces: self.joint_forces.iter().map(|force| force.map(&f)).collect(),
-            welds: self.welds.iter().map(|weld| weld.map(&f)).collect(),
+            bushings: self.bushings.iter().map(|bushing| bushing.map(&f)).collect(),
             transmissions: self.transmissions.clone(),
             gravity: self.gravity.map(&f),
         }
     }
 
-    /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
-    pub(crate) fn plain(&self) -> World {
+    /// World as values alone: without derivatives, and without leaks, which are for derivatives.
+    pub(crate) fn to_f64(&self) -> World {
         let mut plain = self.map(S::value);
-        for pair in plain.kinds_of_contact_mut() {
+        for pair in plain.contact_materials_mut() {
             if pair.smoothing.leaks() {
                 pair.smoothing = GapSmoothing::Hard;
             }
@@ -263,13 +278,13 @@ impl<S: Scalar> World<S> {
     ///
     /// # Panics
     /// If there are fewer states than bodies and joints, where there are joints.
-    pub fn drive(&self, states: &mut [State<S>], time: f64) {
+    pub fn update_kinematics(&self, states: &mut [State<S>], time: f64) {
         for (body, state) in self.bodies.iter().zip(states.iter_mut()) {
-            if let Motion::Driven(trajectory) = &body.motion {
+            if let Motion::Kinematic(trajectory) = &body.motion {
                 *state = trajectory.state(time);
             }
         }
-        self.place_links(states);
+        self.forward_kinematics(states);
     }
 }
 
@@ -295,8 +310,9 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
+    use crate::fields::{Sphere, SphereCavity};
     use crate::scenes::{egg_on, ellipsoid, floor, penalty, sticking};
-    use crate::{RigidBody, Sphere, SphereCavity, Surface};
+    use crate::{RigidBody, Surface};
 
     /// A pebble in a cup, both free, turned and moving; they touch both ways.
     fn pebble_in_cup() -> (World, Vec<State>) {
@@ -312,10 +328,10 @@ mod tests {
             .filter(|p| p.z < 0.02)
             .collect();
         let surface = |points: &[Point3<f64>]| Surface::uniform(points, 5e-3).unwrap();
-        let cup = Body::free("cup", rigid(Point3::new(0.01, 0.0, -0.02)))
+        let cup = Body::dynamic("cup", rigid(Point3::new(0.01, 0.0, -0.02)))
             .with_field(cavity)
             .with_surface(surface(&cup_points));
-        let pebble = Body::free("pebble", rigid(Point3::new(1e-3, -2e-3, 3e-3)))
+        let pebble = Body::dynamic("pebble", rigid(Point3::new(1e-3, -2e-3, 3e-3)))
             .with_field(ball)
             .with_surface(surface(&pebble_points));
         let (cup, pebble) = (world.add(cup), world.add(pebble));
@@ -340,9 +356,9 @@ mod tests {
     fn both_bodies_feel_derivatives_of_both() {
         let (world, states) = pebble_in_cup();
         for moving in 0..2 {
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
             lifted[moving] = states[moving].variables();
-            let exact = world.lift().wrenches(&lifted, 0);
+            let exact = world.cast().wrenches(&lifted, 0);
             let differences = finite_difference_jacobian(
                 |x| {
                     let mut states = states.clone();
@@ -389,11 +405,11 @@ mod tests {
             world.wrenches(&states, 0)[1].iter().copied().collect::<Vec<f64>>()
         };
         let at = [5e6, 2e4, 0.6, 0.3];
-        let mut lifted = world.lift::<Fwd<4>>();
+        let mut lifted = world.cast::<Fwd<4>>();
         let variables = Fwd::variables(at);
         lifted.contacts[0].set_params(&variables[..3]).unwrap();
         lifted.bodies[1].external_wrench = Vector6::repeat(variables[3]);
-        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::lift).collect();
+        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::cast).collect();
         let exact = lifted.wrenches(&constants, 0)[1];
         // Scaled, so that one step suits all.
         let differences = finite_difference_jacobian(
@@ -411,14 +427,14 @@ mod tests {
 
     /// The wrenches and rates of [`pebble_in_cup`] with the centers of mass moved by `change`.
     fn with_centers_moved<S: Scalar>(world: &World, states: &[State], change: &[S]) -> Vec<S> {
-        let mut world = world.lift::<S>();
+        let mut world = world.cast::<S>();
         for (body, change) in world.bodies.iter_mut().zip(change.as_chunks::<3>().0) {
             let rigid = *body.rigid().unwrap();
             let com = rigid.com() + Vector3::from(*change);
             body.motion =
-                Motion::Free(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
+                Motion::Dynamic(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
         }
-        let states: Vec<State<S>> = states.iter().map(State::lift).collect();
+        let states: Vec<State<S>> = states.iter().map(State::cast).collect();
         world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
     }
 
@@ -456,8 +472,8 @@ mod tests {
             let bodies = ContactBodies { samples: BodyId(samples), field: BodyId(field) };
             world.add_contact(bodies, Arc::clone(&law), GapSmoothing::Hard).unwrap_err()
         };
-        assert_eq!(touch(1, 2), SimulationError::NoBody { body: BodyId(2), bodies: 2 });
-        assert_eq!(touch(1, 1), SimulationError::Itself { body: "egg".to_owned() });
-        assert_eq!(touch(0, 1), SimulationError::NoSamples { body: "ground".to_owned() });
+        assert_eq!(touch(1, 2), BuildError::NoBody { body: BodyId(2), bodies: 2 });
+        assert_eq!(touch(1, 1), BuildError::Itself { body: "egg".to_owned() });
+        assert_eq!(touch(0, 1), BuildError::NoSamples { body: "ground".to_owned() });
     }
 }

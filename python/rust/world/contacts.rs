@@ -1,8 +1,8 @@
-//! Contacts and welds.
+//! Contacts and bushings.
 
 use std::collections::BTreeMap;
 
-use prehend_sim::{ContactBodies, Weld, WeldStiffness};
+use prehend_sim::{Bushing, BushingStiffness, ContactBodies};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -17,7 +17,7 @@ impl World {
     /// Python (`prehend.laws`). Returns the names of its parameters.
     ///
     /// `smoothing` is how contact begins: the width of a softplus [m], None for a hard beginning, or "leaky". With `both_ways` the field of the first
-    /// is touched, too, each with half of the force. Contacts that stick have a set of parameters for each way then, of which the first is returned.
+    /// is touched, too, each with half of the force. Contacts with bristles have a set of parameters for each way then, of which the first is returned.
     #[pyo3(signature = (samples, field, law, *, smoothing=None, both_ways=false, **parameters))]
     fn add_contact(
         &mut self,
@@ -61,7 +61,7 @@ impl World {
     /// with an inertia of 0 they turn freely, as in a ball joint. Returns the names of its parameters.
     #[pyo3(signature = (a, b, *, mass, inertia=0.0, time=0.01, frame_a=None, frame_b=None))]
     #[allow(clippy::too_many_arguments)] // as many as Python names
-    fn add_weld(
+    fn add_bushing(
         &mut self,
         a: BodyKey,
         b: BodyKey,
@@ -73,7 +73,7 @@ impl World {
     ) -> PyResult<BTreeMap<String, String>> {
         let bodies = [self.id(&a)?, self.id(&b)?];
         let frames = [pose(frame_a.as_ref(), "frame_a")?, pose(frame_b.as_ref(), "frame_b")?];
-        let stiffness = WeldStiffness::critical(mass, inertia, time);
-        self.naming(|world| world.add_weld(Weld { bodies, frames, stiffness }).raise())
+        let stiffness = BushingStiffness::critical(mass, inertia, time);
+        self.naming(|world| world.add_bushing(Bushing { bodies, frames, stiffness }).raise())
     }
 }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
+use prehend_sim::JointAxis;
 use prehend_sim::articulated::Joint;
-use prehend_sim::{JointAxis, MjcfOptions, UrdfOptions};
+use prehend_sim::robot::{MjcfOptions, UrdfOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use prehend_sim::{
-    DynContactLaw, DynJointLaw, GapSmoothing, LawParameter, LawRegistry, LeakSteps,
-    joint_laws as sim_joint_laws,
-};
+use prehend_sim::contact::{LawParameter, LawRegistry, LeakSteps};
+use prehend_sim::joint_law::{DynJointLaw, joint_laws as sim_joint_laws};
+use prehend_sim::{DynContactLaw, GapSmoothing};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -51,9 +51,9 @@ impl World {
     }
 
     /// What `change` makes of the world, with the parameters that are new since, each by its last name. If it fails, nothing has changed.
-    pub(crate) fn naming(
+    pub(crate) fn naming<T>(
         &mut self,
-        change: impl FnOnce(&mut prehend_sim::World) -> PyResult<()>,
+        change: impl FnOnce(&mut prehend_sim::World) -> PyResult<T>,
     ) -> PyResult<BTreeMap<String, String>> {
         let before: HashSet<String> = self.world.parameter_names().into_iter().collect();
         let mut grown = self.world.clone();
@@ -122,7 +122,7 @@ impl World {
                 return Err(wrong(format!("body '{name}': it is fixed, and has a mass")));
             }
             (true, Some(shape)) => Body::fixed_from_shape(name, shape),
-            (true, None) => Body::kinematic(name),
+            (true, None) => Body::fixed(name),
             (false, Some(shape)) if inertia.is_none() => {
                 let volume = shape.moments().map_or(f64::NAN, |moments| moments.volume);
                 let mass = matter.map_or(f64::NAN, |matter| matter.mass);
@@ -133,7 +133,7 @@ impl World {
                     wrong(format!("body '{name}': it has no mass; fixed=True keeps it in place"))
                 };
                 let Matter { mass, com, inertia } = matter.ok_or_else(no_mass)?;
-                let mut body = Body::free(name, RigidBody::new(mass, inertia, com).raise()?);
+                let mut body = Body::dynamic(name, RigidBody::new(mass, inertia, com).raise()?);
                 if let Some(shape) = shape {
                     body.surface = shape.surface().cloned();
                     body.field = Some(shape.field().clone());

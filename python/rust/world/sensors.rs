@@ -15,7 +15,7 @@ type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 #[pymethods]
 impl World {
-    /// What contacts and welds do to a body: force [N] and torque [N m] about its center of mass, of a link about the origin of its frame; world frame.
+    /// What contacts and bushings do to a body: force [N] and torque [N m] about its center of mass, of a link about the origin of its frame; world frame.
     fn contact_wrench<'py>(
         &self,
         py: Python<'py>,

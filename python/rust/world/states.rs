@@ -48,7 +48,7 @@ pub(crate) fn change(
 #[pymethods]
 impl World {
     /// States in which everything is at rest, bodies with their center of mass at the origin and joints at their neutral coordinates: a row of 13 for
-    /// each body, then for each joint. Contacts that stick begin without a deflection, and have rows in what a rollout returns.
+    /// each body, then for each joint. Contacts with bristles begin without a deflection, and have rows in what a rollout returns.
     fn neutral_states<'py>(
         &self,
         py: Python<'py>,

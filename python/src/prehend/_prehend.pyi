@@ -190,7 +190,7 @@ class World:
         smoothing: float | str | None = None,
         **parameters: float,
     ) -> dict[str, str]: ...
-    def add_weld(
+    def add_bushing(
         self,
         a: _Body,
         b: _Body,

@@ -71,9 +71,9 @@ fn thrown<S: Scalar>(tangent: &[S]) -> State<S> {
     let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
-    let still = State::at_rest(Isometry3::identity()).lift();
+    let still = State::at_rest(Isometry3::identity()).cast();
     let start = start.retract(&std::array::from_fn(|i| tangent[i]));
-    world.lift().simulate(&[still, start], 0.2).unwrap()[1]
+    world.cast().simulate(&[still, start], 0.2).unwrap()[1]
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod heuristic;
 mod icp;
 mod robust_icp;
 mod stability;
+mod stability_loss;
 mod step;
 
 pub use self::chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};

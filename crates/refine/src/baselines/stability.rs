@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, Perturbation,
-    RigidBody, SemiImplicitEuler, StabilityJacobian, StabilityLoss, StabilityWeights,
-    StaticContactTarget, StepError, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
+    StepError, Surface, TimeSteps, World,
 };
 
+use super::stability_loss::{StabilityJacobian, StabilityLoss, StabilityWeights};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{Frame, check_gravity};
@@ -91,12 +92,12 @@ impl StabilityFactor {
         let object = frame.object();
         let fail = |reason: String| RefineError::Object { object: object.name.clone(), reason };
         let inertial = &object.inertial;
-        let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass)
+        let rigid = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass)
             .map_err(|e| fail(e.to_string()))?;
         let positions: Vec<Point3<f64>> = object.samples.iter().map(|s| s.point).collect();
         let surface = Surface::uniform(&positions, object.area).map_err(|e| fail(e.to_string()))?;
         let g = gravity.norm();
-        let target = StaticContactTarget {
+        let target = ContactCalibration {
             mass: inertial.mass,
             gravity: g,
             penetration: settings.penetration,
@@ -111,19 +112,18 @@ impl StabilityFactor {
         let mut world = World::new(gravity);
         let field = Arc::new(robot.posed(&hand.t_cam_hand, &hand.joints)?);
         // Its field is in the camera's frame already.
-        let field = world.add(Body::kinematic("hand").with_field(field));
-        let samples = world.add(Body::free(&object.name, body).with_surface(surface));
+        let field = world.add(Body::fixed("hand").with_field(field));
+        let samples = world.add(Body::dynamic(&object.name, rigid).with_surface(surface));
         world
             .add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)
             .map_err(|e| fail(e.to_string()))?;
         let steps = settings.steps.0;
         let stability = StabilityLoss {
-            integrator: SemiImplicitEuler,
             world,
-            states: vec![prehend_sim::State::at_rest(Isometry3::identity()); 2],
             object: samples,
+            rigid,
             time_steps: TimeSteps { dt: settings.time / steps as f64, steps },
-            perturbations: Perturbation::rest_and_diagonal(settings.perturbation),
+            perturbation: settings.perturbation,
             weights: StabilityWeights::relative_to_fall(g, settings.time, object.radius),
         };
         Ok(Self { stability, initial_center: initial.center(), settings })
@@ -160,7 +160,8 @@ impl Factor for StabilityFactor {
     fn cost(&self, state: &State) -> f64 {
         let pose = &state.t_cam_object;
         let (moved, precision) = self.displacement(state);
-        let loss = self.stable(pose).value(pose).unwrap_or(BLOWN_UP);
+        let loss = self.stable(pose).value(pose).ok().filter(|loss| loss.is_finite());
+        let loss = loss.unwrap_or(BLOWN_UP);
         self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 
@@ -169,12 +170,10 @@ impl Factor for StabilityFactor {
         let center = Point3::from(state.center());
         let (moved, precision) = self.displacement(state);
         // A rollout that blew up has no derivative.
-        let StabilityJacobian { value: loss, gradient, normal: jtj } =
-            self.stable(pose).linearize(pose, &center).unwrap_or(StabilityJacobian {
-                value: BLOWN_UP,
-                gradient: Vector6::zeros(),
-                normal: Matrix6::zeros(),
-            });
+        let linearized = self.stable(pose).linearize(pose, &center).ok();
+        let StabilityJacobian { value: loss, gradient, normal: jtj } = linearized
+            .filter(StabilityJacobian::is_finite)
+            .unwrap_or_else(|| StabilityJacobian::constant(BLOWN_UP));
         let slope = self.settings.weight / (1.0 + loss);
         let (mut gradient, mut hessian) = (gradient * slope, jtj * (2.0 * slope));
         for k in 0..3 {
@@ -188,6 +187,8 @@ impl Factor for StabilityFactor {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector6;
+
     use super::*;
     use crate::factor::gradient_check::{assert_gradient, fixture, scene};
 

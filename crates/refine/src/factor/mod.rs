@@ -1,5 +1,6 @@
 //! The evidence, one kind a file: each factor is a negative log-likelihood of the state, up to a constant.
 
+mod compliant_balance;
 mod facing;
 mod free_space;
 mod hand_depth;

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3, Vector6};
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
-use prehend_sim::{CompliantBalance, CompliantSupport, Support};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::compliant_balance::{CompliantBalance, Support};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{Frame, Hand, Object};
@@ -87,7 +87,7 @@ struct Push {
 struct Near {
     point: Point3<f64>,
     sample: RobotSample,
-    support: CompliantSupport,
+    support: Support,
     /// Relative change of its compliance by the distance \[1/m\].
     stiffening: f64,
 }
@@ -150,7 +150,7 @@ impl SupportFactor {
             let arm = t_cam_link * felt.position - mass_center;
             load + self.wrench(&arm, &(t_cam_link * felt.force))
         });
-        let supports: Vec<CompliantSupport> = near.iter().map(|near| near.support).collect();
+        let supports: Vec<Support> = near.iter().map(|near| near.support).collect();
         let length = self.object.radius;
         let balance = CompliantBalance::find(&supports, &mass_center, length, &load);
         Some(Held { hand, mass_center, near, balance })
@@ -176,11 +176,12 @@ impl SupportFactor {
             return None;
         }
         let normal = Unit::try_new(inward, 0.0)?;
-        let support = Support { position: point, normal, friction: self.settings.friction };
+        let friction = self.settings.friction;
         let area = self.object.area * self.stride() as f64 / self.object.samples.len() as f64;
         let compliance = self.settings.area / (area * left * left);
         let stiffening = 4.0 * apart / (left * reach);
-        Some(Near { point, sample, support: CompliantSupport { support, compliance }, stiffening })
+        let support = Support { position: point, normal, friction, compliance };
+        Some(Near { point, sample, support, stiffening })
     }
 
     /// Force and torque over the object's radius \[N\].

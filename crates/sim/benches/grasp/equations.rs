@@ -2,9 +2,10 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
+use prehend_sim::contact::regularized_coulomb;
 use prehend_sim::{
-    Contact, ContactLaw, Integrator, Response, RigidBody, SimulationError, State, Step, World,
-    regularized_coulomb,
+    ContactForce, ContactKinematics, ContactLaw, Integrator, RigidBody, SimulationError, State,
+    Step, World,
 };
 
 /// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.
@@ -25,14 +26,14 @@ impl ContactLaw for SmoothedPenalty {
     }
 
     #[inline]
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let speed = contact.normal_speed;
         let approach = speed.select(speed.value() < 0.0, S::zero());
         let normal = -(p[0] * contact.gap + p[1] * approach);
-        Response { normal, tangential: regularized_coulomb(p[2], normal, &contact.slip, 1e-2) }
+        ContactForce { normal, tangential: regularized_coulomb(p[2], normal, &contact.slip, 1e-2) }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

@@ -50,8 +50,8 @@ impl Grasp {
         // Weights are in the law: a sample stands for itself.
         let surface = Surface::new(&spiral(count), &vec![1.0; count])?;
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let field = world.add(Body::kinematic("hand").with_field(Arc::clone(&self.field)));
-        let samples = world.add(Body::free("ellipsoid", rigid).with_surface(surface));
+        let field = world.add(Body::fixed("hand").with_field(Arc::clone(&self.field)));
+        let samples = world.add(Body::dynamic("ellipsoid", rigid).with_surface(surface));
         let law: Arc<dyn DynContactLaw> = Arc::new(SmoothedPenalty::shared_by(count));
         world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
         Ok(world)

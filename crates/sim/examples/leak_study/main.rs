@@ -8,17 +8,20 @@
 //! `cargo run --release -p prehend-sim --example leak_study`
 
 mod scene;
+mod smoothing;
 
 use std::error::Error;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, SemiImplicitEuler, SimulationError,
-    SmoothedGradient, Smoothing, State, TimeSteps, World,
+    Coulomb, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler, SimulationError, State, TimeSteps,
+    World,
 };
 use scene::OBJECT;
+use smoothing::{SmoothedGradient, Smoothing};
 
 /// Standard deviation of the perturbations \[m\].
 const SIGMA: f64 = 1e-3;
@@ -56,11 +59,11 @@ impl Drop {
 
     /// The loss and its gradient, with the object dropped `shift` \[m\] away.
     fn gradient(&self, shift: &Vector3<f64>) -> Result<(f64, Vector3<f64>), SimulationError> {
-        let mut start = scene::start().lift::<Fwd<3>>();
+        let mut start = scene::start().cast::<Fwd<3>>();
         for i in 0..3 {
             start.pose.translation.vector[i] += Fwd::variable(shift[i], i);
         }
-        let loss = self.loss(&self.world.lift(), start)?;
+        let loss = self.loss(&self.world.cast(), start)?;
         Ok((loss.value, loss.derivative.into()))
     }
 
@@ -73,7 +76,7 @@ impl Drop {
 
     /// A hundred times the squared distance from a target, and squared velocities.
     fn loss<S: Scalar>(&self, world: &World<S>, start: State<S>) -> Result<S, SimulationError> {
-        let still = State::at_rest(Isometry3::identity()).lift();
+        let still = State::at_rest(Isometry3::identity()).cast();
         let states = [still, start];
         let end = world
             .simulate_with(&SemiImplicitEuler, &states, self.time_steps, |_, _| ())?

@@ -91,7 +91,7 @@ impl DistanceField for Hand {
 /// Number of the object's body.
 pub(crate) const OBJECT: usize = 1;
 
-/// The hand, kinematic, and the object with `count` samples of one unit of area together.
+/// The hand, fixed, and the object with `count` samples of one unit of area together.
 pub(crate) fn world(
     count: usize,
     law: Arc<dyn DynContactLaw>,
@@ -110,8 +110,8 @@ pub(crate) fn world(
     let inertia = Matrix3::from_diagonal(&Vector3::new(b + c, a + c, a + b));
     let rigid = RigidBody::new(MASS, inertia, Point3::origin())?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::kinematic("hand").with_field(Arc::new(Hand)));
-    let object = Body::free("object", rigid).with_surface(Surface::uniform(&points, 1.0)?);
+    let field = world.add(Body::fixed("hand").with_field(Arc::new(Hand)));
+    let object = Body::dynamic("object", rigid).with_surface(Surface::uniform(&points, 1.0)?);
     let samples = world.add(object);
     world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
     Ok(world)

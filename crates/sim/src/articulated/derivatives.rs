@@ -6,8 +6,8 @@ use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::kinematics::Kinematics;
-use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
 use super::tree_factor::TreeFactor;
+use crate::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
 
 /// Derivatives of efforts τ: by displacements along unit velocities, and by velocities.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,8 +48,8 @@ impl Kinematics<'_> {
         let mut with_parent = Vec::with_capacity(n);
         let mut twice = Vec::with_capacity(n);
         let mut with_both = Vec::with_capacity(n);
-        for (freedom, axis) in self.axes.iter().enumerate() {
-            let link = self.tree.link_of(freedom);
+        for (dof, axis) in self.axes.iter().enumerate() {
+            let link = self.tree.link_of(dof);
             let (velocity, acceleration) = match links[link].parent {
                 Some(parent) => (self.velocities[parent], effort.accelerations[parent]),
                 None => (Vector6::zeros(), self.rest()),
@@ -66,28 +66,28 @@ impl Kinematics<'_> {
             [(); 3].map(|()| DMatrix::zeros(n, n));
         for (index, link) in links.iter().enumerate().rev() {
             let (composite, rate) = (&composites[index], rates[index]);
-            let [_, freedoms] = self.tree.range(index);
-            for freedom in freedoms {
-                let axis = &self.axes[freedom];
-                let moved = rate * with_parent[freedom]
-                    + composite.times(&twice[freedom])
+            let [_, dofs] = self.tree.range(index);
+            for dof in dofs {
+                let axis = &self.axes[dof];
+                let moved = rate * with_parent[dof]
+                    + composite.times(&twice[dof])
                     + cross_force(axis, &effort.forces[index]);
-                let pushed = rate * axis + composite.times(&with_both[freedom]);
+                let pushed = rate * axis + composite.times(&with_both[dof]);
                 let (by_rate, by_inertia) = (rate.tr_mul(axis), composite.times(axis));
-                for other in self.tree.freedoms_of(index) {
-                    by_position[(freedom, other)] =
+                for other in self.tree.dofs_of(index) {
+                    by_position[(dof, other)] =
                         by_rate.dot(&with_parent[other]) + by_inertia.dot(&twice[other]);
-                    by_velocity[(freedom, other)] =
+                    by_velocity[(dof, other)] =
                         by_rate.dot(&self.axes[other]) + by_inertia.dot(&with_both[other]);
                     let mass = by_inertia.dot(&self.axes[other]);
-                    by_acceleration[(freedom, other)] = mass;
-                    by_acceleration[(other, freedom)] = mass;
+                    by_acceleration[(dof, other)] = mass;
+                    by_acceleration[(other, dof)] = mass;
                     if self.tree.link_of(other) != index {
-                        by_position[(other, freedom)] = self.axes[other].dot(&moved);
-                        by_velocity[(other, freedom)] = self.axes[other].dot(&pushed);
+                        by_position[(other, dof)] = self.axes[other].dot(&moved);
+                        by_velocity[(other, dof)] = self.axes[other].dot(&pushed);
                     }
                 }
-                by_acceleration[(freedom, freedom)] += link.armature;
+                by_acceleration[(dof, dof)] += link.armature;
             }
             if let Some(parent) = link.parent {
                 rates[parent] += rate;
@@ -99,7 +99,7 @@ impl Kinematics<'_> {
     /// [`inverse_dynamics_derivatives`](Self::inverse_dynamics_derivatives) at coordinates `q` and velocities `v`, direction by direction.
     fn by_forward_mode(&self, q: &[f64], v: &[f64], accelerations: &[f64]) -> DynamicsDerivatives {
         let n = v.len();
-        let lifted = self.tree.lift::<Fwd<1>>();
+        let lifted = self.tree.cast::<Fwd<1>>();
         let constants = |x: &[f64]| x.iter().map(|x| Fwd::constant(*x)).collect::<Vec<Fwd<1>>>();
         let [q, v, accelerations] = [q, v, accelerations].map(constants);
         let effort = |q: &[Fwd<1>], v: &[Fwd<1>]| {

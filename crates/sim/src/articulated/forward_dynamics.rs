@@ -4,13 +4,13 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::cross_force;
+use crate::spatial::cross_force;
 
-/// What is left of the algorithm when accelerations are known: the factor of the mass matrix.
+/// Factor of the mass matrix, which is left of the algorithm when accelerations are known.
 pub(super) struct ArticulatedInertia<S: Scalar> {
-    /// Of each degree of freedom, the force of its acceleration on what hangs on it.
+    /// For each degree of freedom, the force of its acceleration on what hangs on it.
     pulls: Vec<Vector6<S>>,
-    /// Of each link, the inverse of the efforts that accelerations of its joint take.
+    /// For each link, the inverse of the efforts that accelerations of its joint take.
     inverses: Vec<DMatrix<S>>,
 }
 
@@ -56,13 +56,13 @@ impl<S: Scalar> Kinematics<'_, S> {
         let mut rest = vec![S::zero(); n];
         let mut inverses: Vec<DMatrix<S>> = vec![DMatrix::zeros(0, 0); links.len()];
         for (index, link) in links.iter().enumerate().rev() {
-            let [_, freedoms] = self.tree.range(index);
+            let [_, dofs] = self.tree.range(index);
             let (inertia, bias) = (inertias[index], biases[index]);
-            for freedom in freedoms.clone() {
-                pulls[freedom] = inertia * self.axes[freedom];
-                rest[freedom] = efforts[freedom] - self.axes[freedom].dot(&bias);
+            for dof in dofs.clone() {
+                pulls[dof] = inertia * self.axes[dof];
+                rest[dof] = efforts[dof] - self.axes[dof].dot(&bias);
             }
-            let (first, count) = (freedoms.start, freedoms.len());
+            let (first, count) = (dofs.start, dofs.len());
             let (mut left, mut pull) = (inertia, bias);
             if count == 1 {
                 let axis = &self.axes[first];
@@ -103,15 +103,15 @@ impl<S: Scalar> Kinematics<'_, S> {
         let mut rest = efforts.to_vec();
         let mut forces = vec![Vector6::zeros(); self.tree.links().len()];
         for (index, link) in self.tree.links().iter().enumerate().rev() {
-            let [_, freedoms] = self.tree.range(index);
+            let [_, dofs] = self.tree.range(index);
             let mut force: Vector6<S> = forces[index];
-            for freedom in freedoms.clone() {
-                rest[freedom] -= self.axes[freedom].dot(&forces[index]);
+            for dof in dofs.clone() {
+                rest[dof] -= self.axes[dof].dot(&forces[index]);
             }
             let Some(parent) = link.parent else { continue };
-            for r in freedoms.clone() {
-                let inverse = factor.inverses[index].row(r - freedoms.start);
-                let pushed = inverse.iter().zip(&rest[freedoms.clone()]);
+            for r in dofs.clone() {
+                let inverse = factor.inverses[index].row(r - dofs.start);
+                let pushed = inverse.iter().zip(&rest[dofs.clone()]);
                 let value = pushed.fold(S::zero(), |sum, (i, rest)| sum + *i * *rest);
                 force += factor.pulls[r] * value;
             }
@@ -134,24 +134,22 @@ impl<S: Scalar> Kinematics<'_, S> {
         for (index, link) in links.iter().enumerate() {
             let of_parent = link.parent.map_or(root, |p| accelerations[p]);
             let mut acceleration = of_parent + drift(index);
-            let [_, freedoms] = self.tree.range(index);
-            let first = freedoms.start;
+            let [_, dofs] = self.tree.range(index);
+            let first = dofs.start;
             let inverse = &factor.inverses[index];
-            if freedoms.len() == 1 {
+            if dofs.len() == 1 {
                 let value = inverse[0] * (rest[first] - factor.pulls[first].dot(&acceleration));
                 acceleration += self.axes[first] * value;
                 result[first] = value;
             } else {
-                let left: Vec<S> = freedoms
-                    .clone()
-                    .map(|f| rest[f] - factor.pulls[f].dot(&acceleration))
-                    .collect();
-                for freedom in freedoms {
-                    let inverse = inverse.row(freedom - first);
+                let left: Vec<S> =
+                    dofs.clone().map(|f| rest[f] - factor.pulls[f].dot(&acceleration)).collect();
+                for dof in dofs {
+                    let inverse = inverse.row(dof - first);
                     let terms = inverse.iter().zip(&left);
                     let value = terms.fold(S::zero(), |sum, (i, l)| sum + *i * *l);
-                    acceleration += self.axes[freedom] * value;
-                    result[freedom] = value;
+                    acceleration += self.axes[dof] * value;
+                    result[dof] = value;
                 }
             }
             accelerations.push(acceleration);

@@ -4,13 +4,13 @@ use nalgebra::{DVector, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::{angular, cross_force, linear, spatial};
+use crate::spatial::{angular, cross_force, linear, spatial};
 
 /// Motion and force of all links at some accelerations.
 pub(super) struct Effort<S: Scalar> {
     /// Spatial acceleration of each link, less that of free fall.
     pub(super) accelerations: Vec<Vector6<S>>,
-    /// What moves each link and all that hangs on it.
+    /// Force on each link and all that hangs on it.
     pub(super) forces: Vec<Vector6<S>>,
 }
 
@@ -21,12 +21,12 @@ impl<S: Scalar> Kinematics<'_, S> {
     /// If there is not one for each degree of freedom.
     pub fn inverse_dynamics(&self, accelerations: &[S]) -> DVector<S> {
         let effort = self.effort(accelerations);
-        let tau = |freedom: usize| {
-            let link = self.tree.link_of(freedom);
+        let tau = |dof: usize| {
+            let link = self.tree.link_of(dof);
             let armature = self.tree.links()[link].armature;
-            self.axes[freedom].dot(&effort.forces[link]) + armature * accelerations[freedom]
+            self.axes[dof].dot(&effort.forces[link]) + armature * accelerations[dof]
         };
-        DVector::from_fn(self.axes.len(), |freedom, _| tau(freedom))
+        DVector::from_fn(self.axes.len(), |dof, _| tau(dof))
     }
 
     /// Acceleration of a link's origin \[m/s²\], less that of free fall, and its angular acceleration \[rad/s²\], along the world's axes, at
@@ -56,9 +56,9 @@ impl<S: Scalar> Kinematics<'_, S> {
                 None => self.rest(),
             };
             acceleration += self.drifts[index];
-            let [_, freedoms] = self.tree.range(index);
-            for freedom in freedoms {
-                acceleration += self.axes[freedom] * accelerations[freedom];
+            let [_, dofs] = self.tree.range(index);
+            for dof in dofs {
+                acceleration += self.axes[dof] * accelerations[dof];
             }
             let inertia = &self.inertias[index];
             let force =

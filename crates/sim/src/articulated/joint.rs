@@ -1,4 +1,4 @@
-//! How a link may move with respect to its parent.
+//! Joints: motions that a link may make with respect to its parent.
 
 use std::sync::Arc;
 
@@ -6,8 +6,8 @@ use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{se3_exp, so3_exp};
 
-use super::joint_model::{DynJointModel, JointModel, MOST_FREEDOMS};
-use super::spatial::spatial;
+use super::joint_model::{DynJointModel, JointModel, MAX_NV};
+use crate::spatial::spatial;
 
 /// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
 ///
@@ -42,7 +42,7 @@ pub enum Joint {
 pub struct CustomJoint(pub(super) Arc<dyn DynJointModel>);
 
 impl PartialEq for CustomJoint {
-    /// Whether they are the same one.
+    /// True if they are the same one.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -55,28 +55,28 @@ impl Joint {
     }
 
     /// Number of coordinates.
-    pub fn coordinates(&self) -> usize {
+    pub fn nq(&self) -> usize {
         match self {
             Self::Fixed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 4,
             Self::Floating => 7,
-            Self::Custom(CustomJoint(model)) => model.freedoms(),
+            Self::Custom(CustomJoint(model)) => model.nv(),
         }
     }
 
     /// Number of degrees of freedom.
-    pub fn freedoms(&self) -> usize {
+    pub fn nv(&self) -> usize {
         match self {
             Self::Fixed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 3,
             Self::Floating => 6,
-            Self::Custom(CustomJoint(model)) => model.freedoms(),
+            Self::Custom(CustomJoint(model)) => model.nv(),
         }
     }
 
-    /// Whether a rotation is among its coordinates.
+    /// True if a rotation is among its coordinates.
     pub(crate) fn turns(&self) -> bool {
         matches!(self, Self::Spherical | Self::Floating)
     }
@@ -88,9 +88,7 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
             Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-            Self::Custom(CustomJoint(model)) => {
-                &[0.0; MOST_FREEDOMS][..model.freedoms().min(MOST_FREEDOMS)]
-            }
+            Self::Custom(CustomJoint(model)) => &[0.0; MAX_NV][..model.nv().min(MAX_NV)],
         }
     }
 
@@ -108,13 +106,13 @@ impl Joint {
 
     /// The motions of unit velocities, in the frame of the link, at its origin: constant; not of a joint type of one's own.
     #[inline]
-    pub(super) fn axis(&self, freedom: usize) -> Vector6<f64> {
+    pub(super) fn axis(&self, dof: usize) -> Vector6<f64> {
         match self {
             Self::Fixed | Self::Custom(_) => Vector6::zeros(),
             Self::Revolute(axis) => spatial(&Vector3::zeros(), axis),
             Self::Prismatic(axis) => spatial(axis, &Vector3::zeros()),
-            Self::Spherical => Vector6::ith(3 + freedom, 1.0),
-            Self::Floating => Vector6::ith(freedom, 1.0),
+            Self::Spherical => Vector6::ith(3 + dof, 1.0),
+            Self::Floating => Vector6::ith(dof, 1.0),
         }
     }
 
@@ -145,7 +143,7 @@ fn push<S: Scalar>(rotation: &UnitQuaternion<S>, coordinates: &mut Vec<S>) {
     coordinates.extend(rotation.coords.iter());
 }
 
-/// Of the first four of `q`.
+/// Quaternion of the first four of `q`.
 #[inline]
 pub(super) fn quaternion<S: Scalar>(q: &[S]) -> UnitQuaternion<S> {
     Unit::new_normalize(Quaternion::new(q[3], q[0], q[1], q[2]))

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::spatial::spatial;
+use crate::spatial::spatial;
 
 /// Coordinates of a joint type of one's own at most.
-pub(super) const MOST_FREEDOMS: usize = 3;
+pub(super) const MAX_NV: usize = 3;
 
 /// A joint type of one's own, up to three coordinates whose rates are its velocities: where it puts the link. Everything else follows, derivatives
 /// too.
@@ -27,7 +27,7 @@ pub(super) const MOST_FREEDOMS: usize = 3;
 /// }
 ///
 /// impl JointModel for Screw {
-///     fn freedoms(&self) -> usize {
+///     fn nv(&self) -> usize {
 ///         1
 ///     }
 ///     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -37,11 +37,11 @@ pub(super) const MOST_FREEDOMS: usize = 3;
 /// }
 ///
 /// let joint = Joint::custom(Screw { pitch: 1e-3 });
-/// assert_eq!(joint.freedoms(), 1);
+/// assert_eq!(joint.nv(), 1);
 /// ```
 pub trait JointModel: fmt::Debug + Send + Sync + 'static {
     /// Number of its coordinates, 1 to 3.
-    fn freedoms(&self) -> usize;
+    fn nv(&self) -> usize;
 
     /// Link → joint frame \[m\] at coordinates `q`, as many as it has: smooth, with three derivatives.
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S>
@@ -51,57 +51,51 @@ pub trait JointModel: fmt::Debug + Send + Sync + 'static {
 
 /// A [`JointModel`] behind a pointer.
 pub(super) trait DynJointModel: fmt::Debug + Send + Sync {
-    fn freedoms(&self) -> usize;
-    /// What [`CustomMotion`] makes of coordinates and velocities, and its Jacobian.
-    fn motion(&self, x: [f64; 2 * MOST_FREEDOMS]) -> [f64; MOTION];
-    fn linearized(
-        &self,
-        x: [f64; 2 * MOST_FREEDOMS],
-    ) -> ([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION]);
+    fn nv(&self) -> usize;
+    /// Values of a [`CustomMotion`] at coordinates and velocities, and their Jacobian.
+    fn motion(&self, x: [f64; 2 * MAX_NV]) -> [f64; MOTION];
+    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> ([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION]);
 }
 
 impl<J: JointModel> DynJointModel for J {
-    fn freedoms(&self) -> usize {
-        JointModel::freedoms(self)
+    fn nv(&self) -> usize {
+        JointModel::nv(self)
     }
 
-    fn motion(&self, x: [f64; 2 * MOST_FREEDOMS]) -> [f64; MOTION] {
+    fn motion(&self, x: [f64; 2 * MAX_NV]) -> [f64; MOTION] {
         motion(self, x)
     }
 
-    fn linearized(
-        &self,
-        x: [f64; 2 * MOST_FREEDOMS],
-    ) -> ([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION]) {
-        let all = motion(self, Fwd::<{ 2 * MOST_FREEDOMS }>::variables(x));
+    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> ([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION]) {
+        let all = motion(self, Fwd::<{ 2 * MAX_NV }>::variables(x));
         (all.map(|x| x.value), all.map(|x| x.derivative))
     }
 }
 
 /// Coordinates, then velocities, zero where there are fewer.
-pub(super) fn inputs<S: Scalar>(q: &[S], v: &[S]) -> [S; 2 * MOST_FREEDOMS] {
+pub(super) fn inputs<S: Scalar>(q: &[S], v: &[S]) -> [S; 2 * MAX_NV] {
     let part = |all: &[S], i: usize| all.get(i).copied().unwrap_or_else(S::zero);
-    std::array::from_fn(|i| match i.checked_sub(MOST_FREEDOMS) {
+    std::array::from_fn(|i| match i.checked_sub(MAX_NV) {
         None => part(q, i),
         Some(i) => part(v, i),
     })
 }
 
 /// Numbers of a [`CustomMotion`].
-pub(super) const MOTION: usize = 12 + 6 * MOST_FREEDOMS + 6;
+pub(super) const MOTION: usize = 12 + 6 * MAX_NV + 6;
 
-/// Where a link is in its joint's frame, and how it moves along its own axes.
+/// Pose of a link in its joint's frame, and its motion along its own axes.
 pub(super) struct CustomMotion<S: Scalar> {
     pub(super) rotation: Matrix3<S>,
     pub(super) place: Vector3<S>,
     /// Motion by each unit velocity, at the link's origin.
-    pub(super) axes: [Vector6<S>; MOST_FREEDOMS],
+    pub(super) axes: [Vector6<S>; MAX_NV],
     /// Acceleration at constant velocities, less that of axes that turn with the link.
     pub(super) drift: Vector6<S>,
 }
 
 impl<S: Scalar> CustomMotion<S> {
-    /// Of `model` at coordinates `q` with velocities `v`.
+    /// Motion of `model` at coordinates `q` with velocities `v`.
     pub(super) fn new(model: &Arc<dyn DynJointModel>, q: &[S], v: &[S]) -> Self {
         let x = inputs(q, v);
         let values = x.map(S::value);
@@ -113,27 +107,27 @@ impl<S: Scalar> CustomMotion<S> {
         Self::of(&S::local(&Linear { at: values, value, jacobian }, x))
     }
 
-    /// Of numbers in their order.
+    /// Motion of numbers in their order.
     pub(super) fn of(numbers: &[S; MOTION]) -> Self {
         let twist = |from: usize| Vector6::from_column_slice(&numbers[from..from + 6]);
         Self {
             rotation: Matrix3::from_column_slice(&numbers[..9]),
             place: Vector3::from_column_slice(&numbers[9..12]),
             axes: std::array::from_fn(|k| twist(12 + 6 * k)),
-            drift: twist(12 + 6 * MOST_FREEDOMS),
+            drift: twist(12 + 6 * MAX_NV),
         }
     }
 }
 
 /// A motion about where it was linearized.
 struct Linear {
-    at: [f64; 2 * MOST_FREEDOMS],
+    at: [f64; 2 * MAX_NV],
     value: [f64; MOTION],
-    jacobian: [[f64; 2 * MOST_FREEDOMS]; MOTION],
+    jacobian: [[f64; 2 * MAX_NV]; MOTION],
 }
 
-impl LocalFunction<{ 2 * MOST_FREEDOMS }, MOTION> for Linear {
-    fn evaluate<S: Scalar>(&self, x: [S; 2 * MOST_FREEDOMS]) -> [S; MOTION] {
+impl LocalFunction<{ 2 * MAX_NV }, MOTION> for Linear {
+    fn evaluate<S: Scalar>(&self, x: [S; 2 * MAX_NV]) -> [S; MOTION] {
         std::array::from_fn(|row| {
             let slopes = self.jacobian[row].iter().zip(&x).zip(&self.at);
             slopes.fold(S::constant(self.value[row]), |sum, ((slope, x), at)| {
@@ -144,17 +138,17 @@ impl LocalFunction<{ 2 * MOST_FREEDOMS }, MOTION> for Linear {
 
     fn linearize(
         &self,
-        _: [f64; 2 * MOST_FREEDOMS],
-    ) -> Option<([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION])> {
+        _: [f64; 2 * MAX_NV],
+    ) -> Option<([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION])> {
         Some((self.value, self.jacobian))
     }
 }
 
 /// Rotation, place, axes and drift: coordinates carry their derivatives, and those the rates at which they change with time.
-fn motion<J: JointModel, S: Scalar>(model: &J, x: [S; 2 * MOST_FREEDOMS]) -> [S; MOTION] {
-    let count = DynJointModel::freedoms(model);
-    let q: Vec<Fwd<MOST_FREEDOMS, Fwd<1, S>>> = (0..count)
-        .map(|k| Fwd::variable(Fwd { value: x[k], derivative: [x[MOST_FREEDOMS + k]] }, k))
+fn motion<J: JointModel, S: Scalar>(model: &J, x: [S; 2 * MAX_NV]) -> [S; MOTION] {
+    let count = DynJointModel::nv(model);
+    let q: Vec<Fwd<MAX_NV, Fwd<1, S>>> = (0..count)
+        .map(|k| Fwd::variable(Fwd { value: x[k], derivative: [x[MAX_NV + k]] }, k))
         .collect();
     let Isometry3 { translation, rotation } = model.placement(&q);
     let turned = rotation.to_rotation_matrix().into_inner();
@@ -168,9 +162,9 @@ fn motion<J: JointModel, S: Scalar>(model: &J, x: [S; 2 * MOST_FREEDOMS]) -> [S;
         let spin = Vector3::new(spin.m32, spin.m13, spin.m21);
         let axis = spatial(&(back * translation.vector.map(|x| x.derivative[k])), &spin);
         motion[place..place + 6].copy_from_slice(axis.map(|x| x.value).as_slice());
-        drift += axis.map(|x| x.derivative[0]) * x[MOST_FREEDOMS + k];
+        drift += axis.map(|x| x.derivative[0]) * x[MAX_NV + k];
         place += 6;
     }
-    motion[12 + 6 * MOST_FREEDOMS..].copy_from_slice(drift.as_slice());
+    motion[12 + 6 * MAX_NV..].copy_from_slice(drift.as_slice());
     motion
 }

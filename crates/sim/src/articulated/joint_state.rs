@@ -9,6 +9,15 @@ use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 use super::joint::{Joint, quaternion};
 use crate::state::State;
 
+/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`](prehend_geometry::robot::KinematicTree::joint_names), or of one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointState<S = f64> {
+    /// Positions \[rad or m\].
+    pub position: Vec<S>,
+    /// Velocities \[rad/s or m/s\].
+    pub velocity: Vec<S>,
+}
+
 impl Joint {
     /// Appends the coordinates and velocities that `state` is.
     pub(crate) fn read<S: Scalar>(&self, state: &State<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
@@ -23,8 +32,8 @@ impl Joint {
                 v.extend(state.linear.iter().chain(state.angular.iter()));
             }
             Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                q.extend(place.iter().take(self.coordinates()));
-                v.extend(state.linear.iter().take(self.freedoms()));
+                q.extend(place.iter().take(self.nq()));
+                v.extend(state.linear.iter().take(self.nv()));
             }
         }
     }
@@ -64,10 +73,10 @@ impl Joint {
         rate.as_slice()[self.velocities()].to_vec()
     }
 
-    /// Which of a state's velocities, linear and angular, are its own.
+    /// Range of the joint's own velocities among a state's six, linear and angular.
     fn velocities(&self) -> std::ops::Range<usize> {
         let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        first..first + self.freedoms()
+        first..first + self.nv()
     }
 
     /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.

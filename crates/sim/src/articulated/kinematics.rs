@@ -1,4 +1,4 @@
-//! Where links are, and how they move.
+//! Poses and velocities of links.
 
 use nalgebra::{
     Isometry3, Matrix3, Matrix6xX, Point3, Rotation3, UnitQuaternion, Vector3, Vector6,
@@ -8,7 +8,7 @@ use prehend_autodiff::Scalar;
 use super::joint::{CustomJoint, Joint};
 use super::joint_model::CustomMotion;
 use super::link::Articulation;
-use super::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
+use crate::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
 
 /// Positions, velocities and inertias of the links at some coordinates and velocities.
 ///
@@ -23,7 +23,7 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     pub(crate) places: Vec<Vector3<S>>,
     /// Motion of each degree of freedom.
     pub(crate) axes: Vec<Vector6<S>>,
-    /// Of each link, that of its joint alone, and with its parent's.
+    /// For each link, that of its joint alone, and with its parent's.
     pub(crate) joint_velocities: Vec<Vector6<S>>,
     pub(crate) velocities: Vec<Vector6<S>>,
     /// Acceleration of each link at constant velocities of the joints.
@@ -35,12 +35,12 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     pub(crate) custom: Option<[Vec<S>; 2]>,
 }
 
-/// Whether inertias are needed.
+/// True if inertias are needed.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Moves {
-    WithMass,
+pub(crate) enum Scope {
+    WithInertia,
     /// Positions and velocities alone.
-    Only,
+    KinematicsOnly,
 }
 
 /// Energies \[J\].
@@ -53,7 +53,7 @@ pub struct Energy<S: Scalar = f64> {
 }
 
 impl<'a, S: Scalar> Kinematics<'a, S> {
-    pub(crate) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S], moves: Moves) -> Self {
+    pub(crate) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S], scope: Scope) -> Self {
         tree.check(q, v);
         let count = tree.links().len();
         let mut at = Self {
@@ -70,10 +70,10 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             custom: None,
         };
         for (index, link) in tree.links().iter().enumerate() {
-            let [coordinates, freedoms] = tree.range(index);
+            let [coordinates, dofs] = tree.range(index);
             let own = match &link.joint {
                 Joint::Custom(CustomJoint(model)) => {
-                    Some(CustomMotion::new(model, &q[coordinates.clone()], &v[freedoms.clone()]))
+                    Some(CustomMotion::new(model, &q[coordinates.clone()], &v[dofs.clone()]))
                 }
                 _ => None,
             };
@@ -107,16 +107,16 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
                 let turn = rotation * angular(axis);
                 spatial(&(rotation * linear(axis) + place.cross(&turn)), &turn)
             };
-            for (k, freedom) in freedoms.enumerate() {
+            for (k, dof) in dofs.enumerate() {
                 let axis = match &own {
                     Some(motion) => along_world(&motion.axes[k]),
                     None => along_world(&link.joint.axis(k).map(S::constant)),
                 };
-                joint_velocity += axis * v[freedom];
+                joint_velocity += axis * v[dof];
                 at.axes.push(axis);
             }
             let of_parent = link.parent.map_or_else(Vector6::zeros, |p| at.velocities[p]);
-            if moves == Moves::WithMass {
+            if scope == Scope::WithInertia {
                 let com = place + rotation * link.com.coords;
                 let inertia = rotation * link.inertia * rotation.transpose();
                 at.inertias.push(SpatialInertia::new(link.mass, &com, &inertia));
@@ -136,7 +136,7 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
         at
     }
 
-    /// The same under another acceleration of free fall \[m/s²\].
+    /// Under another acceleration of free fall \[m/s²\].
     #[must_use]
     pub fn under(self, gravity: Vector3<S>) -> Self {
         Self { gravity, ..self }
@@ -169,9 +169,9 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
     pub fn jacobian(&self, link: usize, point: &Point3<S>) -> Matrix6xX<S> {
         let arm = self.places[link] + self.rotations[link] * point.coords;
         let mut jacobian = Matrix6xX::zeros(self.axes.len());
-        for freedom in self.tree.freedoms_of(link) {
-            let (velocity, spin) = (linear(&self.axes[freedom]), angular(&self.axes[freedom]));
-            jacobian.set_column(freedom, &spatial(&(velocity + spin.cross(&arm)), &spin));
+        for dof in self.tree.dofs_of(link) {
+            let (velocity, spin) = (linear(&self.axes[dof]), angular(&self.axes[dof]));
+            jacobian.set_column(dof, &spatial(&(velocity + spin.cross(&arm)), &spin));
         }
         jacobian
     }
@@ -189,8 +189,8 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
         for (index, link) in self.tree.links().iter().enumerate() {
             let (velocity, inertia) = (&self.velocities[index], &self.inertias[index]);
             kinetic += velocity.dot(&inertia.times(velocity));
-            let [_, freedoms] = self.tree.range(index);
-            v[freedoms].iter().for_each(|v| kinetic += link.armature * *v * *v);
+            let [_, dofs] = self.tree.range(index);
+            v[dofs].iter().for_each(|v| kinetic += link.armature * *v * *v);
             let moment = inertia.moment + self.origin.map(S::constant) * link.mass;
             potential -= self.gravity.dot(&moment);
         }

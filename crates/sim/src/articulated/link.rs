@@ -4,20 +4,20 @@ use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, Vecto
 use prehend_autodiff::Scalar;
 
 use super::joint::{CustomJoint, Joint};
-use super::joint_model::MOST_FREEDOMS;
-use super::kinematics::{Kinematics, Moves};
+use super::joint_model::MAX_NV;
+use super::kinematics::{Kinematics, Scope};
 use crate::body::RigidBody;
 
 /// A link and the joint that it hangs on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link<S: Scalar = f64> {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The link that it hangs on; none is the world.
     pub parent: Option<usize>,
     /// Joint frame → parent link's frame.
     pub t_parent_joint: Isometry3<S>,
-    /// How the link moves in the joint's frame.
+    /// Joint: the motion of the link in the joint's frame.
     pub joint: Joint,
     /// Mass \[kg\].
     pub mass: S,
@@ -29,10 +29,10 @@ pub struct Link<S: Scalar = f64> {
     pub armature: S,
 }
 
-/// How many numbers a link is made of.
+/// Number of a link's parameters.
 pub(crate) const NUMBERS: usize = 3 + 4 + 1 + 3 + 6 + 1;
 
-/// What they are called.
+/// Their names.
 pub(crate) const NUMBER_NAMES: [&str; NUMBERS] = [
     "joint_x",
     "joint_y",
@@ -55,7 +55,7 @@ pub(crate) const NUMBER_NAMES: [&str; NUMBERS] = [
 ];
 
 impl<S: Scalar> Link<S> {
-    /// Of `body` in the link's frame, hanging on the world by `joint` at its origin.
+    /// Link of `body` in the link's frame, hanging on the world by `joint` at its origin.
     pub fn new(name: impl Into<String>, joint: Joint, body: &RigidBody<S>) -> Self {
         let (mass, com, inertia) = (body.mass(), *body.com(), *body.inertia());
         Self { mass, com, inertia, ..Self::massless(name, joint) }
@@ -93,7 +93,7 @@ impl<S: Scalar> Link<S> {
         Self { armature, ..self }
     }
 
-    /// Whether its numbers are those of a link.
+    /// Checks that its numbers are those of a link.
     fn check_numbers(&self) -> Result<(), ArticulationError> {
         let wrong = |problem| ArticulationError::Mass { link: self.name.clone(), problem };
         if !(self.mass.value() >= 0.0 && self.armature.value() >= 0.0) {
@@ -150,7 +150,7 @@ impl<S: Scalar> Link<S> {
         self.inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
-    /// The same link, each number through `f`.
+    /// Link, each number through `f`.
     fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Link<T> {
         let Isometry3 { translation, rotation } = self.t_parent_joint;
         let rotation = Unit::new_unchecked(Quaternion::from(rotation.coords.map(&f)));
@@ -171,13 +171,13 @@ impl<S: Scalar> Link<S> {
 #[derive(Clone, Debug)]
 pub struct Articulation<S: Scalar = f64> {
     links: Vec<Link<S>>,
-    /// Of each link: the first coordinate and the first degree of freedom of its joint, and last how many there are.
+    /// For each link: the first coordinate and the first degree of freedom of its joint, and last how many there are.
     first: Vec<[usize; 2]>,
-    /// Of each degree of freedom: the link that it moves.
+    /// For each degree of freedom: the link that it moves.
     link_of: Vec<usize>,
-    /// Of each degree of freedom: the one that carries it, the last of those before it on the way to the world.
+    /// For each degree of freedom: the one that carries it, the last of those before it on the way to the world.
     carriers: Vec<Option<usize>>,
-    /// Of each link: the last degree of freedom that moves it.
+    /// For each link: the last degree of freedom that moves it.
     last: Vec<Option<usize>>,
     /// Acceleration of free fall \[m/s²\].
     gravity: Vector3<S>,
@@ -193,24 +193,24 @@ pub enum ArticulationError {
         link: String,
     },
     /// A joint type of one's own with too few or too many coordinates.
-    #[error("link {link}: a joint has 1 to 3 coordinates, not {freedoms}")]
-    Freedoms {
+    #[error("link {link}: a joint has 1 to 3 coordinates, not {count}")]
+    DegreesOfFreedom {
         /// The link.
         link: String,
-        /// How many its joint has.
-        freedoms: usize,
+        /// Number that its joint has.
+        count: usize,
     },
     /// A link that could be accelerated without effort.
     #[error("link {link}: {problem}")]
     Mass {
         /// The link.
         link: String,
-        /// What is wrong.
+        /// Cause.
         problem: &'static str,
     },
 }
 
-/// Whether every joint moves some mass, or has armature.
+/// Checks that every joint moves some mass, or has armature.
 fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
     let mut weighs: Vec<bool> = links
         .iter()
@@ -224,7 +224,7 @@ fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
             let problem = "its joint turns or slides without moving any mass, or has no axis";
             return Err(ArticulationError::Mass { link: link.name.clone(), problem });
         }
-        if !weighs[index] && link.joint.freedoms() > 0 && link.armature.value() == 0.0 {
+        if !weighs[index] && link.joint.nv() > 0 && link.armature.value() == 0.0 {
             let problem = "its joint moves no mass: neither the link nor what hangs on it has any";
             return Err(ArticulationError::Mass { link: link.name.clone(), problem });
         }
@@ -236,7 +236,7 @@ fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
 }
 
 impl<S: Scalar> Articulation<S> {
-    /// Of `links`, each after its parent, that fall with `gravity` \[m/s²\].
+    /// Articulation of `links`, each after its parent, that fall with `gravity` \[m/s²\].
     ///
     /// # Errors
     /// If a parent does not come before its link, a number is not finite, a mass or a principal moment negative, or a joint moves no mass.
@@ -251,18 +251,18 @@ impl<S: Scalar> Articulation<S> {
             }
             link.check_numbers()?;
             if let Joint::Custom(CustomJoint(model)) = &link.joint
-                && !(1..=MOST_FREEDOMS).contains(&model.freedoms())
+                && !(1..=MAX_NV).contains(&model.nv())
             {
-                let (link, freedoms) = (link.name.clone(), model.freedoms());
-                return Err(ArticulationError::Freedoms { link, freedoms });
+                let (link, count) = (link.name.clone(), model.nv());
+                return Err(ArticulationError::DegreesOfFreedom { link, count });
             }
             first.push(next);
-            next = [next[0] + link.joint.coordinates(), next[1] + link.joint.freedoms()];
+            next = [next[0] + link.joint.nq(), next[1] + link.joint.nv()];
             link_of.resize(next[1], index);
             let mut carrier = link.parent.and_then(|parent| last[parent]);
-            for freedom in carriers.len()..next[1] {
+            for dof in carriers.len()..next[1] {
                 carriers.push(carrier);
-                carrier = Some(freedom);
+                carrier = Some(dof);
             }
             last.push(carrier);
         }
@@ -276,7 +276,7 @@ impl<S: Scalar> Articulation<S> {
         &self.links
     }
 
-    /// Whether the numbers of all links are such.
+    /// Checks that the numbers of all links are such.
     pub(crate) fn check_numbers(&self) -> Result<(), ArticulationError> {
         self.links.iter().try_for_each(Link::check_numbers)
     }
@@ -293,31 +293,31 @@ impl<S: Scalar> Articulation<S> {
     }
 
     /// Number of coordinates q.
-    pub fn coordinates(&self) -> usize {
+    pub fn nq(&self) -> usize {
         self.first[self.links.len()][0]
     }
 
     /// Number of degrees of freedom, and so of velocities v and efforts τ.
-    pub fn freedoms(&self) -> usize {
+    pub fn nv(&self) -> usize {
         self.link_of.len()
     }
 
-    /// Where the coordinates and the degrees of freedom of the joint of `link` are.
+    /// Ranges of the coordinates and of the degrees of freedom of the joint of `link`.
     pub fn range(&self, link: usize) -> [std::ops::Range<usize>; 2] {
         [0, 1].map(|k| self.first[link][k]..self.first[link + 1][k])
     }
 
     /// The link that a degree of freedom moves.
-    pub(crate) fn link_of(&self, freedom: usize) -> usize {
-        self.link_of[freedom]
+    pub(crate) fn link_of(&self, dof: usize) -> usize {
+        self.link_of[dof]
     }
 
     /// The degrees of freedom that move a link, the nearest first.
-    pub(crate) fn freedoms_of(&self, link: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn dofs_of(&self, link: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(self.last[link], |k| self.carriers[*k])
     }
 
-    /// Of each degree of freedom the one that carries it.
+    /// For each degree of freedom the one that carries it.
     pub(crate) fn carriers(&self) -> &[Option<usize>] {
         &self.carriers
     }
@@ -341,34 +341,34 @@ impl<S: Scalar> Articulation<S> {
         after
     }
 
-    /// Where the links are at coordinates `q`, and how they move with velocities `v`.
+    /// Kinematics of the links at coordinates `q` and velocities `v`.
     ///
     /// # Panics
     /// If there are not as many as there should be.
     pub fn kinematics(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
-        Kinematics::new(self, q, v, Moves::WithMass)
+        Kinematics::new(self, q, v, Scope::WithInertia)
     }
 
     /// [`kinematics`](Self::kinematics) without inertias: where links are and how they move.
     pub(crate) fn motion(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
-        Kinematics::new(self, q, v, Moves::Only)
+        Kinematics::new(self, q, v, Scope::KinematicsOnly)
     }
 
     pub(crate) fn check(&self, q: &[S], v: &[S]) {
-        assert_eq!(q.len(), self.coordinates(), "one number a coordinate");
-        assert_eq!(v.len(), self.freedoms(), "one number a degree of freedom");
+        assert_eq!(q.len(), self.nq(), "one number a coordinate");
+        assert_eq!(v.len(), self.nv(), "one number a degree of freedom");
     }
 }
 
 impl Articulation {
-    /// The same in constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> Articulation<S> {
+    /// In constants of another scalar.
+    pub fn cast<S: Scalar>(&self) -> Articulation<S> {
         self.map(S::constant)
     }
 }
 
 impl<S: Scalar> Articulation<S> {
-    /// The same trees, each number through `f`.
+    /// Trees, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Articulation<T> {
         let (first, link_of) = (self.first.clone(), self.link_of.clone());
         let (carriers, last) = (self.carriers.clone(), self.last.clone());

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::SpatialInertia;
+use crate::spatial::SpatialInertia;
 
 impl<S: Scalar> Kinematics<'_, S> {
     /// M, by which accelerations cause efforts: symmetric, positive definite where every degree of freedom moves mass or has armature.
@@ -12,15 +12,15 @@ impl<S: Scalar> Kinematics<'_, S> {
         let composites = self.composites();
         let mut matrix = DMatrix::zeros(self.axes.len(), self.axes.len());
         for (index, link) in self.tree.links().iter().enumerate() {
-            let [_, freedoms] = self.tree.range(index);
-            for freedom in freedoms {
-                let force = composites[index].times(&self.axes[freedom]);
-                for other in self.tree.freedoms_of(index) {
+            let [_, dofs] = self.tree.range(index);
+            for dof in dofs {
+                let force = composites[index].times(&self.axes[dof]);
+                for other in self.tree.dofs_of(index) {
                     let entry = self.axes[other].dot(&force);
-                    matrix[(other, freedom)] = entry;
-                    matrix[(freedom, other)] = entry;
+                    matrix[(other, dof)] = entry;
+                    matrix[(dof, other)] = entry;
                 }
-                matrix[(freedom, freedom)] += link.armature;
+                matrix[(dof, dof)] += link.armature;
             }
         }
         matrix
@@ -40,7 +40,7 @@ impl<S: Scalar> Kinematics<'_, S> {
         &root * root.transpose()
     }
 
-    /// Of each link the radius of gyration, about the link's origin, of it and all that hangs on it \[m\]: no number where that has no mass.
+    /// For each link the radius of gyration, about the link's origin, of it and all that hangs on it \[m\]: no number where that has no mass.
     pub(crate) fn radii(&self) -> Vec<f64> {
         let radius = |(composite, place): (SpatialInertia<S>, &Vector3<S>)| {
             let (mass, moment) = (composite.mass.value(), composite.moment.map(S::value));

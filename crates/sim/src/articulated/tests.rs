@@ -11,7 +11,7 @@ use super::*;
 struct Thread;
 
 impl JointModel for Thread {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         1
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -26,7 +26,7 @@ impl JointModel for Thread {
 struct Universal;
 
 impl JointModel for Universal {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         2
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -77,7 +77,7 @@ pub(super) fn random_tree(seed: u64, count: usize) -> Articulation {
 pub(super) fn random_state(tree: &Articulation, seed: u64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let mut random = SplitMix64::new(seed);
     let mut vector = |n: usize| (0..n).map(|_| random.normal()).collect::<Vec<f64>>();
-    let n = tree.freedoms();
+    let n = tree.nv();
     let q = tree.moved(&tree.neutral(), &vector(n));
     (q, vector(n), vector(n))
 }
@@ -162,7 +162,7 @@ fn derivatives_are_those_of_forward_mode() {
         let inverse = at.inverse_dynamics_derivatives(&a);
         assert_near(inverse.by_acceleration.as_slice(), at.mass_matrix().as_slice(), 1e-13, "mass");
         let forward = at.forward_dynamics_derivatives(&DVector::from_column_slice(&a)).unwrap();
-        let lifted = tree.lift::<Fwd<1>>();
+        let lifted = tree.cast::<Fwd<1>>();
         let constants = |x: &[f64]| x.iter().map(|x| Fwd::<1>::constant(*x)).collect::<Vec<_>>();
         for k in 0..n {
             let along = |x: &[f64]| {
@@ -212,12 +212,12 @@ fn jacobians_are_velocities_of_points() {
 #[should_panic(expected = "one number a coordinate")]
 fn too_few_coordinates_are_refused() {
     let tree = random_tree(1, 3);
-    tree.check(&vec![0.0; tree.coordinates() - 1], &vec![0.0; tree.freedoms()]);
+    tree.check(&vec![0.0; tree.nq() - 1], &vec![0.0; tree.nv()]);
 }
 
 #[test]
 #[should_panic(expected = "one number a degree of freedom")]
 fn too_many_velocities_are_refused() {
     let tree = random_tree(1, 3);
-    tree.check(&vec![0.0; tree.coordinates()], &vec![0.0; tree.freedoms() + 1]);
+    tree.check(&vec![0.0; tree.nq()], &vec![0.0; tree.nv() + 1]);
 }

@@ -7,12 +7,12 @@ use nalgebra::DMatrix;
 /// L of M = Lᵀ L, lower triangular: entries are zero where neither degree of freedom moves the other (Featherstone, section 6.5).
 pub(crate) struct TreeFactor<'a> {
     lower: DMatrix<f64>,
-    /// Of each degree of freedom: the one that carries it.
+    /// For each degree of freedom: the one that carries it.
     parents: Cow<'a, [Option<usize>]>,
 }
 
 impl<'a> TreeFactor<'a> {
-    /// Of a mass matrix; `None` if it is not positive definite.
+    /// Factor of a mass matrix; `None` if it is not positive definite.
     pub(crate) fn new(
         mass: &DMatrix<f64>,
         parents: impl Into<Cow<'a, [Option<usize>]>>,
@@ -57,9 +57,9 @@ impl<'a> TreeFactor<'a> {
     }
 }
 
-/// The degrees of freedom that carry `freedom`, the nearest first.
-fn carriers(parents: &[Option<usize>], freedom: usize) -> impl Iterator<Item = usize> {
-    std::iter::successors(parents[freedom], |k| parents[*k])
+/// The degrees of freedom that carry `dof`, the nearest first.
+fn carriers(parents: &[Option<usize>], dof: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(parents[dof], |k| parents[*k])
 }
 
 /// Column `to` −= `factor` · column `from`.

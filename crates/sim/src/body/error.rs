@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::contact::range::{LARGEST, SMALLEST};
+use crate::magnitude::{LARGEST, SMALLEST};
 
 /// Why a body cannot be simulated.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -57,12 +57,12 @@ pub enum BodyError {
     },
 }
 
-/// Whether a length \[m\] is positive, and neither the fifth power of its inverse nor its own overflows, as moments of inertia of a density have it.
+/// True if a length \[m\] is positive, and neither the fifth power of its inverse nor its own overflows, as moments of inertia of a density have it.
 pub(crate) fn is_length(length: f64) -> bool {
     (SMALLEST..=LARGEST).contains(&length)
 }
 
-/// Whether all `lengths` \[m\] are positive and finite.
+/// Checks that all `lengths` \[m\] are positive and finite.
 pub(crate) fn check_lengths(lengths: &[f64]) -> Result<(), BodyError> {
     match lengths.iter().find(|x| !is_length(**x)) {
         Some(&length) => Err(BodyError::Length(length)),

@@ -1,13 +1,13 @@
-//! Wrench and rate of the deflection of a contact that sticks.
+//! Wrench and rate of the deflection of a contact with bristles.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
 use super::bristles::Bristles;
+use super::contact_query::{ContactPoint, ContactQuery};
 use super::dynamic::DynContactLaw;
-use super::moved::{LiftedContact, MovedPatch};
-use super::patch::{Patch, Touch};
+use super::moved::{LiftedContact, MovedQuery};
 use crate::first_order::{Linearized, first_order, linearized};
 
 /// Depth over which bristles take hold, in multiples of their deflection.
@@ -17,12 +17,12 @@ const LET_GO: f64 = 1e-3;
 /// Part of what contacts hold that holds every other direction.
 const REGULARIZATION: f64 = 1e-6;
 
-/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, as a
+/// The wrench of all contacts of `query` about the center of mass and the rate of the deflection, along the axes of the field, as a
 /// function of the tangent of the body's state and of the change of the deflection, to first order.
 pub(crate) struct BristleFunction<'a> {
     pub(crate) law: &'a dyn DynContactLaw,
     pub(crate) p: &'a [f64],
-    pub(crate) patch: &'a Patch<'a>,
+    pub(crate) query: &'a ContactQuery<'a>,
     pub(crate) bristles: Bristles,
     pub(crate) deflection: Vector6<f64>,
 }
@@ -45,7 +45,7 @@ impl LocalFunction<18, 12> for BristleFunction<'_> {
     }
 }
 
-/// Also of the place of the patch's point from the center of mass, after the rest.
+/// Also of the place of the query's point from the center of mass, after the rest.
 impl LocalFunction<21, 12> for BristleFunction<'_> {
     #[inline]
     fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
@@ -67,23 +67,23 @@ impl LocalFunction<21, 12> for BristleFunction<'_> {
 // Not generic: compiled here.
 impl BristleFunction<'_> {
     fn value(&self, change: &[f64]) -> [f64; 12] {
-        self.response(self.p, change, about(change).as_ref())
+        self.wrench(self.p, change, about(change).as_ref())
     }
 
     fn derivatives(&self, change: [f64; 18]) -> Linearized<18, 12> {
-        linearized(self.response(&self.constants(), &Fwd::variables(change), None))
+        linearized(self.wrench(&self.constants(), &Fwd::variables(change), None))
     }
 
     fn derivatives_about(&self, change: [f64; 21]) -> Linearized<21, 12> {
         let change = Fwd::variables(change);
-        linearized(self.response(&self.constants(), &change, about(&change).as_ref()))
+        linearized(self.wrench(&self.constants(), &change, about(&change).as_ref()))
     }
 
     fn directional(&self, x: &[f64], along: &[f64]) -> ([f64; 12], [f64; 12]) {
         let pairs = x.iter().zip(along);
         let change: Vec<Fwd<1>> =
             pairs.map(|(&value, &slope)| Fwd { value, derivative: [slope] }).collect();
-        let results = self.response(&self.constants(), &change, about(&change).as_ref());
+        let results = self.wrench(&self.constants(), &change, about(&change).as_ref());
         (results.map(|y| y.value), results.map(|y| y.derivative[0]))
     }
 
@@ -97,7 +97,7 @@ impl BristleFunction<'_> {
                 _ => Fwd::constant(p),
             };
             let p: Vec<_> = self.p.iter().enumerate().map(seeded).collect();
-            let results = self.response(&p, &[Fwd::constant(0.0); 18], None);
+            let results = self.wrench(&p, &[Fwd::constant(0.0); 18], None);
             let lanes = LANES.min(self.p.len() - from);
             columns.extend((0..lanes).map(|lane| results.map(|y| y.derivative[lane])));
         }
@@ -105,7 +105,7 @@ impl BristleFunction<'_> {
     }
 }
 
-/// The place of the patch's point from the center of mass, if it is among what changes.
+/// The place of the query's point from the center of mass, if it is among what changes.
 fn about<T: Scalar>(change: &[T]) -> Option<Vector3<T>> {
     change.get(18..21).map(Vector3::from_column_slice)
 }
@@ -115,39 +115,39 @@ impl BristleFunction<'_> {
         self.p.iter().map(|&p| S::constant(p)).collect()
     }
 
-    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
-    fn response<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
-        let moved = MovedPatch::new(self.patch, change);
+    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the query has the state of.
+    fn wrench<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
+        let moved = MovedQuery::new(self.query, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
-        self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
+        self.wrench_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
     }
 
     /// The function of dimensions of the shapes, with which `lift` gives a contact.
-    pub(crate) fn response_by_dimensions<T: Scalar>(
+    pub(crate) fn wrench_by_dimensions<T: Scalar>(
         &self,
-        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+        lift: impl Fn(&ContactPoint, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
-        self.response_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
+        self.wrench_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
     }
 
-    fn response_of<T: Scalar>(
+    fn wrench_of<T: Scalar>(
         &self,
         p: &[T],
         deflection: &Vector6<T>,
         from_com: Option<&Vector3<T>>,
-        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+        lift: impl Fn(&ContactPoint, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
-        let Self { patch, bristles, .. } = *self;
-        let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
+        let Self { query, bristles, .. } = *self;
+        let (cutoff, law) = (self.law.cutoff(), BristleLaw::new(self.law, p));
         let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
-        let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
+        let sound = query.for_each_contact(cutoff, T::ORDER == 0, |touch| {
             let LiftedContact { mut contact, lever, stretch } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
             contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
-            let response = law.response(&contact);
+            let response = law.force(&contact);
             let force = contact.normal * response.normal + response.tangential;
             let force = stretch.map_or(force, |stretch| force * stretch);
             let torque = lever.cross(&force);

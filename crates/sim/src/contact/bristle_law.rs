@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::dynamic::DynContactLaw;
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 /// Derivatives that one evaluation of the law gives.
 const LANES: usize = 6;
@@ -25,19 +25,19 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
     }
 
     /// The response at `contact`, with its derivatives.
-    pub(super) fn response(&self, contact: &Contact<T>) -> Response<T> {
+    pub(super) fn force(&self, contact: &ContactKinematics<T>) -> ContactForce<T> {
         let inputs = inputs_of(contact);
         let at = inputs.map(T::value);
         if T::ORDER == 0 {
-            let Response { normal, tangential } =
-                self.law.response(&self.values, &contact_of(at, contact.area));
-            return Response {
+            let ContactForce { normal, tangential } =
+                self.law.force(&self.values, &contact_of(at, contact.area));
+            return ContactForce {
                 normal: T::constant(normal),
                 tangential: tangential.map(T::constant),
             };
         }
         let mut sum: Option<[T; 4]> = None;
-        let mut add = |response: Response<Fwd<LANES>>, changes: &[T]| {
+        let mut add = |response: ContactForce<Fwd<LANES>>, changes: &[T]| {
             let parts = parts_of(&response);
             let sum = sum.get_or_insert(parts.map(|x| T::constant(x.value)));
             for (sum, part) in sum.iter_mut().zip(parts) {
@@ -50,7 +50,7 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
         for from in [0, LANES] {
             let seeded = std::array::from_fn(|i| seed(at[i], i.wrapping_sub(from)));
             let contact = contact_of(seeded, contact.area);
-            add(self.law.response_with_derivative(&self.constants, &contact), &changes[from..]);
+            add(self.law.force_with_derivative(&self.constants, &contact), &changes[from..]);
         }
         for from in (0..self.p.len()).step_by(LANES) {
             let changes: Vec<T> = self.p[from..].iter().map(|p| p.plus(-p.value())).collect();
@@ -60,10 +60,10 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
             let seeded = |(i, &p): (usize, &f64)| seed(p, i.wrapping_sub(from));
             let p: Vec<Fwd<LANES>> = self.values.iter().enumerate().map(seeded).collect();
             let contact = contact_of(at.map(Fwd::constant), contact.area);
-            add(self.law.response_with_derivative(&p, &contact), &changes);
+            add(self.law.force_with_derivative(&p, &contact), &changes);
         }
         let [normal, x, y, z] = sum.unwrap_or_default();
-        Response { normal, tangential: Vector3::new(x, y, z) }
+        ContactForce { normal, tangential: Vector3::new(x, y, z) }
     }
 }
 
@@ -72,18 +72,18 @@ fn seed(value: f64, lane: usize) -> Fwd<LANES> {
     if lane < LANES { Fwd::variable(value, lane) } else { Fwd::constant(value) }
 }
 
-fn inputs_of<T: Scalar>(contact: &Contact<T>) -> [T; 8] {
-    let Contact { gap, normal_speed, slip: s, normal: n, .. } = *contact;
+fn inputs_of<T: Scalar>(contact: &ContactKinematics<T>) -> [T; 8] {
+    let ContactKinematics { gap, normal_speed, slip: s, normal: n, .. } = *contact;
     [gap, normal_speed, s.x, s.y, s.z, n.x, n.y, n.z]
 }
 
-fn contact_of<T: Scalar>(inputs: [T; 8], area: f64) -> Contact<T> {
+fn contact_of<T: Scalar>(inputs: [T; 8], area: f64) -> ContactKinematics<T> {
     let [gap, normal_speed, sx, sy, sz, nx, ny, nz] = inputs;
     let (slip, normal) = (Vector3::new(sx, sy, sz), Vector3::new(nx, ny, nz));
-    Contact { gap, normal_speed, slip, normal, area }
+    ContactKinematics { gap, normal_speed, slip, normal, area }
 }
 
-fn parts_of<T: Scalar>(response: &Response<T>) -> [T; 4] {
-    let Response { normal, tangential: t } = *response;
+fn parts_of<T: Scalar>(response: &ContactForce<T>) -> [T; 4] {
+    let ContactForce { normal, tangential: t } = *response;
     [normal, t.x, t.y, t.z]
 }

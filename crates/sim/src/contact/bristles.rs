@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use super::error::LawError;
 use super::range::ParameterRange;
 
-/// Tangential springs of a contact that sticks, as in P. A. Cundall and O. D. L. Strack, "A discrete numerical model for granular
+/// Tangential springs of a contact with bristles, as in P. A. Cundall and O. D. L. Strack, "A discrete numerical model for granular
 /// assemblies", Géotechnique 29, 1979, and C. Canudas de Wit et al., "A new model for control of systems with friction", IEEE
 /// Trans. Automatic Control 40, 1995, with one deflection for all samples of a pair.
 ///
@@ -28,7 +28,7 @@ pub struct Bristles {
 }
 
 impl Bristles {
-    /// Whether both numbers are positive.
+    /// Checks that both numbers are positive.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let range = ParameterRange::Positive;
         range.check("deflection of bristles", self.deflection)?;

@@ -8,7 +8,7 @@ use super::friction::FrictionLaw;
 use super::law::ContactLaw;
 use super::normal::NormalLaw;
 use super::parameters::{ParameterArray, Parameters};
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 /// A normal law N × a friction law F.
 ///
@@ -20,7 +20,7 @@ use super::point::{Contact, Response};
 /// let spring = KelvinVoigt { stiffness: 2e7, damping: 1e4 };
 /// let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-3 })?;
 /// assert_eq!(law.params(), [2e7, 1e4, 0.5]);
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law<N, F> {
@@ -57,17 +57,17 @@ impl<N: NormalLaw, F: FrictionLaw> ContactLaw for Law<N, F> {
     }
 
     #[inline]
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let Some(((p_normal, p_friction), [])) = Params::<N, F, S>::split(p) else {
-            return Response::nan();
+            return ContactForce::nan();
         };
         let normal = self.normal.force(p_normal, contact);
-        Response { normal, tangential: self.friction.force(p_friction, normal, contact) }
+        ContactForce { normal, tangential: self.friction.force(p_friction, normal, contact) }
     }
 
     #[inline]
-    fn reach(&self) -> f64 {
-        self.normal.reach()
+    fn cutoff(&self) -> f64 {
+        self.normal.cutoff()
     }
 
     fn bristles(&self) -> Option<Bristles> {
@@ -95,11 +95,11 @@ mod tests {
         let spring = KelvinVoigt { stiffness: 1e6, damping: 1e3 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-3 }).unwrap();
         let (slip, normal) = (Vector3::x(), Vector3::z());
-        let contact = Contact { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 };
+        let contact = ContactKinematics { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 };
         for given in [0, 1, 2, 4] {
             let p = vec![1.0; given];
             assert_eq!(law.check(&p), Err(LawError::Count { given, expected: 3 }));
-            let Response { normal, tangential } = law.law(&p, &contact);
+            let ContactForce { normal, tangential } = law.law(&p, &contact);
             assert!(normal.is_nan() && tangential.iter().all(|f| f.is_nan()));
         }
         assert_eq!(law.check(law.params()), Ok(()));

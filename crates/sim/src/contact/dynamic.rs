@@ -3,35 +3,45 @@
 use nalgebra::Vector6;
 use prehend_autodiff::Fwd;
 
+use super::contact_query::ContactQuery;
 use super::error::LawError;
 use super::law::ContactLaw;
-use super::patch::Patch;
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 use super::wrench::{self, WrenchJacobian};
 
-mod sealed {
-    pub trait Sealed {}
-    impl<L: crate::contact::law::ContactLaw> Sealed for L {}
+/// Wrenches of all contacts of a query: loops over contacts are inside, where the law is known.
+pub trait QueryWrench {
+    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `query`, in the field's frame.
+    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64>;
+
+    /// [`QueryWrench::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
+    fn wrench_jacobian(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        by_params: bool,
+    ) -> WrenchJacobian;
+
+    /// [`QueryWrench::wrench`] with its derivative along a direction of the state's [`tangent`](crate::State::tangent).
+    fn wrench_along(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        tangent: &[f64; 12],
+    ) -> [Vector6<f64>; 2];
 }
 
-/// A [`ContactLaw`] behind a pointer, whatever it is: forces at a contact and over all contacts of a surface, and their
-/// derivatives by forward mode. Implemented for every law. Loops over contacts are inside, where the law is known.
-pub trait DynContactLaw: ContactLaw + sealed::Sealed {
+/// A [`ContactLaw`] behind a pointer, whatever it is: forces at a contact, and their derivatives by forward mode. Implemented for every law.
+pub trait DynContactLaw: ContactLaw + QueryWrench {
     /// Force at one contact, with parameters `p`.
-    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64>;
+    fn force(&self, p: &[f64], contact: &ContactKinematics<f64>) -> ContactForce<f64>;
 
     /// Force at one contact with its derivatives along the directions that `contact` and `p` carry.
-    fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
-    -> Response<Fwd<6>>;
-
-    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `patch`, in the field's frame.
-    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
-
-    /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
-    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
-
-    /// [`DynContactLaw::wrench`] with its derivative along a direction of the state's [`tangent`](crate::State::tangent).
-    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2];
+    fn force_with_derivative(
+        &self,
+        p: &[Fwd<6>],
+        contact: &ContactKinematics<Fwd<6>>,
+    ) -> ContactForce<Fwd<6>>;
 }
 
 impl dyn DynContactLaw {
@@ -44,29 +54,41 @@ impl dyn DynContactLaw {
 
 impl<L: ContactLaw> DynContactLaw for L {
     #[inline]
-    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
+    fn force(&self, p: &[f64], contact: &ContactKinematics<f64>) -> ContactForce<f64> {
         self.law(p, contact)
     }
 
     #[inline]
-    fn response_with_derivative(
+    fn force_with_derivative(
         &self,
         p: &[Fwd<6>],
-        contact: &Contact<Fwd<6>>,
-    ) -> Response<Fwd<6>> {
+        contact: &ContactKinematics<Fwd<6>>,
+    ) -> ContactForce<Fwd<6>> {
         self.law(p, contact)
     }
+}
 
-    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
-        wrench::wrench(self, p, patch)
+impl<L: ContactLaw> QueryWrench for L {
+    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64> {
+        wrench::wrench(self, p, query)
     }
 
-    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian {
-        wrench::wrench_jacobian(self, p, patch, by_params)
+    fn wrench_jacobian(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        by_params: bool,
+    ) -> WrenchJacobian {
+        wrench::wrench_jacobian(self, p, query, by_params)
     }
 
-    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2] {
-        wrench::wrench_along(self, p, patch, tangent)
+    fn wrench_along(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        tangent: &[f64; 12],
+    ) -> [Vector6<f64>; 2] {
+        wrench::wrench_along(self, p, query, tangent)
     }
 }
 
@@ -84,13 +106,18 @@ mod tests {
         let boxed: Box<dyn DynContactLaw> = Box::new(law.clone());
         let [gap, normal_speed, x, y, z, k] = Fwd::variables([-1e-3, -0.1, 0.02, 0.01, 0.0, 3e7]);
         let normal = Vector3::z().map(Fwd::constant);
-        let contact =
-            Contact { gap, normal_speed, slip: Vector3::new(x, y, z), normal, area: 2e-5 };
+        let contact = ContactKinematics {
+            gap,
+            normal_speed,
+            slip: Vector3::new(x, y, z),
+            normal,
+            area: 2e-5,
+        };
         let p = [k, Fwd::constant(2e5), Fwd::constant(0.7)];
-        let (own, twin) = (law.law(&p, &contact), boxed.response_with_derivative(&p, &contact));
+        let (own, twin) = (law.law(&p, &contact), boxed.force_with_derivative(&p, &contact));
         assert_eq!(own.normal.derivative, twin.normal.derivative);
         assert_eq!(own.tangential.x.derivative, twin.tangential.x.derivative);
         // With both traits in scope.
-        assert_eq!((boxed.params(), boxed.reach()), (law.params(), law.reach()));
+        assert_eq!((boxed.params(), boxed.cutoff()), (law.params(), law.cutoff()));
     }
 }

@@ -1,4 +1,4 @@
-//! What is wrong with the parameters of a law or of a gap smoothing.
+//! Errors of the parameters of a law or of a gap smoothing.
 
 use thiserror::Error;
 
@@ -10,9 +10,9 @@ pub enum LawError {
     Range {
         /// Name of the parameter.
         name: &'static str,
-        /// What it must be.
+        /// Range that it has to be in.
         range: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// A parameter was not given.
@@ -24,9 +24,9 @@ pub enum LawError {
     /// Too many parameters, or too few.
     #[error("{given} parameters for a law of {expected}")]
     Count {
-        /// How many were given.
+        /// Number given.
         given: usize,
-        /// How many the law has.
+        /// Number that the law has.
         expected: usize,
     },
     /// The law has no parameter of that name.

@@ -1,16 +1,16 @@
 //! Friction laws: the force across the normal.
 
-pub mod anisotropic;
-pub mod coulomb;
-pub mod sticking;
-pub mod stribeck;
+pub(crate) mod anisotropic;
+pub(crate) mod bristle;
+pub(crate) mod coulomb;
+pub(crate) mod stribeck;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::bristles::Bristles;
 use super::parameters::Parameters;
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// Force across the normal: the other factor of a [`Law`](super::composite::Law).
 pub trait FrictionLaw: Parameters {
@@ -19,7 +19,7 @@ pub trait FrictionLaw: Parameters {
         &self,
         p: Self::Params<S>,
         normal_force: S,
-        contact: &Contact<S>,
+        contact: &ContactKinematics<S>,
     ) -> Vector3<S>;
 
     /// See [`ContactLaw::bristles`](super::law::ContactLaw::bristles).
@@ -51,7 +51,7 @@ pub trait FrictionCoefficient: Parameters {
 
 /// √(|slip|² + `slip_scale`²) \[m/s\]: smooth everywhere and never below |slip|.
 #[inline]
-pub fn regularized_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
+pub(super) fn regularized_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
     let [x, y, z] = [slip.x, slip.y, slip.z];
     (x * x + y * y + z * z + S::constant(slip_scale * slip_scale)).sqrt()
 }

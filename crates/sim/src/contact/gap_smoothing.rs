@@ -1,9 +1,9 @@
-//! How contact begins: the map from gap to effective gap, and its derivative.
+//! Smoothing of the gap where contact begins: the map from gap to effective gap, and its derivative.
 
 use super::error::LawError;
 use super::range::ParameterRange;
 
-/// The map x ↦ effective gap that precedes a contact law, for the gap x beyond the law's reach.
+/// The map x ↦ effective gap that precedes a contact law, for the gap x beyond the law's cutoff.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GapSmoothing {
     /// min(x, 0).
@@ -41,7 +41,7 @@ pub enum LeakSteps {
 pub struct SmoothedGap {
     /// Effective gap \[m\], at most zero.
     pub gap: f64,
-    /// What gradients use for d gap / dx: the true derivative, except where leaky.
+    /// Slope d gap / dx that gradients use: the true derivative, except where leaky.
     pub slope: f64,
     /// True derivative d gap / dx, by which gap rates are scaled, in 0..=1.
     pub activation: f64,
@@ -95,7 +95,7 @@ impl GapSmoothing {
         if self.leaks() { 0.0 } else { self.band() }
     }
 
-    /// Whether there are contacts with a derivative that exert no force.
+    /// True if there are contacts with a derivative that exert no force.
     #[inline]
     pub(crate) fn leaks(&self) -> bool {
         matches!(self, Self::Leaky { .. })

@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use super::error::LawError;
 use super::law::ContactLaw;
 use super::parameters::{ParameterArray, Parameters, law_part};
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 law_part! {
     /// Parameters of [`GraspD`].
@@ -64,14 +64,14 @@ impl ContactLaw for GraspD {
     }
 
     #[inline]
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let &[stiffness, gain, friction] = p else {
-            return Response::nan();
+            return ContactForce::nan();
         };
         let depth = S::constant(self.parameters.offset) - contact.gap;
         // Zero counts as active: leaky smoothing differentiates a contact of exactly zero force.
         if depth.value() < 0.0 {
-            return Response::zero();
+            return ContactForce::zero();
         }
         let [x, y, z] = [contact.slip.x, contact.slip.y, contact.slip.z];
         let speed2 = x * x + y * y + z * z;
@@ -83,11 +83,11 @@ impl ContactLaw for GraspD {
             friction * stiffness * depth / speed2.sqrt()
         };
         let tangential = Vector3::new(-(x * scale), -(y * scale), -(z * scale));
-        Response { normal: stiffness * depth, tangential }
+        ContactForce { normal: stiffness * depth, tangential }
     }
 
     #[inline]
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         self.parameters.offset
     }
 
@@ -120,8 +120,13 @@ mod tests {
         let law = GraspD::new(parameters).unwrap();
         for speed in [0.0, 10.0, 49.0, 51.0, 300.0] {
             let slip = Vector3::new(0.0, speed, 0.0);
-            let contact =
-                Contact { gap: 1e-3, normal_speed: -1.0, slip, normal: Vector3::x(), area: 1.0 };
+            let contact = ContactKinematics {
+                gap: 1e-3,
+                normal_speed: -1.0,
+                slip,
+                normal: Vector3::x(),
+                area: 1.0,
+            };
             let response = law.law(law.params(), &contact);
             assert!((response.normal - 100.0).abs() < 1e-9);
             let expected = (1e3 * speed * 1e-3).min(0.5 * 1e5 * 1e-3);

@@ -1,20 +1,20 @@
-//! What the author of a contact law writes.
+//! Interface that a contact law implements.
 
 use prehend_autodiff::Scalar;
 
 use super::bristles::Bristles;
 use super::error::LawError;
-use super::point::{Contact, Response};
+use super::point::{ContactForce, ContactKinematics};
 
 /// A contact law: one function, generic over the scalar, from which come forces and derivatives.
 ///
-/// A response must vanish where the gap equals [`reach`](Self::reach) and its rate is zero. [`Law`](super::composite::Law)
+/// A response must vanish where the gap equals [`cutoff`](Self::cutoff) and its rate is zero. [`Law`](super::composite::Law)
 /// makes one of a normal law and a friction law. A frictionless law whose pressure grows with the square of the depth:
 ///
 /// ```
 /// use nalgebra::Vector3;
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{Contact, ContactLaw, Response};
+/// use prehend_sim::{ContactKinematics, ContactLaw, ContactForce};
 ///
 /// struct Quadratic([f64; 1]);
 ///
@@ -22,18 +22,18 @@ use super::point::{Contact, Response};
 ///     fn params(&self) -> &[f64] {
 ///         &self.0
 ///     }
-///     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+///     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
 ///         let normal = p[0] * contact.gap * contact.gap * S::constant(contact.area);
-///         Response { normal, tangential: Vector3::zeros() }
+///         ContactForce { normal, tangential: Vector3::zeros() }
 ///     }
-///     fn reach(&self) -> f64 {
+///     fn cutoff(&self) -> f64 {
 ///         0.0
 ///     }
 /// }
 ///
 /// let (gap, area) = (-1e-3, 1e-4);
 /// let contact =
-///     Contact { gap, normal_speed: 0.0, slip: Vector3::zeros(), normal: Vector3::z(), area };
+///     ContactKinematics { gap, normal_speed: 0.0, slip: Vector3::zeros(), normal: Vector3::z(), area };
 /// let law = Quadratic([1e10]);
 /// assert!((law.law(law.params(), &contact).normal - 1.0).abs() < 1e-12);
 /// ```
@@ -43,19 +43,19 @@ pub trait ContactLaw: Send + Sync {
         &[]
     }
 
-    /// What the parameters are called, in the order of [`params`](Self::params): empty where they have no name.
+    /// Names of the parameters, in the order of [`params`](Self::params): empty where they have no name.
     fn param_names(&self) -> Vec<&'static str> {
         vec![""; self.params().len()]
     }
 
     /// Force of one contact. `p` are the parameters, as many as [`params`](Self::params), with their derivatives; the laws
     /// of this crate answer NaN to any other number of them.
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S>
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S>
     where
         Self: Sized;
 
-    /// Beyond this gap value and derivative are zero \[m\].
-    fn reach(&self) -> f64;
+    /// Gap beyond which value and derivative are zero \[m\].
+    fn cutoff(&self) -> f64;
 
     /// Tangential springs that make contacts hold; none, and friction knows nothing of what was. With them, `slip` is that of
     /// the contact and of its springs.

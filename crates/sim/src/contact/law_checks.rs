@@ -1,4 +1,4 @@
-//! What every contact law is held to in its tests.
+//! Checks of every contact law, for its tests.
 
 use nalgebra::Vector3;
 use prehend_autodiff::check::finite_difference_jacobian;
@@ -6,13 +6,13 @@ use prehend_autodiff::{Fwd, Scalar};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
+use super::calibration::ContactCalibration;
 use super::composite::Law;
 use super::error::LawError;
 use super::friction::coulomb::Coulomb;
 use super::law::ContactLaw;
 use super::normal::NormalLaw;
-use super::point::Contact;
-use super::static_target::StaticContactTarget;
+use super::point::ContactKinematics;
 
 /// Gap, normal speed, slip and normal.
 const INPUTS: usize = 8;
@@ -23,15 +23,15 @@ const DIRECTIONS: usize = 16;
 const SCALES: [f64; INPUTS] = [1e-3, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0];
 
 /// 300 g that sink in by half a millimeter.
-pub(crate) const TARGET: StaticContactTarget =
-    StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+pub(crate) const TARGET: ContactCalibration =
+    ContactCalibration { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 
 /// `normal` without friction.
 pub(crate) fn frictionless<N: NormalLaw>(normal: Result<N, LawError>) -> Law<N, Coulomb> {
     Law::new(normal.unwrap(), Coulomb { friction: 0.0, slip_scale: 1e-3 }).unwrap()
 }
 
-/// What a law claims of itself.
+/// Claims of a law.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Claims {
     /// Friction is at most this times the normal force.
@@ -49,15 +49,16 @@ impl Claims {
 /// Normal force \[N\] of a still contact of `area` \[m²\] at `depth` \[m\].
 pub(crate) fn load(law: &impl ContactLaw, area: f64, depth: f64) -> f64 {
     let (slip, normal) = (Vector3::zeros(), Vector3::z());
-    law.law(law.params(), &Contact { gap: -depth, normal_speed: 0.0, slip, normal, area }).normal
+    law.law(law.params(), &ContactKinematics { gap: -depth, normal_speed: 0.0, slip, normal, area })
+        .normal
 }
 
 /// Coefficient of restitution of the body of `target` that hits its contact at `speed` \[m/s\], without gravity,
 /// by integration.
-pub(crate) fn bounce(law: &impl ContactLaw, target: &StaticContactTarget, speed: f64) -> f64 {
+pub(crate) fn bounce(law: &impl ContactLaw, target: &ContactCalibration, speed: f64) -> f64 {
     let (slip, normal, area) = (Vector3::zeros(), Vector3::z(), target.contact_area);
     let acceleration = |[gap, normal_speed]: [f64; 2]| {
-        let contact = Contact { gap, normal_speed, slip, normal, area };
+        let contact = ContactKinematics { gap, normal_speed, slip, normal, area };
         law.law(law.params(), &contact).normal / target.mass
     };
     let rate = |x: [f64; 2]| [x[1], acceleration(x)];
@@ -93,10 +94,10 @@ pub(crate) fn check_law(law: &impl ContactLaw, claims: &Claims) {
             prop_assume!(normal.norm() > 0.1);
             let (normal, slip) = (normal.normalize(), Vector3::from(slip));
             let slip = slip - normal * normal.dot(&slip);
-            let x = pack(law.reach() + depth, speed, &slip, &normal);
+            let x = pack(law.cutoff() + depth, speed, &slip, &normal);
             assert_partials(law, x);
             assert_physical(law, x, claims);
-            let fast = pack(law.reach() + depth, 1e3 * speed, &(slip * 1e6), &normal);
+            let fast = pack(law.cutoff() + depth, 1e3 * speed, &(slip * 1e6), &normal);
             assert_physical(law, fast, claims);
             Ok(())
         })
@@ -109,9 +110,9 @@ fn pack(gap: f64, speed: f64, slip: &Vector3<f64>, normal: &Vector3<f64>) -> [f6
     [gap, speed, slip.x, slip.y, slip.z, normal.x, normal.y, normal.z]
 }
 
-fn unpack<S: Scalar>(x: &[S]) -> Contact<S> {
+fn unpack<S: Scalar>(x: &[S]) -> ContactKinematics<S> {
     let (slip, normal) = (Vector3::new(x[2], x[3], x[4]), Vector3::new(x[5], x[6], x[7]));
-    Contact { gap: x[0], normal_speed: x[1], slip, normal, area: 2e-5 }
+    ContactKinematics { gap: x[0], normal_speed: x[1], slip, normal, area: 2e-5 }
 }
 
 /// Force components for the inputs of a contact, followed by the law's parameters.
@@ -161,7 +162,7 @@ fn assert_physical(law: &impl ContactLaw, x: [f64; INPUTS], claims: &Claims) {
     let x = with_params(law, x);
     let (contact, response) = (unpack(&x), law.law(law.params(), &unpack(&x)));
     let normal = response.normal;
-    let still = law.law(law.params(), &Contact { normal_speed: 0.0, ..contact }).normal;
+    let still = law.law(law.params(), &ContactKinematics { normal_speed: 0.0, ..contact }).normal;
     assert!(normal >= 0.0 && normal.is_finite(), "pulls with {normal} at {x:?}");
     let power = (normal - still) * contact.normal_speed;
     assert!(power <= 0.0, "damping does work {power} at {x:?}");
@@ -175,13 +176,13 @@ fn assert_physical(law: &impl ContactLaw, x: [f64; INPUTS], claims: &Claims) {
 /// No slip, no normal speed, the gap at the reach: finite everywhere, and exact where there is a derivative.
 fn assert_singular_points(law: &impl ContactLaw, claims: &Claims) {
     let (none, slip, normal) = (Vector3::zeros(), Vector3::new(0.1, -0.2, 0.0), Vector3::z());
-    let inside = law.reach() - 1e-3;
+    let inside = law.cutoff() - 1e-3;
     assert_partials(law, pack(inside, -0.1, &none, &normal));
     if claims.smooth_at_rest {
         assert_partials(law, pack(inside, 0.0, &slip, &normal));
         assert_partials(law, pack(inside, 0.0, &none, &normal));
     }
-    for gap in [inside, law.reach() - 1e-300, law.reach() - f64::MIN_POSITIVE, law.reach()] {
+    for gap in [inside, law.cutoff() - 1e-300, law.cutoff() - f64::MIN_POSITIVE, law.cutoff()] {
         for speed in [0.0, -0.0, -0.1, 0.1] {
             for slip in [none, slip, slip * 1e-200, slip * 1e-8] {
                 let x = pack(gap, speed, &slip, &normal);
@@ -190,7 +191,7 @@ fn assert_singular_points(law: &impl ContactLaw, claims: &Claims) {
                         row.value.is_finite() && row.derivative.iter().all(|d| d.is_finite());
                     assert!(finite, "{row:?} at {x:?}");
                     assert!(
-                        gap < law.reach() || speed != 0.0 || row.value == 0.0,
+                        gap < law.cutoff() || speed != 0.0 || row.value == 0.0,
                         "{row:?} at {x:?}"
                     );
                 }
@@ -203,7 +204,7 @@ fn assert_nothing_beyond_reach(law: &impl ContactLaw) {
     for beyond in [1e-12, 1e-3, 10.0] {
         for speed in [-1.0, 0.0, 1.0] {
             let slip = Vector3::new(0.1, -0.2, 0.0);
-            let x = pack(law.reach() + beyond, speed, &slip, &Vector3::z());
+            let x = pack(law.cutoff() + beyond, speed, &slip, &Vector3::z());
             for row in forward(law, &with_params(law, x)) {
                 assert_eq!((row.value, row.derivative), (0.0, [0.0; DIRECTIONS]), "at {x:?}");
             }

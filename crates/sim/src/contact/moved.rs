@@ -3,19 +3,19 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
-use super::patch::{Patch, Touch};
-use super::point::Contact;
+use super::contact_query::{ContactPoint, ContactQuery};
+use super::point::ContactKinematics;
 
 /// A contact, and where it is from the center of mass.
 pub(crate) struct LiftedContact<T: Scalar> {
-    pub(super) contact: Contact<T>,
-    pub(super) lever: Vector3<T>,
+    pub(crate) contact: ContactKinematics<T>,
+    pub(crate) lever: Vector3<T>,
     /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
-    pub(super) stretch: Option<T>,
+    pub(crate) stretch: Option<T>,
 }
 
-/// A patch whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
-pub(super) struct MovedPatch<T: Scalar> {
+/// A query whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
+pub(crate) struct MovedQuery<T: Scalar> {
     position: Vector3<T>,
     turn: Vector3<T>,
     linear: Vector3<T>,
@@ -23,18 +23,20 @@ pub(super) struct MovedPatch<T: Scalar> {
     spin: Vector3<T>,
 }
 
-impl<T: Scalar> MovedPatch<T> {
-    pub(super) fn new(patch: &Patch<'_>, tangent: &[T]) -> Self {
+impl<T: Scalar> MovedQuery<T> {
+    pub(crate) fn new(query: &ContactQuery<'_>, tangent: &[T]) -> Self {
         let part = |i: usize| Vector3::new(tangent[i], tangent[i + 1], tangent[i + 2]);
         let (position, turn, linear, angular) = (part(0), part(3), part(6), part(9));
-        Self { position, turn, linear, angular, spin: patch.state.angular.map(T::constant) }
+        Self { position, turn, linear, angular, spin: query.state.angular.map(T::constant) }
     }
 
     /// `touch` with derivatives: the normal turns with the sample's place x by (I − nnᵀ)∇²φ δx/|∇φ|.
     #[inline(always)]
-    pub(super) fn lift(&self, touch: &Touch, cutoff: f64) -> LiftedContact<T> {
+    pub(crate) fn lift(&self, touch: &ContactPoint, cutoff: f64) -> LiftedContact<T> {
         let constant = |v: &Vector3<f64>| v.map(T::constant);
-        let Touch { arm, lever, radius, velocity, smoothing, normal, length, hessian, .. } = touch;
+        let ContactPoint {
+            arm, lever, radius, velocity, smoothing, normal, length, hessian, ..
+        } = touch;
         let turned = self.turn.cross(&constant(arm));
         let place = self.position + turned;
         let along =
@@ -52,7 +54,7 @@ impl<T: Scalar> MovedPatch<T> {
         let depth = along(normal).times(*length);
         let smoothed = |value: f64, slope: f64| depth.times(slope).plus(value);
         let speed = velocity.dot(&normal_now);
-        let contact = Contact {
+        let contact = ContactKinematics {
             gap: smoothed(cutoff + smoothing.gap, smoothing.slope),
             normal_speed: smoothed(smoothing.activation, smoothing.activation_slope) * speed,
             slip: velocity - normal_now * speed,

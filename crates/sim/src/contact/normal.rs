@@ -1,14 +1,14 @@
 //! Normal laws: the force along the normal.
 
-pub mod approach_damped;
-pub mod hertz;
-pub mod hunt_crossley;
-pub mod kelvin_voigt;
+pub(crate) mod approach_damped;
+pub(crate) mod hertz;
+pub(crate) mod hunt_crossley;
+pub(crate) mod kelvin_voigt;
 
 use prehend_autodiff::Scalar;
 
 use super::parameters::Parameters;
-use super::point::Contact;
+use super::point::ContactKinematics;
 
 /// Force along the normal: one factor of a [`Law`](super::composite::Law).
 ///
@@ -16,7 +16,8 @@ use super::point::Contact;
 ///
 /// ```
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{Contact, Law, NormalLaw, Parameters, Stribeck};
+/// use prehend_sim::contact::{NormalLaw, Parameters, Stribeck};
+/// use prehend_sim::{ContactKinematics, Law};
 ///
 /// struct Exponential {
 ///     pressure: f64,
@@ -30,7 +31,7 @@ use super::point::Contact;
 /// }
 ///
 /// impl NormalLaw for Exponential {
-///     fn force<S: Scalar>(&self, [pressure]: [S; 1], contact: &Contact<S>) -> S {
+///     fn force<S: Scalar>(&self, [pressure]: [S; 1], contact: &ContactKinematics<S>) -> S {
 ///         pressure * (-contact.gap.times(1e3)).exp_m1().times(contact.area)
 ///     }
 /// }
@@ -38,14 +39,14 @@ use super::point::Contact;
 /// let friction =
 ///     Stribeck { friction: 0.5, kinetic_friction: 0.3, stribeck_speed: 1e-2, slip_scale: 1e-3 };
 /// let law = Law::new(Exponential { pressure: 1e4 }, friction)?;
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 pub trait NormalLaw: Parameters {
     /// Force along the normal \[N\], never negative, with parameters `p`.
-    fn force<S: Scalar>(&self, p: Self::Params<S>, contact: &Contact<S>) -> S;
+    fn force<S: Scalar>(&self, p: Self::Params<S>, contact: &ContactKinematics<S>) -> S;
 
     /// Beyond this gap value and derivative are zero \[m\].
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }

@@ -10,9 +10,9 @@ pub struct LawParameter {
     pub name: &'static str,
     /// Its unit; empty for plain numbers.
     pub unit: &'static str,
-    /// What it is, in a few words.
+    /// Meaning, in a few words.
     pub meaning: &'static str,
-    /// What it may be.
+    /// Range that it has to be in.
     pub range: ParameterRange,
 }
 
@@ -67,7 +67,7 @@ impl<T, A: ParameterArray<T>, B: ParameterArray<T>> ParameterArray<T> for (A, B)
     }
 }
 
-/// What has parameters that may carry derivatives: a normal law or a friction law.
+/// Interface of laws with parameters that may carry derivatives: a normal law or a friction law.
 pub trait Parameters: Send + Sync {
     /// The parameters over a scalar: `[T; N]`.
     type Params<T: Copy>: ParameterArray<T>;
@@ -75,7 +75,7 @@ pub trait Parameters: Send + Sync {
     /// Their values.
     fn values(&self) -> Self::Params<f64>;
 
-    /// What they are called, in their order: empty where they have no name.
+    /// Names of the parameters, in their order: empty where they have none.
     fn names(&self) -> Vec<&'static str> {
         vec![""; self.values().to_vec().len()]
     }
@@ -94,7 +94,7 @@ pub(crate) trait Tabulated: Parameters {
     /// The constants over a scalar.
     type Constants<T: Copy>: ParameterArray<T>;
 
-    /// What it is, in a few words.
+    /// Meaning, in a few words.
     const SUMMARY: &'static str;
 
     /// The parameters, in their order.
@@ -103,7 +103,7 @@ pub(crate) trait Tabulated: Parameters {
     /// The constants, in their order.
     const CONSTANTS: Self::Constants<LawParameter>;
 
-    /// What has these values; they are not checked.
+    /// Law of these values; they are not checked.
     fn from_values(params: Self::Params<f64>, constants: Self::Constants<f64>) -> Self;
 }
 
@@ -190,7 +190,7 @@ macro_rules! field_doc {
             $meaning,
             " ([`",
             stringify!($range),
-            "`](crate::ParameterRange::",
+            "`](crate::contact::ParameterRange::",
             stringify!($range),
             "))"
         )
@@ -202,7 +202,7 @@ macro_rules! field_doc {
             $unit,
             "\\] ([`",
             stringify!($range),
-            "`](crate::ParameterRange::",
+            "`](crate::contact::ParameterRange::",
             stringify!($range),
             "))"
         )

@@ -6,8 +6,8 @@ use prehend_autodiff::Scalar;
 /// One contact point. Vectors are along the axes of the model frame of the body with the field; under symmetric contact each
 /// direction has the axes of its own field's body.
 #[derive(Clone, Copy, Debug)]
-pub struct Contact<S: Scalar> {
-    /// Effective gap after the [`GapSmoothing`](super::gap_smoothing::GapSmoothing) \[m\], at most the law's reach;
+pub struct ContactKinematics<S: Scalar> {
+    /// Effective gap after the [`GapSmoothing`](super::gap_smoothing::GapSmoothing) \[m\], at most the law's cutoff;
     /// negative in penetration.
     pub gap: S,
     /// Rate of the effective gap \[m/s\], negative while approaching. The smoothing scales it too, so that damping fades in with
@@ -21,16 +21,16 @@ pub struct Contact<S: Scalar> {
     pub area: f64,
 }
 
-/// Force on the body with the sample at one contact point, along the axes of its [`Contact`].
+/// Force on the body with the sample at one contact point, along the axes of its [`ContactKinematics`].
 #[derive(Clone, Copy, Debug)]
-pub struct Response<S: Scalar> {
+pub struct ContactForce<S: Scalar> {
     /// Force along the normal \[N\]; positive pushes the body out.
     pub normal: S,
     /// Force across the normal \[N\].
     pub tangential: Vector3<S>,
 }
 
-impl<S: Scalar> Response<S> {
+impl<S: Scalar> ContactForce<S> {
     /// No force.
     #[inline]
     pub fn zero() -> Self {

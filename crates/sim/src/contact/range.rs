@@ -1,8 +1,9 @@
 //! Ranges of parameters.
 
 use super::error::LawError;
+use crate::magnitude::{LARGEST, SMALLEST};
 
-/// What a parameter may be. Infinity and NaN are in none, but where a range says so; nor is what is larger than 10⁶⁰, or positive
+/// Range of a parameter. Infinity and NaN are in none, but where a range says so; nor is what is larger than 10⁶⁰, or positive
 /// and less than 10⁻⁶⁰ where it is to be positive: laws square and divide by such numbers, and raise them to the fifth power.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum ParameterRange {
@@ -21,10 +22,6 @@ pub enum ParameterRange {
     /// Every number.
     Finite,
 }
-
-/// The largest number, and the smallest that is positive: their fifth powers and those of their inverses are still numbers.
-pub(crate) const LARGEST: f64 = 1e60;
-pub(crate) const SMALLEST: f64 = 1e-60;
 
 impl ParameterRange {
     /// Checks that `value`, called `name` in the error, is in this range.

@@ -7,8 +7,8 @@ use super::dynamic::DynContactLaw;
 use super::error::LawError;
 use super::friction::FrictionLaw;
 use super::friction::anisotropic::AnisotropicFriction;
+use super::friction::bristle::BristleFriction;
 use super::friction::coulomb::Coulomb;
-use super::friction::sticking::Sticking;
 use super::friction::stribeck::Stribeck;
 use super::graspd::{GraspD, GraspDParameters};
 use super::normal::NormalLaw;
@@ -24,9 +24,9 @@ pub type LawConstructor = fn(&[f64]) -> Result<Box<dyn DynContactLaw>, LawError>
 /// A law as the registry knows it.
 #[derive(Clone, Debug)]
 pub struct LawEntry {
-    /// What the law is, in a line.
+    /// Summary of the law, in a line.
     pub summary: String,
-    /// What its constructor takes, in order. The law's own parameters, which may carry derivatives, come first.
+    /// Parameters of its constructor, in order. The law's own parameters, which may carry derivatives, come first.
     pub parameters: Vec<LawParameter>,
     /// Makes the law.
     pub constructor: LawConstructor,
@@ -84,7 +84,7 @@ pub(crate) fn exactly<P: ParameterArray<f64>>(
 /// Contact laws by name, in alphabetical order.
 ///
 /// ```
-/// use prehend_sim::LawRegistry;
+/// use prehend_sim::contact::LawRegistry;
 ///
 /// let registry = LawRegistry::default();
 /// for (name, law) in registry.entries() {
@@ -101,7 +101,7 @@ pub struct LawRegistry {
 }
 
 impl Default for LawRegistry {
-    /// The laws of this crate: `graspd`, `hertz`, `hunt_crossley`, `hunt_crossley_sticking`, `hunt_crossley_stribeck`,
+    /// The laws of this crate: `graspd`, `hertz`, `hunt_crossley`, `hunt_crossley_bristle`, `hunt_crossley_stribeck`,
     /// `penalty`, `penalty_approach`, `penalty_grain` and `penalty_stribeck`.
     fn default() -> Self {
         let mut registry = Self { laws: BTreeMap::new() };
@@ -109,7 +109,7 @@ impl Default for LawRegistry {
         add("graspd", graspd());
         add("hertz", product::<Hertz, Coulomb>());
         add("hunt_crossley", product::<HuntCrossley, Coulomb>());
-        add("hunt_crossley_sticking", product::<HuntCrossley, Sticking<Coulomb>>());
+        add("hunt_crossley_bristle", product::<HuntCrossley, BristleFriction<Coulomb>>());
         add("hunt_crossley_stribeck", product::<HuntCrossley, Stribeck>());
         add("penalty", product::<KelvinVoigt, Coulomb>());
         add("penalty_approach", product::<ApproachDamped, Coulomb>());
@@ -141,7 +141,7 @@ impl LawRegistry {
         self.laws.iter().map(|(name, entry)| (name.as_str(), entry))
     }
 
-    /// What is known of the law called `name`.
+    /// Entry of the law called `name`.
     pub fn entry(&self, name: &str) -> Option<&LawEntry> {
         self.laws.get(name)
     }
@@ -164,7 +164,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::Contact;
+    use crate::ContactKinematics;
     use crate::scenes::penalty;
 
     /// A value that every parameter of that name accepts.
@@ -230,9 +230,14 @@ mod tests {
         let boxed = registry.create("penalty", &[1e6, 1e3, 0.5, 1e-2]).unwrap();
         let law = penalty(1e6, 1e3, 0.5, 1e-2);
         let slip = Vector3::new(0.1, 0.0, 0.0);
-        let contact =
-            Contact { gap: -1e-3, normal_speed: -0.1, slip, normal: Vector3::z(), area: 1e-4 };
-        let [a, b] = [boxed.as_ref(), &law].map(|law| law.response(law.params(), &contact));
+        let contact = ContactKinematics {
+            gap: -1e-3,
+            normal_speed: -0.1,
+            slip,
+            normal: Vector3::z(),
+            area: 1e-4,
+        };
+        let [a, b] = [boxed.as_ref(), &law].map(|law| law.force(law.params(), &contact));
         assert_eq!((a.normal, a.tangential), (b.normal, b.tangential));
         let unknown = registry.create("glue", &[]).map(|_| ()).unwrap_err().to_string();
         assert!(unknown.contains("\"glue\": one of graspd, hertz, hunt_crossley"), "{unknown}");

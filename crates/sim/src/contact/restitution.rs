@@ -1,4 +1,4 @@
-//! How bodies bounce off a damped contact: coefficients of restitution and their inverses.
+//! Coefficients of restitution of damped contacts, and their inverses.
 //!
 //! All are of a single body that hits a contact without gravity. Where the damping is linear they depend on
 //! the damping ratio ζ = c/(2√(k m)) alone, with c and k the whole contact's: ζ = D/(2√(K m/A)) for K and D
@@ -95,7 +95,7 @@ fn log_excess(y: f64) -> f64 {
     -y * y * tail
 }
 
-/// Where `is_below` turns from true to false in `low..high`.
+/// Number in `low..high` where `is_below` turns from true to false.
 fn bisect(mut low: f64, mut high: f64, is_below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..200 {
         let middle = 0.5 * (low + high);

@@ -4,11 +4,12 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
+use super::contact_query::{ContactPoint, ContactQuery};
 use super::law::ContactLaw;
-use super::moved::{LiftedContact, MovedPatch};
+use super::moved::{LiftedContact, MovedQuery};
 use super::param_values::ParamValues;
-use super::patch::{Patch, Touch};
-use super::point::Contact;
+use super::point::ContactKinematics;
+use crate::spatial::spatial;
 
 /// A wrench about the center of mass with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,18 +39,18 @@ impl LocalFunction<12, 6> for LinearWrench {
     }
 }
 
-/// The sum of all contacts of `patch`.
-pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
-    let cutoff = law.reach();
+/// The sum of all contacts of `query`.
+pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64> {
+    let cutoff = law.cutoff();
     let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-    let sound = patch.for_each_touch(cutoff, true, |touch| {
+    let sound = query.for_each_contact(cutoff, true, |touch| {
         let response = law.law(p, &touch.contact(cutoff));
         let f = touch.normal * response.normal + response.tangential;
         force += f;
         torque += touch.lever.cross(&f);
     });
     // A field that fails must not look like free space.
-    if sound { stack(&force, &torque) } else { Vector6::repeat(f64::NAN) }
+    if sound { spatial(&force, &torque) } else { Vector6::repeat(f64::NAN) }
 }
 
 /// [`wrench`] with its derivative.
@@ -59,17 +60,17 @@ pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Ve
 pub(crate) fn wrench_jacobian<L: ContactLaw>(
     law: &L,
     p: &[f64],
-    patch: &Patch<'_>,
+    query: &ContactQuery<'_>,
     by_params: bool,
 ) -> WrenchJacobian {
-    let cutoff = law.reach();
+    let cutoff = law.cutoff();
     let params: ParamValues<Fwd<6>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    let spin = patch.state.angular;
+    let spin = query.state.angular;
     let mut wrench = Vector6::zeros();
     // Force and torque by position, turn, velocity and spin of the body.
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
     let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
-    let sound = patch.for_each_touch(cutoff, false, |touch| {
+    let sound = query.for_each_contact(cutoff, false, |touch| {
         let contact = touch.lifted(cutoff);
         let response = law.law(&params, &contact);
         let force: Vector3<Fwd<6>> =
@@ -92,7 +93,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         }
         // Torque l×f: δ(l×f) = δl×f + l×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
-        wrench += stack(&f, &lever.cross(&f));
+        wrench += spatial(&f, &lever.cross(&f));
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
     if !sound {
@@ -108,32 +109,32 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
 pub(crate) fn wrench_along<L: ContactLaw>(
     law: &L,
     p: &[f64],
-    patch: &Patch<'_>,
+    query: &ContactQuery<'_>,
     tangent: &[f64; 12],
 ) -> [Vector6<f64>; 2] {
-    let cutoff = law.reach();
+    let cutoff = law.cutoff();
     let params: ParamValues<Fwd<1>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    let moved = MovedPatch::new(patch, &tangent.map(|x| Fwd { value: 0.0, derivative: [x] }));
+    let moved = MovedQuery::new(query, &tangent.map(|x| Fwd { value: 0.0, derivative: [x] }));
     let (mut force, mut torque) = (Vector3::<Fwd<1>>::zeros(), Vector3::<Fwd<1>>::zeros());
-    let sound = patch.for_each_touch(cutoff, false, |touch| {
+    let sound = query.for_each_contact(cutoff, false, |touch| {
         let LiftedContact { contact, lever, .. } = moved.lift(touch, cutoff);
         let response = law.law(&params, &contact);
         let f = contact.normal * response.normal + response.tangential;
         force += f;
         torque += lever.cross(&f);
     });
-    let all = stack(&force, &torque);
+    let all = spatial(&force, &torque);
     let value = if sound { all.map(|x| x.value) } else { Vector6::repeat(f64::NAN) };
     [value, all.map(|x| x.derivative[0])]
 }
 
-/// What is added where the lever of a round sample turns with the normal. Never inlined: it is rare, and the rest then fits the
+/// Term of round samples, whose lever turns with the normal. Never inlined: it is rare, and the rest then fits the
 /// registers.
 #[cold]
 #[inline(never)]
 fn roll(
-    touch: &Touch,
-    contact: &Contact<Fwd<6>>,
+    touch: &ContactPoint,
+    contact: &ContactKinematics<Fwd<6>>,
     force: &Vector3<f64>,
     spin: &Vector3<f64>,
     by_velocity: &Matrix3<f64>,
@@ -155,7 +156,7 @@ fn roll(
 fn add_param_slopes<L: ContactLaw>(
     law: &L,
     p: &[f64],
-    touch: &Touch,
+    touch: &ContactPoint,
     cutoff: f64,
     slopes: &mut [Vector6<f64>],
 ) {
@@ -165,10 +166,10 @@ fn add_param_slopes<L: ContactLaw>(
             _ => Fwd::constant(p),
         };
         let params: ParamValues<Fwd<6>> = p.iter().enumerate().map(seeded).collect();
-        let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
+        let ContactKinematics { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
         let response = law.law(
             &params,
-            &Contact {
+            &ContactKinematics {
                 gap: Fwd::constant(gap),
                 normal_speed: Fwd::constant(normal_speed),
                 slip: slip.map(Fwd::constant),
@@ -179,7 +180,7 @@ fn add_param_slopes<L: ContactLaw>(
         for (lane, slope) in slopes.iter_mut().enumerate() {
             let f = touch.normal * response.normal.derivative[lane]
                 + response.tangential.map(|x| x.derivative[lane]);
-            *slope += stack(&f, &touch.lever.cross(&f));
+            *slope += spatial(&f, &touch.lever.cross(&f));
         }
     }
 }
@@ -196,12 +197,6 @@ fn times_cross(m: &Matrix3<f64>, a: &Vector3<f64>) -> Matrix3<f64> {
     -cross_times(a, &m.transpose()).transpose()
 }
 
-/// Force and torque in one vector.
-#[inline]
-pub(crate) fn stack<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector6<S> {
-    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -211,23 +206,24 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
     use prehend_geometry::{DistanceField, FieldSample};
 
+    use crate::contact::LeakSteps;
+    use crate::contact::contact_query::ContactQuery;
+    use crate::contact::dynamic::QueryWrench;
+    use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
-    use crate::{
-        ContactLaw, DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, World,
-        WrenchJacobian,
-    };
+    use crate::{ContactLaw, GapSmoothing, State, Surface, World};
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(
         height: f64,
         field: &dyn DistanceField,
         smoothing: GapSmoothing,
-        f: impl Fn(&Patch<'_>) -> R,
+        f: impl Fn(&ContactQuery<'_>) -> R,
     ) -> R {
         let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
         let (_, states) = egg_on(floor(), smoothing);
         let state = State { pose: Isometry3::translation(0.0, 0.0, height), ..states[1] };
-        f(&Patch { surface: &surface, com: Point3::origin(), state, field, smoothing })
+        f(&ContactQuery { surface: &surface, com: Point3::origin(), state, field, smoothing })
     }
 
     fn is_finite(jacobian: &WrenchJacobian) -> bool {
@@ -237,9 +233,9 @@ mod tests {
     /// The wrench on body 1 presses it up, the same with derivatives as without, and those match differences.
     fn assert_derivatives(world: &World, states: &[State], what: &str) {
         let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
-        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
         lifted[1] = states[1].variables();
-        let exact = world.lift().wrenches(&lifted, 0)[1];
+        let exact = world.cast().wrenches(&lifted, 0)[1];
         let value = wrench(states[1]);
         assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
         assert!(value.z > 0.0);
@@ -284,8 +280,8 @@ mod tests {
     fn a_leak_adds_stiffness_and_no_force() {
         let law = penalty(2e7, 1e4, 0.5, 1e-2);
         let jacobian = |smoothing| {
-            sample_at(1e-3, floor().as_ref(), smoothing, |patch| {
-                law.wrench_jacobian(law.params(), patch, true)
+            sample_at(1e-3, floor().as_ref(), smoothing, |query| {
+                law.wrench_jacobian(law.params(), query, true)
             })
         };
         let leaky = jacobian(GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All });
@@ -311,9 +307,9 @@ mod tests {
             }
         }
         let law = penalty(2e7, 1e4, 0.5, 1e-2);
-        sample_at(0.0, &Broken, GapSmoothing::Hard, |patch| {
-            assert!(law.wrench(law.params(), patch).iter().all(|w| w.is_nan()));
-            let jacobian = law.wrench_jacobian(law.params(), patch, false);
+        sample_at(0.0, &Broken, GapSmoothing::Hard, |query| {
+            assert!(law.wrench(law.params(), query).iter().all(|w| w.is_nan()));
+            let jacobian = law.wrench_jacobian(law.params(), query, false);
             assert!(jacobian.wrench.iter().all(|w| w.is_nan()));
         });
     }
@@ -339,8 +335,8 @@ mod tests {
         let state = State::at_rest(Isometry3::identity());
         let (com, smoothing) = (Point3::origin(), GapSmoothing::Hard);
         let wrench = |surface: &Surface| {
-            let patch = Patch { surface, com, state, field: &Slope, smoothing };
-            law.wrench(law.params(), &patch)
+            let query = ContactQuery { surface, com, state, field: &Slope, smoothing };
+            law.wrench(law.params(), &query)
         };
         let singly = row.iter().map(|p| wrench(&Surface::new(&[*p], &[1e-4]).unwrap()));
         let singly = singly.fold(Vector6::zeros(), |sum: Vector6<f64>, w| sum + w);
@@ -359,12 +355,13 @@ mod tests {
         let law = penalty(2e7, 1e4, 0.5, 1e-2);
         let leaky = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
         for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 1e-4 }, leaky] {
-            let jacobian = |patch: &Patch<'_>| law.wrench_jacobian(law.params(), patch, true);
+            let jacobian =
+                |query: &ContactQuery<'_>| law.wrench_jacobian(law.params(), query, true);
             // ∇φ = 0 gives no contact; φ = 0 without slip, finite ones.
             assert_eq!(sample_at(0.0, &Flat, smoothing, jacobian).wrench, Vector6::zeros());
-            let rest = |patch: &Patch<'_>| {
+            let rest = |query: &ContactQuery<'_>| {
                 let state = State::at_rest(Isometry3::identity());
-                jacobian(&Patch { state, ..*patch })
+                jacobian(&ContactQuery { state, ..*query })
             };
             assert!(is_finite(&sample_at(0.0, floor().as_ref(), smoothing, rest)));
         }

@@ -1,12 +1,12 @@
 //! The default integrator: steps as long as their error allows.
 
-mod course;
 mod error_norm;
 mod islands;
-mod planner;
-mod probe;
+mod schedule;
+mod sensitivity;
+mod step_limiter;
+mod substep_controller;
 mod touch_time;
-mod travel;
 mod windows;
 
 use prehend_autodiff::Scalar;
@@ -21,28 +21,28 @@ use crate::world::World;
 
 /// Dormand and Prince's method of fifth order with steps that it chooses: what [`World::simulate`] uses.
 ///
-/// Each step of a rollout is divided until the estimated error of every part is within the tolerances. Two errors are held:
+/// Each step of a rollout is divided until the estimated error of every substep is within the tolerances. Two errors are held:
 /// that of the states, and that of a *sensitivity*, the derivative of the states along a direction drawn at the start of
-/// the step. A part that resolves the motion may well be too long for its derivatives, where friction or damping decays
+/// the step. A substep that resolves the motion may well be too long for its derivatives, where friction or damping decays
 /// within it; the sensitivity says so. Both estimates hold across kinks, such as the onset of a contact that is shorter than
-/// the part or a damper that stops pulling, so that parts shrink until what is left of the kink is tolerated.
+/// the substep or a damper that stops pulling, so that substeps shrink until what is left of the kink is tolerated.
 ///
 /// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.05 % of converged ones;
 /// `cargo test -p prehend-sim --test it defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
 /// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
 /// their derivatives.
 ///
-/// Where samples touch or let go of a contact without smoothing, parts end just before, and a tiny one goes over it. None is so long that a contact could be passed over: no
+/// Where samples touch or let go of a contact without smoothing, substeps end just before, and a tiny one goes over it. None is so long that a contact could be passed over: no
 /// sample moves by more than its clearance and either a fifth of its body's size or a quarter of the thickness of what it touches
 /// ([`DistanceField::thickness`]), whichever is less; nor does one that moves by more than a fiftieth of its body's size touch in
 /// between, as the cubic of its gap tells. What is pressed past the middle of a
-/// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of driven bodies are
+/// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of kinematic bodies are
 /// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///
-/// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::LeakSteps::First)) leak in its first
-/// part, whose length is not known beforehand: leaks on every step, or a fixed step, have more of a meaning.
+/// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::contact::LeakSteps::First)) leak in its first
+/// substep, whose length is not known beforehand: leaks on every step, or a fixed step, have more of a meaning.
 ///
-/// Parts are chosen by values alone, so that they are the same whatever the scalar. Derivatives are those of the parts that
+/// Substeps are chosen by values alone, so that they are the same whatever the scalar. Derivatives are those of the substeps that
 /// were taken.
 ///
 /// No step is short enough for derivatives through a force that jumps at touch, such as damping that acts before there is
@@ -56,7 +56,7 @@ use crate::world::World;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", stone));
+/// world.add(Body::dynamic("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
 /// let tight = Adaptive { tolerance: 1e-10, sensitivity_tolerance: 1e-9, ..Adaptive::default() };
 /// let run = world.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
@@ -70,11 +70,11 @@ pub struct Adaptive {
     /// points within r), its acceleration a without contacts, and the fastest body's speed v_max. Positive.
     pub tolerance: f64,
     /// Error of the sensitivity in a part of a step, in the same units: that of positions relative to the sensitivity's largest
-    /// component S, that of velocities relative to the largest of these, or to S/10 if that is more. Positive. A kink that no part is
+    /// component S, that of velocities relative to the largest of these, or to S/10 if that is more. Positive. A kink that no substep is
     /// too short for may be off by 10⁻³.
     pub sensitivity_tolerance: f64,
-    /// Parts of a step at most.
-    pub max_parts: usize,
+    /// Substeps of a step at most.
+    pub max_substeps: usize,
 }
 
 impl Adaptive {
@@ -94,9 +94,9 @@ impl Adaptive {
 }
 
 impl Default for Adaptive {
-    /// 5·10⁻⁶ for states, 2·10⁻⁵ for sensitivities, a million parts.
+    /// 5·10⁻⁶ for states, 2·10⁻⁵ for sensitivities, a million substeps.
     fn default() -> Self {
-        Self { tolerance: 5e-6, sensitivity_tolerance: 2e-5, max_parts: 1_000_000 }
+        Self { tolerance: 5e-6, sensitivity_tolerance: 2e-5, max_substeps: 1_000_000 }
     }
 }
 

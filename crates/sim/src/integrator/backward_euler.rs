@@ -24,8 +24,8 @@ use crate::world::World;
 ///
 /// With the cargo feature `faer` the equations of many bodies are solved as sparse ones.
 ///
-/// The deflections of contacts that stick ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
-/// v_b), which is 1 ms for [`Sticking`](crate::Sticking) of 0.1 mm and a slip scale of 1 cm/s.
+/// The deflections of contacts with bristles ([`Bristles`](crate::contact::Bristles)) follow explicitly: steps should not be longer than u_b/(2
+/// v_b), which is 1 ms for [`BristleFriction`](crate::BristleFriction) of 0.1 mm and a slip scale of 1 cm/s.
 ///
 /// # Errors
 /// A force that jumps, as that of a damped contact does without smoothing, may leave the equations of an impact without a
@@ -41,17 +41,17 @@ impl Integrator for BackwardEuler {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        world.refuse_joints("BackwardEuler")?;
-        world.refuse_welds("BackwardEuler")?;
+        world.ensure_no_joints("BackwardEuler")?;
+        world.ensure_no_bushings("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
             return Ok(states.to_vec());
         }
         let values: Vec<State> = states.iter().map(State::value).collect();
-        let plain = world.plain();
-        let lifted = plain.lift();
+        let plain = world.to_f64();
+        let lifted = plain.cast();
         let mut at_end = values.clone();
-        plain.drive(&mut at_end, step.end());
+        plain.update_kinematics(&mut at_end, step.end());
         let mut equations =
             ImplicitStep { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
         let solution = equations.solve()?;
@@ -77,7 +77,7 @@ impl Integrator for BackwardEuler {
     }
 }
 
-/// The states at the end of a step that free bodies make with these velocities, before contacts that stick are deflected.
+/// The states at the end of a step that free bodies make with these velocities, before contacts with bristles are deflected.
 fn moved<S: Scalar>(
     world: &World<S>,
     states: &[State<S>],
@@ -85,7 +85,7 @@ fn moved<S: Scalar>(
     velocity: impl Fn(usize) -> [S; 6],
 ) -> Vec<State<S>> {
     let mut next = states.to_vec();
-    world.drive(&mut next, equations.step.end());
+    world.update_kinematics(&mut next, equations.step.end());
     for (slot, &body) in equations.free.iter().enumerate() {
         next[body] = arrived(&states[body], &velocity(slot), equations.step.dt);
     }
@@ -121,7 +121,7 @@ fn carried<S: Scalar>(
 fn deflected<S: Scalar>(world: &World<S>, mut next: Vec<State<S>>, step: &Step) -> Vec<State<S>> {
     if next.len() > world.bodies.len() {
         let rates = world.wrenches(&next, step.index);
-        world.deflect(&mut next, &rates, S::constant(step.dt));
+        world.integrate_bristles(&mut next, &rates, S::constant(step.dt));
     }
     next
 }
@@ -133,15 +133,16 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
+    use crate::contact::LeakSteps;
     use crate::scenes::{bowl, egg_on};
-    use crate::{GapSmoothing, LeakSteps, Motion, RigidBody, TimeSteps};
+    use crate::{GapSmoothing, Motion, RigidBody, TimeSteps};
 
     /// The egg in a bowl that flies freely.
     fn egg_in_free_bowl(smoothing: GapSmoothing) -> (World, Vec<State>) {
         let (mut world, mut states) = egg_on(bowl(), smoothing);
         let mut rigid = *world.bodies[1].rigid().unwrap();
         rigid = RigidBody::new(0.5, rigid.inertia() * 3.0, *rigid.com()).unwrap();
-        world.bodies[0].motion = Motion::Free(rigid);
+        world.bodies[0].motion = Motion::Dynamic(rigid);
         states[0] = rigid.at_rest(&nalgebra::Isometry3::identity());
         states[0].angular = Vector3::new(-0.5, 0.3, 0.2);
         states[1].pose.translation.z -= 5e-4;
@@ -153,10 +154,10 @@ mod tests {
         let (world, states) = egg_in_free_bowl(GapSmoothing::Softplus { width: 3e-4 });
         let time_steps = TimeSteps { dt: 2e-3, steps: 3 };
         for moving in 0..2 {
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
             lifted[moving] = states[moving].variables();
             let run = world
-                .lift()
+                .cast()
                 .simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ())
                 .unwrap()
                 .states;
@@ -207,9 +208,9 @@ mod tests {
         let ends = [GapSmoothing::Hard, leaky].map(|smoothing| {
             let (world, mut states) = egg_on(bowl(), smoothing);
             states[1].pose.translation.z += 5e-3;
-            let lifted = [states[0].lift(), states[1].variables()];
+            let lifted = [states[0].cast(), states[1].variables()];
             let step = Step::new(0, 1e-3);
-            BackwardEuler.step(&world.lift(), &lifted, step).unwrap()[1]
+            BackwardEuler.step(&world.cast(), &lifted, step).unwrap()[1]
         });
         assert_eq!(ends[0].value(), ends[1].value());
         let slope = |end: &State<Fwd<12>>| end.linear.z.derivative[2];
@@ -220,7 +221,7 @@ mod tests {
     #[test]
     fn nothing_free_is_nothing_to_solve() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        world.bodies[1].motion = Motion::Kinematic;
+        world.bodies[1].motion = Motion::Fixed;
         let step = Step::new(0, 1e-3);
         assert_eq!(BackwardEuler.step(&world, &states, step).unwrap(), states);
     }
@@ -231,16 +232,18 @@ mod tests {
         const BALLS: usize = 27;
         let radius = 0.05;
         let mut world = World::new(Vector3::z() * -9.81);
-        let ground = crate::Body::kinematic("ground").with_field(crate::scenes::floor());
+        let ground = crate::Body::fixed("ground").with_field(crate::scenes::floor());
         let ground = world.add(ground);
         let mut states = vec![State::at_rest(nalgebra::Isometry3::identity())];
         let rigid = RigidBody::ball(0.5, radius).unwrap();
         let surface = std::sync::Arc::new(crate::Surface::ball(radius).unwrap());
-        let field =
-            std::sync::Arc::new(crate::Sphere { center: nalgebra::Point3::origin(), radius });
+        let field = std::sync::Arc::new(crate::fields::Sphere {
+            center: nalgebra::Point3::origin(),
+            radius,
+        });
         let place = |i: usize| 0.0998 * i as f64;
         for i in 0..BALLS {
-            let ball = crate::Body::free(&format!("ball {i}"), rigid);
+            let ball = crate::Body::dynamic(&format!("ball {i}"), rigid);
             world.add(ball.with_surface(surface.clone()).with_field(field.clone()));
             let (x, y, z) = (place(i % 3), place(i / 3 % 3), 0.0499 + place(i / 9));
             states.push(rigid.at_rest(&nalgebra::Isometry3::translation(x, y, z)));
@@ -258,10 +261,10 @@ mod tests {
             let states = run.unwrap().states;
             states.iter().flat_map(|s| [s.linear.x, s.linear.z, s.angular.y]).collect()
         };
-        let mut lifted: Vec<State<Fwd<2>>> = states.iter().map(State::lift).collect();
+        let mut lifted: Vec<State<Fwd<2>>> = states.iter().map(State::cast).collect();
         lifted[1].linear.x = Fwd::variable(0.1, 0);
         lifted[BALLS].angular.y = Fwd::variable(0.0, 1);
-        let run = world.lift().simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ());
+        let run = world.cast().simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ());
         let exact: Vec<Fwd<2>> = (run.unwrap().states.iter())
             .flat_map(|s| [s.linear.x, s.linear.z, s.angular.y])
             .collect();

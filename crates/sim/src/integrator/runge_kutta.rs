@@ -10,15 +10,15 @@ use prehend_autodiff::rigid::turned;
 use prehend_autodiff::{LocalFunction, Scalar};
 
 use crate::body::RigidBody;
-use crate::contact::wrench::stack;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
 
 /// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a joint the same
-/// of its state, with its angular velocity. Of a contact that sticks: the two halves of its deflection, and nothing.
+/// of its state, with its angular velocity. Of a contact with bristles: the two halves of its deflection, and nothing.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
@@ -32,11 +32,11 @@ pub(super) struct Stages<'a, S: Scalar> {
     states: &'a [State<S>],
     step: Step,
     free: Vec<Free<'a, S>>,
-    /// Free bodies, joints and contacts that stick.
+    /// Free bodies, joints and contacts with bristles.
     moving: usize,
-    /// Of each stage, those of the free bodies, then of the joints and of the contacts that stick.
+    /// For each stage, those of the free bodies, then of the joints and of the contacts with bristles.
     slopes: Vec<Change<S>>,
-    /// What led to the last stage.
+    /// Wrenches that led to the last stage.
     change: Vec<Change<S>>,
 }
 
@@ -71,7 +71,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         stages
     }
 
-    /// The states at `fraction` of the step, which `weights` of the slopes lead to, driven bodies where they are then;
+    /// The states at `fraction` of the step, which `weights` of the slopes lead to, kinematic bodies where they are then;
     /// and the wrenches there, whose slope is that of the next stage.
     pub(super) fn stage(
         &mut self,
@@ -83,7 +83,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.add_combined(weights, &mut change);
         let mut states = self.moved(&change);
         self.change = change;
-        self.world.drive(&mut states, self.step.start + fraction * self.step.dt);
+        self.world.update_kinematics(&mut states, self.step.start + fraction * self.step.dt);
         let wrenches = self.world.wrenches(&states, self.step.index);
         self.add_slopes(&states, &wrenches);
         (states, wrenches)
@@ -94,7 +94,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.moved(&self.combined(weights))
     }
 
-    /// Of each free body, joint and contact that sticks, the step's length times the sum of the slopes with `weights`.
+    /// For each free body, joint and contact with bristles, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
         let mut sums = vec![[Vector3::zeros(); 4]; self.moving];
         self.add_combined(weights, &mut sums);
@@ -141,7 +141,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         }
         let states = moved.iter_mut().skip(self.world.joint_places().end);
         for (state, [linear, angular, ..]) in states.zip(deflections) {
-            *state = state.deflected(&stack(linear, angular));
+            *state = state.deflected(&spatial(linear, angular));
         }
         moved
     }

@@ -28,7 +28,7 @@ impl Integrator for SemiImplicitEuler {
     ) -> Result<Vec<State<S>>, SimulationError> {
         let (wrenches, dt) = (world.wrenches(states, step.index), S::constant(step.dt));
         let mut next = moved(world, states, &wrenches, dt);
-        world.deflect(&mut next, &wrenches, dt);
+        world.integrate_bristles(&mut next, &wrenches, dt);
         Ok(next)
     }
 
@@ -44,7 +44,7 @@ impl Integrator for SemiImplicitEuler {
     }
 }
 
-/// The states after `dt` \[s\] with these wrenches on bodies and accelerations of joints, before contacts that stick are deflected.
+/// The states after `dt` \[s\] with these wrenches on bodies and accelerations of joints, before contacts with bristles are deflected.
 pub(crate) fn moved<S: Scalar>(
     world: &World<S>,
     states: &[State<S>],
@@ -58,7 +58,7 @@ pub(crate) fn moved<S: Scalar>(
     });
     let mut next: Vec<State<S>> = next.collect();
     next.extend_from_slice(&states[next.len()..]);
-    world.swing(&mut next, wrenches, dt);
+    world.integrate_joints(&mut next, wrenches, dt);
     next
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn advance<S: Scalar>(
     dt: S,
 ) -> State<S> {
     let mut next = *state;
-    let (linear, momentum) = body.kicked(state, wrench, gravity, dt);
+    let (linear, momentum) = body.apply_impulse(state, wrench, gravity, dt);
     next.linear = linear;
     next.pose.translation.vector += next.linear * dt;
     let rotation = &state.pose.rotation;

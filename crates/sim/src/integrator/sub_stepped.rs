@@ -17,7 +17,7 @@ use crate::world::body::Body;
 /// [`Integrator::stability_limit`] allows, with a margin of a fifth. A step whose equations an implicit integrator
 /// does not solve is divided into twice as many.
 ///
-/// Which division is chosen depends on values only: derivatives are exact for the steps that are taken, and ignore that
+/// The division is chosen by values only: derivatives are exact for the steps that are taken, and ignore that
 /// other steps might be. Contacts that leak in the first step of a rollout leak in the first part of it.
 ///
 /// ```
@@ -26,7 +26,7 @@ use crate::world::body::Body;
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::free("stone", stone));
+/// world.add(Body::dynamic("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
 /// let integrator = SubStepped { integrator: SemiImplicitEuler, max_substeps: 32 };
 /// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
@@ -35,9 +35,9 @@ use crate::world::body::Body;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubStepped<I> {
-    /// What takes the steps.
+    /// Integrator of the substeps.
     pub integrator: I,
-    /// Parts of a step at most; 0 counts as 1.
+    /// Substeps of a step at most; 0 counts as 1.
     pub max_substeps: usize,
 }
 
@@ -55,18 +55,18 @@ impl<I: Integrator> SubStepped<I> {
         let mut states = states.to_vec();
         for part in step.parts(parts) {
             states = self.integrator.step(world, &states, part)?;
-            world.drive(&mut states, part.end());
+            world.update_kinematics(&mut states, part.end());
         }
         Ok(states)
     }
 
-    /// How many parts the contacts demand.
+    /// Number of substeps that the contacts demand.
     fn demanded<S: Scalar>(&self, world: &World<S>, states: &[State<S>], dt: f64) -> f64 {
         let limit = self.integrator.stability_limit();
         if limit.is_infinite() {
             return 1.0;
         }
-        let plain = world.plain();
+        let plain = world.to_f64();
         let now: Vec<State> = states.iter().map(State::value).collect();
         let drift = |(body, state): (&Body, &State)| {
             let mut falling = *state;
@@ -78,8 +78,8 @@ impl<I: Integrator> SubStepped<I> {
         };
         let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
         then.extend_from_slice(&now[then.len()..]);
-        plain.swing(&mut then, &vec![Vector6::zeros(); now.len()], dt);
-        plain.place_links(&mut then);
+        plain.integrate_joints(&mut then, &vec![Vector6::zeros(); now.len()], dt);
+        plain.forward_kinematics(&mut then);
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }

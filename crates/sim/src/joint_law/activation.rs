@@ -7,7 +7,7 @@ use super::affine_actuator::within;
 use crate::contact::error::LawError;
 use crate::contact::parameters::Parameters;
 
-/// What changes the activation of an actuator, which is the velocity of a joint that moves 1 kg m² and nothing else: its integral of the control, or
+/// Rate of the activation of an actuator, which is the velocity of a joint that moves 1 kg m² and nothing else: its integral of the control, or
 /// a filter of it, as in MuJoCo. The control is a parameter, `"control"`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Activation {

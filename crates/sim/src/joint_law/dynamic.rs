@@ -20,7 +20,7 @@ pub trait DynJointLaw: Send + Sync + sealed::Sealed {
     /// Their names, empty where they have none.
     fn param_names(&self) -> Vec<&'static str>;
 
-    /// Whether the law takes these values.
+    /// Checks that the law takes these values.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

@@ -58,7 +58,7 @@ impl JointLawEntry {
 /// The laws of this crate by name: damper, friction, limits, motor, position_servo, slack_spring, spring and velocity_servo.
 ///
 /// ```
-/// let laws = prehend_sim::joint_laws();
+/// let laws = prehend_sim::joint_law::joint_laws();
 /// let spring = laws.iter().find(|law| law.name == "spring").ok_or("it is there")?;
 /// assert_eq!(spring.parameters[0].name, "stiffness");
 /// let spring = spring.create(&[2.0, 0.1])?;

@@ -4,7 +4,9 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::articulated::{ArticulationError, Joint, JointModel, Link};
-use crate::*;
+use crate::contact::LawError;
+use crate::joint_law::*;
+use crate::{Body, BuildError, RigidBody, SimulationError, World};
 
 fn laws() -> Vec<Box<dyn DynJointLaw>> {
     let servo = PositionServo { target: 0.7, stiffness: 3.0, damping: 0.2, max_effort: 1e3 };
@@ -88,12 +90,12 @@ fn what_cannot_be_is_refused_where_it_is_added() {
     let mut world = World::new(Vector3::zeros());
     let rod = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();
     let hinge = Joint::Revolute(Vector3::x_axis());
-    let stone = world.add(Body::free("stone", rod));
+    let stone = world.add(Body::dynamic("stone", rod));
     let links = vec![Link::new("rod", hinge.clone(), &rod), Link::new("plate", Joint::Fixed, &rod)];
     let links = world.add_articulation(links).unwrap();
     let other = world.add_articulation(vec![Link::new("other", hinge.clone(), &rod)]).unwrap()[0];
     let damper = |damping| JointDamper { damping };
-    let refused = |error: SimulationError| error.to_string();
+    let refused = |error: BuildError| error.to_string();
     for (error, message) in [
         (
             refused(world.add_joint_force(links[0], damper(-1.0)).unwrap_err()),
@@ -112,17 +114,20 @@ fn what_cannot_be_is_refused_where_it_is_added() {
     }
     let both = [(links[0].into(), 1.0), (other.into(), -1.0)];
     let apart = world.add_coupled_force(&both, std::sync::Arc::new(damper(1.0))).unwrap_err();
-    assert!(matches!(apart, SimulationError::Apart { .. }));
+    assert!(matches!(apart, BuildError::Apart { .. }));
     let id = world.add_joint_force(links[0], damper(1.0)).unwrap();
     assert!(world.joint_force_mut(id).set_param("friction", 1.0).is_err());
     world.joint_force_mut(id).set_param("damping", f64::NAN).unwrap();
     let states = world.neutral_states();
-    assert!(matches!(world.simulate(&states, 0.1), Err(SimulationError::JointLaw { .. })));
+    assert!(matches!(
+        world.simulate(&states, 0.1),
+        Err(SimulationError::Build(BuildError::JointLaw { .. }))
+    ));
 
     #[derive(Debug)]
     struct Many;
     impl JointModel for Many {
-        fn freedoms(&self) -> usize {
+        fn nv(&self) -> usize {
             4
         }
         fn placement<S: Scalar>(&self, _: &[S]) -> Isometry3<S> {
@@ -130,10 +135,10 @@ fn what_cannot_be_is_refused_where_it_is_added() {
         }
     }
     let many = world.add_articulation(vec![Link::new("many", Joint::custom(Many), &rod)]);
-    let expected = ArticulationError::Freedoms { link: "many".to_owned(), freedoms: 4 };
-    assert_eq!(many, Err(SimulationError::Articulation(expected)));
+    let expected = ArticulationError::DegreesOfFreedom { link: "many".to_owned(), count: 4 };
+    assert_eq!(many, Err(BuildError::Articulation(expected)));
     let light = world.add_articulation(vec![Link::massless("feather", hinge.clone())]);
-    assert!(matches!(light, Err(SimulationError::Articulation(ArticulationError::Mass { .. }))));
+    assert!(matches!(light, Err(BuildError::Articulation(ArticulationError::Mass { .. }))));
     let carried = Link::new("stone", Joint::Fixed, &rod).on(0, Isometry3::identity());
     assert!(world.add_articulation(vec![Link::massless("feather", hinge), carried]).is_ok());
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use crate::articulated::tree_factor::TreeFactor;
-use crate::error::SimulationError;
+use crate::error::BuildError;
 use crate::joint_law::damper::JointDamper;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::friction::JointFriction;
@@ -26,7 +26,7 @@ impl World {
         axes: &[(JointAxis, f64)],
         damping: f64,
         friction: f64,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         losses(damping, friction).try_for_each(|law| self.add_coupled_force(axes, law).map(|_| ()))
     }
 
@@ -36,7 +36,7 @@ impl World {
         axes: &[(JointAxis, f64)],
         range: (f64, f64),
         stiffness: f64,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         self.add_coupled_force(axes, limits(range, stiffness)).map(|_| ())
     }
 
@@ -46,18 +46,18 @@ impl World {
         axes: &[(JointAxis, f64)],
         rest: f64,
         [stiffness, damping]: [f64; 2],
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         self.add_coupled_force(axes, Arc::new(JointSpring { stiffness, rest }))?;
         self.add_coupled_force(axes, Arc::new(JointDamper { damping })).map(|_| ())
     }
 
     /// The inertia along a sum of joints of the last articulation, whose mobility this is.
     pub(super) fn inertia_along(&self, mobility: &Mobility, axes: &[(JointAxis, f64)]) -> f64 {
-        let mut along = DMatrix::zeros(mobility.freedoms, 1);
+        let mut along = DMatrix::zeros(mobility.dofs, 1);
         for (JointAxis { link, index }, factor) in axes {
             if let Ok((articulation, own)) = self.link_of(*link) {
-                let [_, freedoms] = self.articulations[articulation].tree.range(own);
-                along[freedoms.start + index] += factor;
+                let [_, dofs] = self.articulations[articulation].tree.range(own);
+                along[dofs.start + index] += factor;
             }
         }
         1.0 / along.dot(&mobility.times(&along))
@@ -66,9 +66,9 @@ impl World {
     /// The mobility of the last articulation, with its joints at their neutral coordinates.
     pub(super) fn mobility(&self) -> Mobility {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.freedoms()]).mass_matrix();
+        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.nv()]).mass_matrix();
         let factor = TreeFactor::new(&mass, tree.carriers().to_vec());
-        Mobility { freedoms: tree.freedoms(), factor }
+        Mobility { dofs: tree.nv(), factor }
     }
 }
 
@@ -89,7 +89,7 @@ pub(super) fn limits((lower, upper): (f64, f64), stiffness: f64) -> Arc<dyn DynJ
 
 /// The inverse of a mass matrix.
 pub(super) struct Mobility {
-    pub(super) freedoms: usize,
+    pub(super) dofs: usize,
     /// Of the mass matrix; none where something that moves has no mass.
     factor: Option<TreeFactor<'static>>,
 }

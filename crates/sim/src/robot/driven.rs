@@ -6,20 +6,12 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::Fwd;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
 
-use crate::error::SimulationError;
+use crate::articulated::joint_state::JointState;
+use crate::error::BuildError;
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
-
-/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`], or of one joint.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JointState<S = f64> {
-    /// Positions \[rad or m\].
-    pub position: Vec<S>,
-    /// Velocities \[rad/s or m/s\].
-    pub velocity: Vec<S>,
-}
 
 /// A robot whose joints follow a trajectory.
 struct DrivenRobot<C> {
@@ -42,7 +34,7 @@ impl<C: Fn(f64) -> JointState> DrivenRobot<C> {
         let joints = position.iter().zip(&velocity);
         let joints: Vec<Fwd<1>> =
             joints.map(|(&value, &rate)| Fwd { value, derivative: [rate] }).collect();
-        let base: State<Fwd<1>> = State::at_rest(self.t_world_base).lift();
+        let base: State<Fwd<1>> = State::at_rest(self.t_world_base).cast();
         let moving = State::at_rest(base.pose * self.robot.forward_kinematics(&joints)[link]);
         let rate = moving.sensitivity();
         State {
@@ -58,7 +50,7 @@ impl World {
     /// each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
     /// how the joints are and move at a time \[s\], and limits are not enforced.
     ///
-    /// [`World::drive`] brings states to their start. Distances reach as far as the margin of `shape`.
+    /// [`World::update_kinematics`] brings states to their start. Distances reach as far as the margin of `shape`.
     ///
     /// # Errors
     /// If `shape` is not the robot's, or `joints` does not have as many entries as the robot at time 0. Should it not later,
@@ -69,8 +61,8 @@ impl World {
         shape: &RobotShape,
         t_world_base: &Isometry3<f64>,
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
-    ) -> Result<Vec<Option<BodyId>>, SimulationError> {
-        let mismatch = |what, found, expected| SimulationError::Robot { what, found, expected };
+    ) -> Result<Vec<Option<BodyId>>, BuildError> {
+        let mismatch = |what, found, expected| BuildError::Robot { what, found, expected };
         let (found, expected) = (shape.links().len(), robot.links().len());
         if found != expected {
             return Err(mismatch("links of the shape", found, expected));
@@ -89,7 +81,8 @@ impl World {
         let bodies = shape.links().iter().enumerate().map(|(link, shape)| {
             shape.grid()?;
             let driven = Arc::clone(&driven);
-            let body = Body::driven(&robot.links()[link].name, move |t: f64| driven.link(link, t));
+            let body =
+                Body::kinematic(&robot.links()[link].name, move |t: f64| driven.link(link, t));
             Some(self.add(body.with_field(shape.clone())))
         });
         Ok(bodies.collect())
@@ -101,6 +94,7 @@ mod tests {
     use prehend_autodiff::lie::so3_log;
 
     use super::*;
+    use crate::SimulationError;
     use crate::scenes::{ellipsoid, penalty};
     use crate::{ContactBodies, GapSmoothing, RigidBody, SemiImplicitEuler, Surface, TimeSteps};
 
@@ -137,7 +131,7 @@ mod tests {
         assert_eq!(world.bodies[1].name, "tip");
         let at = |time: f64| {
             let mut states = vec![State::at_rest(Isometry3::identity()); 2];
-            world.drive(&mut states, time);
+            world.update_kinematics(&mut states, time);
             states
         };
         let (before, now, after) = (at(0.7 - 1e-5), at(0.7), at(0.7 + 1e-5));
@@ -161,14 +155,14 @@ mod tests {
         let (radius, mass) = (0.03, 0.1);
         let rigid = RigidBody::ball(mass, radius).unwrap();
         let surface = Surface::uniform(&ellipsoid(400, [radius; 3]), 0.0113).unwrap();
-        let ball = world.add(Body::free("ball", rigid).with_surface(surface));
+        let ball = world.add(Body::dynamic("ball", rigid).with_surface(surface));
         // Critically damped, or nearly: the ball keeps to the finger rather than bounce off.
         let law = Arc::new(penalty(1e8, 1e6, 0.5, 1e-2));
         let (bodies, smoothing) =
             (ContactBodies { samples: ball, field: tip }, GapSmoothing::Softplus { width: 1e-4 });
         world.add_contact(bodies, law, smoothing).unwrap();
         let mut states = vec![State::at_rest(Isometry3::identity()); 3];
-        world.drive(&mut states, 0.0);
+        world.update_kinematics(&mut states, 0.0);
         let ahead = Vector3::new(0.04 + radius + 0.002, 0.0, 0.0);
         states[ball].pose = states[tip].pose * nalgebra::Translation3::from(ahead);
         let axis = states[tip].pose.rotation * Vector3::x();
@@ -191,10 +185,7 @@ mod tests {
         let mut world = World::new(Vector3::zeros());
         let short = |_: f64| JointState { position: vec![0.0; 2], velocity: vec![0.0] };
         let refused = world.add_robot(&robot, &shape, &Isometry3::identity(), short).unwrap_err();
-        assert_eq!(
-            refused,
-            SimulationError::Robot { what: "joint velocities", found: 1, expected: 2 }
-        );
+        assert_eq!(refused, BuildError::Robot { what: "joint velocities", found: 1, expected: 2 });
         let (world, _) = arm(|t| JointState {
             position: vec![0.0; 2],
             velocity: vec![0.0; if t > 0.5 { 1 } else { 2 }],

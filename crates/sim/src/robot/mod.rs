@@ -4,3 +4,6 @@ mod constraints;
 pub(crate) mod driven;
 pub(crate) mod mjcf;
 pub(crate) mod urdf;
+
+pub use self::mjcf::{MjcfError, MjcfOptions, MjcfRobot};
+pub use self::urdf::UrdfOptions;

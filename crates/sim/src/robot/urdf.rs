@@ -4,17 +4,17 @@ use nalgebra::Isometry3;
 use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
 
 use crate::articulated::{Joint, Link};
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::BodyId;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::joint_force::JointAxis;
 
-/// How a robot in URDF that forces move becomes part of a world.
+/// Options of reading a robot in URDF that forces move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfOptions {
     /// Base → world.
     pub t_world_base: Isometry3<f64>,
-    /// How the base hangs on the world.
+    /// Joint between the world and the base.
     pub base: Joint,
     /// Time constant of limits and of joints that mimic others \[s\].
     pub time_constant: f64,
@@ -45,10 +45,10 @@ impl World {
         robot: &KinematicTree,
         shape: Option<&RobotShape>,
         options: &UrdfOptions,
-    ) -> Result<Vec<BodyId>, SimulationError> {
+    ) -> Result<Vec<BodyId>, BuildError> {
         let (found, expected) = (shape.map(|shape| shape.links().len()), robot.links().len());
         if let Some(found) = found.filter(|found| *found != expected) {
-            return Err(SimulationError::Robot { what: "links of the shape", found, expected });
+            return Err(BuildError::Robot { what: "links of the shape", found, expected });
         }
         let mut grown = self.clone();
         let bodies = grown.insert_robot(robot, shape, options)?;
@@ -62,7 +62,7 @@ impl World {
         robot: &KinematicTree,
         shape: Option<&RobotShape>,
         options: &UrdfOptions,
-    ) -> Result<Vec<BodyId>, SimulationError> {
+    ) -> Result<Vec<BodyId>, BuildError> {
         let (links, order) = links(robot, options);
         let added = self.add_articulation(links)?;
         let mut bodies = vec![BodyId(0); robot.links().len()];
@@ -83,7 +83,7 @@ impl World {
         robot: &KinematicTree,
         bodies: &[BodyId],
         options: &UrdfOptions,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<(), BuildError> {
         let mobility = self.mobility();
         for joint in robot.joints().iter().filter(|joint| joint.motion != Motion::Fixed) {
             let axis = JointAxis::from(bodies[joint.child]);

@@ -1,10 +1,10 @@
-//! How the edges of a convex solid are round.
+//! Rounding of the edges of a convex solid.
 
 use prehend_autodiff::Scalar;
 
 use crate::fields::INSET;
 
-/// How the edges of a convex solid are round.
+/// Rounding of the edges of a convex solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Border {
     /// Within its size, by this radius \[m\]: for contact only, its mass is that of the sharp solid.
@@ -13,7 +13,7 @@ pub(crate) enum Border {
     Around,
 }
 
-/// What a round solid is made of, in the sharp one: how far that is moved outward, and the radius of the edges \[m\].
+/// Distance by which the sharp solid is moved outward, and radius of the edges \[m\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounding<T> {
     outward: T,
@@ -40,7 +40,7 @@ impl Border {
 }
 
 impl<T: Scalar> Rounding<T> {
-    /// How far the sharp solid is moved outward.
+    /// Distance by which the sharp solid is moved outward.
     pub(crate) fn outward(&self) -> T {
         self.outward
     }
@@ -55,12 +55,12 @@ impl<T: Scalar> Rounding<T> {
         self.radius.times(INSET)
     }
 
-    /// How far the core of the field is inside of the sharp solid.
+    /// Depth of the field's core inside of the sharp solid.
     pub(crate) fn core(&self) -> T {
         self.radius - self.outward
     }
 
-    /// How far the centers of samples are.
+    /// Depth of the centers of samples.
     pub(crate) fn inset(&self) -> T {
         self.samples() - self.outward
     }

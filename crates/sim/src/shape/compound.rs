@@ -18,10 +18,10 @@ pub(crate) struct Compound {
 
 /// A part of a compound.
 pub(crate) struct Part {
-    /// Where it is.
+    /// Its pose.
     pub(crate) pose: Isometry3<f64>,
     pub(crate) kind: Kind,
-    /// How many dimensions it has.
+    /// Number of its dimensions.
     pub(crate) dimensions: usize,
 }
 

@@ -12,7 +12,7 @@ pub enum ShapeError {
     /// A kind of shape that has no inside, or is not known.
     #[error("no bodies are made of a {kind}")]
     Kind {
-        /// What it is.
+        /// Its kind.
         kind: String,
     },
     /// A dimension is not a positive, finite number, or beyond all measure.
@@ -20,7 +20,7 @@ pub enum ShapeError {
     Dimension {
         /// Its name.
         name: String,
-        /// What it is \[m\].
+        /// Its value \[m\].
         value: f64,
     },
     /// Edges are not round, or their rounding leaves nothing of the shape.
@@ -28,9 +28,9 @@ pub enum ShapeError {
         "edges must be round with a radius of less than {limit} m, which leaves something of the shape; it is {radius} m"
     )]
     Rounding {
-        /// What it is \[m\].
+        /// Its value \[m\].
         radius: f64,
-        /// What it has to be less than \[m\].
+        /// Bound that it has to be less than \[m\].
         limit: f64,
     },
     /// A length among the options is not positive and finite.
@@ -38,7 +38,7 @@ pub enum ShapeError {
     Option {
         /// `rounding`, `spacing` or `cell`.
         name: &'static str,
-        /// What it is \[m\].
+        /// Its value \[m\].
         value: f64,
     },
     /// A half-space whose normal has no direction.
@@ -53,7 +53,7 @@ pub enum ShapeError {
     /// Something without a mass can only be a fixed body.
     #[error("a {kind} has no mass: it makes fixed bodies only (Body::fixed_from_shape)")]
     FixedOnly {
-        /// What it is.
+        /// Its kind.
         kind: &'static str,
     },
     /// No dimension has this name.

@@ -20,7 +20,7 @@ use super::polyhedron::{Polyhedron, flat_faces};
 use super::revolved::{Outline, Revolved};
 use crate::fields::HalfSpace;
 
-/// What a shape is, and its dimensions.
+/// Kind and dimensions of a shape.
 pub(super) fn read(
     shape: &dyn shape::Shape,
     options: &ShapeOptions,
@@ -141,9 +141,8 @@ fn polyhedron(
 
 fn mesh(mesh: &shape::TriMesh, options: &ShapeOptions) -> Result<(Kind, Vec<f64>), ShapeError> {
     let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(|p| vector(*p).into()).collect();
-    let lengths = options.lengths(extents(&vertices, 0.0).as_slice())?;
     let mesh = TriMesh::new(vertices, mesh.indices().to_vec());
-    Ok((Kind::Ground(super::mesh::mesh(&mesh, &lengths)?), Vec::new()))
+    Ok((Kind::Ground(super::mesh::mesh(&mesh, options)?), Vec::new()))
 }
 
 fn compound(
@@ -163,7 +162,7 @@ fn compound(
 }
 
 /// Edges of the box around `points`, with a border.
-fn extents(points: &[Point3<f64>], border: f64) -> Vector3<f64> {
+pub(super) fn extents(points: &[Point3<f64>], border: f64) -> Vector3<f64> {
     let [low, high] = points.iter().fold(
         [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)],
         |[low, high], p| [low.inf(&p.coords), high.sup(&p.coords)],

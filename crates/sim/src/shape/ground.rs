@@ -9,7 +9,7 @@ use super::solid::Sample;
 /// A shape without dimensions: a half-space, a height field, a mesh.
 #[derive(Clone)]
 pub(crate) struct Ground {
-    /// What it is called.
+    /// Its name.
     pub(crate) kind: &'static str,
     pub(crate) field: Arc<dyn DistanceField>,
     pub(crate) samples: Vec<Sample<f64>>,
@@ -18,7 +18,7 @@ pub(crate) struct Ground {
 }
 
 impl Ground {
-    /// What is only ever touched.
+    /// Ground, which is only ever touched.
     pub(crate) fn endless(kind: &'static str, field: impl DistanceField + 'static) -> Self {
         Self { kind, field: Arc::new(field), samples: Vec::new(), moments: None }
     }

@@ -39,7 +39,7 @@ impl HeightField {
         Self { heights, least_part, spacing: along_u.min(along_v) }
     }
 
-    /// Where the line from `point` to the ground is normal to it; none if that is farther than `reach`, for certain.
+    /// Foot of the normal from `point` to the ground; none if that is farther than `reach`, for certain.
     #[inline]
     fn foot(&self, point: &Point3<f64>, reach: f64) -> Option<Foot> {
         let target = Vector2::new(point.x, point.z);

@@ -16,11 +16,11 @@ use super::lifted::LiftedField;
 use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
 use super::solid::{Sample, Solid};
-use crate::contact::range::{LARGEST, SMALLEST};
 use crate::fields::INSET;
+use crate::magnitude::{LARGEST, SMALLEST};
 use crate::surface::check_spacing;
 
-/// What a shape is, but for the values of its dimensions.
+/// Kind of a shape, without the values of its dimensions.
 pub(crate) enum Kind {
     Ball(Ball),
     Cuboid(RoundCuboid),
@@ -118,7 +118,7 @@ impl Kind {
         }
     }
 
-    /// Whether there is such a shape.
+    /// Checks that there is such a shape.
     pub(super) fn check(&self, dimensions: &[f64]) -> Result<(), ShapeError> {
         if let Self::Compound(all) = self {
             return all.parts(dimensions).try_for_each(|(part, own)| part.kind.check(own));
@@ -154,7 +154,7 @@ impl Kind {
     }
 }
 
-/// Whether samples leave something of a solid that an inset of `deepest` \[m\] makes nothing of.
+/// Checks that samples leave something of a solid that an inset of `deepest` \[m\] makes nothing of.
 fn check_rounding(border: Border, dimensions: &[f64], deepest: f64) -> Result<(), ShapeError> {
     let rounding = border.rounding(dimensions);
     let limit = (deepest + rounding.outward()) / INSET;

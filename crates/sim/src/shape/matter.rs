@@ -1,10 +1,10 @@
-//! What a body is made of.
+//! Shape and density of a body.
 
 use prehend_autodiff::Scalar;
 
 use super::Shape;
 
-/// What a body is made of.
+/// Shape and density of a body.
 #[derive(Clone)]
 pub(crate) struct Matter<S: Scalar> {
     pub(crate) shape: Shape<S>,

@@ -6,9 +6,10 @@ use prehend_geometry::mass::mass_properties;
 use prehend_geometry::{ClosestPoints, Moments, SdfGrid, TriMesh};
 
 use super::error::ShapeError;
+use super::from_parry::extents;
 use super::ground::Ground;
 use super::lattice::{Triangle, lattice};
-use super::options::Lengths;
+use super::options::ShapeOptions;
 use super::solid::Sample;
 
 /// Margin of the grid around the mesh, in cells: there distances are interpolated.
@@ -16,7 +17,8 @@ const MARGIN: f64 = 8.0;
 
 /// A mesh with a C² grid of its distance, whose edges are as round as a cell, and points on its faces, edges and vertices as
 /// samples. Without an inside it has no mass.
-pub(super) fn mesh(mesh: &TriMesh, lengths: &Lengths) -> Result<Ground, ShapeError> {
+pub(super) fn mesh(mesh: &TriMesh, options: &ShapeOptions) -> Result<Ground, ShapeError> {
+    let lengths = options.lengths(extents(&mesh.vertices, 0.0).as_slice())?;
     let closest = ClosestPoints::new(mesh)?;
     let field = SdfGrid::build(&closest, lengths.cell, MARGIN * lengths.cell)?;
     let all = || (0..mesh.faces.len()).map(|face| mesh.triangle(face));

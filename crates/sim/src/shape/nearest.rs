@@ -30,7 +30,7 @@ impl<T: Scalar> Nearest<T> {
         Self::across(offset, Matrix3::identity() - direction * direction.transpose())
     }
 
-    /// Where `offset` changes by `curved` times the change of the point.
+    /// Nearest point whose `offset` changes by `curved` times the change of the point.
     #[inline]
     fn across(offset: Vector3<T>, curved: Matrix3<T>) -> Self {
         let distance = offset.norm();

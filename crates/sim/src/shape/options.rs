@@ -32,7 +32,7 @@ pub(super) struct Lengths {
 }
 
 impl ShapeOptions {
-    /// Of a shape with these extents \[m\].
+    /// Lengths of a shape with these extents \[m\].
     pub(super) fn lengths(&self, extents: &[f64]) -> Result<Lengths, ShapeError> {
         let smallest = extents.iter().copied().fold(f64::INFINITY, f64::min);
         let largest = extents.iter().copied().fold(0.0, f64::max);

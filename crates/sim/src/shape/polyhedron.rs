@@ -24,7 +24,7 @@ pub(crate) struct Polyhedron {
     pub(crate) vertices: usize,
 }
 
-/// How far a vertex may be above a face, in parts of the size: hulls have faces that are as flat.
+/// Height of a vertex above a face that counts as none, relative to the size: hulls have faces that are as flat.
 const FLAT: f64 = 1e-6;
 
 /// Unit normal of a plane, and its place along it.
@@ -93,7 +93,7 @@ impl Polyhedron {
         self.faces.iter().flat_map(fan).collect()
     }
 
-    /// How deep its faces can be moved in, at most \[m\]; none if it is not convex.
+    /// Largest depth to which its faces can be moved in \[m\]; none if it is not convex.
     pub(crate) fn deepest(&self, dimensions: &[f64]) -> Option<f64> {
         let vertices = self.vertices(dimensions);
         let planes = self.planes(&vertices);
@@ -156,7 +156,7 @@ fn middle<T: Scalar>(points: &[Point3<T>]) -> Point3<f64> {
     Point3::from(sum / points.len() as f64)
 }
 
-/// Which planes meet in a vertex of what is below all of them: the triangles of the hull of the dual points.
+/// Triples of planes that meet in a vertex of the solid below all of them: the triangles of the hull of the dual points.
 fn meetings<T: Scalar>(planes: &[Plane<T>], vertices: &[Point3<T>]) -> Vec<[usize; 3]> {
     let middle = middle(vertices);
     let dual = |(normal, height): &Plane<T>| {
@@ -172,7 +172,7 @@ fn meetings<T: Scalar>(planes: &[Plane<T>], vertices: &[Point3<T>]) -> Vec<[usiz
     triangles.iter().filter_map(meeting).collect()
 }
 
-/// Where three planes meet.
+/// Point where three planes meet.
 fn meeting<T: Scalar>([(a, p), (b, q), (c, r)]: [Plane<T>; 3]) -> Point3<T> {
     let sum = b.cross(&c) * p + c.cross(&a) * q + a.cross(&b) * r;
     Point3::from(sum / a.dot(&b.cross(&c)))

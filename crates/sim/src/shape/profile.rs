@@ -119,7 +119,7 @@ fn out<T: Scalar>(point: &Point3<T>) -> T {
 }
 
 impl Profile<f64> {
-    /// How far it extends from the origin.
+    /// Largest distance of its points from the origin.
     pub(super) fn radius_about_origin(&self) -> f64 {
         let ends = self.sides.iter().flat_map(|s| [s.from, s.from + s.direction * s.length]);
         ends.map(|end| end.norm()).fold(0.0, f64::max)

@@ -12,7 +12,7 @@ use super::round::{Core, Round};
 use super::rows::{parts, rows};
 use super::solid::{Sample, Solid};
 
-/// Which solid of revolution.
+/// Kind of a solid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outline {
     /// A cylinder.

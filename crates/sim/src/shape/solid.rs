@@ -1,4 +1,4 @@
-//! What a kind of solid knows about itself.
+//! Interface of a kind of solid.
 
 use nalgebra::Point3;
 use prehend_autodiff::Scalar;
@@ -16,7 +16,7 @@ pub(crate) struct Sample<T: Scalar> {
 
 /// A convex solid of a few dimensions, which may carry derivatives. How many samples it has follows from their values.
 pub(crate) trait Solid {
-    /// What its dimensions are called.
+    /// Names of its dimensions.
     fn names(&self) -> Vec<String>;
 
     /// Volume, center and second moments.

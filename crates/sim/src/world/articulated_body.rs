@@ -12,12 +12,12 @@ use prehend_autodiff::rigid::turned;
 
 use super::World;
 use super::body::Body;
-use super::body_id::BodyId;
 use super::joint_force::JointAxis;
 use crate::articulated::adjoint::link_states;
+use crate::articulated::joint_state::JointState;
 use crate::articulated::{Articulation, Joint, Link};
-use crate::error::SimulationError;
-use crate::robot::driven::JointState;
+use crate::error::{BuildError, SimulationError};
+use crate::handle::BodyId;
 use crate::state::State;
 
 /// A tree of links, each a body of its world.
@@ -38,7 +38,7 @@ impl<S: Scalar> ArticulatedBody<S> {
         ArticulatedBody { tree: self.tree.map(f), bodies: Arc::clone(&self.bodies) }
     }
 
-    /// The same links as other bodies.
+    /// Links as other bodies.
     pub(crate) fn with_bodies(&self, body: impl Fn(BodyId) -> BodyId) -> Self {
         let bodies = self.bodies.iter().map(|id| body(*id)).collect();
         Self { tree: self.tree.clone(), bodies }
@@ -46,8 +46,7 @@ impl<S: Scalar> ArticulatedBody<S> {
 
     /// Coordinates and velocities of all joints with these states.
     pub(crate) fn coordinates<T: Scalar>(&self, joints: &[State<T>]) -> [Vec<T>; 2] {
-        let [mut q, mut v] =
-            [self.tree.coordinates(), self.tree.freedoms()].map(Vec::with_capacity);
+        let [mut q, mut v] = [self.tree.nq(), self.tree.nv()].map(Vec::with_capacity);
         for (link, state) in self.tree.links().iter().zip(joints) {
             link.joint.read(state, &mut q, &mut v);
         }
@@ -59,7 +58,7 @@ impl World {
     /// Adds links, each after its parent, as bodies named after them, and returns which, in the same order. Give them samples and fields as
     /// other bodies.
     ///
-    /// What is free to move are the joints, whose states follow those of the bodies: start from [`World::neutral_states`] and set them by
+    /// The joints are free to move, and their states follow those of the bodies: start from [`World::neutral_states`] and set them by
     /// [`World::set_joint`]. The state of a link, that of its frame, follows from its joints; what is written there is overwritten.
     ///
     /// ```
@@ -88,7 +87,7 @@ impl World {
     ///
     /// # Errors
     /// If the links are no tree, a joint moves no mass, or a link's inertia has a negative principal moment.
-    pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, SimulationError> {
+    pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, BuildError> {
         let tree = Articulation::new(links, self.gravity)?;
         let links = tree.links().iter();
         let bodies: Vec<BodyId> =
@@ -103,7 +102,7 @@ impl<S: Scalar> World<S> {
     pub fn neutral_states(&self) -> Vec<State<S>> {
         let at_rest = State::at_rest(Isometry3::identity());
         let mut states = vec![at_rest; self.bodies.len() + self.joint_count()];
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         states
     }
 
@@ -119,7 +118,7 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         self.write_joint(states, link, position, velocity)?;
-        self.place_links(states);
+        self.forward_kinematics(states);
         Ok(())
     }
 
@@ -132,11 +131,11 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         let (place, joint) = self.joint_place(states, link)?;
-        if position.len() != joint.coordinates() || velocity.len() != joint.freedoms() {
+        if position.len() != joint.nq() || velocity.len() != joint.nv() {
             return Err(SimulationError::JointNumbers {
                 link: self.bodies[link].name.clone(),
                 given: [position.len(), velocity.len()],
-                expected: [joint.coordinates(), joint.freedoms()],
+                expected: [joint.nq(), joint.nv()],
             });
         }
         if joint.turns() {
@@ -181,7 +180,7 @@ impl<S: Scalar> World<S> {
         Ok(joint.along(&states[place], index))
     }
 
-    /// Whether one body hangs on the other by a joint.
+    /// True if one body hangs on the other by a joint.
     pub(crate) fn share_joint(&self, a: BodyId, b: BodyId) -> bool {
         let (Ok((own, first)), Ok((other, second))) = (self.link_of(a), self.link_of(b)) else {
             return false;
@@ -191,17 +190,17 @@ impl<S: Scalar> World<S> {
     }
 
     /// The articulation and the link in it that a body is.
-    pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), SimulationError> {
+    pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), BuildError> {
         let name = &self.body(body)?.name;
         let found = self.articulations.iter().enumerate().find_map(|(index, own)| {
             Some((index, own.bodies.iter().position(|link| *link == body)?))
         });
-        found.ok_or_else(|| SimulationError::NotALink { body: name.clone() })
+        found.ok_or_else(|| BuildError::NotALink { body: name.clone() })
     }
 
     /// # Errors
     /// If there are joints, which `integrator` does not move.
-    pub(crate) fn refuse_joints(&self, integrator: &'static str) -> Result<(), SimulationError> {
+    pub(crate) fn ensure_no_joints(&self, integrator: &'static str) -> Result<(), SimulationError> {
         match self.articulations.is_empty() {
             true => Ok(()),
             false => Err(SimulationError::Joints { integrator }),
@@ -209,7 +208,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves on the joints among `states`, for `dt` \[s\] by semi-implicit Euler with the accelerations among `wrenches`.
-    pub(crate) fn swing(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
+    pub(crate) fn integrate_joints(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
         for (place, joint) in self.joint_places().zip(self.joints()) {
             let (state, rate) = (&mut states[place], &wrenches[place]);
             state.linear += rate.fixed_rows::<3>(0) * dt;
@@ -233,7 +232,7 @@ impl<S: Scalar> World<S> {
         Ok((place, &self.articulations[articulation].tree.links()[link].joint))
     }
 
-    /// Where the states of an articulation's joints are.
+    /// Range of the states of an articulation's joints.
     pub(crate) fn joint_range(&self, articulation: usize) -> Range<usize> {
         let before = self.articulations[..articulation].iter().map(|own| own.bodies.len());
         let first = self.bodies.len() + before.sum::<usize>();
@@ -241,17 +240,17 @@ impl<S: Scalar> World<S> {
     }
 
     /// The link that a body is.
-    pub(crate) fn link(&self, body: BodyId) -> Result<&Link<S>, SimulationError> {
+    pub(crate) fn link(&self, body: BodyId) -> Result<&Link<S>, BuildError> {
         let (articulation, link) = self.link_of(body)?;
         Ok(&self.articulations[articulation].tree.links()[link])
     }
 
-    /// How many states joints have: one for each link.
+    /// Number of states of joints: one for each link.
     pub(crate) fn joint_count(&self) -> usize {
         self.articulations.iter().map(|own| own.bodies.len()).sum()
     }
 
-    /// Where the states of joints are.
+    /// Range of the states of joints.
     pub(crate) fn joint_places(&self) -> Range<usize> {
         self.bodies.len()..self.bodies.len() + self.joint_count()
     }
@@ -271,7 +270,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves the links to where their joints put them.
-    pub(crate) fn place_links(&self, states: &mut [State<S>]) {
+    pub(crate) fn forward_kinematics(&self, states: &mut [State<S>]) {
         if self.articulations.is_empty() {
             return;
         }
@@ -300,8 +299,8 @@ impl<S: Scalar> World<S> {
             let accelerations =
                 self.accelerated(own, joints, [coordinates, velocities], efforts, &wrenches);
             for (index, link) in own.tree.links().iter().enumerate() {
-                let [_, freedoms] = own.tree.range(index);
-                all.push(link.joint.rate_of_velocities(&accelerations.as_slice()[freedoms]));
+                let [_, dofs] = own.tree.range(index);
+                all.push(link.joint.rate_of_velocities(&accelerations.as_slice()[dofs]));
             }
         }
         all

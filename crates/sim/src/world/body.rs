@@ -13,12 +13,12 @@ use crate::fields::Cuboid;
 use crate::shape::matter::Matter;
 use crate::surface::Surface;
 
-/// What a body is and how it touches others.
+/// Body of a world: what moves it, and its surface and field for contact.
 #[derive(Clone)]
 pub struct Body<S: Scalar = f64> {
     /// Name, for messages.
     pub name: String,
-    /// What moves it.
+    /// Kind of its motion.
     pub motion: Motion<S>,
     /// Samples of its surface, in its model frame: with them it touches the fields of others.
     pub surface: Option<Arc<Surface>>,
@@ -27,20 +27,20 @@ pub struct Body<S: Scalar = f64> {
     /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame; of a link about the origin of its
     /// frame.
     pub external_wrench: Vector6<S>,
-    /// What it is made of, where its surface and field come from a shape.
+    /// Shape and density, where its surface and field come from a shape.
     pub(crate) matter: Option<Matter<S>>,
 }
 
-/// What moves a body.
+/// Kind of a body's motion.
 #[derive(Clone)]
 pub enum Motion<S: Scalar = f64> {
-    /// Forces.
-    Free(RigidBody<S>),
-    /// Nothing but whoever sets its state. What touches it feels the state's velocity, a conveyor's for instance.
-    Kinematic,
-    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a lifted world one that carries derivatives
+    /// Forces, on a body with these mass properties.
+    Dynamic(RigidBody<S>),
+    /// Nothing but whoever sets its state. A body that touches it feels the state's velocity, a conveyor's for instance.
+    Fixed,
+    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a world of numbers with derivatives one that carries them
     /// may take its place.
-    Driven(Arc<dyn Trajectory<S>>),
+    Kinematic(Arc<dyn Trajectory<S>>),
     /// The joint that it hangs on, as a link of one of the world's [articulations](crate::World::add_articulation). Its model frame is the link's.
     Link,
 }
@@ -59,18 +59,18 @@ impl<S: Scalar> Body<S> {
     }
 
     /// A body that forces move.
-    pub fn free(name: &str, body: RigidBody<S>) -> Self {
-        Self::new(name, Motion::Free(body))
+    pub fn dynamic(name: &str, body: RigidBody<S>) -> Self {
+        Self::new(name, Motion::Dynamic(body))
     }
 
     /// A body that keeps the state it is given. Its center of mass is the origin of its model frame.
-    pub fn kinematic(name: &str) -> Self {
-        Self::new(name, Motion::Kinematic)
+    pub fn fixed(name: &str) -> Self {
+        Self::new(name, Motion::Fixed)
     }
 
     /// A body on a trajectory. Its center of mass is the origin of its model frame.
-    pub fn driven(name: &str, trajectory: impl Trajectory<S>) -> Self {
-        Self::new(name, Motion::Driven(Arc::new(trajectory)))
+    pub fn kinematic(name: &str, trajectory: impl Trajectory<S>) -> Self {
+        Self::new(name, Motion::Kinematic(Arc::new(trajectory)))
     }
 
     /// A link.
@@ -78,26 +78,26 @@ impl<S: Scalar> Body<S> {
         Self::new(name, Motion::Link)
     }
 
-    /// Whether forces move it, alone or as a link.
+    /// True if forces move it, alone or as a link.
     pub(crate) fn feels_forces(&self) -> bool {
-        matches!(self.motion, Motion::Free(_) | Motion::Link)
+        matches!(self.motion, Motion::Dynamic(_) | Motion::Link)
     }
 
-    /// The same body with samples of its surface.
+    /// Body with samples of its surface.
     #[must_use]
     pub fn with_surface(mut self, surface: impl Into<Arc<Surface>>) -> Self {
         self.surface = Some(surface.into());
         self
     }
 
-    /// The same body with a distance field, in its model frame.
+    /// Body with a distance field, in its model frame.
     #[must_use]
     pub fn with_field(mut self, field: Arc<dyn DistanceField>) -> Self {
         self.field = Some(field);
         self
     }
 
-    /// The same body as a box around the origin of its model frame: its field, and samples at distances of `spacing` \[m\] at most.
+    /// Body as a box around the origin of its model frame: its field, and samples at distances of `spacing` \[m\] at most.
     ///
     /// # Errors
     /// See [`Cuboid::surface`].
@@ -109,8 +109,8 @@ impl<S: Scalar> Body<S> {
     #[inline]
     pub fn rigid(&self) -> Option<&RigidBody<S>> {
         match &self.motion {
-            Motion::Free(body) => Some(body),
-            Motion::Kinematic | Motion::Driven(_) | Motion::Link => None,
+            Motion::Dynamic(body) => Some(body),
+            Motion::Fixed | Motion::Kinematic(_) | Motion::Link => None,
         }
     }
 
@@ -120,15 +120,17 @@ impl<S: Scalar> Body<S> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())
     }
 
-    /// The same body, each number through `f`, but for a trajectory, which becomes one of constants.
+    /// Body, each number through `f`, but for a trajectory, which becomes one of constants.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Body<T> {
         Body {
             name: self.name.clone(),
             motion: match &self.motion {
-                Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
-                Motion::Kinematic => Motion::Kinematic,
+                Motion::Dynamic(rigid) => Motion::Dynamic(rigid.map(&f)),
+                Motion::Fixed => Motion::Fixed,
                 Motion::Link => Motion::Link,
-                Motion::Driven(trajectory) => Motion::Driven(trajectory::constant(trajectory)),
+                Motion::Kinematic(trajectory) => {
+                    Motion::Kinematic(trajectory::constant(trajectory))
+                }
             },
             surface: self.surface.clone(),
             field: self.field.clone(),

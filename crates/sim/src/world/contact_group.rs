@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use super::body_id::BodyId;
 use super::contact_pair::{ContactBodies, ContactPair};
+use crate::handle::BodyId;
 
 /// Contacts between each body of one list and each of another, under one law with one set of parameters.
 ///
-/// Which of them may touch is looked for as they move, so that bodies far from each other cost nothing.
+/// The broad phase finds those that may touch as they move, so that bodies far from each other cost nothing.
 #[derive(Clone)]
 pub struct ContactGroup<S: Scalar = f64> {
     /// The two lists, which may be the same, in ascending order.
     bodies: [Arc<[BodyId]>; 2],
-    /// What each contact is like: its law, parameters and smoothing. Its bodies are those of one of them.
+    /// Pattern of the contacts: law, parameters and smoothing. Its bodies are those of one of them.
     pub contact: ContactPair<S>,
 }
 
@@ -36,18 +36,18 @@ impl<S: Scalar> ContactGroup<S> {
         pair
     }
 
-    /// Whether the contact of `a`, of its first list, and `b`, of its second one, is not that of `b` and `a`.
+    /// True if the contact of `a`, of its first list, and `b`, of its second one, is not that of `b` and `a`.
     pub(crate) fn is_wanted(&self, a: BodyId, b: BodyId) -> bool {
         let has = |list: usize, body: BodyId| self.bodies[list].binary_search(&body).is_ok();
         a < b || a > b && !(has(0, b) && has(1, a))
     }
 
-    /// The same group, each number through `f`.
+    /// Group, each number through `f`.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> ContactGroup<T> {
         ContactGroup { bodies: self.bodies.clone(), contact: self.contact.map(f) }
     }
 
-    /// Whether it has the same bodies as `other`.
+    /// True if it has the same bodies as `other`.
     pub(crate) fn has_bodies_of<T: Scalar>(&self, other: &ContactGroup<T>) -> bool {
         self.bodies == other.bodies
     }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use super::body_id::BodyId;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::param_values::ParamValues;
 use crate::contact::range::ParameterRange;
+use crate::handle::BodyId;
 use crate::surface::Surface;
 
 /// The two sides of a contact.
@@ -23,7 +23,7 @@ pub struct ContactBodies {
 }
 
 impl ContactBodies {
-    /// The same two with their sides exchanged.
+    /// Two with their sides exchanged.
     #[must_use]
     pub fn swapped(self) -> Self {
         Self { samples: self.field, field: self.samples }
@@ -33,11 +33,11 @@ impl ContactBodies {
 /// Samples of one body that touch the field of another.
 #[derive(Clone)]
 pub struct ContactPair<S: Scalar = f64> {
-    /// Which bodies.
+    /// The two bodies.
     pub bodies: ContactBodies,
     law: Arc<dyn DynContactLaw>,
     params: Vec<S>,
-    /// How contact begins.
+    /// Smoothing of the gap where contact begins.
     pub smoothing: GapSmoothing,
     /// Factor on the forces: a half where both bodies have samples and fields, so that together they count once.
     pub weight: f64,
@@ -112,7 +112,7 @@ impl<S: Scalar> ContactPair<S> {
         Ok(())
     }
 
-    /// Whether the law takes these parameters.
+    /// Checks that the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values = self.param_values();
         let finite = |value: &f64| ParameterRange::Finite.check("parameter of a contact", *value);
@@ -120,18 +120,18 @@ impl<S: Scalar> ContactPair<S> {
         self.law.check_all(&values)
     }
 
-    /// Whether `body` is one of the two.
+    /// True if `body` is one of the two.
     pub(crate) fn joins(&self, body: BodyId) -> bool {
         self.bodies.samples == body || self.bodies.field == body
     }
 
-    /// Whether the force jumps as a contact begins.
+    /// True if the force jumps as a contact begins.
     pub(crate) fn force_jumps(&self) -> bool {
         let values = self.param_values();
         jumps(self.law.as_ref(), &values, &self.smoothing)
     }
 
-    /// The same contact, each number through `f`.
+    /// Contact, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> ContactPair<T> {
         ContactPair {
             bodies: self.bodies,
@@ -154,10 +154,9 @@ mod tests {
 
     use super::*;
     use crate::contact::registry::LawRegistry;
+    use crate::contact::{AnisotropicFriction, Hertz};
     use crate::scenes::{egg_on, floor};
-    use crate::{
-        AnisotropicFriction, Contact, ContactLaw, Coulomb, Hertz, Law, Response, Sticking,
-    };
+    use crate::{BristleFriction, ContactForce, ContactKinematics, ContactLaw, Coulomb, Law};
 
     #[test]
     fn parameters_are_found_by_the_names_of_the_registry() {
@@ -187,7 +186,7 @@ mod tests {
         let expected =
             "the law has no parameter called \"mu\": one of stiffness, friction, across_ratio";
         assert_eq!(error, expected);
-        let held = Sticking { friction: along, deflection: 1e-4 };
+        let held = BristleFriction { friction: along, deflection: 1e-4 };
         pair.set_law(Arc::new(Law::new(Hertz { stiffness: 1e9 }, held).unwrap()));
         assert_eq!(pair.param_mut("friction"), Ok(&mut 0.2));
     }
@@ -199,10 +198,10 @@ mod tests {
             fn params(&self) -> &[f64] {
                 &self.0
             }
-            fn law<S: Scalar>(&self, _: &[S], _: &Contact<S>) -> Response<S> {
-                Response::zero()
+            fn law<S: Scalar>(&self, _: &[S], _: &ContactKinematics<S>) -> ContactForce<S> {
+                ContactForce::zero()
             }
-            fn reach(&self) -> f64 {
+            fn cutoff(&self) -> f64 {
                 0.0
             }
         }

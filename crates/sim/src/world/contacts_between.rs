@@ -1,4 +1,4 @@
-//! Which bodies of two lists touch, and by which of their sides.
+//! Contacts between two lists of bodies.
 
 use std::sync::Arc;
 
@@ -6,12 +6,12 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::body::Body;
-use super::body_id::BodyId;
 use super::contact_group::{ContactGroup, ascending};
 use super::contact_pair::{ContactBodies, ContactPair};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, ContactId, ContactPlace};
 use crate::surface::Surface;
 
 impl World {
@@ -19,7 +19,7 @@ impl World {
     /// by [`add_symmetric_contact`](World::add_symmetric_contact) where each has samples and a field, unless one is a
     /// ball, a single round sample: then that touches the field of the other, which is all there is to it.
     ///
-    /// Contacts that stick remember how: they are added one by one for all pairs, to [`contacts`](World::contacts). All others make
+    /// Contacts with bristles remember how: they are added one by one for all pairs, to [`contacts`](World::contacts). All others make
     /// up one of [`contact_groups`](World::contact_groups).
     ///
     /// # Errors
@@ -31,7 +31,7 @@ impl World {
         b: &[BodyId],
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
-    ) -> Result<(), SimulationError> {
+    ) -> Result<ContactId, BuildError> {
         a.iter().chain(b).try_for_each(|body| self.body(*body).map(|_| ()))?;
         smoothing.check()?;
         let lists = [a, b].map(ascending);
@@ -39,15 +39,14 @@ impl World {
         let group = ContactGroup::new(lists, ContactPair::new(first, law, smoothing));
         if group.contact.law().bristles().is_some() {
             let every = self.all_pairs(&group);
-            self.contacts.extend(every);
-        } else {
-            self.contact_groups.push(group);
+            return Ok(self.push_contacts(every));
         }
-        Ok(())
+        self.contact_groups.push(group);
+        Ok(ContactId(ContactPlace::Group(self.contact_groups.len() - 1)))
     }
 
     /// One of the contacts between two lists of bodies, if all of them can touch.
-    fn first_contact(&self, lists: &[Arc<[BodyId]>; 2]) -> Result<ContactBodies, SimulationError> {
+    fn first_contact(&self, lists: &[Arc<[BodyId]>; 2]) -> Result<ContactBodies, BuildError> {
         let mut first = None;
         // Bodies that can do the same need be asked once, or twice where they are to touch each other.
         let kind = |id: BodyId| {
@@ -70,7 +69,7 @@ impl World {
                 }
             }
         }
-        first.ok_or(SimulationError::NoContacts)
+        first.ok_or(BuildError::NoContacts)
     }
 
     /// All contacts of a group, one by one.
@@ -85,17 +84,17 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// Whether a force may move one of two bodies against the other; links that share a joint overlap there and do not count.
+    /// True if a force may move one of two bodies against the other; links that share a joint overlap there and do not count.
     pub(crate) fn moves_against(&self, a: BodyId, b: BodyId) -> bool {
         (self.bodies[a].feels_forces() || self.bodies[b].feels_forces()) && !self.share_joint(a, b)
     }
 
-    /// Which of two bodies brings the samples and which the field, with the weight of each contact.
+    /// Samples and fields by which two bodies touch, with the weight of each contact.
     pub(super) fn sides(
         &self,
         a: BodyId,
         b: BodyId,
-    ) -> Result<Vec<(ContactBodies, f64)>, SimulationError> {
+    ) -> Result<Vec<(ContactBodies, f64)>, BuildError> {
         let there = ContactBodies { samples: a, field: b };
         let [on_b, on_a] = [there, there.swapped()].map(|ContactBodies { samples, field }| {
             self.bodies[samples].surface.is_some() && self.bodies[field].field.is_some()
@@ -109,16 +108,16 @@ impl<S: Scalar> World<S> {
             (false, false) => {
                 let name = |id: BodyId| self.bodies[id].name.clone();
                 Err(match [a, b].map(|id| self.bodies[id].surface.is_some()) {
-                    [false, false] => SimulationError::NoSamples { body: name(a) },
-                    [true, _] => SimulationError::NoField { body: name(b) },
-                    [false, true] => SimulationError::NoField { body: name(a) },
+                    [false, false] => BuildError::NoSamples { body: name(a) },
+                    [true, _] => BuildError::NoField { body: name(b) },
+                    [false, true] => BuildError::NoField { body: name(a) },
                 })
             }
         }
     }
 }
 
-/// Whether a body is one round sample.
+/// True if a body is one round sample.
 fn is_ball<S: Scalar>(body: &Body<S>) -> bool {
     let single = |surface: &Arc<Surface>| surface.points().len() == 1 && surface.rounding() > 0.0;
     body.surface.as_ref().is_some_and(single)

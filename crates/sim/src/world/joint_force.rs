@@ -1,4 +1,4 @@
-//! What acts along the joints of a world.
+//! Forces along the joints of a world.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,12 +6,12 @@ use std::sync::Arc;
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
 use super::path::Path;
 use crate::articulated::{Joint, Kinematics};
 use crate::contact::error::LawError;
 use crate::contact::range::ParameterRange;
-use crate::error::SimulationError;
+use crate::error::BuildError;
+use crate::handle::{BodyId, JointForceId};
 use crate::joint_law::JointLaw;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::state::State;
@@ -21,7 +21,7 @@ use crate::state::State;
 pub struct JointAxis {
     /// The link that the joint moves.
     pub link: BodyId,
-    /// Which of its degrees of freedom, from 0.
+    /// Index among its degrees of freedom, from 0.
     pub index: usize,
 }
 
@@ -32,22 +32,18 @@ impl From<BodyId> for JointAxis {
     }
 }
 
-/// Which force along joints of a world: given by [`World::add_joint_force`](super::World::add_joint_force).
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-pub struct JointForceId(pub(crate) usize);
-
 /// An effort along a joint, or along a weighted sum of joints: a tendon, a gear, a coupling.
 #[derive(Clone)]
 pub struct JointForce<S: Scalar = f64> {
     /// The axes of one articulation whose positions, times these factors, add up to that of the law, and that share its effort so.
     pub axes: Vec<(JointAxis, f64)>,
-    /// What it acts along beside the axes, in the articulation of the first.
+    /// Path that it acts along beside the axes, in the articulation of the first.
     pub(crate) path: Option<Arc<Path>>,
     /// The axis whose velocity is the first of its parameters, and how far ahead that is \[s\].
     pub(crate) input: Option<(JointAxis, f64)>,
     /// The number of a group whose sum of forces is bounded, and the bounds.
     pub(crate) bound: Option<(usize, [f64; 2])>,
-    /// Whether it counts where the sum of actuators is bounded.
+    /// True if it counts where the sum of actuators is bounded.
     pub(crate) is_actuator: bool,
     law: Arc<dyn DynJointLaw>,
     params: Vec<S>,
@@ -87,7 +83,7 @@ impl<S: Scalar> JointForce<S> {
         self.path.is_none() && matches!(self.axes[..], [(own, _)] if own == axis)
     }
 
-    /// Whether the law takes these parameters.
+    /// Checks that the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
         let finite =
@@ -96,7 +92,7 @@ impl<S: Scalar> JointForce<S> {
         self.law.check(&values)
     }
 
-    /// The same force, each number through `f`.
+    /// Force, each number through `f`.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> JointForce<T> {
         JointForce {
             axes: self.axes.clone(),
@@ -109,7 +105,7 @@ impl<S: Scalar> JointForce<S> {
         }
     }
 
-    /// The same force among other bodies.
+    /// Force among other bodies.
     pub(crate) fn with_bodies(&self, body: impl Fn(BodyId) -> BodyId) -> Self {
         let mut force = self.clone();
         let axes = force.axes.iter_mut().map(|(axis, _)| axis);
@@ -138,11 +134,11 @@ fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
     }
 }
 
-/// Where a force along joints acts.
+/// Degrees of freedom that a force acts along.
 pub(crate) struct Along<S> {
     pub(crate) articulation: usize,
     /// Degrees of freedom of the articulation, with the derivatives of the position by them.
-    pub(crate) freedoms: Vec<(usize, S)>,
+    pub(crate) dofs: Vec<(usize, S)>,
     pub(crate) position: S,
     pub(crate) velocity: S,
 }
@@ -156,7 +152,7 @@ impl World {
         &mut self,
         axis: impl Into<JointAxis>,
         law: impl JointLaw,
-    ) -> Result<JointForceId, SimulationError> {
+    ) -> Result<JointForceId, BuildError> {
         self.add_coupled_force(&[(axis.into(), 1.0)], Arc::new(law))
     }
 
@@ -169,13 +165,13 @@ impl World {
         &mut self,
         axes: &[(JointAxis, f64)],
         law: Arc<dyn DynJointLaw>,
-    ) -> Result<JointForceId, SimulationError> {
-        let Some((first, _)) = axes.first() else { return Err(SimulationError::NoAxes) };
+    ) -> Result<JointForceId, BuildError> {
+        let Some((first, _)) = axes.first() else { return Err(BuildError::NoAxes) };
         for (axis, _) in axes {
             self.check_axis(axis.link, axis.index)?;
             if self.link_of(axis.link)?.0 != self.link_of(first.link)?.0 {
                 let links = [axis.link, first.link].map(|link| self.bodies[link].name.clone());
-                return Err(SimulationError::Apart { links });
+                return Err(BuildError::Apart { links });
             }
         }
         let force = JointForce::new(axes.to_vec(), law);
@@ -186,21 +182,21 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// Whether the joint of a link has such an axis.
-    pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), SimulationError> {
+    /// Checks that the joint of a link has such an axis.
+    pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), BuildError> {
         let joint = &self.link(link)?.joint;
-        match axis < joint.freedoms() && !matches!(joint, Joint::Floating) {
+        match axis < joint.nv() && !matches!(joint, Joint::Floating) {
             true => Ok(()),
-            false => Err(SimulationError::NoAxis { link: self.bodies[link].name.clone(), axis }),
+            false => Err(BuildError::NoAxis { link: self.bodies[link].name.clone(), axis }),
         }
     }
 
-    /// Whether a law takes its parameters.
-    pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), SimulationError> {
+    /// Checks that a law takes its parameters.
+    pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), BuildError> {
         let link = |(axis, _): &(JointAxis, f64)| self.bodies[axis.link].name.clone();
         let wrong = |error| {
             let link = force.axes.first().map(link).unwrap_or_default();
-            SimulationError::JointLaw { link, error }
+            BuildError::JointLaw { link, error }
         };
         force.check().map_err(wrong)
     }
@@ -216,7 +212,7 @@ impl<S: Scalar> World<S> {
     /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
     pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
         let none = || -> Vec<Vec<S>> {
-            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect()
+            self.articulations.iter().map(|own| vec![S::zero(); own.tree.nv()]).collect()
         };
         let is_bounded = !self.transmissions.bounds.is_empty();
         let (mut efforts, mut driven) = (none(), if is_bounded { none() } else { Vec::new() });
@@ -238,8 +234,8 @@ impl<S: Scalar> World<S> {
         bound_groups(&mut acting);
         for (force, along, effort) in acting {
             let all = if is_bounded && force.is_actuator { &mut driven } else { &mut efforts };
-            for (freedom, factor) in along.freedoms {
-                all[along.articulation][freedom] += effort * factor;
+            for (dof, factor) in along.dofs {
+                all[along.articulation][dof] += effort * factor;
             }
         }
         let mut carried: Vec<Vec<S>> = Vec::new();
@@ -250,10 +246,10 @@ impl<S: Scalar> World<S> {
                 self.add_carried(own, at, &mut carried[index]);
             }
         }
-        for (articulation, freedom, [low, high], counts) in self.bounded() {
-            let own = &mut driven[articulation][freedom];
+        for (articulation, dof, [low, high], counts) in self.bounded() {
+            let own = &mut driven[articulation][dof];
             if let Some(carried) = carried.get_mut(articulation).filter(|_| counts) {
-                *own += std::mem::replace(&mut carried[freedom], S::zero());
+                *own += std::mem::replace(&mut carried[dof], S::zero());
             }
             match own.value() {
                 value if value < low => *own = S::constant(low),
@@ -293,7 +289,7 @@ impl<S: Scalar> World<S> {
         })
     }
 
-    /// Where a force acts.
+    /// Degrees of freedom that a force acts along.
     pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
         let mut places: Vec<_> = self.articulations.iter().map(|_| None).collect();
         self.along_at(force, states, &mut places)
@@ -310,7 +306,7 @@ impl<S: Scalar> World<S> {
         let (own, joints) = (&self.articulations[articulation], self.joint_range(articulation));
         let mut along = Along {
             articulation,
-            freedoms: Vec::with_capacity(force.axes.len()),
+            dofs: Vec::with_capacity(force.axes.len()),
             position: S::zero(),
             velocity: S::zero(),
         };
@@ -319,10 +315,10 @@ impl<S: Scalar> World<S> {
             let [_, velocities] = own.coordinates(states.get(joints)?);
             let length = path.length(at, false);
             along.position = length.value;
-            for (freedom, slope) in length.slopes.into_iter().enumerate() {
-                along.velocity += slope * velocities[freedom];
+            for (dof, slope) in length.slopes.into_iter().enumerate() {
+                along.velocity += slope * velocities[dof];
                 if !slope.is_constant_zero() {
-                    along.freedoms.push((freedom, slope));
+                    along.dofs.push((dof, slope));
                 }
             }
             return Some(along);
@@ -330,15 +326,14 @@ impl<S: Scalar> World<S> {
         for (JointAxis { link, index }, factor) in &force.axes {
             let link = own.bodies().iter().position(|body| body == link)?;
             let (joint, state) = (&own.tree.links()[link].joint, states.get(joints.start + link)?);
-            let [_, freedoms] = own.tree.range(link);
+            let [_, dofs] = own.tree.range(link);
             let [position, velocity] = joint.along(state, *index);
             along.position += position.times(*factor);
             along.velocity += velocity.times(*factor);
             // A virtual displacement moves the position by its slopes, and so the effort acts along them.
             let slopes = joint.position_slopes(state, *index);
-            let slopes =
-                freedoms.zip(slopes).map(|(freedom, slope)| (freedom, slope.times(*factor)));
-            along.freedoms.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));
+            let slopes = dofs.zip(slopes).map(|(dof, slope)| (dof, slope.times(*factor)));
+            along.dofs.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));
         }
         Some(along)
     }

@@ -1,15 +1,16 @@
-//! What contacts do, recorded as one node.
+//! Wrenches of contacts, recorded as one node.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::World;
-use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
-use crate::contact::patch::Patch;
-use crate::contact::wrench::{WrenchJacobian, stack};
+use crate::contact::contact_query::ContactQuery;
+use crate::contact::wrench::WrenchJacobian;
+use crate::handle::BodyId;
+use crate::spatial::spatial;
+use crate::state::STATE;
 use crate::state::State;
-use crate::state_coordinates::STATE;
 
 /// The contacts of a world at one moment as a linear function of its states: one node of the tape, however many they are.
 #[derive(Default)]
@@ -58,9 +59,11 @@ impl LinearContacts {
         wrenches: &mut [Vector6<S>],
     ) {
         let ids = [pair.bodies.samples, pair.bodies.field];
-        let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { return };
-        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let (WrenchJacobian { wrench, by_state, .. }, slopes) = world.linearized(pair, &patch);
+        let Some(query) = world.contact_query(pair, world.relative_value(pair, states)) else {
+            return;
+        };
+        let query = ContactQuery { smoothing: pair.smoothing.at_step(step), ..query };
+        let (WrenchJacobian { wrench, by_state, .. }, slopes) = world.linearized(pair, &query);
         let [samples, field] = ids.map(|id| states[id].value().pose);
         let axes = field.rotation.to_rotation_matrix();
         let offset = samples.translation.vector - field.translation.vector;
@@ -70,8 +73,8 @@ impl LinearContacts {
                 |from: usize| axes * Vector3::from_fn(|i, _| slopes[from + i].times(pair.weight));
             let (force, torque) = (part(0), part(3));
             let turned = torque + offset.map(S::constant).cross(&force);
-            wrenches[ids[0].index()] += stack(&force, &torque);
-            wrenches[ids[1].index()] -= stack(&force, &turned);
+            wrenches[ids[0].index()] += spatial(&force, &torque);
+            wrenches[ids[1].index()] -= spatial(&force, &turned);
         }
         if wrench == Vector6::zeros() && by_state == [[0.0; 12]; 6] {
             return;
@@ -85,8 +88,8 @@ impl LinearContacts {
                 self.bodies.len() - 1
             })
         });
-        self.bodies[ends[0]].wrench += stack(&force, &torque);
-        self.bodies[ends[1]].wrench -= stack(&force, &(torque + offset.cross(&force)));
+        self.bodies[ends[0]].wrench += spatial(&force, &torque);
+        self.bodies[ends[1]].wrench -= spatial(&force, &(torque + offset.cross(&force)));
         let weight = pair.weight;
         self.contacts.push(LinearContact { ends, force, torque, by_state, weight });
     }
@@ -124,7 +127,7 @@ impl LinearContacts {
             *sum += wrench;
             if let Some((_, from_com)) = shifted {
                 let force = wrench.fixed_rows::<3>(0).into_owned();
-                *sum += stack(&Vector3::zeros(), &from_com.cross(&force));
+                *sum += spatial(&Vector3::zeros(), &from_com.cross(&force));
             }
         }
     }
@@ -133,7 +136,7 @@ impl LinearContacts {
 /// The derivative of [`LinearContacts`].
 struct Node {
     contacts: Vec<LinearContact>,
-    /// Of each body that touches, and where its coordinates begin among the inputs, if they are inputs.
+    /// For each body that touches, and where its coordinates begin among the inputs, if they are inputs.
     states: Vec<(State, Option<usize>)>,
 }
 

@@ -3,7 +3,7 @@
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
+use crate::handle::BodyId;
 
 impl<S: Scalar> World<S> {
     /// Radius of gyration about its own center of mass of a body that forces move, 0 of others \[m\].

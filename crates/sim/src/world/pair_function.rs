@@ -1,10 +1,10 @@
-//! What two bodies do to each other, as a function of both their states.
+//! Wrench between two bodies as a function of both their states.
 
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
+use crate::state::STATE;
 use crate::state::State;
-use crate::state_coordinates::STATE;
 
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;
@@ -42,7 +42,7 @@ pub(super) struct PairFunction<W> {
     at: Relation,
 }
 
-/// How a state changes.
+/// Change of a state.
 struct Change<S: Scalar> {
     place: Vector3<S>,
     turn: Vector3<S>,
@@ -115,7 +115,7 @@ impl<W> PairFunction<W> {
     }
 }
 
-/// How the field sees the samples, along the axes of the world.
+/// State of the samples relative to the field, along the axes of the world.
 struct Relative {
     axes: Matrix3<f64>,
     r: Vector3<f64>,

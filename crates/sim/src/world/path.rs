@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::so3_log;
 
 use crate::articulated::Kinematics;
-use crate::articulated::spatial::{angular, linear, spatial};
+use crate::spatial::{angular, linear, spatial};
 
 /// A point of a link, or of the world where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub(crate) enum PathPart {
     Straight { ends: [Anchor; 2], factor: f64 },
     /// The shortest way around an obstacle, or a straight line that does not meet it.
     Around { ends: [Anchor; 2], obstacle: Obstacle, factor: f64 },
-    /// What a force and torque along the axes of a frame move: a rate, but no length.
+    /// Direction of a force and torque along the axes of a frame: it has a rate, but no length.
     Twist { frame: Frame, gear: [f64; 6] },
     /// Place and turn of a frame in another, along the other's axes: links that carry both move neither.
     Relative { frame: Frame, reference: Frame, gear: [f64; 6] },
@@ -158,8 +158,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
     ) {
         let Some(link) = link else { return };
         let wrench = spatial(force, &(torque + place.cross(force)));
-        for freedom in self.at.tree.freedoms_of(link).filter(|freedom| counts(*freedom)) {
-            self.slopes[freedom] += self.at.axes[freedom].dot(&wrench);
+        for dof in self.at.tree.dofs_of(link).filter(|dof| counts(*dof)) {
+            self.slopes[dof] += self.at.axes[dof].dot(&wrench);
         }
     }
 
@@ -205,7 +205,7 @@ impl<S: Scalar> Sum<'_, '_, S> {
             self.value += turn[k].times(gear[3 + k]);
         }
         let of = |link: Option<usize>| -> Vec<usize> {
-            link.map(|link| self.at.tree.freedoms_of(link).collect()).unwrap_or_default()
+            link.map(|link| self.at.tree.dofs_of(link).collect()).unwrap_or_default()
         };
         let [own, other] = [of(frame.link), of(reference.link)];
         self.add_wrench(frame.link, &place, &force, &torque, &|k| !other.contains(&k));
@@ -244,8 +244,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
         }
         let torque = if in_parent { base * torque } else { rotation * torque };
         let place = self.at.places[link];
-        let [_, freedoms] = self.at.tree.range(link);
-        self.add_wrench(Some(link), &place, &(base * force), &torque, &|k| freedoms.contains(&k));
+        let [_, dofs] = self.at.tree.range(link);
+        self.add_wrench(Some(link), &place, &(base * force), &torque, &|k| dofs.contains(&k));
     }
 
     fn add_angle(&mut self, link: usize) {
@@ -263,8 +263,8 @@ impl<S: Scalar> Sum<'_, '_, S> {
         self.value += angle;
         let torque = rotation * (turn / angle);
         let place = self.at.places[link];
-        let [_, freedoms] = self.at.tree.range(link);
-        self.add_wrench(Some(link), &place, &Vector3::zeros(), &torque, &|k| freedoms.contains(&k));
+        let [_, dofs] = self.at.tree.range(link);
+        self.add_wrench(Some(link), &place, &Vector3::zeros(), &torque, &|k| dofs.contains(&k));
     }
 
     fn add_crank(&mut self, pin: &Anchor, slider: &Frame, rod: f64, factor: f64) {

@@ -1,16 +1,16 @@
-//! What sensors on a body feel. Over numbers that carry derivatives, so do they.
+//! Readings of sensors on a body. Over numbers that carry derivatives, so do they.
 
 use nalgebra::{Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
-use crate::articulated::spatial::{angular, linear};
 use crate::error::SimulationError;
+use crate::handle::BodyId;
+use crate::spatial::{angular, linear};
 use crate::state::State;
 
 impl<S: Scalar> World<S> {
-    /// What contacts and welds do to a body: force \[N\] and torque \[N m\] about its center of mass, of a link about the origin of its frame; world
+    /// Wrench of contacts and bushings on a body: force \[N\] and torque \[N m\] about its center of mass, of a link about the origin of its frame; world
     /// frame.
     ///
     /// # Errors
@@ -27,7 +27,7 @@ impl<S: Scalar> World<S> {
         Ok(world.contact_wrenches(&states, 1)[body] - external)
     }
 
-    /// What an accelerometer at `point` of a body, given in its model frame \[m\], shows: acceleration less that of free fall, along the axes of the
+    /// Reading of an accelerometer at `point` of a body, given in its model frame \[m\]: acceleration less that of free fall, along the axes of the
     /// body \[m/s²\].
     ///
     /// # Errors
@@ -89,7 +89,7 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        self.place_links(&mut states);
+        self.forward_kinematics(&mut states);
         Ok(states)
     }
 }

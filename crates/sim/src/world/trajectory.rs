@@ -1,4 +1,4 @@
-//! Trajectories of driven bodies.
+//! Trajectories of kinematic bodies.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ struct Lifted(Arc<dyn Trajectory>);
 
 impl<S: Scalar> Trajectory<S> for Lifted {
     fn state(&self, time: f64) -> State<S> {
-        self.0.state(time).lift()
+        self.0.state(time).cast()
     }
 }
 
@@ -67,27 +67,27 @@ mod tests {
     #[test]
     fn a_lifted_trajectory_is_known_again() {
         let mut world = World::new(Vector3::zeros());
-        world.add(Body::driven("table", |_: f64| State::at_rest(Isometry3::identity())));
+        world.add(Body::kinematic("table", |_: f64| State::at_rest(Isometry3::identity())));
         let source = |motion: &Motion| match motion {
-            Motion::Driven(trajectory) => plain(trajectory).unwrap(),
+            Motion::Kinematic(trajectory) => plain(trajectory).unwrap(),
             _ => panic!("not driven"),
         };
-        let there_and_back = world.lift::<Fwd<1>>().plain().lift::<Fwd<2>>().plain();
+        let there_and_back = world.cast::<Fwd<1>>().to_f64().cast::<Fwd<2>>().to_f64();
         let [a, b] = [&world, &there_and_back].map(|world| source(&world.bodies[0].motion));
         assert!(Arc::ptr_eq(&a, &b));
     }
 
     #[test]
     fn values_of_a_trajectory_with_derivatives_are_found() {
-        let mut world = World::new(Vector3::zeros()).lift::<Fwd<1>>();
+        let mut world = World::new(Vector3::zeros()).cast::<Fwd<1>>();
         let [speed] = Fwd::<1>::variables([0.2]);
-        world.bodies.push(Body::driven("table", move |time: f64| {
-            let mut state = State::at_rest(Isometry3::identity()).lift();
+        world.bodies.push(Body::kinematic("table", move |time: f64| {
+            let mut state = State::at_rest(Isometry3::identity()).cast();
             state.pose.translation.x = speed.times(time);
             state
         }));
         let mut state = [State::at_rest(Isometry3::identity())];
-        world.plain().drive(&mut state, 0.5);
+        world.to_f64().update_kinematics(&mut state, 0.5);
         assert_eq!(state[0].pose.translation.x, 0.1);
     }
 }

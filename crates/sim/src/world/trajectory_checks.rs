@@ -1,4 +1,4 @@
-//! Which trajectories a simulation refuses.
+//! Checks of trajectories.
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
@@ -6,15 +6,15 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::body::Motion;
 use super::trajectory::plain;
-use crate::error::SimulationError;
+use crate::error::{BuildError, SimulationError};
 use crate::state::State;
 
 impl<S: Scalar> World<S> {
     /// Refuses trajectories that may carry derivatives, for what keeps their values only.
-    pub(crate) fn check_trajectories(&self) -> Result<(), SimulationError> {
-        let carries = |motion: &Motion<S>| matches!(motion, Motion::Driven(trajectory) if plain(trajectory).is_none());
+    pub(crate) fn check_trajectories(&self) -> Result<(), BuildError> {
+        let carries = |motion: &Motion<S>| matches!(motion, Motion::Kinematic(trajectory) if plain(trajectory).is_none());
         match self.bodies.iter().find(|body| S::ORDER > 0 && carries(&body.motion)) {
-            Some(body) => Err(SimulationError::TrajectoryDerivatives { body: body.name.clone() }),
+            Some(body) => Err(BuildError::TrajectoryDerivatives { body: body.name.clone() }),
             None => Ok(()),
         }
     }
@@ -22,7 +22,7 @@ impl<S: Scalar> World<S> {
     /// Refuses trajectories whose velocity is not the rate of their pose, at some times of a rollout of `duration` \[s\].
     pub(crate) fn check_velocities(&self, duration: f64) -> Result<(), SimulationError> {
         for body in &self.bodies {
-            let Motion::Driven(trajectory) = &body.motion else { continue };
+            let Motion::Kinematic(trajectory) = &body.motion else { continue };
             let plain = plain(trajectory);
             let state = |time: f64| match &plain {
                 Some(plain) => plain.state(time),
@@ -49,7 +49,7 @@ const SMOOTH: f64 = 0.1;
 /// Slower rates say nothing \[m/s\], \[rad/s\].
 const SLOWEST: f64 = 1e-6;
 
-/// Whether the velocity of `state` at `time` \[s\] is far from the rate of its pose, where that is the same over times up to `apart`
+/// True if the velocity of `state` at `time` \[s\] is far from the rate of its pose, where that is the same over times up to `apart`
 /// \[s\] before and after.
 fn contradicts(state: impl Fn(f64) -> State, time: f64, apart: f64) -> bool {
     let State { pose, linear, angular } = state(time);
@@ -90,24 +90,24 @@ mod tests {
     fn trajectories_that_carry_derivatives_are_refused() {
         let mut world = World::new(Vector3::zeros());
         let still = |_: f64| State::at_rest(Isometry3::identity());
-        world.add(Body::driven("table", still));
-        let mut lifted = world.lift::<Fwd<1>>();
+        world.add(Body::kinematic("table", still));
+        let mut lifted = world.cast::<Fwd<1>>();
         assert_eq!(lifted.check_trajectories(), Ok(()));
         let [speed] = Fwd::<1>::variables([0.2]);
-        lifted.bodies[0].motion = Motion::Driven(Arc::new(move |time: f64| {
+        lifted.bodies[0].motion = Motion::Kinematic(Arc::new(move |time: f64| {
             let mut state = State::at_rest(Isometry3::identity());
             state.pose.translation.x = speed.times(time);
             state
         }));
-        let error = SimulationError::TrajectoryDerivatives { body: "table".to_owned() };
+        let error = BuildError::TrajectoryDerivatives { body: "table".to_owned() };
         assert_eq!(lifted.check_trajectories(), Err(error.clone()));
         assert_eq!(lifted.with_parameters(&lifted.parameters()).unwrap_err(), error);
     }
 
-    /// What a rollout of a second says of a trajectory.
+    /// Result of a rollout of a second on a trajectory.
     fn refused(trajectory: impl Trajectory) -> Option<f64> {
         let mut world = World::new(Vector3::zeros());
-        world.add(Body::driven("table", trajectory));
+        world.add(Body::kinematic("table", trajectory));
         match world.simulate(&[State::at_rest(Isometry3::identity())], 1.0) {
             Ok(_) => None,
             Err(SimulationError::TrajectoryVelocity { body, time }) => {

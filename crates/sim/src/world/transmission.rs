@@ -1,4 +1,4 @@
-//! What a robot's transmissions do beyond forces along single joints: bounds on what actuators do together, inertia that moves with a
+//! Effects of a robot's transmissions beyond forces along single joints: bounds on what actuators do together, inertia that moves with a
 //! length, weight that is carried, and inputs with a state of their own.
 
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::World;
-use super::body_id::BodyId;
 use super::joint_force::{JointAxis, JointForce};
 use super::path::Path;
 use crate::articulated::Kinematics;
 use crate::articulated::adjoint::{Acting, accelerations};
-use crate::articulated::spatial::spatial;
+use crate::handle::BodyId;
+use crate::handle::JointForceId;
 use crate::joint_law::dynamic::DynJointLaw;
+use crate::spatial::spatial;
 use crate::state::State;
 use crate::world::articulated_body::ArticulatedBody;
-use crate::world::joint_force::JointForceId;
 
 /// Transmissions of the robots of a world.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +72,7 @@ impl World {
         link: BodyId,
         path: Arc<Path>,
         law: Arc<dyn DynJointLaw>,
-    ) -> Result<JointForceId, crate::error::SimulationError> {
+    ) -> Result<JointForceId, crate::error::BuildError> {
         let mut force = JointForce::new(vec![(link.into(), 0.0)], law);
         force.path = Some(path);
         self.check_joint_force(&force)?;
@@ -86,8 +86,8 @@ impl<S: Scalar> World<S> {
     pub(super) fn bounded(&self) -> impl Iterator<Item = (usize, usize, [f64; 2], bool)> {
         self.transmissions.bounds.iter().filter_map(|(axis, range, counts)| {
             let (articulation, link) = self.link_of(axis.link).ok()?;
-            let [_, freedoms] = self.articulations[articulation].tree.range(link);
-            Some((articulation, freedoms.start + axis.index, *range, *counts))
+            let [_, dofs] = self.articulations[articulation].tree.range(link);
+            Some((articulation, dofs.start + axis.index, *range, *counts))
         })
     }
 
@@ -104,8 +104,8 @@ impl<S: Scalar> World<S> {
             let weight = self.gravity * inertia.mass.times(-*share);
             let moment = (inertia.moment).cross(&(self.gravity * S::constant(-*share)));
             let wrench: Vector6<S> = spatial(&weight, &moment);
-            for freedom in own.tree.freedoms_of(link) {
-                efforts[freedom] += at.axes[freedom].dot(&wrench);
+            for dof in own.tree.dofs_of(link) {
+                efforts[dof] += at.axes[dof].dot(&wrench);
             }
         }
     }
@@ -120,17 +120,15 @@ impl<S: Scalar> World<S> {
         let rotors = self.transmissions.rotors.iter();
         let own_rotors = rotors.filter(|rotor| own.bodies().contains(&rotor.link));
         let slopes = own_rotors.map(|rotor| {
-            let mut slopes = DVector::zeros(own.tree.freedoms());
+            let mut slopes = DVector::zeros(own.tree.nv());
             let mut drift = S::zero();
             for (axis, factor) in &rotor.axes {
                 let link = own.bodies().iter().position(|body| *body == axis.link);
                 let Some(link) = link else { continue };
                 let joint = &own.tree.links()[link].joint;
-                let [_, freedoms] = own.tree.range(link);
-                for (freedom, slope) in
-                    freedoms.zip(joint.position_slopes(&joints[link], axis.index))
-                {
-                    slopes[freedom] += slope.times(*factor);
+                let [_, dofs] = own.tree.range(link);
+                for (dof, slope) in dofs.zip(joint.position_slopes(&joints[link], axis.index)) {
+                    slopes[dof] += slope.times(*factor);
                 }
             }
             if let Some(path) = &rotor.path {

@@ -14,6 +14,6 @@ mod shapes;
 
 // The scenes name these as `crate::…`.
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    RigidBody, SphereCavity, State, Sticking, Surface, World,
+    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
+    RigidBody, State, Surface, World, fields,
 };

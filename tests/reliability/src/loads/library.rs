@@ -19,12 +19,12 @@ use crate::scene::body_over_floor;
 fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<S>> {
     // A body of n segments has n²/2 vertices, about.
     let world = body_over_floor((2 * points).isqrt() + 1)?;
-    let mut start: State<S> = State::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).lift();
+    let mut start: State<S> = State::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).cast();
     start.linear = Vector3::from(push);
-    let still = State::at_rest(Isometry3::identity()).lift();
+    let still = State::at_rest(Isometry3::identity()).cast();
     let time_steps = TimeSteps { dt: 5e-5, steps };
     let euler = SemiImplicitEuler;
-    let end = world.lift().simulate_with(&euler, &[still, start], time_steps, |_, _| ())?;
+    let end = world.cast().simulate_with(&euler, &[still, start], time_steps, |_, _| ())?;
     Ok(end.states[1].pose.translation.vector)
 }
 

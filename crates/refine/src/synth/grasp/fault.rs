@@ -3,7 +3,8 @@
 use prehend_geometry::VolumeError;
 use prehend_geometry::closest::ClosestError;
 use prehend_geometry::robot::RobotError;
-use prehend_sim::{BodyError, LawError, SimulationError};
+use prehend_sim::contact::LawError;
+use prehend_sim::{BodyError, SimulationError};
 use thiserror::Error;
 
 use crate::error::RefineError;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
-use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, LawError, RigidBody};
+use prehend_sim::contact::LawError;
+use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, RigidBody};
 
 use super::drive::{Drive, Effort};
 use super::fault::{GraspError, GraspFault};

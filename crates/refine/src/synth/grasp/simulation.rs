@@ -7,8 +7,9 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Contact, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, World,
+    BackwardEuler, Body, BodyId, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
+    GapSmoothing, Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Step,
+    SubStepped, Surface, World,
 };
 
 use crate::scene::Hand;
@@ -103,13 +104,13 @@ impl<'a> Simulation<'a> {
                     |k, _| if i >> k & 1 == 0 { low[k] } else { high[k] },
                 ))
             };
-            let body = Body::kinematic(&robot.tree.links()[link].name).with_field(shape.clone());
+            let body = Body::fixed(&robot.tree.links()[link].name).with_field(shape.clone());
             fields.push(world.add(body));
             states.push(State::at_rest(poses[link]));
             let (shape, corners) = (shape.clone(), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
         }
-        let object = world.add(Body::free("object", setup.body));
+        let object = world.add(Body::dynamic("object", setup.body));
         states.push(setup.body.at_rest(t_hand_object));
         let joints = joints.to_vec();
         let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
@@ -232,7 +233,7 @@ impl<'a> Simulation<'a> {
             kept.extend(self.setup.samples.first());
         }
         let surface = Surface::new(&kept, &vec![self.setup.area; kept.len()])
-            .map_err(|error| SimulationError::Body { body: "object".to_owned(), error })?;
+            .map_err(|error| BuildError::Body { body: "object".to_owned(), error })?;
         self.world.bodies[self.object].surface = Some(Arc::new(surface));
         Ok(())
     }
@@ -260,9 +261,14 @@ impl<'a> Simulation<'a> {
                 let relative = velocity - link.linear - link.angular.cross(&lever);
                 let normal_speed = relative.dot(&normal);
                 let slip = relative - normal * normal_speed;
-                let contact =
-                    Contact { gap: distance, normal_speed, slip, normal, area: sample.area };
-                let response = law.response(law.params(), &contact);
+                let contact = ContactKinematics {
+                    gap: distance,
+                    normal_speed,
+                    slip,
+                    normal,
+                    area: sample.area,
+                };
+                let response = law.force(law.params(), &contact);
                 touches.push(Touch {
                     link: solid.link,
                     point,

@@ -7,9 +7,9 @@ use super::inputs::{Inputs, LinkAdjoint, add_varying};
 use super::motion::{Force, mass_adjoint};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
-use crate::articulated::spatial::{angular, cross_force, cross_motion, linear, spatial};
+use crate::spatial::{angular, cross_force, cross_motion, linear, spatial};
 
-/// What a tree's accelerations follow from.
+/// Inputs of a tree's accelerations.
 pub(crate) struct Acting<'a, S: Scalar> {
     /// Acceleration of free fall \[m/s²\].
     pub(crate) gravity: Vector3<S>,
@@ -121,7 +121,7 @@ impl Sweep {
             own.velocity += cross_force(joint_velocity, &own.acceleration);
             let of_joint = own.velocity - cross_force(moves, &own.acceleration);
             let own = *own;
-            let [coordinates, freedoms] = tree.range(index);
+            let [coordinates, dofs] = tree.range(index);
             let (of_parent, acceleration_of_parent, motion_of_parent) = match link.parent {
                 Some(p) => (at.velocities[p], effort.accelerations[p], virtual_motions[p]),
                 None => (Vector6::zeros(), at.rest(), Vector6::zeros()),
@@ -137,7 +137,7 @@ impl Sweep {
                 &displacement,
                 &mut sweep.q[coordinates.clone()],
             );
-            for k in freedoms.clone() {
+            for k in dofs.clone() {
                 sweep.v[k] -= at.axes[k].dot(&of_joint);
                 sweep.links[index].armature -= multipliers[k] * node.accelerations[k];
             }
@@ -146,13 +146,13 @@ impl Sweep {
                     + own.acceleration * node.accelerations[k]
                     + own.motion * multipliers[k])
             };
-            let by_axes: Vec<Vector6<f64>> = freedoms.clone().map(by_axis).collect();
+            let by_axes: Vec<Vector6<f64>> = dofs.clone().map(by_axis).collect();
             at.custom_adjoint(
                 index,
-                [&node.q[coordinates.clone()], &node.v[freedoms.clone()]],
+                [&node.q[coordinates.clone()], &node.v[dofs.clone()]],
                 &by_axes,
                 Some(&-own.acceleration),
-                [&mut sweep.q[coordinates], &mut sweep.v[freedoms]],
+                [&mut sweep.q[coordinates], &mut sweep.v[dofs]],
             );
             let adjoint = &mut sweep.links[index];
             adjoint.displacement = displacement;

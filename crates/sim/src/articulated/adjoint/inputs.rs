@@ -1,13 +1,13 @@
-//! Which numbers a node is a function of, and their adjoints in a row.
+//! Inputs of a node, and their adjoints in a row.
 
 use nalgebra::{Matrix3, Quaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use crate::articulated::joint::{CustomJoint, Joint, quaternion};
-use crate::articulated::joint_model::{MOST_FREEDOMS, inputs};
+use crate::articulated::joint_model::{MAX_NV, inputs};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::{Articulation, Link, NUMBERS};
-use crate::articulated::spatial::{angular, linear, spatial};
+use crate::spatial::{angular, linear, spatial};
 
 /// Adjoints of what a link is made of.
 #[derive(Clone, Copy, Default)]
@@ -20,13 +20,13 @@ pub(super) struct LinkAdjoint {
     pub(super) armature: f64,
 }
 
-/// What of a node's inputs varies, so that constants are not recorded.
+/// Inputs of a node that vary: constants are not recorded.
 pub(super) struct Inputs<S> {
     /// The numbers that vary.
     pub(super) varying: Vec<S>,
     /// Of all numbers in their order, whether they do.
     pub(super) varies: Vec<bool>,
-    /// Whether numbers of links are among them.
+    /// True if numbers of links are among them.
     pub(super) links: bool,
 }
 
@@ -91,8 +91,8 @@ impl Kinematics<'_> {
         displacement: &Vector6<f64>,
         adjoints: &mut [f64],
     ) {
-        let [_, freedoms] = self.tree.range(link);
-        let along: Vec<f64> = freedoms.map(|k| self.axes[k].dot(displacement)).collect();
+        let [_, dofs] = self.tree.range(link);
+        let along: Vec<f64> = dofs.map(|k| self.axes[k].dot(displacement)).collect();
         let by_turn = |q: &[f64], turn: &[f64], adjoints: &mut [f64]| {
             let rotation = Quaternion::new(q[3], q[0], q[1], q[2]);
             let square = rotation.norm_squared();
@@ -133,15 +133,12 @@ impl Kinematics<'_> {
         let mut add = |first: usize, force: Vector6<f64>| {
             for (row, force) in jacobian[first..].iter().zip(&force) {
                 q_adjoint.iter_mut().zip(row).for_each(|(a, slope)| *a += slope * force);
-                v_adjoint
-                    .iter_mut()
-                    .zip(&row[MOST_FREEDOMS..])
-                    .for_each(|(a, slope)| *a += slope * force);
+                v_adjoint.iter_mut().zip(&row[MAX_NV..]).for_each(|(a, slope)| *a += slope * force);
             }
         };
         by_axes.iter().enumerate().for_each(|(k, force)| add(12 + 6 * k, local(force)));
         if let Some(force) = by_drift {
-            add(12 + 6 * MOST_FREEDOMS, local(force));
+            add(12 + 6 * MAX_NV, local(force));
         }
     }
 }

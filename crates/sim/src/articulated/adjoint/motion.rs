@@ -1,10 +1,10 @@
-//! What adjoints of motions are summed of.
+//! Terms of adjoints of motions.
 
 use nalgebra::{Vector3, Vector6};
 
 use super::inputs::LinkAdjoint;
 use crate::articulated::kinematics::Kinematics;
-use crate::articulated::spatial::{angular, linear};
+use crate::spatial::{angular, linear};
 
 /// Adjoints of a link's motions, and of those of all that hangs on it: forces about the origin.
 #[derive(Clone, Copy, Default)]

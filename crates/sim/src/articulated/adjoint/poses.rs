@@ -6,9 +6,8 @@ use prehend_autodiff::{CustomVjp, Scalar};
 use super::inputs::{Inputs, LinkAdjoint, add_varying};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
-use crate::articulated::spatial::{angular, cross_force, spatial};
-use crate::state::State;
-use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::spatial::{angular, cross_force, spatial};
+use crate::state::{STATE, State, coordinates_of, states_of};
 
 /// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
 pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {
@@ -23,7 +22,7 @@ pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -
     let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
     match S::recorded(&varying, &outputs, node) {
         Some(recorded) => states_of(&recorded).collect(),
-        None => result.iter().map(State::lift).collect(),
+        None => result.iter().map(State::cast).collect(),
     }
 }
 
@@ -71,18 +70,18 @@ impl CustomVjp for Node {
             let of_parent = link.parent.map_or_else(Vector6::zeros, |p| at.velocities[p]);
             let (placed_here, moving_here) = (placed[index], moving[index]);
             let displacement = placed_here - cross_force(&of_parent, &moving_here);
-            let [coordinates, freedoms] = self.tree.range(index);
+            let [coordinates, dofs] = self.tree.range(index);
             let own = &self.q[coordinates.clone()];
             at.coordinate_adjoint(index, own, &displacement, &mut q[coordinates.clone()]);
-            freedoms.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
+            dofs.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
             let by_axes: Vec<Vector6<f64>> =
-                freedoms.clone().map(|k| moving_here * self.v[k]).collect();
+                dofs.clone().map(|k| moving_here * self.v[k]).collect();
             at.custom_adjoint(
                 index,
-                [own, &self.v[freedoms.clone()]],
+                [own, &self.v[dofs.clone()]],
                 &by_axes,
                 None,
-                [&mut q[coordinates], &mut v[freedoms]],
+                [&mut q[coordinates], &mut v[dofs]],
             );
             links[index].displacement = displacement;
             if let Some(parent) = link.parent {

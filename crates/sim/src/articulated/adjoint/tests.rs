@@ -6,11 +6,11 @@ use prehend_autodiff::{Fwd, Scalar, gradient};
 use super::*;
 use crate::articulated::link::Articulation;
 use crate::articulated::tests::{random_state, random_tree};
-use crate::state_coordinates::coordinates_of;
+use crate::state::coordinates_of;
 
-/// How many numbers [`weighed`] is a function of.
+/// Number of inputs of [`weighed`].
 fn inputs(tree: &Articulation) -> usize {
-    3 + tree.coordinates() + 2 * tree.freedoms() + 6 * tree.links().len() + 18 * tree.links().len()
+    3 + tree.nq() + 2 * tree.nv() + 6 * tree.links().len() + 18 * tree.links().len()
 }
 
 /// Accelerations and states of links, each with a weight, as a function of everything that they follow from.
@@ -18,12 +18,12 @@ fn weighed<S: Scalar>(tree: &Articulation, start: &[f64], x: &[S]) -> S {
     let mut numbers = x.iter().zip(start).map(|(x, start)| x.plus(*start));
     let mut next = || numbers.next().unwrap();
     let gravity = nalgebra::Vector3::from_fn(|_, _| next());
-    let q: Vec<S> = (0..tree.coordinates()).map(|_| next()).collect();
-    let v: Vec<S> = (0..tree.freedoms()).map(|_| next()).collect();
-    let efforts: Vec<S> = (0..tree.freedoms()).map(|_| next()).collect();
+    let q: Vec<S> = (0..tree.nq()).map(|_| next()).collect();
+    let v: Vec<S> = (0..tree.nv()).map(|_| next()).collect();
+    let efforts: Vec<S> = (0..tree.nv()).map(|_| next()).collect();
     let wrenches: Vec<Vector6<S>> =
         tree.links().iter().map(|_| Vector6::from_fn(|_, _| next())).collect();
-    let mut links = tree.lift::<S>().links().to_vec();
+    let mut links = tree.cast::<S>().links().to_vec();
     for link in &mut links {
         let turn = nalgebra::Vector3::from_fn(|_, _| next());
         link.t_parent_joint.rotation =

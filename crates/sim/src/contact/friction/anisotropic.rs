@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use super::{FrictionCoefficient, FrictionLaw, regularized_speed};
 use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, Parameters, Tabulated, entry};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::range::ParameterRange;
 
 /// Friction with the coefficient μ of `along` along the unit direction a, and r·μ across it. The direction is fixed to the
@@ -24,14 +24,15 @@ use crate::contact::range::ParameterRange;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{AnisotropicFriction, ContactLaw, Coulomb, KelvinVoigt, Law};
+/// use prehend_sim::contact::AnisotropicFriction;
+/// use prehend_sim::{ContactLaw, Coulomb, KelvinVoigt, Law};
 ///
 /// // Slides three times as easily along x as along y.
 /// let along = Coulomb { friction: 0.2, slip_scale: 1e-3 };
 /// let friction = AnisotropicFriction { along, across_ratio: 3.0, direction: Vector3::x_axis() };
 /// let law = Law::new(KelvinVoigt { stiffness: 2e7, damping: 1e4 }, friction)?;
 /// assert_eq!(law.params(), [2e7, 1e4, 0.2, 3.0]);
-/// # Ok::<(), prehend_sim::LawError>(())
+/// # Ok::<(), prehend_sim::contact::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnisotropicFriction<F> {
@@ -95,7 +96,7 @@ impl<F: FrictionCoefficient> FrictionLaw for AnisotropicFriction<F> {
         &self,
         (along, [across]): Self::Params<S>,
         normal_force: S,
-        contact: &Contact<S>,
+        contact: &ContactKinematics<S>,
     ) -> Vector3<S> {
         let speed = regularized_speed(&contact.slip, self.along.slip_scale());
         let scale = -(self.along.coefficient(along, speed) * normal_force) / speed;
@@ -115,11 +116,12 @@ mod tests {
     use nalgebra::{Isometry3, Matrix3, Point3};
 
     use super::*;
+    use crate::contact::Stribeck;
     use crate::contact::law_checks::{Claims, check_law};
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{
         Body, ContactLaw, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State,
-        Stribeck, Surface,
+        Surface,
     };
 
     const SPRING: KelvinVoigt = KelvinVoigt { stiffness: 1e7, damping: 0.0 };
@@ -129,8 +131,8 @@ mod tests {
         AnisotropicFriction { along, across_ratio, direction }
     }
 
-    fn contact(slip: Vector3<f64>, normal: Vector3<f64>) -> Contact<f64> {
-        Contact { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 }
+    fn contact(slip: Vector3<f64>, normal: Vector3<f64>) -> ContactKinematics<f64> {
+        ContactKinematics { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 }
     }
 
     #[test]
@@ -186,7 +188,7 @@ mod tests {
         let law = Law::new(SPRING, friction(Vector3::x_axis(), 3.0)).unwrap();
         let rigid = RigidBody::new(0.2, Matrix3::identity(), Point3::origin()).unwrap();
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let runner = Body::free("runner", rigid).with_surface(surface);
+        let runner = Body::dynamic("runner", rigid).with_surface(surface);
         let world = on_ground(Vector3::zeros(), floor(), runner, Arc::new(law), GapSmoothing::Hard);
         let friction = |degrees: f64, slip: Vector3<f64>| {
             let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());

@@ -5,7 +5,7 @@ use prehend_autodiff::Scalar;
 
 use super::{FrictionCoefficient, FrictionLaw};
 use crate::contact::parameters::law_part;
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 
 law_part! {
     /// Coulomb friction: f_t = −μ f_n u/√(|u|² + v_s²) for slip u, friction coefficient μ and slip scale v_s
@@ -14,7 +14,7 @@ law_part! {
     /// What should stick creeps at v_s times its share of the friction that it could use, so v_s is the creep that you can
     /// bear: a hundredth of the speeds that matter, often 1 cm/s for impacts and 0.1 mm/s for grasps. Fixed steps must be
     /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) sees to it. What has
-    /// to hold for seconds wants [`Sticking`](super::sticking::Sticking) around it.
+    /// to hold for seconds wants [`BristleFriction`](super::bristle::BristleFriction) around it.
     pub struct Coulomb: "Coulomb friction" {
         friction [""] NotNegative "friction coefficient";
     }
@@ -37,7 +37,12 @@ impl FrictionCoefficient for Coulomb {
 
 impl FrictionLaw for Coulomb {
     #[inline]
-    fn force<S: Scalar>(&self, p: [S; 1], normal_force: S, contact: &Contact<S>) -> Vector3<S> {
+    fn force<S: Scalar>(
+        &self,
+        p: [S; 1],
+        normal_force: S,
+        contact: &ContactKinematics<S>,
+    ) -> Vector3<S> {
         self.isotropic_force(p, normal_force, &contact.slip)
     }
 }

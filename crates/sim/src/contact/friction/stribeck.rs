@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use super::{FrictionCoefficient, FrictionLaw};
 use crate::contact::error::LawError;
 use crate::contact::parameters::law_part;
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 
 law_part! {
     /// Friction that falls from μ_s at rest to μ_k in fast slip: μ(u) = μ_k + (μ_s − μ_k)·exp(−(u/u_st)²) (the Stribeck
@@ -48,7 +48,12 @@ impl FrictionCoefficient for Stribeck {
 
 impl FrictionLaw for Stribeck {
     #[inline]
-    fn force<S: Scalar>(&self, p: [S; 3], normal_force: S, contact: &Contact<S>) -> Vector3<S> {
+    fn force<S: Scalar>(
+        &self,
+        p: [S; 3],
+        normal_force: S,
+        contact: &ContactKinematics<S>,
+    ) -> Vector3<S> {
         self.isotropic_force(p, normal_force, &contact.slip)
     }
 }
@@ -57,7 +62,8 @@ impl FrictionLaw for Stribeck {
 mod tests {
     use super::*;
     use crate::contact::law_checks::{Claims, check_law};
-    use crate::{ApproachDamped, ContactLaw, Hertz, HuntCrossley, KelvinVoigt, Law, NormalLaw};
+    use crate::contact::{ApproachDamped, Hertz, NormalLaw};
+    use crate::{ContactLaw, HuntCrossley, KelvinVoigt, Law};
 
     const FRICTION: Stribeck =
         Stribeck { friction: 0.6, kinetic_friction: 0.35, stribeck_speed: 0.05, slip_scale: 1e-2 };
@@ -87,8 +93,13 @@ mod tests {
         let law = Law::new(KelvinVoigt { stiffness: 1e7, damping: 0.0 }, friction).unwrap();
         let ratio = |speed: f64| {
             let slip = Vector3::new(speed, 0.0, 0.0);
-            let contact =
-                Contact { gap: -1e-3, normal_speed: 0.0, slip, normal: Vector3::z(), area: 1e-4 };
+            let contact = ContactKinematics {
+                gap: -1e-3,
+                normal_speed: 0.0,
+                slip,
+                normal: Vector3::z(),
+                area: 1e-4,
+            };
             let response = law.law(law.params(), &contact);
             response.tangential.norm() / response.normal
         };

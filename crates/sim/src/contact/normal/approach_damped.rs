@@ -3,11 +3,11 @@
 use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
+use crate::contact::calibration::ContactCalibration;
 use crate::contact::error::LawError;
 use crate::contact::parameters::{Parameters, law_part};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::restitution::approach_damping_ratio;
-use crate::contact::static_target::StaticContactTarget;
 
 law_part! {
     /// Spring, and a damper that resists approach only: f_n = A·(−K g + D·max(0, −ġ)) for g ≤ 0, as in NVIDIA
@@ -23,11 +23,11 @@ law_part! {
 
 impl ApproachDamped {
     /// The law with which the body of `target` rests at its depth, and bounces with coefficient `restitution`, above 0 and at
-    /// most 1: that of an impact without gravity, see [`StaticContactTarget`].
+    /// most 1: that of an impact without gravity, see [`ContactCalibration`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
-    pub fn from_target(target: &StaticContactTarget, restitution: f64) -> Result<Self, LawError> {
+    pub fn from_target(target: &ContactCalibration, restitution: f64) -> Result<Self, LawError> {
         let [stiffness, damping] = target.bouncing(restitution, approach_damping_ratio)?;
         let law = Self { stiffness, damping };
         law.check(&law.values()).map(|()| law)
@@ -36,7 +36,7 @@ impl ApproachDamped {
 
 impl NormalLaw for ApproachDamped {
     #[inline]
-    fn force<S: Scalar>(&self, [stiffness, damping]: [S; 2], contact: &Contact<S>) -> S {
+    fn force<S: Scalar>(&self, [stiffness, damping]: [S; 2], contact: &ContactKinematics<S>) -> S {
         if contact.gap.value() > 0.0 {
             return S::zero();
         }

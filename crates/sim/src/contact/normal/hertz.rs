@@ -3,10 +3,10 @@
 use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
+use crate::contact::calibration::ContactCalibration;
 use crate::contact::error::LawError;
 use crate::contact::parameters::{Parameters, law_part};
-use crate::contact::point::Contact;
-use crate::contact::static_target::StaticContactTarget;
+use crate::contact::point::ContactKinematics;
 
 law_part! {
     /// An elastic contact that stiffens with depth d = −g: f_n = A·K·d^{3/2}.
@@ -28,7 +28,7 @@ impl Hertz {
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
-    pub fn from_target(target: &StaticContactTarget) -> Result<Self, LawError> {
+    pub fn from_target(target: &ContactCalibration) -> Result<Self, LawError> {
         target.check()?;
         let law = Self { stiffness: target.stiffness(1.5) };
         law.check(&law.values()).map(|()| law)
@@ -37,7 +37,7 @@ impl Hertz {
 
 impl NormalLaw for Hertz {
     #[inline]
-    fn force<S: Scalar>(&self, [stiffness]: [S; 1], contact: &Contact<S>) -> S {
+    fn force<S: Scalar>(&self, [stiffness]: [S; 1], contact: &ContactKinematics<S>) -> S {
         let depth = -contact.gap;
         // The root's slope is infinite at zero, that of d^{3/2} is zero there.
         if depth.value() <= 0.0 {

@@ -3,12 +3,12 @@
 use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
+use crate::contact::calibration::ContactCalibration;
 use crate::contact::error::LawError;
 use crate::contact::parameters::{Parameters, law_part};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::range::ParameterRange;
 use crate::contact::restitution::hunt_crossley_damping;
-use crate::contact::static_target::StaticContactTarget;
 
 law_part! {
     /// A power-law spring whose damping grows with the load: f_n = A·K·dⁿ·max(0, 1 + c ḋ) for depth d = −g
@@ -26,7 +26,7 @@ law_part! {
     }
 }
 
-/// How a body bounces off a contact whose restitution depends on the speed.
+/// Restitution of a contact at an impact speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounce {
     /// Coefficient of restitution, above 0 and at most 1.
@@ -37,12 +37,12 @@ pub struct Bounce {
 
 impl HuntCrossley {
     /// The law of this `exponent` with which the body of `target` rests at its depth, and bounces as `bounce` says in an impact without
-    /// gravity, see [`StaticContactTarget`].
+    /// gravity, see [`ContactCalibration`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
     pub fn from_target(
-        target: &StaticContactTarget,
+        target: &ContactCalibration,
         exponent: f64,
         bounce: Bounce,
     ) -> Result<Self, LawError> {
@@ -59,7 +59,7 @@ impl HuntCrossley {
 
 impl NormalLaw for HuntCrossley {
     #[inline]
-    fn force<S: Scalar>(&self, p: [S; 3], contact: &Contact<S>) -> S {
+    fn force<S: Scalar>(&self, p: [S; 3], contact: &ContactKinematics<S>) -> S {
         let [stiffness, damping, exponent] = p;
         let depth = -contact.gap;
         let load = S::one() - damping * contact.normal_speed;
@@ -73,8 +73,9 @@ impl NormalLaw for HuntCrossley {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Hertz;
     use crate::contact::law_checks::{Claims, TARGET, bounce, check_law, frictionless, load};
-    use crate::{Coulomb, Hertz, Law};
+    use crate::{Coulomb, Law};
 
     #[test]
     fn keeps_what_laws_promise() {

@@ -3,11 +3,11 @@
 use prehend_autodiff::Scalar;
 
 use super::NormalLaw;
+use crate::contact::calibration::ContactCalibration;
 use crate::contact::error::LawError;
 use crate::contact::parameters::{Parameters, law_part};
-use crate::contact::point::Contact;
+use crate::contact::point::ContactKinematics;
 use crate::contact::restitution::damping_ratio;
-use crate::contact::static_target::StaticContactTarget;
 
 law_part! {
     /// Spring and damper per area, clamped so that contact never pulls: f_n = A·max(0, −K g − D ġ) for g ≤ 0.
@@ -23,11 +23,11 @@ law_part! {
 
 impl KelvinVoigt {
     /// The law with which the body of `target` rests at its depth, and bounces with coefficient `restitution`, above 0 and at
-    /// most 1: that of an impact without gravity, see [`StaticContactTarget`].
+    /// most 1: that of an impact without gravity, see [`ContactCalibration`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
-    pub fn from_target(target: &StaticContactTarget, restitution: f64) -> Result<Self, LawError> {
+    pub fn from_target(target: &ContactCalibration, restitution: f64) -> Result<Self, LawError> {
         let [stiffness, damping] = target.bouncing(restitution, damping_ratio)?;
         let law = Self { stiffness, damping };
         law.check(&law.values()).map(|()| law)
@@ -36,7 +36,7 @@ impl KelvinVoigt {
 
 impl NormalLaw for KelvinVoigt {
     #[inline]
-    fn force<S: Scalar>(&self, [stiffness, damping]: [S; 2], contact: &Contact<S>) -> S {
+    fn force<S: Scalar>(&self, [stiffness, damping]: [S; 2], contact: &ContactKinematics<S>) -> S {
         let pressure = -(stiffness * contact.gap + damping * contact.normal_speed);
         // Zero counts as active: leaky smoothing differentiates a contact of exactly zero force.
         if pressure.value() < 0.0 || contact.gap.value() > 0.0 {
@@ -75,11 +75,16 @@ mod tests {
     fn contact_never_pulls() {
         let law = penalty(1e6, 1e5, 0.5, 1e-3);
         let slip = Vector3::new(0.1, 0.0, 0.0);
-        let leaving =
-            Contact { gap: -1e-3, normal_speed: 1.0, slip, normal: Vector3::z(), area: 1e-4 };
+        let leaving = ContactKinematics {
+            gap: -1e-3,
+            normal_speed: 1.0,
+            slip,
+            normal: Vector3::z(),
+            area: 1e-4,
+        };
         let response = law.law(law.params(), &leaving);
         assert_eq!((response.normal, response.tangential.norm()), (0.0, 0.0));
-        let resting = Contact { normal_speed: 0.0, ..leaving };
+        let resting = ContactKinematics { normal_speed: 0.0, ..leaving };
         assert!((law.law(law.params(), &resting).normal - 0.1).abs() < 1e-15);
     }
 }

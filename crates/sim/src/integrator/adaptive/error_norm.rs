@@ -1,17 +1,17 @@
-//! How large an error is.
+//! Norm of errors.
 
 use std::cell::LazyCell;
 
 use nalgebra::{Vector3, Vector6};
 
 use super::Adaptive;
-use super::probe::Probe;
+use super::sensitivity::Tangent;
 use crate::articulated::Joint;
 use crate::contact::bristles::Bristles;
+use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
 use crate::state::State;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactPair;
 
 /// Part of the fastest body's speed that counts for all: what is at rest may be hit by it.
@@ -21,29 +21,29 @@ const SLOWEST: f64 = 1e-9;
 
 /// Part of the largest sensitivity that those of velocities are compared with at least.
 const SMALL: f64 = 0.1;
-/// Error of the sensitivity in a part that cannot be shorter, because of a kink: next to nothing beside what follows, where the kink
+/// Error of the sensitivity in a substep that cannot be shorter, because of a kink: next to nothing beside what follows, where the kink
 /// is the onset of a contact that stiff.
 const SHARPEST_KINK: f64 = 1e-3;
 
-/// How far off a part is: its states, and its sensitivity relative to that.
+/// Errors of a substep: of its states, and of its sensitivity relative to that.
 pub(super) struct Errors {
     state: f64,
     sensitivity: f64,
 }
 
-/// How large errors are.
+/// Norm of errors.
 pub(super) struct ErrorNorm {
     tolerance: f64,
     sensitivity_tolerance: f64,
-    /// How many bodies there are, whose states come first.
+    /// Number of bodies, whose states come first.
     bodies: usize,
-    /// Of each free body, then of each joint, with the place of its state.
+    /// For each free body, then of each joint, with the place of its state.
     scales: Vec<(usize, Scale)>,
-    /// Of each contact that sticks, the radius of gyration of its smaller body \[m\].
+    /// For each contact with bristles, the radius of gyration of its smaller body \[m\].
     deflections: Vec<f64>,
 }
 
-/// What counts as one for a body or joint.
+/// Units of the coordinates of a body or joint.
 #[derive(Clone, Copy)]
 struct Scale {
     /// By which angular momenta are those of angular velocities times the squared length; so 1/length² where they are such velocities.
@@ -54,7 +54,7 @@ struct Scale {
     speed: f64,
     /// Speed of a coordinate by that of the bodies: 1, or 1/radius \[1/m\] of an angle.
     per_meter: f64,
-    /// Which of its coordinates there are: places, rotations.
+    /// Presence of its coordinates: places, rotations.
     has: [bool; 2],
 }
 
@@ -68,7 +68,7 @@ impl Scale {
     }
 
     /// The largest components of the sensitivity of `state`.
-    fn sensitivity(&self, state: &State<Probe>, speed: f64) -> [f64; 2] {
+    fn sensitivity(&self, state: &State<Tangent>, speed: f64) -> [f64; 2] {
         let tangent = state.tangent().map(|x| x.derivative[0]);
         let [position, turn, velocity, spin] =
             std::array::from_fn(|k| Vector3::from_column_slice(&tangent[3 * k..][..3]).norm());
@@ -106,7 +106,7 @@ impl ErrorNorm {
             let lengths = bodies.map(|body| world.gyration_radius(body)).into_iter();
             lengths.filter(|length| *length > 0.0).fold(f64::INFINITY, f64::min)
         };
-        let deflections = world.sticking().map(length).collect();
+        let deflections = world.bristle_contacts().map(length).collect();
         let bodies = world.bodies.len();
         Self { tolerance, sensitivity_tolerance, bodies, scales, deflections }
     }
@@ -121,7 +121,7 @@ impl ErrorNorm {
     }
 
     /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.
-    pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Probe>]) -> f64 {
+    pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Tangent>]) -> f64 {
         let time = |(place, scale): &(usize, Scale)| {
             let (Scale { mass, length, speed, .. }, wrench) =
                 (*scale, wrenches[*place].map(|w| w.value));
@@ -138,13 +138,13 @@ impl ErrorNorm {
     /// The errors of `trial`, a step from `states` that is off by `estimate`: no numbers if the step is none.
     pub(super) fn errors(
         &self,
-        states: &[State<Probe>],
-        trial: &Trial<Probe>,
-        estimate: &Estimate<Probe>,
+        states: &[State<Tangent>],
+        trial: &Trial<Tangent>,
+        estimate: &Estimate<Tangent>,
     ) -> Errors {
-        let (value, derivative) = (|x: Probe| x.value, |x: Probe| x.derivative[0]);
+        let (value, derivative) = (|x: Tangent| x.value, |x: Tangent| x.derivative[0]);
         let (mut error, mut slope_error, mut slope) = (0.0, [0.0; 2], [0.0; 2]);
-        let bodies = |states| <[State<Probe>]>::iter(states).take(self.bodies);
+        let bodies = |states| <[State<Tangent>]>::iter(states).take(self.bodies);
         let speeds = bodies(states).chain(bodies(trial.end()));
         let speeds = speeds.map(|s| s.linear.map(value).norm());
         let fastest = speeds.fold(0.0, f64::max);
@@ -153,7 +153,7 @@ impl ErrorNorm {
             let own = [start, end].map(|state| state.value().speed_within(scale.length));
             let own = max_or_nan(own[0], own[1]);
             let speed = scale.speed + own + SLOW * fastest * scale.per_meter;
-            let largest = |part| scale.largest(estimate.across_kinks(i, part), speed);
+            let largest = |substep| scale.largest(estimate.across_kinks(i, substep), speed);
             error = largest(value).into_iter().fold(error, max_or_nan);
             slope_error = larger(slope_error, largest(derivative));
             for state in [start, end] {
@@ -180,14 +180,14 @@ impl ErrorNorm {
         max_or_nan(state / self.tolerance, sensitivity / self.sensitivity_tolerance)
     }
 
-    /// Whether `errors` of a part that could not be shorter are those of a kink alone: a part that short has no other of its
+    /// True if `errors` of a substep that could not be shorter are those of a kink alone: a substep that short has no other of its
     /// sensitivity.
     pub(super) fn only_kinks(&self, errors: &Errors) -> bool {
         errors.state <= self.tolerance && errors.sensitivity <= SHARPEST_KINK
     }
 }
 
-/// Of each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
+/// For each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
 /// the joint itself.
 fn joint_scales<'a>(
     world: &'a World,
@@ -208,7 +208,7 @@ fn joint_scales<'a>(
             gravity => gravity,
         };
         let speed = (acceleration * radius).sqrt().max(SLOWEST) * per_meter;
-        let has = [joint.freedoms() > 0 && !matches!(joint, Joint::Spherical), joint.turns()];
+        let has = [joint.nv() > 0 && !matches!(joint, Joint::Spherical), joint.turns()];
         Scale { mass: 1.0 / (length * length), length, speed, per_meter, has }
     })
 }

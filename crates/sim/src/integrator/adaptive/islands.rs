@@ -2,11 +2,11 @@
 
 use prehend_autodiff::Scalar;
 
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
-use crate::world::body_id::BodyId;
+use crate::world::broad_phase::CandidateContact;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
-use crate::world::neighbors::Neighbors;
 
 /// Bodies that are linked by contacts or joints, and what they touch that no force moves. What happens to them depends on no others.
 #[derive(Default)]
@@ -22,7 +22,7 @@ pub(super) struct Island {
     deflections: Vec<usize>,
 }
 
-/// What tells one island from another.
+/// Key that tells one island from another.
 #[derive(Eq, Hash, PartialEq)]
 pub(super) struct Links {
     bodies: Vec<BodyId>,
@@ -42,9 +42,9 @@ impl Island {
         for articulation in &world.articulations {
             articulation.bodies().windows(2).for_each(|pair| join(&mut roots, [pair[0], pair[1]]));
         }
-        for weld in &world.welds {
-            if weld.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
-                join(&mut roots, weld.bodies);
+        for bushing in &world.bushings {
+            if bushing.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
+                join(&mut roots, bushing.bodies);
             }
         }
         let mut place = vec![None; world.bodies.len()];
@@ -78,9 +78,9 @@ impl Island {
             }
             deflection += usize::from(sticks);
         }
-        for weld in &world.welds {
+        for bushing in &world.bushings {
             let (moved, fixed): (Vec<BodyId>, Vec<BodyId>) =
-                weld.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
+                bushing.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
             let root = moved.first().map(|id| root_of(&mut roots, id.index()));
             if let Some(place) = root.and_then(|root| place[root]) {
                 islands[place].bodies.extend(fixed);
@@ -95,9 +95,10 @@ impl Island {
 
     /// What happens to it follows from its bodies and these of its contacts, the group and bodies of those of groups; the others are
     /// first among all, as many as `single`.
-    pub(super) fn links(&self, single: usize, neighbors: &[Neighbors]) -> Links {
-        let neighbors = self.contacts.iter().filter_map(|i| neighbors.get(i.checked_sub(single)?));
-        let contacts = neighbors.map(|contact| (contact.group, contact.bodies)).collect();
+    pub(super) fn links(&self, single: usize, candidates: &[CandidateContact]) -> Links {
+        let candidates =
+            self.contacts.iter().filter_map(|i| candidates.get(i.checked_sub(single)?));
+        let contacts = candidates.map(|contact| (contact.group, contact.bodies)).collect();
         Links { bodies: self.bodies.clone(), contacts }
     }
 
@@ -130,12 +131,12 @@ impl Island {
                 .filter(|force| force.axes.iter().all(|(axis, _)| self.has(axis.link)))
                 .map(|force| force.with_bodies(body))
                 .collect(),
-            welds: world
-                .welds
+            bushings: world
+                .bushings
                 .iter()
-                .filter(|weld| weld.bodies.iter().all(|id| self.has(*id)))
-                .filter(|weld| weld.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
-                .map(|weld| weld.with_bodies(body))
+                .filter(|bushing| bushing.bodies.iter().all(|id| self.has(*id)))
+                .filter(|bushing| bushing.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
+                .map(|bushing| bushing.with_bodies(body))
                 .collect(),
             transmissions: world.transmissions.with_bodies(|id| self.has(id), body),
             gravity: world.gravity,

@@ -2,8 +2,8 @@
 
 use prehend_geometry::FieldSample;
 
+use crate::contact::contact_query::ContactQuery;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::surface::SurfacePoint;
 use crate::world::World;
@@ -31,7 +31,7 @@ fn first_of(
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
-    let reach = pair.law().reach();
+    let reach = pair.law().cutoff();
     let passage = Passage::new(world, pair, ends, dt)?;
     let times = passage.each_near(reach).filter_map(|(point, _)| {
         let [from, to] = passage.gaps(point, reach);
@@ -40,7 +40,7 @@ fn first_of(
     times.min_by(f64::total_cmp)
 }
 
-/// Whether a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
+/// True if a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
 pub(super) fn dips(
     world: &World,
     pair: &ContactPair,
@@ -48,7 +48,7 @@ pub(super) fn dips(
     dt: f64,
     depth: f64,
 ) -> bool {
-    let reach = pair.law().reach() + pair.smoothing.force_band();
+    let reach = pair.law().cutoff() + pair.smoothing.force_band();
     let Some(passage) = Passage::new(world, pair, ends, dt) else { return false };
     passage.each_near(reach).any(|(point, distance)| {
         // Most of those that are asked about touch.
@@ -63,30 +63,30 @@ pub(super) fn dips(
 /// Samples beside a field at both ends of a step.
 struct Passage<'a> {
     /// At the start.
-    patch: Patch<'a>,
+    query: ContactQuery<'a>,
     ends: [State; 2],
-    /// How far a sample moves at most \[m\].
+    /// Largest distance that a sample moves \[m\].
     travel: f64,
 }
 
 impl<'a> Passage<'a> {
     /// Of `pair` in a step of `dt` \[s\].
     fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
-        let ends = ends.map(|states| world.seen_value(pair, states));
-        let patch = world.patch(pair, ends[0])?;
-        let radius = patch.surface.radius_about(&patch.com);
+        let ends = ends.map(|states| world.relative_value(pair, states));
+        let query = world.contact_query(pair, ends[0])?;
+        let radius = query.surface.radius_about(&query.com);
         let travel = dt * ends[0].speed_within(radius).max(ends[1].speed_within(radius));
-        Some(Self { patch, ends, travel })
+        Some(Self { query, ends, travel })
     }
 
     /// The samples that may come within `reach` \[m\], each with its center's distance at the start \[m\].
     fn each_near(&self, reach: f64) -> impl Iterator<Item = (&SurfacePoint, f64)> {
-        self.patch.each_near(reach, self.travel)
+        self.query.each_near(reach, self.travel)
     }
 
     /// The gaps of a sample beyond `reach` \[m\] and their rates \[m/s\], at both ends.
     fn gaps(&self, point: &SurfacePoint, reach: f64) -> [Option<[f64; 2]>; 2] {
-        let Patch { com, field, .. } = self.patch;
+        let ContactQuery { com, field, .. } = self.query;
         self.ends.map(|state| {
             let arm = state.pose.rotation * (point.position - com);
             let place = (state.pose.translation.vector + arm).into();
@@ -120,7 +120,7 @@ fn least(from: [f64; 2], to: [f64; 2], dt: f64) -> f64 {
     inside.min(from[0]).min(to[0])
 }
 
-/// Where the cubic with a value and a slope at 0 and at `dt` changes its sign, if the values differ in theirs.
+/// Zero of the cubic with a value and a slope at 0 and at `dt`, if the values differ in their signs.
 fn crossing(from: [f64; 2], to: [f64; 2], dt: f64) -> Option<f64> {
     let a = from[0];
     if (a > 0.0) == (to[0] > 0.0) {
@@ -144,7 +144,8 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::{Body, ContactBodies, Coulomb, HalfSpace, KelvinVoigt, Law, RigidBody, Surface};
+    use crate::fields::HalfSpace;
+    use crate::{Body, ContactBodies, Coulomb, KelvinVoigt, Law, RigidBody, Surface};
 
     /// A foot that comes down and goes up again by the cubic whose least value is a quarter of the way of its speed below both ends.
     #[test]
@@ -152,9 +153,9 @@ mod tests {
         let (dt, speed, depth) = (0.01, 0.4, 1e-4);
         let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
         let mut world = World::new(Vector3::zeros());
-        let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+        let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let samples = world.add(Body::free("foot", rigid).with_surface(surface));
+        let samples = world.add(Body::dynamic("foot", rigid).with_surface(surface));
         let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
         let bodies = ContactBodies { samples, field };

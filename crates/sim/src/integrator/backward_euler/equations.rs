@@ -10,10 +10,10 @@ use prehend_autodiff::{Fwd, Scalar};
 
 use crate::body::RigidBody;
 use crate::error::SimulationError;
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body_id::BodyId;
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
 pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -> State<S> {
@@ -32,7 +32,7 @@ pub(super) fn excess<S: Scalar>(
     dt: f64,
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
-    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, S::constant(dt));
+    let (linear, momentum) = body.apply_impulse(state, wrench, &world.gravity, S::constant(dt));
     let rotation = turned(&state.pose.rotation, &Vector3::new(wx, wy, wz).map(|w| w.times(dt)));
     let angular = body.angular(&rotation, &momentum);
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
@@ -112,7 +112,7 @@ impl ImplicitStep<'_> {
             let at = velocity_at(x, slot);
             let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
             let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
-            let state = self.states[body].lift();
+            let state = self.states[body].cast();
             let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
             let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
             write(slot, slot, by(0));
@@ -145,8 +145,8 @@ impl Equations for ImplicitStep<'_> {
         let mut wrenches: Vec<Vector6<f64>> =
             self.world.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
-        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
-        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::lift);
+        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::cast).collect();
+        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::cast);
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
             let bodies = [pair.bodies.samples, pair.bodies.field];
@@ -154,11 +154,12 @@ impl Equations for ImplicitStep<'_> {
                 if let Some(slot) = slots[body] {
                     let at = velocity_at(x, slot);
                     let velocity = std::array::from_fn(|i| Fwd::variable(at[i], lane + i));
-                    states[body] = arrived(&self.states[body].lift(), &velocity, dt);
+                    states[body] = arrived(&self.states[body].cast(), &velocity, dt);
                 }
             }
             let deflection = pair.law().bristles().and_then(|_| deflections.next());
-            let effect = self.lifted.effect(pair, &states, deflection.as_ref(), self.step.index);
+            let effect =
+                self.lifted.pair_wrench(pair, &states, deflection.as_ref(), self.step.index);
             for (on, wrench) in bodies.into_iter().zip([effect.on_samples, effect.on_field]) {
                 wrenches[on] += wrench.map(|w| w.value);
                 let Some(row) = slots[on] else { continue };
@@ -170,7 +171,7 @@ impl Equations for ImplicitStep<'_> {
                     }
                 }
             }
-            bodies.into_iter().for_each(|body| states[body] = ends[body].lift());
+            bodies.into_iter().for_each(|body| states[body] = ends[body].cast());
         }
         let jacobian = self.jacobian(x, &wrenches, &by_velocity)?;
         Ok((self.excesses(x, &wrenches), jacobian))

@@ -45,7 +45,7 @@ const LOWER: [[f64; 7]; 2] = [
     [-1.0 / 20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 20.0],
 ];
 
-/// Where a step leads.
+/// States that a step leads to.
 pub(in crate::integrator) struct Trial<S: Scalar> {
     /// The states at its stages, the last of which is its end.
     pub(in crate::integrator) stages: Vec<Vec<State<S>>>,
@@ -53,9 +53,9 @@ pub(in crate::integrator) struct Trial<S: Scalar> {
     pub(in crate::integrator) wrenches: Vec<Vector6<S>>,
 }
 
-/// How far off a step may be.
+/// Estimated errors of a step.
 pub(in crate::integrator) struct Estimate<S: Scalar> {
-    /// Of each free body and contact that sticks, by how much the solutions of fifth and fourth order differ.
+    /// For each free body and contact with bristles, by how much the solutions of fifth and fourth order differ.
     orders: Vec<Change<S>>,
     /// Divided differences of its slopes.
     third: [Vec<Change<S>>; 3],
@@ -107,7 +107,7 @@ impl<S: Scalar> Trial<S> {
 }
 
 impl<S: Scalar> Estimate<S> {
-    /// How far off `part` of the numbers of free body or contact `i` may be, at kinks too.
+    /// Estimated error of `part` of the numbers of free body or contact `i`, at kinks too.
     ///
     /// The two orders differ as those of a smooth motion do. Their weights nearly cancel on either side of the gap between the
     /// stages at 3/10 and 4/5: of a slope that jumps in there they see eighty times less than what is wrong. There, divided

@@ -10,6 +10,8 @@ use prehend_geometry::mjcf::{
 use super::super::constraints::{Mobility, limits, losses};
 use super::MjcfError;
 use super::lengths::{Along, Lengths, length_and_inertia};
+use crate::handle::BodyId;
+use crate::handle::JointForceId;
 use crate::joint_law::activation::Activation;
 use crate::joint_law::affine_actuator::AffineActuator;
 use crate::joint_law::dynamic::DynJointLaw;
@@ -17,8 +19,7 @@ use crate::joint_law::polynomial::{PolynomialDamper, PolynomialSpring};
 use crate::joint_law::slack_spring::SlackSpring;
 use crate::joint_law::spring::JointSpring;
 use crate::world::World;
-use crate::world::body_id::BodyId;
-use crate::world::joint_force::{JointAxis, JointForceId};
+use crate::world::joint_force::JointAxis;
 use crate::world::path::{Path, PathPart};
 use crate::world::transmission::Rotor;
 

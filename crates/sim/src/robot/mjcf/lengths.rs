@@ -129,7 +129,7 @@ impl Lengths<'_> {
 
 /// The length of a path, and the inertia along it, with the joints at coordinates `q`.
 pub(super) fn length_and_inertia(tree: &Articulation, q: &[f64], path: &Path) -> [f64; 2] {
-    let at = tree.kinematics(q, &vec![0.0; tree.freedoms()]);
+    let at = tree.kinematics(q, &vec![0.0; tree.nv()]);
     let length = path.length(&at, false);
     let slopes = DMatrix::from_row_slice(1, length.slopes.len(), &length.slopes);
     let mass = at.mass_matrix();

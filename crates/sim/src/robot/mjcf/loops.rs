@@ -6,11 +6,11 @@ use prehend_geometry::mjcf::{EqualityKind, Model, SolverParameters};
 use super::super::constraints::Mobility;
 use super::forces::stiffness;
 use super::{MjcfError, MjcfOptions, MjcfRobot};
+use crate::handle::BodyId;
 use crate::world::World;
 use crate::world::body::Body;
-use crate::world::body_id::BodyId;
+use crate::world::bushing::{Bushing, BushingStiffness};
 use crate::world::joint_force::JointAxis;
-use crate::world::weld::{Weld, WeldStiffness};
 
 /// Mobility that counts, as part of that of the most mobile direction.
 const LEAST_MOBILITY: f64 = 1e-2;
@@ -42,7 +42,7 @@ impl World {
             let ends = |world: &mut Self, bodies: &[Option<usize>; 2]| {
                 bodies.map(|body| match body {
                     Some(body) => robot.bodies[body],
-                    None => *ground.get_or_init(|| world.add(Body::kinematic("model's world"))),
+                    None => *ground.get_or_init(|| world.add(Body::fixed("model's world"))),
                 })
             };
             match &equality.kind {
@@ -52,7 +52,7 @@ impl World {
                     let frames = placed(anchors, fixed, &options.t_world_model);
                     let held =
                         self.held(bodies, &frames, mobility, &equality.solver, options.softness);
-                    self.add_weld(Weld { bodies, frames, stiffness: weld(held, 0.0) })?;
+                    self.add_bushing(Bushing { bodies, frames, stiffness: bushing(held, 0.0) })?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
                     let fixed = bodies.map(|body| body.is_none());
@@ -62,8 +62,8 @@ impl World {
                     frames[0].rotation *= *rotation;
                     let held =
                         self.held(bodies, &frames, mobility, &equality.solver, options.softness);
-                    let stiffness = weld(held, *torque_scale);
-                    self.add_weld(Weld { bodies, frames, stiffness })?;
+                    let stiffness = bushing(held, *torque_scale);
+                    self.add_bushing(Bushing { bodies, frames, stiffness })?;
                 }
                 EqualityKind::Tendon { .. } => {
                     let name = &equality.name;
@@ -117,9 +117,9 @@ impl World {
         mobility: &Mobility,
     ) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        let rest = vec![0.0; tree.freedoms()];
+        let rest = vec![0.0; tree.nv()];
         let at = tree.kinematics(&tree.neutral(), &rest);
-        let mut relative = DMatrix::zeros(3, tree.freedoms());
+        let mut relative = DMatrix::zeros(3, tree.nv());
         for ((body, point), sign) in bodies.into_iter().zip(points).zip([1.0, -1.0]) {
             if let Ok((_, link)) = self.link_of(body) {
                 relative += at.jacobian(link, &point).rows(0, 3) * sign;
@@ -136,9 +136,9 @@ impl World {
     }
 }
 
-/// A weld of this stiffness and damping, whose angles count as lengths by `torque_scale` \[m/rad\].
-fn weld([linear, linear_damping]: [f64; 2], torque_scale: f64) -> WeldStiffness {
+/// A bushing of this stiffness and damping, whose angles count as lengths by `torque_scale` \[m/rad\].
+fn bushing([linear, linear_damping]: [f64; 2], torque_scale: f64) -> BushingStiffness {
     let square = torque_scale * torque_scale;
     let (angular, angular_damping) = (linear * square, linear_damping * square);
-    WeldStiffness { linear, linear_damping, angular, angular_damping }
+    BushingStiffness { linear, linear_damping, angular, angular_damping }
 }

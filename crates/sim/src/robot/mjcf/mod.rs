@@ -12,28 +12,29 @@ use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Shape as MjcfShape, Tra
 use thiserror::Error;
 
 use crate::articulated::Joint;
-use crate::error::SimulationError;
+use crate::error::{BuildError, SimulationError};
+use crate::handle::BodyId;
+use crate::handle::JointForceId;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
 use crate::world::World;
-use crate::world::body_id::BodyId;
-use crate::world::joint_force::{JointAxis, JointForceId};
+use crate::world::joint_force::JointAxis;
 
-/// How a robot in MJCF becomes part of a world.
+/// Options of reading a robot in MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfOptions {
     /// Model's world → world.
     pub t_world_model: Isometry3<f64>,
     /// How bodies that would be fixed to the model's world hang on it instead: on a slide that lifts a gripper, for instance.
     pub base: Joint,
-    /// Whether bodies get the shapes that collide, as samples and fields; contacts are up to the caller. Meshes are their convex hulls, as in MuJoCo.
+    /// True if bodies get the shapes that collide, as samples and fields; contacts are up to the caller. Meshes are their convex hulls, as in MuJoCo.
     pub shapes: bool,
     /// Lengths of those shapes.
     pub shape_options: ShapeOptions,
     /// Time constants of loops and couplings as a part of those in the file. MuJoCo pushes within its constraints against what would violate them;
     /// springs alone have to be stiffer to give way no more. Limits have those of the file.
     pub softness: f64,
-    /// Whether to go on without what of the model has no counterpart and yet changes how it moves.
+    /// Permission to go on without what of the model has no counterpart and yet changes how it moves.
     pub partial: bool,
 }
 
@@ -55,7 +56,7 @@ pub struct MjcfRobot {
     pub joints: Vec<(String, JointAxis)>,
     /// Each actuator with its name, to set its `"control"`.
     pub actuators: Vec<(String, JointForceId)>,
-    /// What of the model has no counterpart, in words.
+    /// Parts of the model without a counterpart, in words.
     pub warnings: Vec<String>,
     /// The link of each actuator with a state, whose velocity is that state, in the order of MuJoCo's `act`.
     pub activations: Vec<BodyId>,
@@ -92,9 +93,12 @@ pub enum MjcfError {
         /// What is wrong.
         error: ShapeError,
     },
-    /// Its bodies are no articulation, or a force or state does not fit.
+    /// Its bodies are no articulation, or a force does not fit.
     #[error(transparent)]
-    World(#[from] SimulationError),
+    World(#[from] BuildError),
+    /// A state does not fit.
+    #[error(transparent)]
+    State(#[from] SimulationError),
     /// Positions that are too few or too many.
     #[error("{given} positions for a model of {expected}")]
     Positions {

@@ -37,7 +37,7 @@ impl MjcfRobot {
             };
             world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
         }
-        world.place_links(states);
+        world.forward_kinematics(states);
         Ok(())
     }
 
@@ -69,7 +69,7 @@ impl MjcfRobot {
             }
             world.write_joint(states, *link, &joint.position, &velocity)?;
         }
-        world.place_links(states);
+        world.forward_kinematics(states);
         Ok(())
     }
 
@@ -129,12 +129,12 @@ impl MjcfRobot {
         let mut column = 0;
         for (kind, link) in &self.moved {
             let Ok((_, link_index)) = world.link_of(*link) else { continue };
-            let [_, freedoms] = world.articulations[articulation].tree.range(link_index);
+            let [_, dofs] = world.articulations[articulation].tree.range(link_index);
             let n = kind.velocities();
-            turned.view_mut((freedoms.start, column), (n, n)).fill_with_identity();
+            turned.view_mut((dofs.start, column), (n, n)).fill_with_identity();
             if let (JointKind::Free, Ok(joint)) = (kind, world.joint(states, *link)) {
                 let axes = axes(&joint.position).transpose();
-                turned.view_mut((freedoms.start, column), (3, 3)).copy_from(&axes);
+                turned.view_mut((dofs.start, column), (3, 3)).copy_from(&axes);
             }
             column += n;
         }

@@ -44,7 +44,7 @@ impl World {
                         normal: nalgebra::Unit::new_normalize(normal),
                         height: normal.dot(&place),
                     };
-                    let body = Body::kinematic(&geom.name);
+                    let body = Body::fixed(&geom.name);
                     self.add(body.with_field(std::sync::Arc::new(field)));
                     continue;
                 }
@@ -75,7 +75,7 @@ fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeE
     Ok(Some(Shape::from_parry_with(&Compound::new(parts), options)?))
 }
 
-/// Whether a geom collides and has a shape here: terrain has none.
+/// True if a geom collides and has a shape here: terrain has none.
 fn touches(geom: &Geom) -> bool {
     geom.collides() && !matches!(geom.shape, MjcfShape::HeightField(_))
 }

@@ -12,7 +12,7 @@ const ITERATIONS: usize = 30;
 
 /// A way that touches an obstacle.
 pub(super) struct Wrapped<S: Scalar> {
-    /// Where it begins and ends to touch \[m\].
+    /// Points where it begins and ends to touch \[m\].
     pub(super) touch: [Vector3<S>; 2],
     /// Its length between them \[m\].
     pub(super) length: S,
@@ -81,7 +81,7 @@ fn across<S: Scalar>(x: &Vector3<S>) -> Vector3<S> {
     normal / normal.norm()
 }
 
-/// Which way the shortest one around a circle turns, clockwise or not; `None` where it is straight.
+/// Sense in which the shortest one around a circle turns, clockwise or not; `None` where it is straight.
 fn chosen(ends: [Vector2<f64>; 2], radius: f64, side: Option<Vector2<f64>>) -> Option<bool> {
     let [a, b] = ends;
     let leans: f64 = ends.iter().map(|p| (radius / p.norm()).min(1.0).acos()).sum();
@@ -104,7 +104,7 @@ fn angle(from: &Vector2<f64>, to: &Vector2<f64>) -> f64 {
     from.perp(to).atan2(from.dot(to))
 }
 
-/// Where the tangents from two points touch a circle, and the length of the arc between.
+/// Points where the tangents from two points touch a circle, and the length of the arc between.
 fn tangents<S: Scalar>(
     [a, b]: [Vector2<S>; 2],
     radius: f64,

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law, RigidBody, State,
-    Surface, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, State, Surface, World,
 };
 
 /// A brick over a floor, free or as a link.
@@ -18,13 +18,13 @@ fn worlds() -> [(World, Vec<State>); 2] {
     let (velocity, spin) = (Vector3::new(0.3, -0.1, -0.5), Vector3::new(2.0, 3.0, -1.0));
     [false, true].map(|linked| {
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let floor = Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor()));
+        let floor = Body::fixed("floor").with_field(Arc::new(HalfSpace::floor()));
         let floor = world.add(floor);
         let brick = if linked {
             let link = Link::new("brick", Joint::Floating, &rigid);
             world.add_articulation(vec![link]).unwrap()[0]
         } else {
-            world.add(Body::free("brick", rigid))
+            world.add(Body::dynamic("brick", rigid))
         };
         let surface = Surface::cuboid([0.02, 0.03, 0.01], 0.01).unwrap();
         world.bodies[brick].surface = Some(Arc::new(surface));

@@ -11,7 +11,7 @@ const STEPS: TimeSteps = TimeSteps { dt: 2e-4, steps: 6 };
 /// Whether contacts push at the start.
 fn touches((world, states): &(World, Vec<State>)) -> bool {
     let mut world = world.clone();
-    world.welds.clear();
+    world.bushings.clear();
     world.bodies.iter().zip(world.wrenches(states, 0)).any(|(_, wrench)| wrench.norm() > 0.1)
 }
 
@@ -26,16 +26,16 @@ fn weighed<S: Scalar>(
     let world = world.with_parameters(&moved).unwrap();
     let mut rest = x[parameters.len()..].iter().copied();
     let mut next = || rest.next().unwrap();
-    let mut start: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
     start[1] = states[1].retract(&std::array::from_fn(|_| next()));
     let links = world.articulations[0].bodies().to_vec();
     for (link, body) in world.articulations[0].tree.links().iter().zip(links) {
         let at = world.joint(&start, body).unwrap();
-        let freedoms = link.joint.freedoms();
+        let dofs = link.joint.nv();
         let velocity: Vec<S> = at.velocity.iter().map(|v| *v + next()).collect();
         // Along coordinates, quaternions too: they are normalized where they are read.
         let position: Vec<S> = at.position.iter().map(|q| *q + next()).collect();
-        assert_eq!(velocity.len(), freedoms);
+        assert_eq!(velocity.len(), dofs);
         world.set_joint(&mut start, body, &position, &velocity).unwrap();
     }
     let end = world.simulate_with(integrator, &start, STEPS, |_, _| ()).unwrap().states;
@@ -53,7 +53,7 @@ fn weighed<S: Scalar>(
 
 fn inputs((world, _): &(World, Vec<State>)) -> usize {
     let joints = world.articulations[0].tree.links().iter().map(|link| &link.joint);
-    let joints = joints.map(|joint| joint.coordinates() + joint.freedoms());
+    let joints = joints.map(|joint| joint.nq() + joint.nv());
     world.parameters().len() + 12 + joints.sum::<usize>()
 }
 

@@ -1,21 +1,22 @@
-//! Welds and the loops that they close.
+//! Bushings and the loops that they close.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
+use prehend_sim::joint_law::{JointLimits, JointSpring};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, JointLimits, JointSpring, Motion, RigidBody, SimulationError,
-    State, Step, TimeSteps, Weld, WeldStiffness, World,
+    BackwardEuler, Body, BodyId, Bushing, BushingStiffness, Motion, RigidBody, SimulationError,
+    State, Step, TimeSteps, World,
 };
 
 #[test]
-fn a_welded_ball_is_an_oscillator() {
+fn a_sprung_ball_is_an_oscillator() {
     let mut world = World::new(Vector3::zeros());
     let rigid = RigidBody::ball(0.5, 0.1).unwrap();
-    let (post, ball) = (world.add(Body::kinematic("post")), world.add(Body::free("ball", rigid)));
+    let (post, ball) = (world.add(Body::fixed("post")), world.add(Body::dynamic("ball", rigid)));
     let stiffness =
-        WeldStiffness { linear: 50.0, linear_damping: 0.0, angular: 0.2, angular_damping: 0.0 };
+        BushingStiffness { linear: 50.0, linear_damping: 0.0, angular: 0.2, angular_damping: 0.0 };
     let frames = [Isometry3::identity(); 2];
-    world.add_weld(Weld { bodies: [ball, post], frames, stiffness }).unwrap();
+    world.add_bushing(Bushing { bodies: [ball, post], frames, stiffness }).unwrap();
     let turn = Vector3::new(0.0, 0.0, 0.3);
     let mut states = world.neutral_states();
     states[ball] = State::at_rest(Isometry3::new(Vector3::new(0.02, 0.0, 0.0), turn));
@@ -42,42 +43,42 @@ fn parallelogram() -> (World, [BodyId; 2]) {
     ];
     let bodies = world.add_articulation(links).unwrap();
     let frames = [Isometry3::translation(1.0, 0.0, 0.0), Isometry3::translation(0.0, 0.0, -1.0)];
-    let stiffness = WeldStiffness::critical(1.0, 0.0, 2e-3);
-    world.add_weld(Weld { bodies: [bodies[2], bodies[1]], frames, stiffness }).unwrap();
+    let stiffness = BushingStiffness::critical(1.0, 0.0, 2e-3);
+    world.add_bushing(Bushing { bodies: [bodies[2], bodies[1]], frames, stiffness }).unwrap();
     (world, [bodies[0], bodies[1]])
 }
 
 #[test]
-fn a_weld_feels_the_center_of_mass_and_what_knows_no_welds_refuses() {
+fn a_bushing_feels_the_center_of_mass_and_what_knows_no_bushings_refuses() {
     use prehend_autodiff::Fwd;
     let mut world = World::new(Vector3::zeros());
     let rigid = RigidBody::ball(0.5, 0.1).unwrap().moved(&Isometry3::translation(0.05, 0.0, 0.0));
-    let (post, ball) = (world.add(Body::kinematic("post")), world.add(Body::free("ball", rigid)));
-    let stiffness = WeldStiffness { angular: 3.0, ..WeldStiffness::critical(1.0, 0.1, 0.1) };
+    let (post, ball) = (world.add(Body::fixed("post")), world.add(Body::dynamic("ball", rigid)));
+    let stiffness = BushingStiffness { angular: 3.0, ..BushingStiffness::critical(1.0, 0.1, 0.1) };
     let frames = [Isometry3::translation(0.1, 0.2, 0.0), Isometry3::identity()];
-    world.add_weld(Weld { bodies: [ball, post], frames, stiffness }).unwrap();
+    world.add_bushing(Bushing { bodies: [ball, post], frames, stiffness }).unwrap();
     let turned = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::new(0.3, 0.1, -0.5));
     let wrench = |x: f64| {
         let moved = rigid.moved(&Isometry3::translation(0.0, x, 0.0));
         let mut world = world.clone();
-        world.bodies[ball].motion = Motion::Free(moved);
+        world.bodies[ball].motion = Motion::Dynamic(moved);
         let mut states = world.neutral_states();
         states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) };
         world.wrenches(&states, 0)[ball]
     };
     let difference = (wrench(1e-6) - wrench(-1e-6)) / 2e-6;
-    let mut lifted = world.lift::<Fwd<1>>();
+    let mut lifted = world.cast::<Fwd<1>>();
     let mut parameters = lifted.parameters();
     // Of the free body: mass, inertia, and of its center of mass x, then y.
     parameters[6 + 1 + 6 + 1].derivative[0] = 1.0;
     lifted = world.with_parameters(&parameters).unwrap();
     let mut states = lifted.neutral_states();
-    states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) }.lift();
+    states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) }.cast();
     let slopes = lifted.wrenches(&states, 0)[ball].map(|x| x.derivative[0]);
     assert!(difference.norm() > 1.0 && (slopes - difference).norm() < 1e-6, "{slopes}{difference}");
     let states = world.neutral_states();
     let refused = world.step(&BackwardEuler, &states, Step::new(0, 1e-3));
-    assert!(matches!(refused, Err(SimulationError::Welds { .. })));
+    assert!(matches!(refused, Err(SimulationError::Bushings { .. })));
 }
 
 /// A spring along one axis of a ball joint, where axes are not those of the rotation vector, keeps energy.

@@ -3,7 +3,7 @@
 mod free_body;
 mod golden;
 mod gradients;
-mod linear_step;
+mod linearize_step;
 mod loops;
 mod pendulum;
 mod scenes;

@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
+use prehend_sim::joint_law::{JointDamper, JointLimits, JointSpring};
 use prehend_sim::{
-    Adaptive, BodyId, Integrator, JointDamper, JointLimits, JointSpring, RigidBody, RungeKutta4,
-    SemiImplicitEuler, State, TimeSteps, World,
+    Adaptive, BodyId, Integrator, RigidBody, RungeKutta4, SemiImplicitEuler, State, TimeSteps,
+    World,
 };
 
 const GRAVITY: f64 = 9.81;

@@ -6,10 +6,13 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, V
 use prehend_autodiff::Scalar;
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::{Joint, JointModel, Link};
+use prehend_sim::fields::{HalfSpace, Sphere};
+use prehend_sim::joint_law::{
+    JointDamper, JointFriction, JointLimits, JointSpring, PositionServo, VelocityServo,
+};
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, JointDamper,
-    JointFriction, JointLimits, JointSpring, KelvinVoigt, Law, PositionServo, RigidBody, Sphere,
-    State, Sticking, Surface, VelocityServo, Weld, WeldStiffness, World,
+    Body, BristleFriction, Bushing, BushingStiffness, ContactBodies, Coulomb, DynContactLaw,
+    GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World,
 };
 
 /// A nut on a thread.
@@ -17,7 +20,7 @@ use prehend_sim::{
 struct Thread;
 
 impl JointModel for Thread {
-    fn freedoms(&self) -> usize {
+    fn nv(&self) -> usize {
         1
     }
     fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
@@ -70,7 +73,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     let links = (0..count).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
     let links: Vec<Link> = links.collect();
     let mut world = World::new(Vector3::new(0.1, -0.2, -9.81));
-    let floor = Body::kinematic("floor")
+    let floor = Body::fixed("floor")
         .with_field(Arc::new(HalfSpace { height: -0.02, ..HalfSpace::floor() }));
     let floor = world.add(floor);
     let ball = |world: &mut World, body, radius: f64| {
@@ -78,18 +81,18 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         body.surface = Some(Arc::new(Surface::ball(radius).unwrap()));
         body.field = Some(Arc::new(Sphere { center: Point3::origin(), radius }));
     };
-    let free = world.add(Body::free("ball", RigidBody::ball(0.3, 0.06).unwrap()));
+    let free = world.add(Body::dynamic("ball", RigidBody::ball(0.3, 0.06).unwrap()));
     ball(&mut world, free, 0.06);
     let bodies = world.add_articulation(links).unwrap();
     bodies.iter().for_each(|body| ball(&mut world, *body, 0.08));
     let (slides, smoothing) = coulomb_law();
-    let holds = Sticking { friction: FRICTION, deflection: 1e-3 };
+    let holds = BristleFriction { friction: FRICTION, deflection: 1e-3 };
     let holds: Arc<dyn DynContactLaw> = Arc::new(Law::new(SPRING, holds).unwrap());
     for (index, &samples) in bodies.iter().enumerate() {
         let field = if index % 2 == 0 { floor } else { free };
         let law = if index % 3 == 2 { holds.clone() } else { slides.clone() };
         world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
-        let moves = world.articulations[0].tree.links()[index].joint.freedoms();
+        let moves = world.articulations[0].tree.links()[index].joint.nv();
         if moves == 0 || matches!(world.articulations[0].tree.links()[index].joint, Joint::Floating)
         {
             continue;
@@ -125,9 +128,9 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         ];
         let (others, last) = ([free, floor], bodies[count - 1]);
         let inertia = if seed.is_multiple_of(2) { 1e-3 } else { 0.0 };
-        let stiffness = WeldStiffness::critical(0.03, inertia, 0.05);
+        let stiffness = BushingStiffness::critical(0.03, inertia, 0.05);
         let bodies = [last, others[seed as usize % 5]];
-        world.add_weld(Weld { bodies, frames, stiffness }).unwrap();
+        world.add_bushing(Bushing { bodies, frames, stiffness }).unwrap();
     }
     let mut states = world.neutral_states();
     states[free].pose.translation.vector = Vector3::new(0.05, 0.02, 0.03);
@@ -138,7 +141,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         let mut q: Vec<f64> = joint.neutral().to_vec();
         let change = numbers(q.len());
         q.iter_mut().zip(change).for_each(|(q, x)| *q += 0.3 * x);
-        let v = numbers(joint.freedoms());
+        let v = numbers(joint.nv());
         world.set_joint(&mut states, link, &q, &v).unwrap();
     }
     (world, states)

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
-use prehend_sim::{Body, ContactBodies, HalfSpace, JointDamper, RigidBody, State, Surface, World};
+use prehend_sim::fields::HalfSpace;
+use prehend_sim::joint_law::JointDamper;
+use prehend_sim::{Body, ContactBodies, RigidBody, State, Surface, World};
 
 use super::scenes::coulomb_law;
 
@@ -19,7 +21,7 @@ fn an_accelerometer_shows_the_motion_less_free_fall() {
         Link::new("hand", Joint::Revolute(Vector3::x_axis()), &rigid).on(1, place(-0.3)),
     ];
     let bodies = world.add_articulation(links).unwrap();
-    let stone = world.add(Body::free("stone", rigid));
+    let stone = world.add(Body::dynamic("stone", rigid));
     world.bodies[stone].external_wrench.x = 2.0;
     world.bodies[bodies[2]].external_wrench.y = 3.0;
     let mut states = world.neutral_states();
@@ -50,7 +52,7 @@ fn an_accelerometer_shows_the_motion_less_free_fall() {
 #[test]
 fn a_link_at_rest_feels_the_floor_that_carries_it() {
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.4, 0.05).unwrap();
     let slide = Joint::Prismatic(Vector3::z_axis());
     let place = Isometry3::new(Vector3::new(0.3, 0.0, 0.05), Vector3::z() * 0.5);

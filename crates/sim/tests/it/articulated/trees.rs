@@ -61,9 +61,9 @@ fn end_by_two<S: Scalar>(
     (world, states): &(World, Vec<State>),
     [gravity, velocity]: [S; 2],
 ) -> (World<S>, Vec<State<S>>) {
-    let mut world = world.lift::<S>();
+    let mut world = world.cast::<S>();
     world.gravity.z = gravity;
-    let mut states: Vec<State<S>> = states.iter().map(State::lift).collect();
+    let mut states: Vec<State<S>> = states.iter().map(State::cast).collect();
     let link = world.articulations[0].bodies()[0];
     let mut joint = world.joint(&states, link).unwrap();
     if let Some(first) = joint.velocity.first_mut() {
@@ -112,7 +112,7 @@ fn error_control_records_what_forward_mode_carries() {
 }
 
 fn heights_of_five<S: Scalar>(ends: impl Iterator<Item = Vec<State<S>>>, world: &World) -> S {
-    let lifted = world.lift();
+    let lifted = world.cast();
     ends.fold(S::constant(0.0), |sum, end| sum + height(&lifted, &end))
 }
 

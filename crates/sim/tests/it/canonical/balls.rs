@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
-use prehend_sim::{Body, DynContactLaw, GapSmoothing, Sphere, State, Surface, TimeSteps, World};
+use prehend_sim::fields::Sphere;
+use prehend_sim::{Body, DynContactLaw, GapSmoothing, State, Surface, TimeSteps, World};
 
 use super::integrators::{INPUTS, Scheme};
 use super::laws::{G, Law, Spec};
@@ -33,7 +34,7 @@ fn two_balls(
     let inertia = 0.4 * MASS * RADIUS * RADIUS;
     let [a, b] = points.map(|points| {
         let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
-        let ball = Body::free("ball", rigid(MASS, inertia));
+        let ball = Body::dynamic("ball", rigid(MASS, inertia));
         world.add(
             ball.with_surface(surface)
                 .with_field(Arc::new(Sphere { center: Point3::origin(), radius: RADIUS })),
@@ -105,7 +106,7 @@ pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
     let bounces = (0..20).map(|phase| {
         let start = above_floor(1.0 + dt * f64::from(phase) / 20.0, -Vector3::z());
-        let start = [start[0].lift(), varied(&start[BODY], &[(2, 0), (8, 1)])];
+        let start = [start[0].cast(), varied(&start[BODY], &[(2, 0), (8, 1)])];
         let end = scheme.method.differentiate(&world, &start, time_steps).unwrap()[BODY];
         let [by_height, by_speed, ..] = end.pose.translation.z.derivative;
         let speed = if scheme.keeps_energy { 1.0 } else { end.linear.z.value };

@@ -11,7 +11,7 @@ use super::scene::{down, rigid};
 /// Velocity −n g dt, and the scheme's own sum of it.
 pub(crate) fn free_fall(scheme: &Scheme) -> Vec<Row> {
     let mut world = World::new(down());
-    world.add(Body::free("body", rigid(0.3, 1e-3)));
+    world.add(Body::dynamic("body", rigid(0.3, 1e-3)));
     let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
     let end = scheme.end(&world, &[State::at_rest(Isometry3::identity())], time_steps)[0];
     let (dt, n) = (time_steps.dt, time_steps.steps as f64);
@@ -29,7 +29,7 @@ fn spinning(
 ) -> (World, State) {
     let mut world = World::new(Vector3::zeros());
     let inertia = Matrix3::from_diagonal(&inertia);
-    world.add(Body::free("top", RigidBody::new(0.3, inertia, Point3::origin()).unwrap()));
+    world.add(Body::dynamic("top", RigidBody::new(0.3, inertia, Point3::origin()).unwrap()));
     let pose = Isometry3::from_parts(nalgebra::Translation3::identity(), tilt);
     (world, State { angular: tilt * spin, ..State::at_rest(pose) })
 }

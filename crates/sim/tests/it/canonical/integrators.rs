@@ -5,7 +5,7 @@ use std::f64::consts::SQRT_2;
 use prehend_autodiff::Fwd;
 use prehend_sim::{
     BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
-    TimeSteps, VelocityVerlet, World,
+    TimeSteps, World,
 };
 
 /// An integrator.
@@ -29,14 +29,6 @@ pub(crate) const SCHEMES: &[Scheme] = &[
         method: &SemiImplicitEuler,
         stable_below: Some(2.0),
         fall_lead: 1.0,
-        keeps_energy: true,
-        keeps_angular_momentum: true,
-    },
-    Scheme {
-        name: "velocity Verlet",
-        method: &VelocityVerlet,
-        stable_below: Some(2.0),
-        fall_lead: 0.0,
         keeps_energy: true,
         keeps_angular_momentum: true,
     },
@@ -98,7 +90,7 @@ impl<I: Integrator> Method for I {
         start: &[State<Fwd<INPUTS>>],
         time_steps: TimeSteps,
     ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
-        world.lift().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
+        world.cast().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
     }
 }
 

@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
-use prehend_sim::{
-    BodyId, JointDamper, JointSpring, RigidBody, SimulationError, State, Step, TimeSteps, World,
-};
+use prehend_sim::joint_law::{JointDamper, JointSpring};
+use prehend_sim::{BodyId, RigidBody, SimulationError, State, Step, TimeSteps, World};
 
 use super::integrators::Scheme;
 use super::laws::G;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use prehend_sim::contact::restitution::{
     approach_restitution, hunt_crossley_restitution, restitution,
 };
+use prehend_sim::contact::{ApproachDamped, GraspD, GraspDParameters, Hertz, NormalLaw, Stribeck};
 use prehend_sim::{
-    ApproachDamped, Coulomb, DynContactLaw, GraspD, GraspDParameters, Hertz, HuntCrossley,
-    KelvinVoigt, Law as Product, NormalLaw, StaticContactTarget, Stribeck,
+    ContactCalibration, Coulomb, DynContactLaw, HuntCrossley, KelvinVoigt, Law as Product,
 };
 
 /// Gravity \[m/s²\].
@@ -33,8 +33,8 @@ pub(crate) struct Spec {
 }
 
 impl Spec {
-    fn target(&self) -> StaticContactTarget {
-        StaticContactTarget {
+    fn target(&self) -> ContactCalibration {
+        ContactCalibration {
             mass: self.mass,
             gravity: G,
             penetration: self.depth,

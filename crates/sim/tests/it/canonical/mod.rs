@@ -4,7 +4,6 @@
 //! one entry in [`integrators::SCHEMES`], a law by one in [`laws::LAWS`], a problem by one in [`PROBLEMS`].
 
 mod balls;
-mod compliant_balance;
 mod flight;
 mod friction;
 mod integrators;

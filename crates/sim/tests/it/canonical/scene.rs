@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use prehend_sim::{Body, ContactBodies, GapSmoothing, HalfSpace, RigidBody, State, Surface, World};
+use prehend_sim::fields::HalfSpace;
+use prehend_sim::{Body, ContactBodies, GapSmoothing, RigidBody, State, Surface, World};
 
 use super::laws::{G, Law, Spec};
 
 /// Number of the free body in [`on_floor`].
 pub(crate) const BODY: usize = 1;
 
-/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a kinematic floor.
+/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a fixed floor.
 pub(crate) fn on_floor(
     law: &Law,
     spec: &Spec,
@@ -20,10 +21,10 @@ pub(crate) fn on_floor(
     inertia: f64,
 ) -> World {
     let mut world = World::new(gravity);
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = rigid(spec.mass, inertia);
     let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
-    let samples = world.add(Body::free("body", rigid).with_surface(surface));
+    let samples = world.add(Body::dynamic("body", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
     world.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
     world

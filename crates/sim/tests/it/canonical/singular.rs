@@ -1,8 +1,15 @@
 //! Where formulas divide by zero, and the friction cone.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_autodiff::Fwd;
 use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{Contact, GapSmoothing, HalfSpace, LeakSteps, Patch, State, Surface};
+use prehend_sim::contact::LeakSteps;
+use prehend_sim::fields::HalfSpace;
+use prehend_sim::{
+    Body, ContactBodies, ContactKinematics, GapSmoothing, RigidBody, State, Surface, World,
+};
 
 use super::laws::{Law, Spec};
 use super::rows::Row;
@@ -21,29 +28,40 @@ impl DistanceField for Flat {
 /// Forces and derivatives are numbers without slip, at the surface and where the field has no gradient.
 pub(crate) fn finite(law: &Law) -> Vec<Row> {
     let law = (law.build)(&Spec { damping: 0.5, friction: 0.5, ..SLAB });
-    let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
-    let bad = |height: f64, linear: Vector3<f64>, field: &dyn DistanceField| {
+    let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
+    let bad = |height: f64, linear: Vector3<f64>, field: &Arc<dyn DistanceField>| {
         let leaky = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
         let smoothings = [GapSmoothing::Hard, GapSmoothing::Softplus { width: 1e-4 }, leaky];
         let not_finite = |smoothing: GapSmoothing| {
+            let mut world = World::new(Vector3::zeros());
+            let field = world.add(Body::fixed("field").with_field(Arc::clone(field)));
+            let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
+            let samples = world.add(Body::dynamic("sample", rigid).with_surface(surface));
+            let bodies = ContactBodies { samples, field };
+            world.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
             let rest = State::at_rest(Isometry3::translation(0.0, 0.0, height));
             let state = State { linear, ..rest };
-            let com = Point3::origin();
-            let patch = Patch { surface: &surface, com, state, field, smoothing };
-            let jacobian = law.wrench_jacobian(law.params(), &patch, true);
-            let slopes = jacobian.by_params.iter().flat_map(|slope| slope.iter());
-            let all = jacobian.wrench.iter().chain(jacobian.by_state.as_flattened()).chain(slopes);
-            all.filter(|x| !x.is_finite()).count()
+            let fixed = State::at_rest(Isometry3::identity()).cast();
+            let by_state = world.cast().wrenches(&[fixed, state.variables()], 1)[samples];
+            let mut varied = world.cast::<Fwd<12>>();
+            for (k, p) in varied.contacts[0].params_mut().iter_mut().enumerate() {
+                p.derivative[k] = 1.0;
+            }
+            let by_params = varied.wrenches(&[fixed, state.cast()], 1)[samples];
+            let all = by_state.iter().chain(&by_params);
+            let numbers = all.flat_map(|x| x.derivative.into_iter().chain([x.value]));
+            numbers.filter(|x| !x.is_finite()).count()
         };
         smoothings.map(not_finite).iter().sum::<usize>() as f64
     };
     let (still, moving) = (Vector3::zeros(), Vector3::new(0.1, 0.0, -0.1));
-    let floor = HalfSpace::floor();
+    let floor: Arc<dyn DistanceField> = Arc::new(HalfSpace::floor());
+    let flat: Arc<dyn DistanceField> = Arc::new(Flat);
     vec![
         Row::new("not finite at u_t = 0", bad(-1e-3, still, &floor), 0.0, 0.0),
         Row::new("not finite at φ = 0", bad(0.0, moving, &floor), 0.0, 0.0),
         Row::new("not finite at φ = 0, u_t = 0", bad(0.0, still, &floor), 0.0, 0.0),
-        Row::new("not finite at ∇φ = 0", bad(-1e-3, moving, &Flat), 0.0, 0.0),
+        Row::new("not finite at ∇φ = 0", bad(-1e-3, moving, &flat), 0.0, 0.0),
     ]
 }
 
@@ -58,8 +76,9 @@ pub(crate) fn cone(law: &Law) -> Vec<Row> {
             for exponent in -14..6 {
                 let slip = Vector3::new(1.0, -0.5, 0.0) * 10f64.powi(exponent);
                 let normal = Vector3::z();
-                let contact = Contact { gap: -depth, normal_speed, slip, normal, area: 1e-4 };
-                let force = law.response(law.params(), &contact);
+                let contact =
+                    ContactKinematics { gap: -depth, normal_speed, slip, normal, area: 1e-4 };
+                let force = law.force(law.params(), &contact);
                 let (across, limit) = (force.tangential.norm(), bound * force.normal);
                 worst = worst.max(if across == 0.0 { 0.0 } else { across / limit });
             }

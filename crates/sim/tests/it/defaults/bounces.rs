@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use prehend_autodiff::{Fwd, Scalar};
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Bounce, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, HuntCrossley, KelvinVoigt,
-    Law, State, StaticContactTarget, Surface, TimeSteps, World,
+    Adaptive, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
+    Law, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
 
@@ -21,7 +23,7 @@ const THROWS: [f64; 8] = [0.5, 0.58, 0.74, 0.96, 1.04, 1.1, 1.18, 1.22];
 
 /// A ball that rests `penetration` \[m\] deep, half a meter above the floor.
 fn ball(penetration: f64, damped_by: &str) -> (World, Vec<State>) {
-    let target = StaticContactTarget { mass: MASS, gravity: 9.81, penetration, contact_area: AREA };
+    let target = ContactCalibration { mass: MASS, gravity: 9.81, penetration, contact_area: AREA };
     let friction = Coulomb { friction: 0.3, slip_scale: 1e-2 };
     let bounce = Bounce { restitution: 0.7, impact_speed: 3.0 };
     let law: Arc<dyn DynContactLaw> = match damped_by {
@@ -44,10 +46,10 @@ fn ball(penetration: f64, damped_by: &str) -> (World, Vec<State>) {
 
 /// How fast it rises after 0.45 s, if thrown down with `speed` \[m/s\].
 fn rise<S: Scalar>((world, start): &(World, Vec<State>), speed: S, integrator: &Adaptive) -> S {
-    let mut start: Vec<State<S>> = start.iter().map(State::lift).collect();
+    let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
     start[1].linear.z = -speed;
     let once = TimeSteps { dt: 0.45, steps: 1 };
-    let run = world.lift().simulate_with(integrator, &start, once, |_, _| ()).unwrap();
+    let run = world.cast().simulate_with(integrator, &start, once, |_, _| ()).unwrap();
     run.states[1].linear.z
 }
 

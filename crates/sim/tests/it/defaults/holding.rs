@@ -1,13 +1,15 @@
-//! Contacts that stick hold.
+//! Contacts with bristles hold.
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Fwd;
+use prehend_sim::contact::Bounce;
+use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Adaptive, Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, DynContactLaw, GapSmoothing,
-    HalfSpace, HuntCrossley, KelvinVoigt, Law, RigidBody, State, StaticContactTarget, Sticking,
-    TimeSteps, World,
+    Adaptive, Body, BodyId, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
+    DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State, TimeSteps,
+    World,
 };
 
 use super::CONVERGED;
@@ -25,7 +27,7 @@ const MASS: f64 = 0.2;
 fn sticking() -> Arc<dyn DynContactLaw> {
     let normal = KelvinVoigt { stiffness: 1e8, damping: 5e5 };
     let friction = Coulomb { friction: 0.5, slip_scale: 2e-2 };
-    Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 }).unwrap())
+    Arc::new(Law::new(normal, BristleFriction { friction, deflection: 1e-4 }).unwrap())
 }
 
 /// A cube with round edges and four samples on each face.
@@ -35,7 +37,7 @@ fn cube(body: Body, half: f64) -> Body {
 }
 
 fn free_cube(name: &str) -> Body {
-    cube(Body::free(name, RigidBody::cuboid(MASS, [HALF; 3]).unwrap()), HALF)
+    cube(Body::dynamic(name, RigidBody::cuboid(MASS, [HALF; 3]).unwrap()), HALF)
 }
 
 fn at(x: f64, y: f64, z: f64) -> State {
@@ -58,7 +60,7 @@ fn a_stack_of_three_boxes_stays() {
     let mut world = World::new(down());
     // A slope of 6°: what does not hold slides.
     world.gravity.x = 0.1 * 9.81;
-    let table = world.add(cube(Body::kinematic("table"), LARGE));
+    let table = world.add(cube(Body::fixed("table"), LARGE));
     let mut start = vec![at(0.0, 0.0, -LARGE)];
     let mut stack = vec![table];
     for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
@@ -75,14 +77,14 @@ fn a_stack_of_three_boxes_stays() {
     assert!(moved < 1e-5);
 }
 
-/// A point of 0.2 kg just above the floor, moving along it and down, on which `Sticking` has a deflection of 0.1 mm.
+/// A point of 0.2 kg just above the floor, moving along it and down, on which `BristleFriction` has a deflection of 0.1 mm.
 fn skipping(smoothing: GapSmoothing) -> (World, Vec<State>) {
     let target =
-        StaticContactTarget { mass: 0.2, gravity: 9.81, penetration: 1e-5, contact_area: 4e-4 };
+        ContactCalibration { mass: 0.2, gravity: 9.81, penetration: 1e-5, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.8, impact_speed: 0.05 };
     let normal = HuntCrossley::from_target(&target, 1.5, bounce).unwrap();
     let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
-    let friction = Sticking { friction, deflection: 1e-4 };
+    let friction = BristleFriction { friction, deflection: 1e-4 };
     let point = body("point", 0.2, 1e-5, &[Point3::origin()], 4e-4);
     let start = state(Isometry3::translation(0.0, 0.0, 1e-4), [0.05, 0.0, -0.05], [0.0; 3]);
     let law = Arc::new(Law::new(normal, friction).unwrap());
@@ -101,9 +103,9 @@ fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
                 let run = world.simulate_with(integrator, &start, once, |_, _| ()).unwrap();
                 [run.states[1].linear.x, run.states[2].linear.x]
             };
-            let mut lifted: Vec<State<Fwd<1>>> = start.iter().map(State::lift).collect();
+            let mut lifted: Vec<State<Fwd<1>>> = start.iter().map(State::cast).collect();
             lifted[1].linear.z = Fwd::variable(-0.05, 0);
-            let end = world.lift().simulate(&lifted, time).unwrap();
+            let end = world.cast().simulate(&lifted, time).unwrap();
             let [low, high] = [-1e-6, 1e-6].map(|h| slides(-0.05 + h, &CONVERGED));
             for (k, found) in [end[1].linear.x, end[2].linear.x].into_iter().enumerate() {
                 let (found, expected) = (found.derivative[0], (high[k] - low[k]) / 2e-6);
@@ -120,12 +122,12 @@ fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
 #[test]
 fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
     let mut world = World::new(Vector3::new(0.09 * 9.81, 0.0, -9.81));
-    let mut below = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut below = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let mut start = vec![at(0.0, 0.0, 0.0)];
     let cuboid = Cuboid { half_extents: Vector3::repeat(HALF), rounding: ROUNDING };
     for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
         let rigid = RigidBody::cuboid(MASS, [HALF; 3]).unwrap();
-        let body = world.add(Body::free(name, rigid).with_cuboid(cuboid, 0.01).unwrap());
+        let body = world.add(Body::dynamic(name, rigid).with_cuboid(cuboid, 0.01).unwrap());
         let (samples, field) = (body, below);
         match level {
             0 => world.add_contact(ContactBodies { samples, field }, sticking(), SMOOTH),
@@ -136,7 +138,7 @@ fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
         below = body;
     }
     // With samples where the flat part of the other box ends it is more than ten times as many.
-    let few = Adaptive { max_parts: 10_000, ..Adaptive::default() };
+    let few = Adaptive { max_substeps: 10_000, ..Adaptive::default() };
     let second = TimeSteps { dt: 1.0, steps: 1 };
     let end = world.simulate_with(&few, &start, second, |_, _| ()).unwrap().states;
     assert!(end[1..4].iter().all(|state| state.linear.norm() < 1e-4), "{end:?}");
@@ -163,8 +165,8 @@ fn a_gripper_holds() {
         }
     };
     let fingers = [("left", -1.0), ("right", 1.0)]
-        .map(|(name, sign)| world.add(cube(Body::driven(name, finger(sign)), LARGE)));
-    let table = world.add(cube(Body::kinematic("table"), LARGE));
+        .map(|(name, sign)| world.add(cube(Body::kinematic(name, finger(sign)), LARGE)));
+    let table = world.add(cube(Body::fixed("table"), LARGE));
     let object = world.add(free_cube("object"));
     for other in fingers.into_iter().chain([table]) {
         world.add_symmetric_contact(object, other, sticking(), SMOOTH).unwrap();

@@ -17,7 +17,7 @@ use scene::Scene;
 
 /// Tight enough to take differences of.
 const CONVERGED: Adaptive =
-    Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_parts: 10_000_000 };
+    Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_substeps: 10_000_000 };
 
 /// What is found in a scene.
 struct Findings {

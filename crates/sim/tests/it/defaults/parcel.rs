@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley, KelvinVoigt, Law,
-    RigidBody, State, StaticContactTarget, Surface, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+    RigidBody, State, Surface, World,
 };
 
 use super::scenes::{HARD, down};
@@ -45,12 +46,12 @@ pub(crate) fn tipped() -> (World, Vec<State>) {
     let tip = Surface::uniform(&[Point3::origin()], tip_area).unwrap().rounded(TIP).unwrap();
 
     let mut world = World::new(down());
-    let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
-    let parcel = Body::free("parcel", rigid).with_field(Arc::new(sides));
+    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let parcel = Body::dynamic("parcel", rigid).with_field(Arc::new(sides));
     let parcel = world.add(parcel.with_surface(Surface::uniform(&bottom, area).unwrap()));
-    let plunger = world.add(Body::driven("plunger", plunger).with_surface(tip));
+    let plunger = world.add(Body::kinematic("plunger", plunger).with_surface(tip));
     let target =
-        StaticContactTarget { mass: 0.4, gravity: 9.81, penetration: DEPTH, contact_area: area };
+        ContactCalibration { mass: 0.4, gravity: 9.81, penetration: DEPTH, contact_area: area };
     let floor = KelvinVoigt::from_target(&target, 0.3).unwrap();
     let law = Law::new(floor, Coulomb { friction: 0.432, slip_scale: 5e-3 }).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 0.1 * DEPTH };

@@ -45,8 +45,8 @@ impl Scene {
         steps: usize,
         change: S,
     ) -> Result<Simulation<S>, SimulationError> {
-        let mut world = self.world.lift::<S>();
-        let mut start: Vec<State<S>> = self.start.iter().map(State::lift).collect();
+        let mut world = self.world.cast::<S>();
+        let mut start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
         match self.input {
             Input::Start(body, coordinate) => {
                 let mut tangent = [S::zero(); 12];

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
+use prehend_sim::contact::{Bounce, Hertz, Stribeck, regularized_coulomb};
+use prehend_sim::fields::{HalfSpace, Sphere, SphereCavity};
 use prehend_sim::{
-    Body, Bounce, Contact, ContactBodies, ContactLaw, Coulomb, DynContactLaw, GapSmoothing,
-    HalfSpace, Hertz, HuntCrossley, KelvinVoigt, Law, Response, RigidBody, Sphere, SphereCavity,
-    State, StaticContactTarget, Sticking, Stribeck, Surface, World, regularized_coulomb,
+    Body, BristleFriction, ContactBodies, ContactCalibration, ContactForce, ContactKinematics,
+    ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody,
+    State, Surface, World,
 };
 
 use super::parcel;
@@ -23,12 +25,12 @@ impl ContactLaw for Quadratic {
     fn params(&self) -> &[f64] {
         &self.0
     }
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
         let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
-        Response { normal, tangential }
+        ContactForce { normal, tangential }
     }
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }
@@ -38,7 +40,7 @@ pub(crate) const HARD: GapSmoothing = GapSmoothing::Hard;
 
 /// Hunt and Crossley's law for a body of `mass` \[kg\] on samples of 4 cm² together, 0.5 mm deep, with Coulomb friction.
 pub(crate) fn hunt_crossley(mass: f64, friction: f64, slip_scale: f64) -> Arc<dyn DynContactLaw> {
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce).unwrap();
     Arc::new(Law::new(normal, Coulomb { friction, slip_scale }).unwrap())
@@ -56,7 +58,7 @@ pub(crate) fn down() -> Vector3<f64> {
 /// A free body of `mass` \[kg\], isotropic `inertia` \[kg m²\] and equal samples of `area` \[m²\] together.
 pub(crate) fn body(name: &str, mass: f64, inertia: f64, points: &[Point3<f64>], area: f64) -> Body {
     let rigid = RigidBody::new(mass, Matrix3::identity() * inertia, Point3::origin()).unwrap();
-    Body::free(name, rigid).with_surface(Surface::uniform(points, area).unwrap())
+    Body::dynamic(name, rigid).with_surface(Surface::uniform(points, area).unwrap())
 }
 
 /// The corners of a box.
@@ -100,7 +102,7 @@ pub(crate) fn on(
     start: State,
 ) -> (World, Vec<State>) {
     let mut world = World::new(gravity);
-    let ground = world.add(Body::kinematic("ground").with_field(Arc::new(field)));
+    let ground = world.add(Body::fixed("ground").with_field(Arc::new(field)));
     let samples = world.add(body);
     let bodies = ContactBodies { samples, field: ground };
     world.add_contact(bodies, law, smoothing).unwrap();
@@ -139,11 +141,11 @@ pub(crate) fn all() -> Vec<Scene> {
 fn holding() -> Vec<Scene> {
     let law = |mass: f64, friction: f64| {
         let target =
-            StaticContactTarget { mass, gravity: 9.81, penetration: 2e-4, contact_area: 4e-4 };
+            ContactCalibration { mass, gravity: 9.81, penetration: 2e-4, contact_area: 4e-4 };
         let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
         let normal = HuntCrossley::from_target(&target, 1.0, bounce).unwrap();
         let friction = Coulomb { friction, slip_scale: 1e-2 };
-        Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 }).unwrap())
+        Arc::new(Law::new(normal, BristleFriction { friction, deflection: 1e-4 }).unwrap())
     };
     let floor = HalfSpace::floor;
     let stool = body("stool", 0.2, 1e-4, &feet(0.015), 4e-4);
@@ -152,7 +154,7 @@ fn holding() -> Vec<Scene> {
     let thrown = state(pose, [1.0, 0.0, 0.0], [0.0, 3.0, 0.0]);
     let rigid = RigidBody::new(0.2, Matrix3::identity() * 5e-5, Point3::origin()).unwrap();
     let round = Surface::uniform(&[Point3::origin()], 4e-4).unwrap().rounded(0.02).unwrap();
-    let ball = Body::free("ball", rigid).with_surface(round);
+    let ball = Body::dynamic("ball", rigid).with_surface(round);
     let spinning = state(at(0.0, 0.0, 0.04), [0.2, 0.0, 0.0], [0.0, -20.0, 5.0]);
     let stool = on(floor(), down(), stool, (law(0.2, 0.5), HARD), sliding);
     let cube = on(floor(), down(), cube(), (law(0.37, 0.3), HARD), thrown);
@@ -307,7 +309,7 @@ fn falling() -> Vec<Scene> {
         on(
             field,
             down(),
-            Body::free("egg", rigid).with_surface(surface),
+            Body::dynamic("egg", rigid).with_surface(surface),
             (kelvin_voigt(0.4, 1e-2), SMOOTH),
             start,
         )
@@ -375,7 +377,7 @@ fn several() -> Vec<Scene> {
     };
     let pushed = || {
         let mut world = World::new(down());
-        let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+        let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
         let block = world.add(cube());
         let pusher = Sphere { center: Point3::new(-0.08, 0.01, 0.05), radius: 0.02 };
         let arm = |time: f64| {
@@ -383,7 +385,7 @@ fn several() -> Vec<Scene> {
             state.linear.x = 0.1;
             state
         };
-        let arm = world.add(Body::driven("pusher", arm).with_field(Arc::new(pusher)));
+        let arm = world.add(Body::kinematic("pusher", arm).with_field(Arc::new(pusher)));
         let lattice: Vec<Point3<f64>> = (0..441)
             .map(|i| {
                 Point3::new(-0.05, (i % 21) as f64 * 5e-3 - 0.05, (i / 21) as f64 * 5e-3 - 0.05)

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Recording, Scalar};
+use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, Body, Contact, ContactBodies, ContactLaw, Cuboid, DynContactLaw, GapSmoothing,
-    HalfSpace, Response, RungeKutta4, SemiImplicitEuler, SimulationError, Sphere, State,
-    StepCheckpointed, Surface, TimeSteps, World,
+    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, DynContactLaw,
+    GapSmoothing, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
+    Surface, TimeSteps, World,
 };
 
 use super::scenes::{
@@ -35,7 +36,7 @@ fn a_finger_that_starts_from_rest_does_not_pass_through() {
     for duration in [0.2, 0.5, 1.0, 2.0] {
         let mut world = World::new(Vector3::zeros());
         let tip = Arc::new(Sphere { center: Point3::origin(), radius: 0.03 });
-        let field = world.add(Body::driven("finger", finger(duration)).with_field(tip));
+        let field = world.add(Body::kinematic("finger", finger(duration)).with_field(tip));
         let samples = world.add(pebble());
         let bodies = ContactBodies { samples, field };
         world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
@@ -69,7 +70,7 @@ fn a_paddle_that_waits_is_not_passed_over() {
     for (gravity, height, stroke) in [(0.0, 2e-3, 5e-3), (-9.81, -2.07e-4, 1e-4)] {
         for duration in [0.2, 0.05, 0.02, 0.005] {
             let mut world = World::new(Vector3::new(0.0, 0.0, gravity));
-            let paddle = Body::driven("paddle", tapping(stroke, duration));
+            let paddle = Body::kinematic("paddle", tapping(stroke, duration));
             let field = world.add(paddle.with_field(Arc::new(HalfSpace::floor())));
             let samples = world.add(ball());
             let bodies = ContactBodies { samples, field };
@@ -162,11 +163,11 @@ impl ContactLaw for Belt {
     fn params(&self) -> &[f64] {
         &self.0
     }
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let normal = (-p[0] * contact.gap).times(contact.area);
-        Response { normal, tangential: contact.slip * (p[1] * normal) }
+        ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
     }
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }
@@ -210,15 +211,14 @@ fn forces_that_jump_are_refused_before_anything_is_recorded() {
         on(HalfSpace::floor(), down(), pebble(), (kelvin_voigt(0.3, 1e-2), HARD), start);
     assert!(world.simulate(&start, 0.2).is_ok());
     let recording = Recording::start();
-    let mut lifted: Vec<_> = start.iter().map(State::lift).collect();
+    let mut lifted: Vec<_> = start.iter().map(State::cast).collect();
     lifted[1].linear.x = recording.variable(0.0);
-    let world = world.lift();
+    let world = world.cast();
     let (adaptive, once) = (Adaptive::default(), TimeSteps { dt: 0.2, steps: 1 });
     let compact = StepCheckpointed::new(adaptive, &world).unwrap();
     let refused = [
         world.simulate(&lifted, 0.2).unwrap_err(),
         world.simulate_with(&compact, &lifted, once, |_, _| ()).unwrap_err(),
-        world.simulate_checkpointed(adaptive, &lifted, once, 2).unwrap_err(),
     ];
     assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
 }
@@ -270,7 +270,7 @@ fn too_many_parts_are_told_as_such() {
     let start = state(at(0.0, 0.0, 0.05), [0.3, 0.0, 0.0], [0.0; 3]);
     let (world, start) =
         on(HalfSpace::floor(), down(), cube(), (kelvin_voigt(0.3, 1e-5), SMOOTH), start);
-    let few = Adaptive { max_parts: 50, ..Adaptive::default() };
+    let few = Adaptive { max_substeps: 50, ..Adaptive::default() };
     let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 }, |_, _| ());
-    assert!(matches!(run, Err(SimulationError::TooManyParts { max_parts: 50, .. })));
+    assert!(matches!(run, Err(SimulationError::TooManySubsteps { max_substeps: 50, .. })));
 }

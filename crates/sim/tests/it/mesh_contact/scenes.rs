@@ -7,9 +7,10 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::shape::Cuboid;
 use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::{Mug, cuboid};
+use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, Shape, ShapeOptions, State,
-    StaticContactTarget, World,
+    Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    ShapeOptions, State, World,
 };
 
 use super::meshes::{ROD, Thread, bolt, hook, nut};
@@ -60,8 +61,7 @@ fn law(
     depth: f64,
     friction: f64,
 ) -> anyhow::Result<Law<HuntCrossley, Coulomb>> {
-    let target =
-        StaticContactTarget { mass, gravity: 9.81, penetration: depth, contact_area: area };
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: depth, contact_area: area };
     let bounce = Bounce { restitution: 0.4, impact_speed: 0.2 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     Ok(Law::new(normal, Coulomb { friction, slip_scale: 1e-2 })?)

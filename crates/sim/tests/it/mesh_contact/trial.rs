@@ -11,7 +11,7 @@ use super::scenes::Scene;
 
 /// Tight enough to take differences of.
 const CONVERGED: Adaptive =
-    Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_parts: 10_000_000 };
+    Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_substeps: 10_000_000 };
 
 /// What a scene is differentiated by, in this order: pose and velocity of the moving body along the directions of
 /// [`State::tangent`], the logarithms of [`LAW`], and a dimension \[m\].
@@ -36,8 +36,8 @@ impl Scene {
         integrator: &impl Integrator,
         changes: &[S; INPUTS],
     ) -> Result<Vector3<S>, SimulationError> {
-        let mut world = self.world.lift::<S>();
-        let mut start: Vec<State<S>> = self.start.iter().map(State::lift).collect();
+        let mut world = self.world.cast::<S>();
+        let mut start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
         let tangent = std::array::from_fn(|i| changes[i]);
         start[self.moving] = self.start[self.moving].retract(&tangent);
         for (name, change) in LAW.into_iter().zip(&changes[12..15]) {

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prehend_geometry::mjcf::Model;
 use prehend_sim::articulated::Joint;
-use prehend_sim::{BodyId, JointAxis, MjcfError, MjcfOptions, ShapeOptions, TimeSteps, World};
+use prehend_sim::robot::{MjcfError, MjcfOptions};
+use prehend_sim::{BodyId, JointAxis, ShapeOptions, TimeSteps, World};
 
 const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
     <geom name="ground" type="plane" size="1 1 .1"/>

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Quaternion, Translation3, UnitQuater
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::articulated::Articulation;
-use prehend_sim::{BodyId, MjcfOptions, State, UrdfOptions, World};
+use prehend_sim::robot::{MjcfOptions, UrdfOptions};
+use prehend_sim::{BodyId, State, World};
 use serde_json::Value;
 
 use super::data_folder;
@@ -56,7 +57,7 @@ fn urdf(golden: &Value) -> Robot {
 }
 
 /// Of each joint of the golden values, its degree of freedom.
-fn freedoms(world: &World, joints: &[BodyId]) -> Vec<usize> {
+fn velocity_places(world: &World, joints: &[BodyId]) -> Vec<usize> {
     let own = &world.articulations[0];
     let place = |body: &BodyId| own.bodies().iter().position(|link| link == body).unwrap();
     joints.iter().map(|body| own.tree.range(place(body))[1].start).collect()
@@ -79,7 +80,7 @@ fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) 
         compared += 1;
     }
     assert!(compared >= joints.len() && compared + 2 >= golden["poses"].as_object().unwrap().len());
-    let order = freedoms(world, joints);
+    let order = velocity_places(world, joints);
     let n = order.len();
     let tree: &Articulation = &world.articulations[0].tree;
     let ordered = |x: &[f64]| {

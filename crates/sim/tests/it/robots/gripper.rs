@@ -1,7 +1,8 @@
 //! A gripper with closed loops beside MuJoCo: `benches/peers/sim/gripper_golden.py` has made its motion.
 
 use prehend_geometry::mjcf::Model;
-use prehend_sim::{Adaptive, MjcfOptions, State, TimeSteps, World};
+use prehend_sim::robot::MjcfOptions;
+use prehend_sim::{Adaptive, State, TimeSteps, World};
 use serde_json::Value;
 
 use super::data_folder;

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use prehend_geometry::mjcf::Model;
-use prehend_sim::{MjcfOptions, MjcfRobot, RungeKutta4, State, TimeSteps, World};
+use prehend_sim::robot::{MjcfOptions, MjcfRobot};
+use prehend_sim::{RungeKutta4, State, TimeSteps, World};
 use serde_json::Value;
 
 use super::golden::numbers;

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::robot::KinematicTree;
-use prehend_sim::{BodyId, State, UrdfOptions, World};
+use prehend_sim::robot::UrdfOptions;
+use prehend_sim::{BodyId, State, World};
 
 /// The links are not in the order of the tree.
 const ARM: &str = r#"<robot name="arm">
@@ -65,7 +66,7 @@ fn links_are_where_kinematics_has_them() {
     }
     // What holds the shoulder against gravity.
     let own = &world.articulations[0];
-    assert_eq!(own.tree.freedoms(), 2);
+    assert_eq!(own.tree.nv(), 2);
     let [q, v] = super::coordinates(&world, &states);
     let at = own.tree.kinematics(&q, &v).under(world.gravity);
     let efforts = at.inverse_dynamics(&[0.0; 2]);

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
+use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Batch, Body, ContactBodies, GapSmoothing, HalfSpace, Integrator, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Adaptive, Batch, Body, ContactBodies, GapSmoothing, Integrator, RigidBody, SemiImplicitEuler,
+    SimulationError, State, Surface, TimeSteps, World,
 };
 
 use crate::scenes::penalty;
@@ -18,9 +19,10 @@ const BROKEN: usize = 4;
 /// A ball thrown at a floor.
 fn throw() -> (World, [State; 2]) {
     let mut world = World::new(Vector3::z() * -9.81);
-    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.1, 0.03).unwrap();
-    let samples = world.add(Body::free("ball", rigid).with_surface(Surface::ball(0.03).unwrap()));
+    let samples =
+        world.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(0.03).unwrap()));
     let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
     let smoothing = GapSmoothing::Softplus { width: 1e-5 };
     world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
@@ -35,7 +37,7 @@ fn variant<S: Scalar>(
     index: usize,
     x: [S; 2],
 ) -> (World<S>, Vec<State<S>>) {
-    let (mut world, mut states) = (world.lift::<S>(), states.map(|state| state.lift()).to_vec());
+    let (mut world, mut states) = (world.cast::<S>(), states.map(|state| state.cast()).to_vec());
     let share = index as f64 / WORLDS as f64;
     world.contacts[0].params_mut()[2] = if index == BROKEN { -x[0] } else { x[0].plus(share) };
     states[1].linear.x = x[1].times(1.0 + share);
@@ -113,7 +115,7 @@ fn what_is_not_of_the_batch_is_refused_alone() {
     let (world, states) = throw();
     let batch = Batch::new(&world).unwrap();
     let mut other = world.clone();
-    other.add(Body::kinematic("wall"));
+    other.add(Body::fixed("wall"));
     let time_steps = TimeSteps { dt: 0.01, steps: 1 };
     let variants =
         [(other, states.to_vec()), (world.clone(), states.to_vec()), (world, Vec::new())];

@@ -6,10 +6,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
+use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody,
-    RungeKutta4, SemiImplicitEuler, SimulationError, Sphere, State, StepCheckpointed, Surface,
-    TimeSteps, Trajectory, VelocityVerlet, World,
+    Adaptive, BackwardEuler, Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion,
+    RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed, Surface,
+    TimeSteps, Trajectory, World,
 };
 
 use super::gradients::coordinates;
@@ -46,9 +47,9 @@ fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, [State<S>; 3]) {
     let surface = Surface::cuboid([0.02; 3], 5e-3).unwrap();
     let ball = Arc::new(Sphere { center: Point3::new(-0.031, 5e-3, 0.02), radius: 0.01 });
     let mut world = World::new(Vector3::z() * -9.81);
-    let ground = world.add(Body::kinematic("floor").with_field(floor()));
-    let samples = world.add(Body::free("block", rigid).with_surface(surface));
-    let pusher = world.add(Body::driven("pusher", course(INPUTS)).with_field(ball));
+    let ground = world.add(Body::fixed("floor").with_field(floor()));
+    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
+    let pusher = world.add(Body::kinematic("pusher", course(INPUTS)).with_field(ball));
     for (field, stiffness) in [(ground, 2e6), (pusher, 5e7)] {
         let law = Arc::new(sticking(stiffness, 1e-3 * stiffness, 0.4, 3e-2));
         let smoothing = GapSmoothing::Softplus { width: 2e-4 };
@@ -56,9 +57,9 @@ fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, [State<S>; 3]) {
     }
     let still = State::at_rest(Isometry3::identity());
     let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.0194));
-    let mut lifted = world.lift();
-    lifted.bodies[pusher].motion = Motion::Driven(Arc::new(course(inputs)));
-    (lifted, [still, stands, still].map(|state| state.lift()))
+    let mut lifted = world.cast();
+    lifted.bodies[pusher].motion = Motion::Kinematic(Arc::new(course(inputs)));
+    (lifted, [still, stands, still].map(|state| state.cast()))
 }
 
 /// Where the block ends, by changes of the inputs.
@@ -100,7 +101,6 @@ fn a_push_by_speed_and_waypoint_of_what_pushes() {
     let tight = Adaptive { tolerance: 1e-8, sensitivity_tolerance: 1e-7, ..Adaptive::default() };
     check(&Adaptive::default(), &tight, TIME, 1e-4);
     check(&SemiImplicitEuler, &SemiImplicitEuler, 4e-4, 1e-6);
-    check(&VelocityVerlet, &VelocityVerlet, 4e-4, 1e-6);
     check(&RungeKutta4, &RungeKutta4, 4e-4, 1e-6);
     check(&BackwardEuler, &BackwardEuler, 2e-3, 1e-6);
 }
@@ -111,15 +111,14 @@ fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
     let (world, start) = scene(INPUTS);
     let (carrying, lifted_start) = scene(recording.variables(INPUTS));
     let time_steps = TimeSteps { dt: 1e-4, steps: 3 };
-    let error = SimulationError::TrajectoryDerivatives { body: "pusher".to_owned() };
+    let error: SimulationError =
+        BuildError::TrajectoryDerivatives { body: "pusher".to_owned() }.into();
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
     let run = carrying.simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
     assert_eq!(run.unwrap_err(), error);
-    let whole = carrying.simulate_checkpointed(SemiImplicitEuler, &lifted_start, time_steps, 2);
-    assert_eq!(whole.unwrap_err(), error);
     assert_eq!(StepCheckpointed::new(SemiImplicitEuler, &carrying).unwrap_err(), error);
     // A plain one, lifted, is known again.
-    let run = world.lift().simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
+    let run = world.cast().simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
     let expected = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
     let values = run.unwrap().states.iter().map(State::value).collect::<Vec<_>>();
     assert_eq!(values, expected.unwrap().states);

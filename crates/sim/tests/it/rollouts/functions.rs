@@ -42,7 +42,7 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
 
     // The same by hand, on one tape.
     let recording = Recording::start();
-    let mut lifted = world.lift();
+    let mut lifted = world.cast();
     let parameters = recording.variables(parameters);
     lifted.contacts[0].params_mut()[2] = parameters[0];
     let rigid = *world.bodies[1].rigid().unwrap();
@@ -51,11 +51,11 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
         rigid.inertia().map(Scalar::constant),
         rigid.com().map(Scalar::constant),
     );
-    lifted.bodies[1].motion = prehend_sim::Motion::Free(rigid.unwrap());
+    lifted.bodies[1].motion = prehend_sim::Motion::Dynamic(rigid.unwrap());
     let variables = recording.variables_of(&start);
     let initial = [0, 1].map(|body| {
         let row = &variables[13 * body..];
-        let mut state = states[body].lift();
+        let mut state = states[body].cast();
         state.pose.translation.vector = nalgebra::Vector3::from_column_slice(&row[..3]);
         state.pose.rotation.as_mut_unchecked().coords.copy_from_slice(&row[3..7]);
         state.linear.copy_from_slice(&row[7..10]);

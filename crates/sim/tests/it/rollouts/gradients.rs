@@ -9,10 +9,12 @@ use prehend_autodiff::check::{
 use prehend_autodiff::lie::lift;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
 use prehend_geometry::DistanceField;
+use prehend_sim::contact::{LeakSteps, regularized_coulomb};
+use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, Body, Contact, ContactBodies, ContactLaw, ContactPair, DynContactLaw, GapSmoothing,
-    Integrator, LeakSteps, Motion, Response, RigidBody, SemiImplicitEuler, SimulationError, Sphere,
-    State, Step, StepCheckpointed, Surface, TimeSteps, World, regularized_coulomb,
+    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, ContactPair,
+    DynContactLaw, GapSmoothing, Integrator, Motion, RigidBody, SemiImplicitEuler, SimulationError,
+    State, Step, StepCheckpointed, Surface, TimeSteps, World,
 };
 use proptest::prelude::*;
 
@@ -26,17 +28,17 @@ impl ContactLaw for Powers {
         &self.0
     }
 
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+    fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
         let depth = -contact.gap;
         let normal = p[0]
             * (p[1] * depth.times(1e4)).exp()
             * depth.times(contact.area)
             * (S::one() - p[2] * contact.normal_speed);
         let tangential = regularized_coulomb(p[3], normal, &contact.slip, 3e-2);
-        Response { normal, tangential }
+        ContactForce { normal, tangential }
     }
 
-    fn reach(&self) -> f64 {
+    fn cutoff(&self) -> f64 {
         0.0
     }
 }
@@ -93,7 +95,7 @@ impl Scene {
         let mut dice = Dice(dice.iter());
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81) + dice.vector());
         let ground = [floor(), bowl(), sphere(Point3::new(0.0, 0.0, -0.05), 0.05)][kind[0]].clone();
-        let field = world.add(Body::kinematic("ground").with_field(Arc::clone(&ground)));
+        let field = world.add(Body::fixed("ground").with_field(Arc::clone(&ground)));
         let mut states = vec![State::at_rest(Isometry3::identity())];
         let law: Arc<dyn DynContactLaw> = if kind[2] == 1 {
             let stiffness = dice.between(2e6, 6e6);
@@ -138,7 +140,7 @@ impl Scene {
                 pose.translation.vector = first.translation.vector + aside * (0.04 + gap);
             }
             let mut body =
-                Body::free("body", rigid).with_surface(Surface::uniform(&points, 6e-3).unwrap());
+                Body::dynamic("body", rigid).with_surface(Surface::uniform(&points, 6e-3).unwrap());
             if two {
                 body = body.with_field(sphere(Point3::origin(), 0.02));
             }
@@ -181,7 +183,7 @@ impl Scene {
     fn set_up<S: Scalar>(&self, x: &[S]) -> (World<S>, Vec<State<S>>) {
         let units = [[1e-3; 3], [1e-2; 3], [2e-2; 3], [1.0; 3]];
         let (tangents, rest) = x.split_at(12 * (self.states.len() - 1));
-        let mut states = vec![self.states[0].lift()];
+        let mut states = vec![self.states[0].cast()];
         for (state, tangent) in self.states[1..].iter().zip(tangents.as_chunks::<12>().0) {
             let tangent = std::array::from_fn(|i| tangent[i].times(units[i / 3][i % 3]));
             states.push(state.retract(&tangent));
@@ -240,16 +242,6 @@ impl Scene {
         }
         sum
     }
-
-    /// Reverse mode, the whole rollout as one node.
-    fn checkpointed(&self, integrator: impl Integrator + 'static, snapshots: usize) -> Vec<f64> {
-        let loss = |x: &[Var]| {
-            let (world, states) = self.set_up(x);
-            let end = world.simulate_checkpointed(integrator, &states, TIME_STEPS, snapshots);
-            self.measure(&end.unwrap())
-        };
-        gradient(loss, &vec![0.0; self.inputs()]).1
-    }
 }
 
 /// Forward mode, eight inputs at a time.
@@ -307,9 +299,6 @@ fn check(
 
     let exact = forward(|x| scene.last(&integrator, x), inputs);
     compare("compact", &gradient(|x| scene.last(&compact, x), &zeros).1, &exact, 1e-10);
-    let whole = scene.checkpointed(integrator, usize::MAX);
-    compare("checkpointed", &whole, &exact, 1e-10);
-    assert_eq!(scene.checkpointed(integrator, 3), whole);
 }
 
 fn kinds() -> impl Strategy<Value = [usize; 3]> {
@@ -350,14 +339,14 @@ fn bounced<S: Scalar>(law: Arc<dyn DynContactLaw>, change: &[S]) -> Vec<S> {
     world.contacts[0].set_law(law);
     let rigid = *world.bodies[1].rigid().unwrap();
     let t_world_model = rigid.model_pose(&states[1].pose);
-    let mut world = world.lift::<S>();
-    let rigid: RigidBody<S> = rigid.lift();
+    let mut world = world.cast::<S>();
+    let rigid: RigidBody<S> = rigid.cast();
     let com = rigid.com() + Vector3::new(change[0], change[1], change[2]);
     let rigid = RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap();
-    world.bodies[1].motion = Motion::Free(rigid);
+    world.bodies[1].motion = Motion::Dynamic(rigid);
     let mut egg = rigid.at_rest(&lift(&t_world_model));
     egg.linear.z = S::constant(-0.5);
-    let end = world.simulate(&[states[0].lift(), egg], 0.03).unwrap()[1];
+    let end = world.simulate(&[states[0].cast(), egg], 0.03).unwrap()[1];
     assert!(end.linear.z.value() > 0.1);
     coordinates(&State { pose: rigid.model_pose(&end.pose), ..end })
 }
@@ -411,8 +400,6 @@ fn singular_points_are_finite_all_the_way() {
             assert!(exact.iter().all(|x| x.is_finite()), "{smoothing:?}");
             let zeros = vec![0.0; scene.inputs()];
             assert_close("compact", &gradient(|x| scene.all(&compact, x), &zeros).1, &exact, 1e-10);
-            let whole = scene.checkpointed(SemiImplicitEuler, 4);
-            assert!(whole.iter().all(|x| x.is_finite()));
         }
     }
 }
@@ -423,7 +410,7 @@ fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, world
     let x = recording.variables_of(&vec![0.0; scene.inputs()]);
     let (mut lifted, states) = scene.set_up(&x);
     if !world {
-        lifted = scene.world.lift();
+        lifted = scene.world.cast();
     }
     // Past the chunk in which a tape grows.
     let time_steps = TimeSteps { dt: 1e-5, steps: 4000 };
@@ -452,8 +439,8 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let (world, states) = egg_on(floor(), GapSmoothing::Hard);
     let (other, _) = egg_on(floor(), GapSmoothing::Hard);
     let compact = StepCheckpointed::new(SemiImplicitEuler, &other).unwrap();
-    let lifted: Vec<State<Var>> = states.iter().map(State::lift).collect();
-    let error = world.lift().simulate_with(&compact, &lifted, TIME_STEPS, |_, _| ()).unwrap_err();
+    let lifted: Vec<State<Var>> = states.iter().map(State::cast).collect();
+    let error = world.cast().simulate_with(&compact, &lifted, TIME_STEPS, |_, _| ()).unwrap_err();
     assert_eq!(error, SimulationError::AnotherWorld);
 
     let recording = Recording::start();
@@ -461,11 +448,9 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     wild[1].linear = Vector3::repeat(recording.variable(1e308));
     let long = TimeSteps { dt: 1.0, steps: 10 };
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
-    let world = world.lift::<Var>();
+    let world = world.cast::<Var>();
     let blown_up = world.simulate_with(&compact, &wild, long, |_, _| ()).unwrap_err();
     assert!(matches!(blown_up, SimulationError::NotFinite { .. }));
-    let whole = world.simulate_checkpointed(SemiImplicitEuler, &wild, long, 3);
-    assert_eq!(whole.unwrap_err(), blown_up);
 }
 
 #[test]
@@ -475,11 +460,10 @@ fn driven_bodies_keep_to_their_trajectory_in_every_mode() {
         linear: Vector3::z() * 0.2,
         ..State::at_rest(Isometry3::translation(0.0, 0.0, 0.2 * time))
     };
-    world.bodies[0].motion = Motion::Driven(Arc::new(lift));
+    world.bodies[0].motion = Motion::Kinematic(Arc::new(lift));
     let scene = Scene { world, states, weights: vec![1.0; 26] };
     let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.world).unwrap();
     let exact = forward(|x| scene.last(&SemiImplicitEuler, x), scene.inputs());
     let zeros = vec![0.0; scene.inputs()];
     assert_close("compact", &gradient(|x| scene.last(&compact, x), &zeros).1, &exact, 1e-10);
-    assert_close("checkpointed", &scene.checkpointed(SemiImplicitEuler, 2), &exact, 1e-10);
 }

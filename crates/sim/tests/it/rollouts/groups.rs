@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Var};
 use prehend_geometry::{DistanceField, FieldSample};
+use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyId, ContactBodies, GapSmoothing, HalfSpace, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, Sphere, State, StepCheckpointed, SubStepped,
-    Surface, TimeSteps, World,
+    Adaptive, BackwardEuler, Body, BodyId, BuildError, ContactBodies, GapSmoothing, Integrator,
+    RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, SubStepped, Surface,
+    TimeSteps, World,
 };
 
 use crate::scenes::{penalty, sticking};
@@ -23,14 +24,14 @@ fn balls(
     link: impl Fn(&mut World, BodyId, &[BodyId]),
 ) -> (World, Vec<State>) {
     let mut world = World::new(Vector3::z() * -9.81);
-    let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.1, RADIUS).unwrap();
     let surface = Arc::new(Surface::ball(RADIUS).unwrap());
     let field = Arc::new(Sphere { center: Point3::origin(), radius: RADIUS });
     let mut states = vec![State::at_rest(Isometry3::identity())];
     let mut ids = Vec::new();
     for (i, (center, velocity)) in centers.iter().zip(velocities).enumerate() {
-        let ball = Body::free(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
+        let ball = Body::dynamic(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
         ids.push(world.add(ball.with_field(Arc::clone(&field) as Arc<dyn DistanceField>)));
         let mut state = rigid.at_rest(&Isometry3::from(Vector3::from(*center)));
         state.linear = Vector3::from(*velocity);
@@ -78,9 +79,9 @@ fn groups_do_as_contacts_one_by_one() {
     let tight = Adaptive { tolerance: 1e-9, sensitivity_tolerance: 1e-8, ..Adaptive::default() };
     let once = TimeSteps { dt: 0.25, steps: 1 };
     let by_speed = |world: &World| {
-        let mut states: Vec<State<Fwd<1>>> = start.iter().map(State::lift).collect();
+        let mut states: Vec<State<Fwd<1>>> = start.iter().map(State::cast).collect();
         states[1].linear.x.derivative = [1.0];
-        world.lift().simulate_with(&tight, &states, once, |_, _| ()).unwrap().states
+        world.cast().simulate_with(&tight, &states, once, |_, _| ()).unwrap().states
     };
     let (a, b) = (by_speed(&grouped), by_speed(&named));
     for (a, b) in a.iter().zip(&b) {
@@ -137,17 +138,17 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn reverse_mode_goes_through_groups() {
     let (world, start) = balls(&CENTERS, &VELOCITIES, by_groups);
     let forward = {
-        let mut world = world.lift::<Fwd<2>>();
+        let mut world = world.cast::<Fwd<2>>();
         *world.contact_groups[0].contact.param_mut("stiffness").unwrap() = Fwd::variable(2e6, 1);
-        let mut states: Vec<State<Fwd<2>>> = start.iter().map(State::lift).collect();
+        let mut states: Vec<State<Fwd<2>>> = start.iter().map(State::cast).collect();
         states[1].linear.x.derivative = [1.0, 0.0];
         world.simulate(&states, 0.2).unwrap()[3].pose.translation.y
     };
     let recording = Recording::start();
-    let mut lifted = world.lift::<Var>();
+    let mut lifted = world.cast::<Var>();
     let stiffness = recording.variable(2e6);
     *lifted.contact_groups[0].contact.param_mut("stiffness").unwrap() = stiffness;
-    let mut states: Vec<State<Var>> = start.iter().map(State::lift).collect();
+    let mut states: Vec<State<Var>> = start.iter().map(State::cast).collect();
     states[1].linear.x = recording.variable(start[1].linear.x);
     let speed = states[1].linear.x;
     let plain = lifted.simulate(&states, 0.2).unwrap()[3].pose.translation.y;
@@ -195,28 +196,25 @@ fn what_is_far_away_is_never_asked() {
 fn bodies_that_cannot_touch_are_refused() {
     let mut world = World::new(Vector3::zeros());
     let rigid = RigidBody::ball(0.1, RADIUS).unwrap();
-    let wall = world.add(Body::kinematic("wall").with_field(Arc::new(HalfSpace::floor())));
-    let bare = world.add(Body::free("bare", rigid));
+    let wall = world.add(Body::fixed("wall").with_field(Arc::new(HalfSpace::floor())));
+    let bare = world.add(Body::dynamic("bare", rigid));
     let pebbles = [0, 1].map(|i| {
-        let pebble = Body::free(&format!("pebble {i}"), rigid);
+        let pebble = Body::dynamic(&format!("pebble {i}"), rigid);
         world.add(pebble.with_surface(Surface::ball(RADIUS).unwrap()))
     });
     let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
     let mut refused = |a: &[BodyId], b: &[BodyId]| {
         world.add_contacts_between(a, b, law.clone(), GapSmoothing::Hard).unwrap_err()
     };
-    let none = SimulationError::NoSamples { body: "bare".to_owned() };
+    let none = BuildError::NoSamples { body: "bare".to_owned() };
     assert_eq!(refused(&[bare], &[wall]), none);
-    assert_eq!(
-        refused(&pebbles, &pebbles),
-        SimulationError::NoField { body: "pebble 1".to_owned() }
-    );
-    assert_eq!(refused(&[wall], &[wall]), SimulationError::NoContacts);
-    assert_eq!(refused(&[], &pebbles), SimulationError::NoContacts);
+    assert_eq!(refused(&pebbles, &pebbles), BuildError::NoField { body: "pebble 1".to_owned() });
+    assert_eq!(refused(&[wall], &[wall]), BuildError::NoContacts);
+    assert_eq!(refused(&[], &pebbles), BuildError::NoContacts);
     assert!(world.contact_groups.is_empty());
     world.add_contacts_between(&pebbles, &[wall, bare][..1], law, GapSmoothing::Hard).unwrap();
     assert_eq!(world.contact_groups[0].bodies(), [&pebbles[..], &[wall]]);
-    // Contacts that stick are named one by one.
+    // Contacts with bristles are named one by one.
     let law = Arc::new(sticking(2e6, 1e3, 0.4, 2e-2));
     world.add_contacts_between(&pebbles, &[wall], law, GapSmoothing::Hard).unwrap();
     assert_eq!((world.contacts.len(), world.contact_groups.len()), (2, 1));
@@ -227,7 +225,7 @@ fn bodies_may_be_listed_in_any_order_and_more_than_once() {
     let mut world = World::new(Vector3::zeros());
     let rigid = RigidBody::ball(0.1, RADIUS).unwrap();
     let [first, second] = ["first", "second"].map(|name| {
-        let body = Body::free(name, rigid).with_field(Arc::new(HalfSpace::floor()));
+        let body = Body::dynamic(name, rigid).with_field(Arc::new(HalfSpace::floor()));
         world.add(body.with_surface(Surface::ball(RADIUS).unwrap()))
     });
     let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
@@ -247,11 +245,13 @@ fn what_is_too_fast_to_look_for_is_an_error() {
                 let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
                 world.add_contacts_between(ids, &[floor], law, GapSmoothing::Hard).unwrap();
             });
-        let few = Adaptive { max_parts: 1000, ..Adaptive::default() };
+        let few = Adaptive { max_substeps: 1000, ..Adaptive::default() };
         let once = TimeSteps { dt: 1.0, steps: 1 };
         let error = world.rollout_with(&few, &states, once).unwrap_err();
-        let told =
-            matches!(error, SimulationError::TooManyParts { .. } | SimulationError::Stalled { .. });
+        let told = matches!(
+            error,
+            SimulationError::TooManySubsteps { .. } | SimulationError::Stalled { .. }
+        );
         assert!(told, "{error}");
     }
 }

@@ -10,8 +10,8 @@ use parry3d_f64::shape::{
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_geometry::SplitMix64;
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
-    Law, Shape, ShapeOptions, State, StepCheckpointed, Sticking, TimeSteps, World,
+    Adaptive, Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
+    HuntCrossley, KelvinVoigt, Law, Shape, ShapeOptions, State, StepCheckpointed, TimeSteps, World,
 };
 
 use super::catalog::{ROUND, SHARP, vector};
@@ -21,7 +21,7 @@ const DEPTH: f64 = 3e-4;
 
 fn laws() -> [Arc<dyn DynContactLaw>; 2] {
     let friction = Coulomb { friction: 0.5, slip_scale: 2e-2 };
-    let held = Sticking { friction, deflection: 1e-4 };
+    let held = BristleFriction { friction, deflection: 1e-4 };
     let normal = KelvinVoigt { stiffness: 1e7, damping: 2e5 };
     [Arc::new(Law::new(normal, friction).unwrap()), Arc::new(Law::new(normal, held).unwrap())]
 }
@@ -46,9 +46,9 @@ fn by_dimension(world: &World, states: &[State], name: &str) -> [Vec<f64>; 2] {
     });
     let differences = one.into_iter().zip(two);
     let differences = differences.map(|(one, two)| (8.0 * one - two) / (12.0 * step)).collect();
-    let mut lifted = world.lift::<Fwd<1>>();
+    let mut lifted = world.cast::<Fwd<1>>();
     lifted.bodies[1].set_dimension(name, Fwd::variable(value, 0)).unwrap();
-    let constants: Vec<State<Fwd<1>>> = states.iter().map(State::lift).collect();
+    let constants: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
     let exact = lifted.wrenches(&constants, 0);
     let exact = numbers(exact.iter().map(|w| w.map(|x| x.derivative[0])).collect());
     [exact, differences]
@@ -151,7 +151,7 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     let plate = Cuboid::new(Vector::new(0.2, 0.01, 0.2));
     let plate =
         Shape::from_parry(&RoundCuboid { inner_shape: plate, border_radius: 2e-3 }).unwrap();
-    let mut world = World::new(Vector3::new(0.5, -9.81, 0.2)).lift::<S>();
+    let mut world = World::new(Vector3::new(0.5, -9.81, 0.2)).cast::<S>();
     let mut plain = World::new(Vector3::zeros());
     let field = plain.add(Body::fixed_from_shape("plate", &plate));
     let samples = plain.add(Body::from_shape("body", &shape, 1e3).unwrap());
@@ -159,7 +159,7 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     let law = Law::new(spring, Coulomb { friction: 0.3, slip_scale: 5e-2 }).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 2e-5 };
     plain.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
-    let lifted = plain.lift::<S>();
+    let lifted = plain.cast::<S>();
     (world.bodies, world.contacts) = (lifted.bodies, lifted.contacts);
     let dimensions = world.bodies[body].shape().unwrap().dimensions();
     let (_, value) = dimensions.into_iter().find(|(own, _)| own == name).unwrap();
@@ -167,7 +167,7 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     let turn = UnitQuaternion::from_euler_angles(0.3, 0.2, 0.4);
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.07, 0.0), turn);
     let start = [State::at_rest(Isometry3::identity()), State::at_rest(pose)];
-    let start = start.map(|state| state.lift::<S>());
+    let start = start.map(|state| state.cast::<S>());
     let tight = Adaptive { tolerance: 1e-9, sensitivity_tolerance: 1e-8, ..Adaptive::default() };
     let once = TimeSteps { dt: 0.15, steps: 1 };
     let end = world.simulate_with(&tight, &start, once, |_, _| ()).unwrap().states;
@@ -218,9 +218,9 @@ fn reverse_mode_and_checkpoints_know_dimensions() {
         .add_contact(ContactBodies { samples, field }, law, GapSmoothing::Softplus { width: 1e-5 })
         .unwrap();
     let start = [Isometry3::identity(), Isometry3::translation(0.0, 0.031, 0.0)];
-    let start = start.map(|pose| State::at_rest(pose).lift::<Var>());
+    let start = start.map(|pose| State::at_rest(pose).cast::<Var>());
     let radius = recording.variable(0.03);
-    let mut lifted = world.lift::<Var>();
+    let mut lifted = world.cast::<Var>();
     lifted.bodies[samples.index()].set_dimension("radius", radius).unwrap();
     let steps = TimeSteps { dt: 0.01, steps: 5 };
     let checkpointed = StepCheckpointed::new(Adaptive::default(), &world).unwrap();

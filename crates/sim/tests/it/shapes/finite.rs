@@ -3,7 +3,8 @@
 use nalgebra::{Point3, UnitQuaternion};
 use parry3d_f64::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, HalfSpace, Shape as ParryShape};
 use prehend_geometry::DistanceField;
-use prehend_sim::{Body, RigidBody, Shape, ShapeOptions, Sphere, SphereCavity, Surface};
+use prehend_sim::fields::{Sphere, SphereCavity};
+use prehend_sim::{Body, RigidBody, Shape, ShapeOptions, Surface};
 
 #[test]
 fn shapes_of_all_sizes() {

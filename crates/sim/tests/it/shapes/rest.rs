@@ -8,8 +8,8 @@ use parry3d_f64::shape::{
     Ball, Cone, Cuboid, Cylinder, HalfSpace, RoundCuboid, RoundCylinder, Shape as ParryShape,
 };
 use prehend_sim::{
-    Body, BodyId, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Shape, State, Sticking,
-    World,
+    Body, BodyId, BristleFriction, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Shape,
+    State, World,
 };
 
 /// A body of `shape` with its model frame at `height` above `ground`, gravity along −y.
@@ -20,7 +20,7 @@ pub(crate) fn on(ground: &Shape, shape: &Shape, height: f64) -> (World, Vec<Stat
     let start = body.rigid().unwrap().at_rest(&Isometry3::translation(0.0, height, 0.0));
     let samples = world.add(body);
     let friction = Coulomb { friction: 0.5, slip_scale: 1e-3 };
-    let held = Sticking { friction, deflection: 1e-5 };
+    let held = BristleFriction { friction, deflection: 1e-5 };
     let law = Law::new(KelvinVoigt { stiffness: 1e8, damping: 1e5 }, held).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 1e-6 };
     world.add_contact(ContactBodies { samples, field: floor }, Arc::new(law), smoothing).unwrap();
@@ -80,8 +80,8 @@ fn whole_faces_press() {
 /// The second body of a world.
 fn world_body() -> BodyId {
     let mut world = World::new(Vector3::zeros());
-    world.add(Body::kinematic("ground"));
-    world.add(Body::kinematic("body"))
+    world.add(Body::fixed("ground"));
+    world.add(Body::fixed("body"))
 }
 
 #[test]

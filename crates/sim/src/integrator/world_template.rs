@@ -1,0 +1,125 @@
+//! A world of which others differ in parameters alone.
+
+use std::sync::Arc;
+
+use prehend_autodiff::Scalar;
+
+use super::Integrator;
+use crate::articulated::Link;
+use crate::error::BuildError;
+use crate::world::World;
+use crate::world::articulated_body::ArticulatedBody;
+use crate::world::body::{Body, Motion};
+use crate::world::contact_group::ContactGroup;
+use crate::world::contact_pair::ContactPair;
+use crate::world::joint_force::JointForce;
+use crate::world::trajectory::plain;
+
+/// The world and the integrator that all steps, or all worlds of a batch, share.
+#[derive(Debug)]
+pub(crate) struct WorldTemplate<I> {
+    pub(crate) integrator: I,
+    pub(super) world: World,
+    parameters: Vec<f64>,
+}
+
+/// Parameters of a world that are not its template's constants, by their places.
+pub(crate) struct ParameterDelta<S> {
+    pub(crate) places: Box<[u32]>,
+    pub(crate) values: Vec<S>,
+}
+
+impl<I: Integrator> WorldTemplate<I> {
+    pub(crate) fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Arc<Self>, BuildError> {
+        world.check_trajectories()?;
+        let parameters: Vec<f64> = world.parameters().into_iter().map(S::value).collect();
+        Ok(Arc::new(Self { world: world.map(S::value), parameters, integrator }))
+    }
+
+    pub(crate) fn world_values(&self) -> &World {
+        &self.world
+    }
+
+    pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> ParameterDelta<S> {
+        let changed = |x: S, own: f64| x.value() != own || !x.is_constant();
+        let all = (0..).zip(world.parameters()).zip(&self.parameters);
+        let changes = all.filter(|((_, x), own)| changed(*x, **own)).map(|(change, _)| change);
+        let (places, values): (Vec<u32>, _) = changes.unzip();
+        ParameterDelta { places: places.into(), values }
+    }
+
+    /// True if `world` differs in parameters only.
+    pub(crate) fn is_of<S: Scalar>(&self, world: &World<S>) -> bool {
+        has_parts_of(world, &self.world)
+    }
+
+    /// This template's world with `values` at `places`.
+    pub(crate) fn world<S: Scalar>(
+        &self,
+        places: &[u32],
+        values: &[S],
+    ) -> Result<World<S>, BuildError> {
+        if places.is_empty() {
+            return Ok(self.world.cast());
+        }
+        let mut all: Vec<S> = self.parameters.iter().map(|&x| S::constant(x)).collect();
+        for (&place, &value) in places.iter().zip(values) {
+            all[place as usize] = value;
+        }
+        self.world.with_parameters(&all)
+    }
+}
+
+/// True if `a` is made of the same surfaces, fields, laws and trajectories as `b`.
+fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
+    fn same<T: ?Sized>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
+        match (a, b) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+    let body = |(a, b): (&Body<S>, &Body)| {
+        let motion = match (&a.motion, &b.motion) {
+            (Motion::Dynamic(_), Motion::Dynamic(_))
+            | (Motion::Fixed, Motion::Fixed)
+            | (Motion::Link, Motion::Link) => true,
+            (Motion::Kinematic(a), Motion::Kinematic(b)) => {
+                same(plain(a).as_ref(), plain(b).as_ref())
+            }
+            _ => false,
+        };
+        motion
+            && same(a.surface.as_ref(), b.surface.as_ref())
+            && same(a.field.as_ref(), b.field.as_ref())
+    };
+    let pair = |(a, b): (&ContactPair<S>, &ContactPair)| {
+        (a.bodies, a.smoothing, a.weight) == (b.bodies, b.smoothing, b.weight)
+            && Arc::ptr_eq(a.law(), b.law())
+    };
+    let group = |(a, b): (&ContactGroup<S>, &ContactGroup)| {
+        a.has_bodies_of(b) && pair((&a.contact, &b.contact))
+    };
+    let articulation = |(a, b): (&ArticulatedBody<S>, &ArticulatedBody)| {
+        let link = |(a, b): (&Link<S>, &Link)| (a.parent, &a.joint) == (b.parent, &b.joint);
+        a.bodies() == b.bodies() && a.tree.links().iter().zip(b.tree.links()).all(link)
+    };
+    let force = |(a, b): (&JointForce<S>, &JointForce)| {
+        (&a.axes, &a.path, a.input) == (&b.axes, &b.path, b.input) && Arc::ptr_eq(a.law(), b.law())
+    };
+    a.bodies.len() == b.bodies.len()
+        && a.articulations.len() == b.articulations.len()
+        && a.joint_forces.len() == b.joint_forces.len()
+        && a.articulations.iter().zip(&b.articulations).all(articulation)
+        && a.joint_forces.iter().zip(&b.joint_forces).all(force)
+        && a.bushings.len() == b.bushings.len()
+        && a.bushings
+            .iter()
+            .zip(&b.bushings)
+            .all(|(a, b)| (a.bodies, a.frames) == (b.bodies, b.frames))
+        && a.contacts.len() == b.contacts.len()
+        && a.contact_groups.len() == b.contact_groups.len()
+        && a.contact_groups.iter().zip(&b.contact_groups).all(group)
+        && a.bodies.iter().zip(&b.bodies).all(body)
+        && a.contacts.iter().zip(&b.contacts).all(pair)
+}

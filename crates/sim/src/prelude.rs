@@ -1,0 +1,19 @@
+//! The names that most programs need: `use prehend_sim::prelude::*;`.
+
+pub use crate::articulated::{Joint, Link};
+pub use crate::contact::{
+    BristleFriction, ContactCalibration, ContactForce, ContactKinematics, ContactLaw, Coulomb,
+    DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+};
+pub use crate::fields::HalfSpace;
+pub use crate::joint_law::{
+    JointDamper, JointFriction, JointLaw, JointLimits, JointSpring, Motor, PositionServo,
+    VelocityServo,
+};
+pub use crate::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
+pub use crate::{
+    Adaptive, BackwardEuler, Batch, Body, BodyId, BuildError, Bushing, BushingId, BushingStiffness,
+    ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Motion, RigidBody,
+    RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, ShapeOptions,
+    SimulationError, State, Step, StepCheckpointed, SubStepped, Surface, TimeSteps, World,
+};

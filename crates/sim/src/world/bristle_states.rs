@@ -1,0 +1,78 @@
+//! The states of contacts with bristles.
+//!
+//! They follow the states of the bodies and joints, in the order of the contacts. Each is a state at the origin, whose velocities are the
+//! deflection of the contact's [`Bristles`]: a twist along the axes of the field, \[m\] and \[rad\].
+
+use nalgebra::{Isometry3, Vector6};
+use prehend_autodiff::Scalar;
+
+use super::World;
+use super::contact_pair::ContactPair;
+use crate::contact::bristles::Bristles;
+use crate::error::SimulationError;
+use crate::spatial::spatial;
+use crate::state::State;
+
+impl<S: Scalar> State<S> {
+    /// The deflection that this state is.
+    pub(crate) fn deflection(&self) -> Vector6<S> {
+        spatial(&self.linear, &self.angular)
+    }
+
+    /// The state of this deflection after a change.
+    pub(crate) fn deflected(&self, change: &Vector6<S>) -> Self {
+        let mut deflected = *self;
+        deflected.linear += change.fixed_rows::<3>(0);
+        deflected.angular += change.fixed_rows::<3>(3);
+        deflected
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The contacts with bristles.
+    pub(crate) fn bristle_contacts(&self) -> impl Iterator<Item = (&ContactPair<S>, Bristles)> {
+        self.contacts.iter().filter_map(|pair| Some((pair, pair.law().bristles()?)))
+    }
+
+    /// True if the state at `index` is that of a free body, a joint or a contact with bristles.
+    pub(crate) fn moves_by_forces(&self, index: usize) -> bool {
+        self.bodies.get(index).is_none_or(|body| body.rigid().is_some())
+    }
+
+    /// Number of states.
+    pub(crate) fn state_count(&self) -> usize {
+        self.bodies.len() + self.joint_count() + self.bristle_contacts().count()
+    }
+
+    /// The error of as many `states`.
+    pub(crate) fn wrong_count(&self, states: usize) -> SimulationError {
+        let (bodies, joints) = (self.bodies.len(), self.joint_count());
+        SimulationError::States {
+            states,
+            bodies,
+            joints,
+            bristles: self.bristle_contacts().count(),
+        }
+    }
+
+    /// `states` with those of contacts with bristles, not deflected if they are missing.
+    pub(crate) fn with_deflections(&self, states: &[State<S>]) -> Vec<State<S>> {
+        let mut states = states.to_vec();
+        if states.len() == self.bodies.len() + self.joint_count() {
+            states.resize(self.state_count(), State::at_rest(Isometry3::identity()));
+        }
+        states
+    }
+
+    /// Moves on the deflections among `states`, for `dt` \[s\] at the rates that follow the `wrenches` on the bodies.
+    pub(crate) fn integrate_bristles(
+        &self,
+        states: &mut [State<S>],
+        wrenches: &[Vector6<S>],
+        dt: S,
+    ) {
+        for (state, rate) in states.iter_mut().zip(wrenches).skip(self.joint_places().end) {
+            *state = state.deflected(&(rate * dt));
+        }
+    }
+}

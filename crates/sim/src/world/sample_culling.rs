@@ -1,0 +1,157 @@
+//! Culling of samples that cannot touch for a while (a Verlet list).
+
+use std::sync::Arc;
+
+use prehend_autodiff::Scalar;
+
+use super::World;
+use super::contact_pair::ContactPair;
+use crate::state::State;
+
+/// Distance that samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
+/// that pays.
+const MARGIN: [f64; 2] = [1e-3, 4e-3];
+
+/// Steps for which a search for near samples should serve.
+const STEPS: f64 = 2.0;
+
+/// Up to so many samples cost no more to ask than to look for near ones.
+const FEW: usize = 8;
+
+/// A world in which contacts of more than [`FEW`] samples know only those near to the field. The others exert no force, so results are the same to the last bit.
+pub(crate) struct SampleCulling<S: Scalar> {
+    world: Option<World<S>>,
+    /// The contacts whose near samples are looked for, and how far the samples of each are from their body's center of mass \[m\].
+    followed: Vec<(usize, f64)>,
+    /// For each of those, the body with the samples as the field saw it when near ones were looked for.
+    made_at: Vec<State>,
+    /// Distance that samples may move until the next search \[m\].
+    margin: f64,
+}
+
+impl<S: Scalar> SampleCulling<S> {
+    pub(crate) fn new(full: &World<S>) -> Self {
+        let followed = |(index, pair): (usize, &ContactPair<S>)| {
+            let body = &full.bodies[pair.bodies.samples];
+            let surface = body.surface.as_ref().filter(|surface| surface.points().len() > FEW)?;
+            Some((index, surface.radius_about(&body.com().map(S::value))))
+        };
+        let followed = full.contacts.iter().enumerate().filter_map(followed).collect();
+        Self { world: None, followed, made_at: Vec::new(), margin: 0.0 }
+    }
+
+    /// A world whose forces at `states` are those of `full`, for a step of `dt` \[s\].
+    pub(crate) fn world<'a>(
+        &'a mut self,
+        full: &'a World<S>,
+        states: &[State<S>],
+        dt: f64,
+    ) -> &'a World<S> {
+        if self.followed.is_empty() {
+            return full;
+        }
+        let (mut moved, mut ahead): (f64, f64) = (0.0, 0.0);
+        for (place, (index, radius)) in self.followed.iter().enumerate() {
+            let now = full.relative_value(&full.contacts[*index], states);
+            ahead = ahead.max(now.speed_within(*radius));
+            if let Some(then) = self.made_at.get(place) {
+                let shift = now.pose.translation.vector - then.pose.translation.vector;
+                let turn = now.pose.rotation.angle_to(&then.pose.rotation);
+                moved = moved.max(shift.norm() + turn * radius);
+            }
+        }
+        if self.world.is_none() || moved.is_nan() || moved > self.margin {
+            self.margin = MARGIN[0].max(STEPS * ahead * dt);
+            if self.margin > MARGIN[1] {
+                self.world = None;
+                return full;
+            }
+            self.look(full, states);
+        }
+        self.world.as_ref().unwrap_or(full)
+    }
+
+    fn look(&mut self, full: &World<S>, states: &[State<S>]) {
+        let mut near = full.clone();
+        self.made_at.clear();
+        for (index, _) in &self.followed {
+            let (pair, near) = (&full.contacts[*index], &mut near.contacts[*index]);
+            let state = full.relative_value(pair, states);
+            self.made_at.push(state);
+            if let Some(query) = full.contact_query(pair, state) {
+                near.near = Some(Arc::new(query.near(pair.law().cutoff(), self.margin)));
+            }
+        }
+        self.world = Some(near);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Vector3};
+
+    use crate::scenes::{bowl, egg_on, floor};
+    use crate::{
+        BackwardEuler, Body, ContactBodies, GapSmoothing, Integrator, RigidBody, RungeKutta4,
+        SemiImplicitEuler, State, Surface, TimeSteps, World,
+    };
+
+    fn assert_same(integrator: &impl Integrator, gap: f64, dt: f64, steps: usize) {
+        for field in [bowl(), floor()] {
+            let (world, mut states) = egg_on(field, GapSmoothing::Softplus { width: 1e-5 });
+            states[1].pose.translation.z += gap;
+            states[1].linear = Vector3::zeros();
+            assert_steps_alike(&world, &states, integrator, dt, steps);
+        }
+    }
+
+    /// A rollout goes where single steps, which look at all samples, go.
+    fn assert_steps_alike(
+        world: &World,
+        states: &[State],
+        integrator: &impl Integrator,
+        dt: f64,
+        steps: usize,
+    ) {
+        let mut expected = states.to_vec();
+        let compare = |step, states: &[_]| {
+            expected = world.step(integrator, &expected, step).unwrap();
+            assert_eq!(expected, states, "{step:?}");
+        };
+        world.simulate_with(integrator, states, TimeSteps { dt, steps }, compare).unwrap();
+    }
+
+    #[test]
+    fn contacts_of_few_samples_come_and_go_beside_others() {
+        let ball = RigidBody::ball(0.5, 0.05).unwrap();
+        let surface = Arc::new(Surface::ball(0.05).unwrap());
+        for egg_too in [false, true] {
+            let (mut world, mut states) = egg_on(floor(), GapSmoothing::Softplus { width: 1e-5 });
+            let law = Arc::clone(world.contacts[0].law());
+            let id = world.add(Body::dynamic("ball", ball).with_surface(Arc::clone(&surface)));
+            let mut contacts = std::mem::take(&mut world.contacts);
+            let field = contacts[0].bodies.field;
+            let bodies = ContactBodies { samples: id, field };
+            world.add_contact(bodies, law, GapSmoothing::Hard).unwrap();
+            if egg_too {
+                world.contacts.append(&mut contacts);
+            }
+            let mut rolling = ball.at_rest(&Isometry3::translation(0.5, 0.0, 0.0495));
+            rolling.linear.x = 0.3;
+            states.push(rolling);
+            assert_steps_alike(&world, &states, &SemiImplicitEuler, 1e-3, 200);
+        }
+    }
+
+    #[test]
+    fn leaving_out_far_samples_changes_no_bit() {
+        for (gap, dt, steps) in [(0.0, 1e-3, 200), (3e-3, 2e-3, 30), (2e-3, 1e-2, 3)] {
+            assert_same(&SemiImplicitEuler, gap, dt, steps);
+            assert_same(&RungeKutta4, gap, dt, steps.min(30));
+        }
+        // Forces at the end of a long step are of samples that were out of reach at its start.
+        assert_same(&BackwardEuler, 2e-3, 4e-2, 1);
+    }
+}

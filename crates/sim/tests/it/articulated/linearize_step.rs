@@ -1,0 +1,89 @@
+//! The Jacobian of a step against gradients of the step itself.
+
+use nalgebra::DMatrix;
+use prehend_autodiff::Fwd;
+use prehend_sim::articulated::Joint;
+use prehend_sim::{SemiImplicitEuler, State, Step, World};
+
+use super::scenes::random_scene;
+
+/// Derivatives of the velocities of bodies and joints, and of places, by initial velocities and coordinates, by forward mode.
+fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
+    let free = 1;
+    let links = world.articulations[0].bodies();
+    let joints: Vec<&Joint> =
+        world.articulations[0].tree.links().iter().map(|link| &link.joint).collect();
+    let n = 6 + joints.iter().map(|joint| joint.nv()).sum::<usize>();
+    let mut all = DMatrix::zeros(n, n);
+    let lifted = world.cast::<Fwd<1>>();
+    for column in 0..n {
+        let mut start: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
+        if column < 6 {
+            let velocity =
+                if column < 3 { &mut start[free].linear } else { &mut start[free].angular };
+            velocity[column % 3].derivative[0] = 1.0;
+        }
+        let mut next = 6;
+        for (link, joint) in links.iter().zip(&joints) {
+            let count = joint.nv();
+            if (next..next + count).contains(&column) {
+                let at = lifted.joint(&start, *link).unwrap();
+                let mut velocity = at.velocity;
+                velocity[column - next].derivative[0] = 1.0;
+                lifted.set_joint(&mut start, *link, &at.position, &velocity).unwrap();
+            }
+            next += count;
+        }
+        let end = lifted.step(&SemiImplicitEuler, &start, step).unwrap();
+        let mut rates: Vec<f64> =
+            end[free].linear.iter().chain(&end[free].angular).map(|x| x.derivative[0]).collect();
+        for link in links {
+            let velocity = lifted.joint(&end, *link).unwrap().velocity;
+            rates.extend(velocity.iter().map(|x| x.derivative[0]));
+        }
+        all.column_mut(column).copy_from_slice(&rates);
+    }
+    all
+}
+
+#[test]
+fn the_closed_form_is_forward_mode() {
+    let (mut closed, mut forward) = (0, 0);
+    for seed in 0..200 {
+        let (mut world, states) = random_scene(seed);
+        let has = |kind: fn(&Joint) -> bool| {
+            world.articulations[0].tree.links().iter().any(|link| kind(&link.joint))
+        };
+        let custom = has(|joint| matches!(joint, Joint::Custom(_)));
+        // Laws along their axes have no closed form.
+        if has(|joint| matches!(joint, Joint::Spherical)) {
+            world.joint_forces.clear();
+        }
+        let sticks = world.contacts.iter().any(|pair| pair.law().bristles().is_some());
+        let step = Step::new(0, 1e-3);
+        let found = world.linearize_step(&states, step).unwrap();
+        let n = found.by_force.ncols();
+        let end = world.step(&SemiImplicitEuler, &states, step).unwrap();
+        for (a, b) in found.states.iter().zip(&end) {
+            assert!((a.pose.to_homogeneous() - b.pose.to_homogeneous()).norm() < 1e-12);
+            assert!((a.linear - b.linear).norm() + (a.angular - b.angular).norm() < 1e-10);
+        }
+        let expected = by_velocities(&world, &states, step);
+        let off = (found.by_state.view((n, n), (n, n)) - &expected).amax() / expected.amax();
+        assert!(off < 1e-11, "{seed}: {off}");
+        if custom || sticks {
+            forward += 1;
+            continue;
+        }
+        closed += 1;
+        let reference = world.linearize_step_by_forward_mode(&states, step).unwrap();
+        for (name, a, b) in [
+            ("state", &found.by_state, &reference.by_state),
+            ("force", &found.by_force, &reference.by_force),
+        ] {
+            let off = (a - b).amax() / b.amax();
+            assert!(off < 1e-10, "{seed}, by {name}: {off}");
+        }
+    }
+    assert!(closed > 50 && forward > 50, "{closed} {forward}");
+}
