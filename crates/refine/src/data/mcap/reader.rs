@@ -25,12 +25,12 @@ pub(super) struct MessageReader<'a> {
 
 /// Records in their order.
 struct RecordReader<'a> {
-    source: Box<dyn Read + 'a>,
+    source: Box<dyn Read + Send + 'a>,
     reader: LinearReader,
 }
 
 impl<'a> MessageReader<'a> {
-    pub(super) fn new(source: impl Read + 'a) -> Self {
+    pub(super) fn new(source: impl Read + Send + 'a) -> Self {
         let options = LinearReaderOptions::default().with_emit_chunks(true);
         let file = RecordReader::new(source, options);
         Self { open: vec![file], channels: ChannelAccumulator::default() }
@@ -48,7 +48,7 @@ impl<'a> MessageReader<'a> {
             if opcode == op::CHUNK {
                 // With its kind and length before it, as in a file.
                 let length = (record.len() as u64).to_le_bytes();
-                let chunk = Cursor::new([&[op::CHUNK], &length[..], &record].concat());
+                let chunk = Cursor::new([&[op::CHUNK], &length[..], record.as_slice()].concat());
                 let options = LinearReaderOptions::default()
                     .with_skip_start_magic(true)
                     .with_skip_end_magic(true)
@@ -78,7 +78,7 @@ impl Iterator for MessageReader<'_> {
 }
 
 impl<'a> RecordReader<'a> {
-    fn new(source: impl Read + 'a, options: LinearReaderOptions) -> Self {
+    fn new(source: impl Read + Send + 'a, options: LinearReaderOptions) -> Self {
         let options = options.with_record_length_limit(LONGEST);
         Self { source: Box::new(source), reader: LinearReader::new_with_options(options) }
     }
