@@ -11,7 +11,7 @@ use super::range::ParameterRange;
 /// must have that depth to give, and a corner, whose area is small, goes several times as deep as all of the area together.
 ///
 /// ```
-/// use prehend_sim::{KelvinVoigt, ContactCalibration};
+/// use prehend_sim::{ContactCalibration, KelvinVoigt};
 ///
 /// // 300 g on 4 cm², half a millimeter deep, that bounces back at 45 % of its speed.
 /// let target =

@@ -14,7 +14,7 @@ use super::point::{ContactForce, ContactKinematics};
 /// ```
 /// use nalgebra::Vector3;
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{ContactKinematics, ContactLaw, ContactForce};
+/// use prehend_sim::{ContactForce, ContactKinematics, ContactLaw};
 ///
 /// struct Quadratic([f64; 1]);
 ///

@@ -22,7 +22,7 @@ use crate::world::body::Body;
 ///
 /// ```
 /// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-/// use prehend_sim::{Body, TimeSteps, RigidBody, SemiImplicitEuler, SubStepped, World};
+/// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, SubStepped, TimeSteps, World};
 ///
 /// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));

@@ -17,7 +17,7 @@ use crate::contact::point::ContactKinematics;
 /// deflection counts as five times that slip, which is 98 % of full friction.
 ///
 /// ```
-/// use prehend_sim::{Coulomb, HuntCrossley, Law, BristleFriction};
+/// use prehend_sim::{BristleFriction, Coulomb, HuntCrossley, Law};
 ///
 /// let friction = BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 /// let law = Law::new(HuntCrossley { stiffness: 1e9, damping: 1.0, exponent: 1.5 }, friction)?;
