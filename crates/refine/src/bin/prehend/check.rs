@@ -73,7 +73,7 @@ impl Check {
         let (jobs, mut failures) = selection.jobs(poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         let findings = mistakes(&mut assets, &jobs);
-        let named = |(found, targets): (Finding, Vec<Target>)| {
+        let named = |(targets, found): (Vec<Target>, Finding)| {
             let message = found.message(&names_of_dataset(&dataset, poses, &targets)?);
             match &targets[..] {
                 [target] if jobs.len() > 1 => log::warn!("{target}: {message}"),
@@ -129,7 +129,7 @@ impl Check {
 }
 
 /// Mistakes that many of the frames have in common, each with the targets that it was found in. Frames that cannot be read are left out.
-fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Finding, Vec<Target>)> {
+fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)> {
     let settings = CorrectionSettings::default();
     let stride = jobs.len().div_ceil(settings.frames).max(1);
     let bar = progress(jobs.len() / stride, "comparing");
@@ -139,9 +139,9 @@ fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Finding, Vec<Target>)
     };
     let trials: Vec<(Target, CorrectionTrial)> =
         bar.wrap_iter(jobs.iter().step_by(stride)).filter_map(attempt).collect();
-    let found = find_corrections(&trials, &settings).into_iter();
     let targets = |found: &Finding| found.frames.iter().map(|&k| trials[k].0).collect();
-    found.map(|found| (targets(&found), found)).map(|(targets, found)| (found, targets)).collect()
+    let found = find_corrections(&trials, &settings).into_iter();
+    found.map(|found| (targets(&found), found)).collect()
 }
 
 /// Says what a plain BOP dataset does not have, and which methods need it.
