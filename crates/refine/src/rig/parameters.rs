@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_render::Camera;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
@@ -13,13 +14,15 @@ use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
 use crate::scene::{CameraCalibrationError, RemapCache, SurfaceDeviation};
 
 /// Standard deviations of what changes from frame to frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
 pub struct Play {
-    /// Place of the hand in each direction \[m\].
+    /// Standard deviation of the hand's place in each direction \[m\].
     pub hand_translation: f64,
-    /// Turn of the hand about each axis \[rad\].
+    /// Standard deviation of the hand's rotation about each axis \[rad\].
     pub hand_rotation: f64,
-    /// Each joint \[rad or m\].
+    /// Standard deviation of each joint \[rad or m\].
     pub joints: f64,
 }
 

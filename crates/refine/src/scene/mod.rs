@@ -31,9 +31,8 @@ pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose, likely_unit};
 pub use object::{Inertial, Object, StatedSize};
 pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
-pub(crate) use region::{
-    COLOR_LIMIT, ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index,
-};
+pub use region::ForegroundSettings;
+pub(crate) use region::{ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index};
 pub(crate) use remap_cache::RemapCache;
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};

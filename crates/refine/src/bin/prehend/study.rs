@@ -8,6 +8,7 @@ use std::sync::Mutex;
 
 use anyhow::bail;
 use clap::{Args, Subcommand};
+use prehend_refine::Method;
 use prehend_refine::data::bop::{Dataset, create_folder};
 use prehend_refine::data::identity::{
     SENSED, TRUTH, canonical, dataset_fingerprint, file_fingerprint,
@@ -17,7 +18,6 @@ use prehend_refine::evaluate::study::{
     Design, Failure, Frame, FrameRecord, FrameResult, Kind, Level, MethodSettings, RECORDS, Runner,
     Shard, Sweep, TIMES, merge, write_outputs,
 };
-use prehend_refine::{Method, NamedMethod};
 
 use crate::options::{Selection, limit_threads, named, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
@@ -74,7 +74,7 @@ struct Run {
     restart: bool,
     /// Methods to compare, such as "depth,combined" [default: those of the study]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named)]
-    methods: Option<Vec<&'static NamedMethod>>,
+    methods: Option<Vec<String>>,
     /// Iterations at most [default: the method's own; 1000 for steps]
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
@@ -177,26 +177,23 @@ impl Run {
     }
 
     fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Method)>> {
-        let chosen = match &self.methods {
-            Some(methods) => methods.clone(),
-            None => kind.methods().into_iter().filter_map(NamedMethod::find).collect(),
-        };
+        let chosen = self.methods.clone().unwrap_or_else(|| kind.methods());
         if kind == Kind::Steps && chosen.len() != 1 {
             bail!("the steps study is of one method");
         }
         let mut methods: Vec<(String, Method)> = Vec::new();
-        for named in chosen {
-            let name = named.name;
-            if methods.iter().any(|(other, _)| other == name) {
+        for name in chosen {
+            if methods.iter().any(|(other, _)| *other == name) {
                 bail!("method {name} is named twice");
             }
-            let method = Design::method(kind, named, self.iterations);
+            let Some(method) = Method::named(&name) else { bail!("{name} is no method") };
+            let method = Design::method(kind, method, self.iterations);
             if kind == Kind::Steps && matches!(method, Method::Fused(_)) {
                 bail!(
                     "{name} has too few steps for the steps study: it ends when nothing is left to gain"
                 );
             }
-            methods.push((name.to_owned(), method));
+            methods.push((name, method));
         }
         Ok(methods)
     }

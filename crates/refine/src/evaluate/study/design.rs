@@ -10,7 +10,7 @@ use super::kind::{INITIAL, Kind, TRUTH};
 use super::sweep::Sweep;
 use crate::data::bop::{DatasetError, ResultRow, read_results};
 use crate::data::identity::file_fingerprint;
-use crate::method::{Method, NamedMethod};
+use crate::method::Method;
 use crate::strategy::Strategy;
 
 /// All inputs and settings that determine a study's results.
@@ -165,8 +165,7 @@ impl Design {
 
     /// The settings of a study's method; `iterations` replaces the number of iterations of the method itself. The steps
     /// study runs all of them, 1000 unless told otherwise.
-    pub fn method(study: Kind, method: &NamedMethod, iterations: Option<usize>) -> Method {
-        let mut method = method.method();
+    pub fn method(study: Kind, mut method: Method, iterations: Option<usize>) -> Method {
         if study == Kind::Steps {
             method.set_exhaustive();
             method.set_iterations(1000);
@@ -252,9 +251,10 @@ mod tests {
 
     #[test]
     fn steps_are_those_of_the_paper() {
-        let named = NamedMethod::find("combined-free").unwrap();
-        let steps =
-            |study, iterations| Design::steps(study, &Design::method(study, named, iterations));
+        let named = Method::named("combined-free").unwrap();
+        let steps = |study, iterations| {
+            Design::steps(study, &Design::method(study, named.clone(), iterations))
+        };
         assert_eq!(steps(Kind::Steps, None), [100, 200, 400, 600, 1000]);
         assert_eq!(steps(Kind::Steps, Some(5)), [1, 2, 3, 5]);
         assert!(steps(Kind::Main, None).is_empty());

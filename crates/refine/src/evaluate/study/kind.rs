@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use strum::{Display, IntoStaticStr, VariantArray};
 
-use crate::method::NamedMethod;
+use crate::method::Method;
 
 /// Which study.
 #[derive(
@@ -57,22 +57,25 @@ impl Kind {
     }
 
     /// The methods compared unless others are asked for, by name and in the order of the paper's table.
-    pub fn methods(self) -> Vec<&'static str> {
-        match self {
-            Self::Main => vec!["icp", "icp-best", "robust-icp", "combined", "fused"],
-            Self::Gradients => {
-                let each = ["depth", "tactile", "rendering", "physics", "physics-best"];
-                [&each[..], &["robust-icp", "combined"]].concat()
-            }
-            Self::Noise => vec!["robust-icp", "combined", "fused"],
-            Self::Steps => vec!["combined-free"],
-            Self::Evidence => {
-                let ablations = NamedMethod::ablations().iter().map(|m| m.name);
-                ["fused"].into_iter().chain(ablations).collect()
-            }
-            Self::Posterior => vec!["fused"],
-            Self::Robustness => vec!["robust-icp", "fused"],
-        }
+    pub fn methods(self) -> Vec<String> {
+        let fixed: &[&str] = match self {
+            Self::Main => &["icp", "icp-best", "robust-icp", "combined", "fused"],
+            Self::Gradients => &[
+                "depth",
+                "tactile",
+                "rendering",
+                "physics",
+                "physics-best",
+                "robust-icp",
+                "combined",
+            ],
+            Self::Noise => &["robust-icp", "combined", "fused"],
+            Self::Steps => &["combined-free"],
+            Self::Evidence | Self::Posterior => &["fused"],
+            Self::Robustness => &["robust-icp", "fused"],
+        };
+        let ablations = if self == Self::Evidence { Method::ablations() } else { Vec::new() };
+        fixed.iter().map(|name| (*name).to_owned()).chain(ablations).collect()
     }
 
     /// The method that the others are compared with, frame by frame.
@@ -103,8 +106,9 @@ mod tests {
     #[test]
     fn all_methods_exist() {
         for kind in Kind::VARIANTS {
-            for name in kind.methods().into_iter().chain(kind.reference()) {
-                assert!(NamedMethod::find(name).is_some(), "{name}");
+            let reference = kind.reference().map(ToOwned::to_owned);
+            for name in kind.methods().into_iter().chain(reference) {
+                assert!(Method::named(&name).is_some(), "{name}");
             }
         }
     }

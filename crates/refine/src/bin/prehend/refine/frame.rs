@@ -13,7 +13,7 @@ use prehend_refine::{Method, State};
 use prehend_render::Backend;
 use serde_json::json;
 
-use super::options::{MethodOptions, OutputOptions};
+use super::options::{MethodOptions, OutputOptions, record};
 use crate::options::open_rig;
 use crate::terminal::{cache, progress, say};
 
@@ -25,9 +25,9 @@ pub(super) fn refine_frame(
     backend: Arc<dyn Backend>,
     rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
+    let mut configured = method.configured()?;
     let (rig, cache) = (open_rig(rig)?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
-    let mut configured = method.configured()?;
     let mut terms = Vec::new();
     if let Method::Heuristic(heuristic) = &mut configured {
         // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
@@ -64,6 +64,7 @@ pub(super) fn refine_frame(
         "warnings": warnings,
         "confidence": refined.posterior.as_ref().map(PosteriorSummary::from),
         "trace": refined.trace,
+        "settings": record(&configured)?,
     });
     let text = format!("{document:#}");
     if let Some(out) = &output.out {
