@@ -260,7 +260,8 @@ def test_settings_are_a_dict_or_a_file(example, refined, tmp_path):
     frame, initial, _ = example
     file = tmp_path / "settings.toml"
     file.write_text("[estimator.prior]\njoints = 0.02\n")
-    given = [frame.refine(initial, settings=s) for s in (file, {"estimator.prior.joints": 0.02}, {"estimator": {"prior": {"joints": 0.02}}})]
+    dotted, nested = {"estimator.prior.joints": 0.02}, {"estimator": {"prior": {"joints": 0.02}}}
+    given = [frame.refine(initial, settings=settings) for settings in (file, dotted, nested)]
     assert all((estimate.pose == given[0].pose).all() for estimate in given)
     assert not (given[0].pose == refined.pose).all()
     few = {"search": {"rotations": 300, "placed": 40, "turned": 8, "seen": 4, "last": 1}}

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use prehend_refine::tracker::Recovery;
 use pyo3::prelude::*;
 
 use super::estimate;
@@ -44,7 +45,7 @@ impl Tracker {
         recovery: Option<&str>,
         settings: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let recovery = recovery.map(|name| name.parse().raise()).transpose()?;
+        let recovery = recovery.map(|name| name.parse::<Recovery>().raise()).transpose()?;
         let budget = budget.map(|budget| seconds(budget, "budget")).transpose()?;
         let mut settings = self::settings(settings.as_ref())?.tracker();
         settings.budget = budget.or(settings.budget);

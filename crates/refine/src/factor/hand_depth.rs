@@ -17,7 +17,7 @@ use crate::scene::{Frame, Hand};
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct HandDepthSettings {
-    /// Noise of distances of depth points from the hand \[m\]. EXPERIMENTS: Scales and test of fit.
+    /// Noise of distances of depth points from the hand \[m\]. EXPERIMENTS: Depth points of the hand near edges left out.
     pub noise: NoiseModel,
     /// Distance from where the hand is measured to be up to which a depth point is of it \[m\]: beyond, it is of something else.
     pub reach: f64,

@@ -21,7 +21,7 @@ pub struct PriorSettings {
     /// Standard deviation of the object's rotation about each axis \[rad\].
     pub object_rotation: f64,
     /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
-    /// EXPERIMENTS: Noise of modes.
+    /// EXPERIMENTS: Probability of another rotation convention.
     pub object_turned: f64,
     /// Standard deviation of the hand's translation at the object's place, in each direction \[m\].
     pub hand_translation: f64,

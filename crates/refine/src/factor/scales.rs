@@ -48,9 +48,9 @@ impl ErrorGroup {
 #[serde(default, deny_unknown_fields)]
 pub struct ScaleSettings {
     /// Standard deviation of the common logarithm c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are
-    /// known. EXPERIMENTS: Scales and test of fit.
+    /// known. EXPERIMENTS: Prior of scales.
     pub common: f64,
-    /// Standard deviation of each group's own logarithm d. EXPERIMENTS: Scales and test of fit.
+    /// Standard deviation of each group's own logarithm d. EXPERIMENTS: Prior of scales.
     pub own: f64,
     /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
     pub noise: f64,

@@ -17,9 +17,9 @@ use crate::error::RefineError;
 pub struct ModelErrorSettings {
     /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
     pub sigma: f64,
-    /// Length scale of its Gaussian process over the surface \[m\]. EXPERIMENTS: Number and smoothness of the patches.
+    /// Length scale of its Gaussian process over the surface \[m\]. EXPERIMENTS: Number and smoothness of patches.
     pub length_scale: f64,
-    /// Number of patches of what is seen that would cover the mask if all were full. EXPERIMENTS: Number and smoothness of the patches.
+    /// Number of patches of what is seen that would cover the mask if all were full. EXPERIMENTS: Number and smoothness of patches.
     pub patches: f64,
     /// Number of patches at most.
     pub max_patches: usize,

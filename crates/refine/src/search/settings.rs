@@ -25,7 +25,7 @@ pub struct SearchSettings {
     pub steps: usize,
     /// Number of hypotheses that stage 1 keeps.
     pub placed: usize,
-    /// Number of hypotheses that stage 2 keeps. EXPERIMENTS: Settings of the search.
+    /// Number of hypotheses that stage 2 keeps. EXPERIMENTS: Hypotheses after stage 2.
     pub turned: usize,
     /// Number of hypotheses that stage 3 solves.
     pub seen: usize,

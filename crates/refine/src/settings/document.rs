@@ -18,7 +18,7 @@ impl Settings {
     /// # Errors
     /// Those of [`to_toml`](Self::to_toml).
     pub fn document(&self) -> Result<String, SettingsError> {
-        let wrong = |error: &dyn fmt::Display| SettingsError::field("settings", error);
+        let wrong = |error: &dyn fmt::Display| SettingsError::value("settings", error);
         let values = Value::try_from(self).map_err(|error| wrong(&error))?;
         let root = Json::from(schema_for!(Self));
         let mut document =

@@ -3,7 +3,7 @@
 #[cfg(feature = "cli")]
 mod document;
 
-use std::io;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use prehend_geometry::limits::MAX_TEXT_BYTES;
@@ -11,7 +11,6 @@ use prehend_geometry::read_plain;
 #[cfg(feature = "cli")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 use toml::{Table, Value};
 
 use crate::calibration::CalibratorSettings;
@@ -46,46 +45,30 @@ pub struct Settings {
 }
 
 /// Why settings are not taken.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingsError {
-    /// The file cannot be read.
-    #[error("{}: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The file is wrong.
+    /// The file cannot be read, or is wrong.
     #[error("{}: {source}", file.display())]
     File {
         /// The file.
         file: PathBuf,
-        /// What is wrong with it.
-        source: Box<SettingsError>,
+        /// What the system says, or what is wrong with it.
+        source: Box<dyn Error + Send + Sync>,
     },
-    /// It is no TOML.
-    #[error("line {line}: {problem}")]
-    Syntax {
-        /// The line, from 1.
-        line: usize,
-        /// What the parser says.
-        problem: String,
-    },
-    /// There is no such setting, or it cannot have this value.
-    #[error("{field}: {problem}")]
-    Field {
-        /// Its path, such as `estimator.patches.sigma`.
-        field: String,
+    /// It is no TOML, there is no such setting, or it cannot have this value.
+    #[error("{place}: {problem}")]
+    Value {
+        /// Path of the setting, such as `estimator.patches.sigma`; line of a file that is no TOML.
+        place: String,
         /// What is wrong.
         problem: String,
     },
 }
 
 impl SettingsError {
-    fn field(field: impl Into<String>, problem: impl ToString) -> Self {
-        Self::Field { field: field.into(), problem: problem.to_string().trim_end().to_owned() }
+    fn value(place: impl Into<String>, problem: impl ToString) -> Self {
+        Self::Value { place: place.into(), problem: problem.to_string().trim_end().to_owned() }
     }
 }
 
@@ -97,8 +80,8 @@ impl Settings {
     pub fn from_toml(text: &str) -> Result<Self, SettingsError> {
         let changes = text.parse().map_err(|error: toml::de::Error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let problem = error.message().replace('\n', ", ");
-            SettingsError::Syntax { line: before.matches('\n').count() + 1, problem }
+            let line = before.matches('\n').count() + 1;
+            SettingsError::value(format!("line {line}"), error.message().replace('\n', ", "))
         })?;
         Self::default().changed(Value::Table(changes))
     }
@@ -108,11 +91,11 @@ impl Settings {
     /// # Errors
     /// See there; and if it cannot be read.
     pub fn load(file: &Path) -> Result<Self, SettingsError> {
-        let text = read_plain(file, MAX_TEXT_BYTES)
-            .and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other))
-            .map_err(|source| SettingsError::Read { file: file.to_owned(), source })?;
-        Self::from_toml(&text)
-            .map_err(|source| SettingsError::File { file: file.to_owned(), source: source.into() })
+        let read = || -> Result<Self, Box<dyn Error + Send + Sync>> {
+            let text = String::from_utf8(read_plain(file, MAX_TEXT_BYTES)?)?;
+            Ok(Self::from_toml(&text)?)
+        };
+        read().map_err(|source| SettingsError::File { file: file.to_owned(), source })
     }
 
     /// Changes the setting at `path`, names and indices of arrays from 0 with dots between, such as `estimator.stages.3.points`; `value` is as TOML has
@@ -133,17 +116,17 @@ impl Settings {
     /// # Errors
     /// If a number is larger than TOML has them.
     pub fn to_toml(&self) -> Result<String, SettingsError> {
-        toml::to_string(self).map_err(|error| SettingsError::field("settings", error))
+        toml::to_string(self).map_err(|error| SettingsError::value("settings", error))
     }
 
     /// With the values that `changes` have.
     fn changed(&self, changes: Value) -> Result<Self, SettingsError> {
         let mut all =
-            Value::try_from(self).map_err(|error| SettingsError::field("settings", error))?;
+            Value::try_from(self).map_err(|error| SettingsError::value("settings", error))?;
         require_sizes("", &changes)?;
         merge(&mut all, changes);
         serde_path_to_error::deserialize(all).map_err(|error| {
-            SettingsError::field(error.path().to_string(), error.inner().message())
+            SettingsError::value(error.path().to_string(), error.inner().message())
         })
     }
 
@@ -203,7 +186,7 @@ fn require_sizes(path: &str, value: &Value) -> Result<(), SettingsError> {
         _ => false,
     };
     match is_wrong {
-        true => Err(SettingsError::field(path, format!("{value} is not a number from zero on"))),
+        true => Err(SettingsError::value(path, format!("{value} is not a number from zero on"))),
         false => Ok(()),
     }
 }

@@ -30,7 +30,7 @@ pub struct AppearanceSettings {
     pub least_found: f64,
     /// Number of places that are compared where an object is looked for.
     pub places: usize,
-    /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color alone.
+    /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
     pub stated_sigma: f64,
     /// Standard deviation of the sides of a box that is given for a mask \[px\].
     pub box_sigma: f64,

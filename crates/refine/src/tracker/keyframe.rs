@@ -20,7 +20,8 @@ use crate::scene::Object;
 pub struct KeyframeSettings {
     /// Number of points at most; zero for no alignment.
     pub points: usize,
-    /// Effective sample size of their intensities at most: shading and interpolation err alike in neighbors. EXPERIMENTS: Alignment in the hand.
+    /// Effective sample size of their intensities at most: shading and interpolation err alike in neighbors. EXPERIMENTS: Image alignment also in a known
+    /// hand.
     pub effective_samples: f64,
     /// Share of the points that must be seen as in the keyframe, or this frame is the next one.
     pub least_inliers: f64,

@@ -136,10 +136,8 @@ pub struct TrackerSettings {
     /// Standard deviation of the least certain rotation in [`Posterior::covariance`](crate::strategy::Posterior::covariance) from which poses turned
     /// about its axis are modes, too \[rad\]; infinity for never.
     pub turn_sigma: f64,
-    /// Time that following may take in a frame, in files \[s\]; without one it takes what it needs. A step that would not end in time is
+    /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.
-    #[serde(with = "seconds")]
-    #[cfg_attr(feature = "cli", schemars(with = "Option<f64>"))]
     pub budget: Option<Duration>,
     /// Gating: when a pose is not believed.
     pub gating: GatingSettings,
@@ -214,29 +212,6 @@ impl TrackerSettings {
             }
         }
         Ok(())
-    }
-}
-
-/// A span of time in seconds.
-mod seconds {
-    use std::time::Duration;
-
-    use serde::de::Error;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[allow(clippy::ref_option)] // as serde calls it
-    pub(super) fn serialize<S: Serializer>(
-        span: &Option<Duration>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        span.map(|span| span.as_secs_f64()).serialize(serializer)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Duration>, D::Error> {
-        let seconds = Option::<f64>::deserialize(deserializer)?;
-        seconds.map(Duration::try_from_secs_f64).transpose().map_err(D::Error::custom)
     }
 }
 

@@ -27,8 +27,8 @@ fn a_document_says_what_settings_are() {
     // Whoever has no budget can leave it out.
     assert!(document.contains("\n# tracker.budget =\n"), "{document}");
     settings.tracker.budget = Some(Duration::from_secs(1));
-    assert!(settings.document().unwrap().contains("\ntracker.budget = 1.0\n"));
-    let patches = "[m]; zero if models are exact.\nestimator.patches.sigma = 0.0007\n";
+    assert!(settings.document().unwrap().contains("\ntracker.budget = { "));
+    let patches = "\n# models are exact.\nestimator.patches.sigma = 0.0007\n";
     assert!(document.contains(patches), "{document}");
     assert!(!document.contains("]("), "{document}");
 }
@@ -64,7 +64,7 @@ fn single_settings_are_set_by_their_paths() {
         ("estimator.stages.3.points", "900"),
         ("estimator.modalities", "[\"depth\", \"touch\"]"),
         ("tracker.recovery", "near"),
-        ("tracker.budget", "0.02"),
+        ("tracker.budget", "{ secs = 0, nanos = 20_000_000 }"),
         ("search.rotations", "500"),
     ] {
         settings.set(path, value).unwrap();
@@ -98,7 +98,7 @@ fn what_is_no_setting_is_named() {
     let mut settings = Settings::default();
     for path in ["", "estimator", "estimator.stages.9.points", "tracker.fused.views", "x"] {
         let refused = settings.set(path, "1");
-        assert!(matches!(refused, Err(SettingsError::Field { .. })), "{path}: {refused:?}");
+        assert!(matches!(refused, Err(SettingsError::Value { .. })), "{path}: {refused:?}");
     }
     let file = Settings::load("no/settings.toml".as_ref()).unwrap_err();
     assert!(file.to_string().starts_with("no/settings.toml: "), "{file}");

@@ -32,10 +32,10 @@ pub struct PointToPlaneSettings {
     /// Standard deviation of the smooth field by which neighboring points are off alike \[m\]: errors of the depth camera and, unless
     /// surface patches account for them, of the object's model; zero if there is none.
     pub gp_sigma: f64,
-    /// Length scale of that field, a Gaussian process over space \[m\]. EXPERIMENTS: Settings of the field.
+    /// Length scale of that field, a Gaussian process over space \[m\]. EXPERIMENTS: Settings of the depth field.
     pub length_scale: f64,
     /// Margin of the mask in which points are left out \[px\], if at least half of all is left then: there depth is of what is in front or behind, or of
-    /// both. EXPERIMENTS: Margin at the mask's border.
+    /// both. EXPERIMENTS: Mask margin.
     pub margin: usize,
     /// Distance in front of the hand from which a point is of something else \[m\]: the accuracy of a hand's pose and joints.
     pub in_front: f64,

@@ -30,7 +30,7 @@ pub struct RegionSettings {
     /// Standard deviation of the object's surface about its model \[m\].
     pub surface: f64,
     /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn
-    /// away are darker, masks are drawn too small or too large \[px of the reduced image\]. EXPERIMENTS: Edges, offset of the outline, growth of masks.
+    /// away are darker, masks are drawn too small or too large \[px of the reduced image\]. EXPERIMENTS: Offset of the outline.
     pub offset: f64,
     /// Effective sample size of the outline.
     pub effective_samples: f64,

@@ -10,7 +10,7 @@ pub struct ForegroundSettings {
     /// Largest log-likelihood ratio of the mask \[nat\]: odds of twenty to one away from its border.
     pub mask_limit: f64,
     /// Largest log-likelihood ratio of a color beside the mask \[nat\]: below the mask's, since the object and what is around it may share colors.
-    /// EXPERIMENTS: Edges, offset of the outline, growth of masks.
+    /// EXPERIMENTS: Weight of color, 2 instead of 1 nat.
     pub color_limit: f64,
     /// Smallest contrast of a border, as a share of the mean contrast: some borders are seen of which nothing is.
     pub least_contrast: f64,
@@ -20,8 +20,8 @@ pub struct ForegroundSettings {
     pub border_sigma: f64,
     /// Half-width of the Cauchy distribution of what a mask is grown or shrunk by everywhere \[px\].
     pub growth: f64,
-    /// Effective sample size of all pixels about a border as measurements of that growth: shadows and shades err alike along it. EXPERIMENTS: Edges,
-    /// offset of the outline, growth of masks.
+    /// Effective sample size of all pixels about a border as measurements of that growth: shadows and shades err alike along it. EXPERIMENTS: Offset of
+    /// the outline.
     pub effective_samples: f64,
 }
 

@@ -240,7 +240,7 @@ impl Posterior {
                     Some((*off, (hypothesis.covariance + more).cholesky()?.l()))
                 })
                 .collect();
-            let samples = self.settings.samples;
+            let samples = self.settings.samples.max(1);
             let inside = (0..samples).filter(|k| {
                 let Some((off, root)) = roots.get(k % roots.len().max(1)) else { return false };
                 let twist = off + root * Vector6::from_fn(|_, _| random.normal());

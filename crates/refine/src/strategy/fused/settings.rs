@@ -161,13 +161,13 @@ pub struct HypothesisSettings {
     /// difference in cost lie farther apart than the curvature about the best of them has it. EXPERIMENTS: More restarts.
     pub reach: f64,
     /// Standard deviation of the pose \[m of surface motion\] below which the first solution needs no others beside it, if depth scatters about the
-    /// surface by less than its nominal noise. EXPERIMENTS: No restarts where the first solution leaves nothing open.
+    /// surface by less than its nominal noise. EXPERIMENTS: Restarts only where the first solution leaves a direction open.
     pub settled_sigma: f64,
     /// Cost behind the best hypothesis after a stage, colors considered, from which another is given up \[nat\]: its weight would be 3·10⁻⁷. EXPERIMENTS:
-    /// Giving up hypotheses 15 nats behind the best.
+    /// Pruning of unconverged hypotheses 15 nat behind.
     pub prune_margin: f64,
     /// Factor by which color and silhouette tell more of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as
-    /// errors of light and shape, is nearly the same in all modes. EXPERIMENTS: Noise of modes.
+    /// errors of light and shape, is nearly the same in all modes. EXPERIMENTS: Weight of the image between modes.
     pub image_between_modes: f64,
     /// Surface motion below which two poses are the same solution \[m\].
     pub same: f64,
@@ -215,10 +215,10 @@ pub struct FusedSettings {
     pub hypotheses: HypothesisSettings,
     /// Smallest standard deviation of depth points that is believed when measured \[m\]: a rendered image has none.
     pub min_depth_sigma: f64,
-    /// Effective sample size of depth points at most, beside the errors that neighbors share. EXPERIMENTS: Settings of the field.
+    /// Effective sample size of depth points at most, beside the errors that neighbors share. EXPERIMENTS: Settings of the depth field.
     pub max_effective_samples: f64,
-    /// Effective sample size of the hand's depth in frames of a known rig: what depth is off by in all frames is in the rig. EXPERIMENTS: Scales and test
-    /// of fit.
+    /// Effective sample size of the hand's depth in frames of a known rig: what depth is off by in all frames is in the rig. EXPERIMENTS: Depth points of
+    /// the hand near edges left out.
     pub samples_with_rig: f64,
     /// True if contact says less of the pose where the surface may be elsewhere than the model has it; a rig has the surface as it is.
     pub blurred_contact: bool,

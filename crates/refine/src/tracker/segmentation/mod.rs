@@ -204,7 +204,7 @@ impl Segmenter {
             return [0.0; 2];
         }
         let error = self.settings.mask_error as f32;
-        let rate = |share: f32| share.clamp(error, 1.0 - error);
+        let rate = |share: f32| share.max(error).min(1.0 - error);
         let (hits, false_alarms) = (rate(self.hits), rate(self.false_alarms));
         // One that is wrong more often than right is of something else, and does not tell where the object is not.
         [(hits / false_alarms).ln().max(0.0), ((1.0 - hits) / (1.0 - false_alarms)).ln().min(0.0)]
