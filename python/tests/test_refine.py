@@ -256,6 +256,24 @@ def test_sizes_of_errors_have_names(example):
         frame.refine(initial, method="icp", noise={"joints": "1deg"})
 
 
+def test_settings_are_a_dict_or_a_file(example, refined, tmp_path):
+    frame, initial, _ = example
+    file = tmp_path / "settings.toml"
+    file.write_text("[estimator.prior]\njoints = 0.02\n")
+    dotted, nested = {"estimator.prior.joints": 0.02}, {"estimator": {"prior": {"joints": 0.02}}}
+    given = [frame.refine(initial, settings=settings) for settings in (file, dotted, nested)]
+    assert all((estimate.pose == given[0].pose).all() for estimate in given)
+    assert not (given[0].pose == refined.pose).all()
+    few = {"search": {"rotations": 300, "placed": 40, "turned": 8, "seen": 4, "last": 1}}
+    assert len(frame.search(settings=few)) == 1
+    with pytest.raises(prehend.Error, match="settings: estimator.prior.joint: unknown field"):
+        frame.refine(initial, settings={"estimator": {"prior": {"joint": 0.02}}})
+    with pytest.raises(prehend.Error, match="settings: are of the fused methods, not of 'icp'"):
+        frame.refine(initial, method="icp", settings={})
+    with pytest.raises(prehend.Error, match="none.toml"):
+        prehend.Tracker(frame.object, settings=tmp_path / "none.toml")
+
+
 def test_a_bad_frame_loses_no_other(example, refined):
     frame, initial, _ = example
     behind = initial.copy()

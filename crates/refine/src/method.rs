@@ -34,11 +34,6 @@ impl Method {
         Heuristic::combined().into()
     }
 
-    /// The method called `name`, if there is one: see [`NamedMethod`].
-    pub fn named(name: &str) -> Option<Self> {
-        NamedMethod::find(name).map(NamedMethod::method)
-    }
-
     /// Sets how many steps are tried at most: of the fused estimator, by every solve of each stage.
     pub fn set_iterations(&mut self, iterations: usize) {
         match self {
@@ -122,193 +117,90 @@ impl From<RobustIcp> for Method {
     }
 }
 
-/// A method with a name.
-#[derive(Clone, Copy, Debug)]
-pub struct NamedMethod {
-    /// Short name, as options and tables have it.
-    pub name: &'static str,
-    /// What it is, in one line.
-    pub summary: &'static str,
-    method: fn() -> Method,
-}
+/// Names of the methods with what each is, in the order of the paper's tables.
+const METHODS: [(&str, &str); 17] = [
+    ("fused", "all evidence in one least-squares problem, with calibrations estimated"),
+    ("combined", "all four gradients, checkpointing"),
+    ("combined-last", "all four gradients, the last pose"),
+    ("combined-free", "all four gradients, no regularization, the last pose"),
+    ("combined-free-best", "all four gradients, no regularization, checkpointing"),
+    ("depth", "this gradient alone, the last pose"),
+    ("depth-best", "this gradient alone, checkpointing"),
+    ("tactile", "this gradient alone, the last pose"),
+    ("tactile-best", "this gradient alone, checkpointing"),
+    ("rendering", "this gradient alone, the last pose"),
+    ("rendering-best", "this gradient alone, checkpointing"),
+    ("physics", "this gradient alone, the last pose"),
+    ("physics-best", "this gradient alone, checkpointing"),
+    ("physics-free", "this gradient alone, no regularization, the last pose"),
+    ("icp", "the paper's ICP, point to point, the last pose"),
+    ("icp-best", "the paper's ICP, point to point, checkpointing"),
+    ("robust-icp", "robust point-to-plane ICP, a strong baseline, the last pose"),
+];
 
-impl NamedMethod {
-    /// The fused estimator, the default.
-    pub const FUSED: Self = Self {
-        name: "fused",
-        summary: "all evidence in one least-squares problem, with calibrations estimated",
-        method: Method::default,
-    };
-
-    /// The paper's method.
-    pub const COMBINED: Self = Self {
-        name: "combined",
-        summary: "all four gradients, checkpointing",
-        method: Method::combined,
-    };
-
-    /// All methods, in the order of the paper's tables.
-    pub fn all() -> &'static [Self] {
+impl Method {
+    /// Names of the methods with what each is, in the order of the paper's tables.
+    pub fn all() -> &'static [(&'static str, &'static str)] {
         &METHODS
     }
 
-    /// The fused estimator with less than all evidence, or with quantities believed that it would estimate: what each of them
-    /// is worth.
+    /// Names of the fused estimator with less than all evidence, or with quantities believed that it would estimate: what each of them is worth.
     #[cfg(any(feature = "cli", test))]
-    pub(crate) fn ablations() -> &'static [Self] {
-        &ABLATIONS
+    pub(crate) fn ablations() -> Vec<String> {
+        let of = |kind: &'static str| move |m: Modality| format!("fused-{kind}-{}", m.name());
+        let without = Modality::ALL.into_iter().map(of("without"));
+        let only = Modality::ALL.into_iter().map(of("only"));
+        let fixed = Nuisance::ALL.into_iter().map(|group| format!("fused-fixed-{}", group.name()));
+        without.chain(only).chain(fixed).chain(["fused-fixed-all".to_owned()]).collect()
     }
 
-    /// The method called `name`, ablations included. `colour` stands for `color`, as it was spelled before.
-    pub fn find(name: &str) -> Option<&'static Self> {
-        let name = name.replace("colour", "color");
-        METHODS.iter().chain(&ABLATIONS).find(|m| m.name == name)
+    /// The method called `name`, of default settings: one of [`all`](Self::all), or `fused-without-M` and `fused-only-M` of a [`Modality`],
+    /// `fused-fixed-N` of a [`Nuisance`] and `fused-fixed-all`. `colour` stands for `color`, as it was spelled before.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::with_settings(name, &FusedSettings::default())
     }
 
-    /// The method, with its settings.
-    pub fn method(&self) -> Method {
-        (self.method)()
+    /// The method called `name`, as [`named`](Self::named) has it; one of the fused estimator changes `settings`.
+    pub fn with_settings(name: &str, settings: &FusedSettings) -> Option<Self> {
+        let name = &name.replace("colour", "color")[..];
+        if let Some(ablation) = name.strip_prefix("fused") {
+            return ablated(settings.clone(), ablation).map(|settings| Fused::new(settings).into());
+        }
+        METHODS.iter().find(|(known, _)| *known == name)?;
+        let checkpoint = name == "combined" || name.ends_with("-best");
+        let gradients = match name.split('-').next()? {
+            "icp" => return Some(Icp { checkpoint, ..Icp::default() }.into()),
+            "robust" => return Some(RobustIcp::default().into()),
+            "combined" => GradientKind::ALL.to_vec(),
+            gradient => vec![gradient.parse().ok()?],
+        };
+        let mut heuristic = Heuristic { checkpoint, ..Heuristic::of(&gradients) };
+        if name.contains("-free") {
+            // Without the pull to the initial pose.
+            heuristic.stability.displacement_sigma = f64::INFINITY;
+        }
+        Some(heuristic.into())
     }
 }
 
-/// One gradient alone.
-macro_rules! alone {
-    ($name:literal, $gradient:expr, $checkpoint:literal) => {
-        NamedMethod {
-            name: $name,
-            summary: if $checkpoint {
-                "this gradient alone, checkpointing"
-            } else {
-                "this gradient alone, the last pose"
-            },
-            method: || Heuristic { checkpoint: $checkpoint, ..Heuristic::of(&[$gradient]) }.into(),
-        }
-    };
+/// `settings` with less evidence or fewer quantities estimated: those of the name's part after `fused`.
+fn ablated(mut settings: FusedSettings, ablation: &str) -> Option<FusedSettings> {
+    let modality = |name: &str| Modality::ALL.into_iter().find(|m| m.name() == name);
+    if let Some(without) = ablation.strip_prefix("-without-") {
+        let without = modality(without)?;
+        settings.modalities.retain(|m| *m != without);
+    } else if let Some(only) = ablation.strip_prefix("-only-") {
+        settings.modalities = vec![modality(only)?];
+    } else if ablation == "-fixed-all" {
+        settings.nuisances.clear();
+    } else if let Some(fixed) = ablation.strip_prefix("-fixed-") {
+        let fixed = Nuisance::ALL.into_iter().find(|group| group.name() == fixed)?;
+        settings.nuisances.retain(|group| *group != fixed);
+    } else if !ablation.is_empty() {
+        return None;
+    }
+    Some(settings)
 }
-
-/// Without the pull to the initial pose.
-fn free(mut heuristic: Heuristic) -> Method {
-    heuristic.stability.displacement_sigma = f64::INFINITY;
-    heuristic.into()
-}
-
-/// The fused estimator with other settings.
-fn fused(change: impl FnOnce(&mut FusedSettings)) -> Method {
-    let mut settings = FusedSettings::default();
-    change(&mut settings);
-    Fused::new(settings).into()
-}
-
-/// All modalities but one.
-macro_rules! without {
-    ($name:literal, $modality:expr) => {
-        NamedMethod {
-            name: concat!("fused-without-", $name),
-            summary: concat!("fused, all evidence but ", $name),
-            method: || fused(|settings| settings.modalities.retain(|m| *m != $modality)),
-        }
-    };
-}
-
-/// One modality, and the prior.
-macro_rules! only {
-    ($name:literal, $modality:expr) => {
-        NamedMethod {
-            name: concat!("fused-only-", $name),
-            summary: concat!("fused, no evidence but ", $name, " and the prior"),
-            method: || fused(|settings| settings.modalities = vec![$modality]),
-        }
-    };
-}
-
-/// One group of quantities believed as they are stated.
-macro_rules! fixed {
-    ($name:literal, $group:expr) => {
-        NamedMethod {
-            name: concat!("fused-fixed-", $name),
-            summary: concat!("fused, ", $name, " not estimated"),
-            method: || fused(|settings| settings.nuisances.retain(|group| *group != $group)),
-        }
-    };
-}
-
-static ABLATIONS: [NamedMethod; 23] = [
-    without!("color", Modality::Color),
-    without!("silhouette", Modality::Silhouette),
-    without!("depth", Modality::Depth),
-    without!("hand-depth", Modality::HandDepth),
-    without!("free-space", Modality::FreeSpace),
-    without!("touch", Modality::Touch),
-    without!("quiet", Modality::Quiet),
-    without!("penetration", Modality::Penetration),
-    without!("support", Modality::Support),
-    only!("color", Modality::Color),
-    only!("silhouette", Modality::Silhouette),
-    only!("depth", Modality::Depth),
-    only!("hand-depth", Modality::HandDepth),
-    only!("free-space", Modality::FreeSpace),
-    only!("touch", Modality::Touch),
-    only!("quiet", Modality::Quiet),
-    only!("penetration", Modality::Penetration),
-    only!("support", Modality::Support),
-    fixed!("hand-pose", Nuisance::HandPose),
-    fixed!("joints", Nuisance::Joints),
-    fixed!("camera", Nuisance::Camera),
-    fixed!("model", Nuisance::Model),
-    NamedMethod {
-        name: "fused-fixed-all",
-        summary: "fused, nothing estimated but the pose",
-        method: || fused(|settings| settings.nuisances.clear()),
-    },
-];
-
-static METHODS: [NamedMethod; 17] = [
-    NamedMethod::FUSED,
-    NamedMethod::COMBINED,
-    NamedMethod {
-        name: "combined-last",
-        summary: "all four gradients, the last pose",
-        method: || Heuristic::of(&GradientKind::ALL).into(),
-    },
-    NamedMethod {
-        name: "combined-free",
-        summary: "all four gradients, no regularization, the last pose",
-        method: || free(Heuristic::of(&GradientKind::ALL)),
-    },
-    NamedMethod {
-        name: "combined-free-best",
-        summary: "all four gradients, no regularization, checkpointing",
-        method: || free(Heuristic::combined()),
-    },
-    alone!("depth", GradientKind::Depth, false),
-    alone!("depth-best", GradientKind::Depth, true),
-    alone!("tactile", GradientKind::Tactile, false),
-    alone!("tactile-best", GradientKind::Tactile, true),
-    alone!("rendering", GradientKind::Rendering, false),
-    alone!("rendering-best", GradientKind::Rendering, true),
-    alone!("physics", GradientKind::Physics, false),
-    alone!("physics-best", GradientKind::Physics, true),
-    NamedMethod {
-        name: "physics-free",
-        summary: "this gradient alone, no regularization, the last pose",
-        method: || free(Heuristic::of(&[GradientKind::Physics])),
-    },
-    NamedMethod {
-        name: "icp",
-        summary: "the paper's ICP, point to point, the last pose",
-        method: || Icp::default().into(),
-    },
-    NamedMethod {
-        name: "icp-best",
-        summary: "the paper's ICP, point to point, checkpointing",
-        method: || Icp { checkpoint: true, ..Icp::default() }.into(),
-    },
-    NamedMethod {
-        name: "robust-icp",
-        summary: "robust point-to-plane ICP, a strong baseline, the last pose",
-        method: || RobustIcp::default().into(),
-    },
-];
 
 #[cfg(test)]
 mod tests {
@@ -316,15 +208,23 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_found() {
-        let all = || NamedMethod::all().iter().chain(NamedMethod::ablations());
-        for method in all() {
-            assert_eq!(all().filter(|m| m.name == method.name).count(), 1);
-            let found = NamedMethod::find(method.name);
-            assert_eq!(found.map(|m| m.summary), Some(method.summary));
+        let names = Method::all().iter().map(|(name, _)| (*name).to_owned());
+        let mut all: Vec<String> = names.chain(Method::ablations()).collect();
+        for name in &all {
+            assert!(Method::named(name).is_some(), "{name}");
         }
-        assert!(NamedMethod::find("guess").is_none());
-        let old = NamedMethod::find("fused-without-colour").map(|m| m.name);
-        assert_eq!(old, Some("fused-without-color"));
+        let count = all.len();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!((all.len(), count), (40, 40));
+        for name in
+            ["guess", "fused-", "fused-only-", "fused-fixed-touch", "depth-free", "icp-free"]
+        {
+            assert!(Method::named(name).is_none(), "{name}");
+        }
+        let debug = |name: &str| format!("{:?}", Method::named(name));
+        assert_eq!(debug("fused-without-colour"), debug("fused-without-color"));
+        assert_eq!(debug("combined"), format!("{:?}", Some(Method::combined())));
     }
 
     #[test]
@@ -351,8 +251,8 @@ mod tests {
 
     #[test]
     fn iterations_are_set() {
-        for method in NamedMethod::all() {
-            let mut method = method.method();
+        for (name, _) in Method::all() {
+            let mut method = Method::named(name).unwrap();
             method.set_iterations(7);
             match &method {
                 Method::Fused(fused) => {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use prehend_refine::calibration::{Calibrator, CalibratorSettings};
+use prehend_refine::calibration::Calibrator;
 use prehend_refine::data::{AssetError, Assets, Target, user_cache};
 use prehend_refine::data::{Calibrated, CalibrationFrames, Passes};
 use pyo3::prelude::*;
@@ -12,14 +12,15 @@ use super::dataset::Dataset;
 use super::poses::poses;
 use super::rig::Rig;
 use super::run::at_least_one;
+use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
 
 /// `prehend.calibrate` is made of it: the rig, what is to be said of frames that were left out, and what is wrong with others. `ids` are the numbers of
 /// scene, image, object and mask of each pose.
 #[pyfunction]
-#[pyo3(signature = (dataset, ids, poses, passes=6, window=None))]
-#[allow(clippy::type_complexity)] // as Python has it
+#[pyo3(signature = (dataset, ids, poses, passes=6, window=None, settings=None))]
+#[allow(clippy::type_complexity, clippy::too_many_arguments)] // as Python has it
 pub(crate) fn _calibrate(
     py: Python<'_>,
     dataset: &Dataset,
@@ -27,6 +28,7 @@ pub(crate) fn _calibrate(
     poses: Numbers<'_>,
     passes: usize,
     window: Option<usize>,
+    settings: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(Rig, Vec<String>, Vec<String>)> {
     let poses = self::poses(&poses, "poses")?;
     if poses.len() != ids.len() {
@@ -38,6 +40,7 @@ pub(crate) fn _calibrate(
     let targets: Vec<Target> = told.iter().map(|(target, _)| *target).collect();
     let passes = at_least_one(passes, "passes")?;
     let window = window.map(|window| at_least_one(window, "window")).transpose()?;
+    let settings = self::settings(settings.as_ref())?.calibration();
     let source = Arc::clone(&dataset.dataset);
     let learn = move || -> Result<Calibrated, AssetError> {
         // Frames as they are, whatever rig the dataset is read with.
@@ -49,8 +52,7 @@ pub(crate) fn _calibrate(
             .collect::<Result<_, AssetError>>()?;
         let frames = CalibrationFrames::new(assets, told);
         let (joints, size) = frames.layout()?;
-        let nominal =
-            Calibrator::new(joints.unwrap_or(0), size, objects, CalibratorSettings::default())?;
+        let nominal = Calibrator::new(joints.unwrap_or(0), size, objects, settings)?;
         Passes::new(&frames, passes, window).run(nominal, &mut |_| ())
     };
     let done = py.detach(learn).raise()?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target};
 use prehend_refine::scene::check_gravity;
-use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::search::{PoseCandidate, PoseSearch};
 use prehend_refine::{Observation, RefineError, RefineJob};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
@@ -17,6 +17,7 @@ use super::object::prepared;
 use super::poses::{pose, poses};
 use super::rig::Rig;
 use super::run::{self, Noise};
+use super::settings::settings;
 use super::{estimate, images};
 use crate::arrays::{Numbers, in_order, matrix, vector};
 use crate::error::{Raise, wrong};
@@ -121,8 +122,10 @@ impl Frame {
     /// Refines a pose of the object (4 × 4, camera ← object [m]): an `Estimate`. Python's other threads run on meanwhile.
     ///
     /// `rivals` (n × 4 × 4) are the other poses that a search ended with, where the pose comes from one. `iterations` limits those of each stage. `noise` has sizes of errors by name, as
-    /// `prehend refine --noise` does: `{"model.scale": "5%"}` estimates the size of the model.
-    #[pyo3(signature = (pose, *, method="fused", iterations=None, rivals=None, noise=None))]
+    /// `prehend refine --noise` does: `{"model.scale": "5%"}` estimates the size of the model. `settings` of the estimator are a dict such as
+    /// `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
+    #[pyo3(signature = (pose, *, method="fused", iterations=None, rivals=None, noise=None, settings=None))]
+    #[allow(clippy::too_many_arguments)] // as Python has it
     fn refine<'py>(
         &self,
         py: Python<'py>,
@@ -131,8 +134,9 @@ impl Frame {
         iterations: Option<usize>,
         rivals: Option<Numbers<'py>>,
         noise: Option<Noise>,
+        settings: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let method = run::method(method, iterations, noise.as_ref())?;
+        let method = run::method(method, iterations, noise.as_ref(), settings.as_ref())?;
         let initial = self::pose(&pose, "pose")?;
         let rivals = rivals.map(|rivals| poses(&rivals, "rivals")).transpose()?;
         let job = RefineJob { rivals, ..RefineJob::new(&self.input, initial) };
@@ -143,11 +147,17 @@ impl Frame {
     }
 
     /// Searches the object in the masked depth, without any pose to begin with: up to four poses (4 × 4, camera ← object [m]), each with its share, the best
-    /// first. `refine` takes the first, and the others as `rivals`. Python's other threads run on meanwhile.
-    fn search<'py>(&self, py: Python<'py>) -> PyResult<Vec<(Bound<'py, PyAny>, f64)>> {
+    /// first. `refine` takes the first, and the others as `rivals`; `settings` are as it has them. Python's other threads run on meanwhile.
+    #[pyo3(signature = (*, settings=None))]
+    fn search<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Vec<(Bound<'py, PyAny>, f64)>> {
+        let settings = self::settings(settings.as_ref())?.search();
         let search = || -> Result<Vec<PoseCandidate>, RefineError> {
             let object = Arc::clone(&self.input.object);
-            PoseSearch::new(object, SearchSettings::default())?.run(&self.input.frame()?)
+            PoseSearch::new(object, settings)?.run(&self.input.frame()?)
         };
         let found = py.detach(search).raise()?;
         let pose = |c: &PoseCandidate| Ok((matrix(py, &c.t_cam_object)?.into_any(), c.weight));

@@ -15,6 +15,7 @@ mod object;
 mod poses;
 mod rig;
 mod run;
+mod settings;
 mod tracker;
 
 pub(crate) use calibrate::_calibrate;

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
-use prehend_refine::{Method, NamedMethod, RefineJob, refine_all};
+use prehend_refine::{Method, RefineJob, refine_all};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use super::estimate;
 use super::frame::Frame;
 use super::poses::poses;
+use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Error, Raise, wrong};
 
@@ -26,12 +27,17 @@ pub(super) fn method(
     name: &str,
     iterations: Option<usize>,
     noise: Option<&Noise>,
+    given: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Method> {
     let unknown = || {
-        let names: Vec<_> = NamedMethod::all().iter().map(|method| method.name).collect();
+        let names: Vec<_> = Method::all().iter().map(|(name, _)| *name).collect();
         wrong(format!("method: '{name}' is unknown: one of {}", names.join(", ")))
     };
-    let mut method = Method::named(name).ok_or_else(unknown)?;
+    let estimator = settings(given)?.estimator;
+    let mut method = Method::with_settings(name, &estimator).ok_or_else(unknown)?;
+    if given.is_some() && !matches!(method, Method::Fused(_)) {
+        return Err(wrong(format!("settings: are of the fused methods, not of '{name}'")));
+    }
     if let Some(iterations) = iterations {
         method.set_iterations(at_least_one(iterations, "iterations")?.get());
     }
@@ -48,7 +54,7 @@ pub(super) fn method(
 /// The names of all methods, and what each is.
 #[pyfunction]
 pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
-    NamedMethod::all().iter().map(|method| (method.name, method.summary)).collect()
+    Method::all().iter().copied().collect()
 }
 
 /// Refines many frames side by side, each from its pose (n × 4 × 4, camera ← object [m]): a list of one `Estimate` a frame, in their order. In place
@@ -56,7 +62,8 @@ pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
 ///
 /// `threads` is how many threads work, all cores if it is not given; poses are the same for any number.
 #[pyfunction]
-#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, threads=None))]
+#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, settings=None, threads=None))]
+#[allow(clippy::too_many_arguments)] // as Python has it
 pub(crate) fn refine_batch<'py>(
     py: Python<'py>,
     frames: Vec<Py<Frame>>,
@@ -64,9 +71,10 @@ pub(crate) fn refine_batch<'py>(
     method: &str,
     iterations: Option<usize>,
     noise: Option<Noise>,
+    settings: Option<Bound<'py, PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let method = self::method(method, iterations, noise.as_ref())?;
+    let method = self::method(method, iterations, noise.as_ref(), settings.as_ref())?;
     let threads = threads.map(|threads| at_least_one(threads, "threads")).transpose()?;
     let poses = self::poses(&poses, "poses")?;
     let (count, given) = (frames.len(), poses.len());

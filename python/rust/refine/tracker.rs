@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use prehend_refine::tracker::{Recovery, TrackerSettings};
+use prehend_refine::tracker::Recovery;
 use pyo3::prelude::*;
 
 use super::estimate;
@@ -12,14 +12,15 @@ use super::hand::Hand;
 use super::object::prepared;
 use super::poses::pose;
 use super::rig::Rig;
+use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
 
 /// Follows one object through the frames of a camera.
 ///
 /// `pose` (4 × 4, camera ← object [m]) is where to begin; without it the first frame is searched. `budget` [s] is what following may take in a frame.
-/// `recovery` is what is done about an object that is lost: "off", "near" (look about where it should be) or "anywhere". Of a `rig`, frames
-/// and the object are corrected already.
+/// `recovery` is what is done about an object that is lost: "off", "near" (look about where it should be) or "anywhere", the default. Of a `rig`, frames
+/// and the object are corrected already. `settings` are a dict or the path of a TOML file, as `Frame.refine` has them.
 #[pyclass(module = "prehend")]
 pub(crate) struct Tracker {
     tracker: prehend_refine::tracker::Tracker,
@@ -33,18 +34,22 @@ fn seconds(seconds: f64, what: &str) -> PyResult<Duration> {
 #[pymethods]
 impl Tracker {
     #[new]
-    #[pyo3(signature = (object, hand=None, *, pose=None, rig=None, budget=None, recovery="anywhere"))]
+    #[allow(clippy::too_many_arguments)] // as Python has it
+    #[pyo3(signature = (object, hand=None, *, pose=None, rig=None, budget=None, recovery=None, settings=None))]
     fn new(
         object: Bound<'_, PyAny>,
         hand: Option<&Hand>,
         pose: Option<Numbers<'_>>,
         rig: Option<&Rig>,
         budget: Option<f64>,
-        recovery: &str,
+        recovery: Option<&str>,
+        settings: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let recovery: Recovery = recovery.parse().raise()?;
+        let recovery = recovery.map(|name| name.parse::<Recovery>().raise()).transpose()?;
         let budget = budget.map(|budget| seconds(budget, "budget")).transpose()?;
-        let settings = TrackerSettings { budget, recovery, ..TrackerSettings::default() };
+        let mut settings = self::settings(settings.as_ref())?.tracker();
+        settings.budget = budget.or(settings.budget);
+        settings.recovery = recovery.unwrap_or(settings.recovery);
         let hand = hand.map(|hand| Arc::clone(&hand.hand));
         let object = prepared(&object)?;
         let mut tracker = prehend_refine::tracker::Tracker::new(object, hand, settings).raise()?;

@@ -10,6 +10,7 @@ from .render import Image, LinearizedLoss, RenderGradient
 
 _Array = NDArray[np.float64]
 _Body = int | str
+_Settings = Mapping[str, Any] | str | PathLike[str]
 _Axis = _Body | tuple[_Body, int]
 _Law = tuple[str, list[tuple[str, str, str]]]
 
@@ -326,8 +327,9 @@ class Frame:
         iterations: int | None = None,
         rivals: ArrayLike | None = None,
         noise: Mapping[str, str] | None = None,
+        settings: _Settings | None = None,
     ) -> Estimate: ...
-    def search(self) -> list[tuple[NDArray[np.float64], float]]: ...
+    def search(self, *, settings: _Settings | None = None) -> list[tuple[NDArray[np.float64], float]]: ...
     def warnings(self, pose: ArrayLike) -> list[str]: ...
     @property
     def rgb(self) -> NDArray[np.uint8]: ...
@@ -373,7 +375,8 @@ class Tracker:
         pose: ArrayLike | None = None,
         rig: Rig | None = None,
         budget: float | None = None,
-        recovery: Literal["off", "near", "anywhere"] = "anywhere",
+        recovery: Literal["off", "near", "anywhere"] | None = None,
+        settings: _Settings | None = None,
     ) -> Tracker: ...
     def push(self, frame: Frame, time: float) -> Tracked: ...
     def start_from(self, pose: ArrayLike) -> None: ...
@@ -406,6 +409,7 @@ def refine_batch(
     method: str = "fused",
     iterations: int | None = None,
     noise: Mapping[str, str] | None = None,
+    settings: _Settings | None = None,
     threads: int | None = None,
 ) -> list[Estimate | Error]: ...
 def example_frame(seed: int = 0) -> tuple[Frame, NDArray[np.float64], NDArray[np.float64]]: ...
@@ -423,6 +427,7 @@ def _calibrate(
     poses: ArrayLike,
     passes: int = 6,
     window: int | None = None,
+    settings: _Settings | None = None,
 ) -> tuple[Rig, list[str], list[str]]: ...
 
 _Mesh = Mesh | str | PathLike[str] | tuple[ArrayLike, ArrayLike]

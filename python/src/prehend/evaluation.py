@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,15 +65,21 @@ def evaluate(dataset: Bop, poses: Poses) -> Scores:
 
 
 def calibrate(
-    dataset: Bop, poses: Poses, *, passes: int = 6, window: int | None = None
+    dataset: Bop,
+    poses: Poses,
+    *,
+    passes: int = 6,
+    window: int | None = None,
+    settings: Mapping[str, Any] | str | os.PathLike[str] | None = None,
 ) -> Rig:
     """Learns a rig from frames of a dataset in which the poses of objects are roughly known: what camera, hand and models get wrong in all of them. As
-    `prehend calibrate` has it, with up to 6 `passes` over all frames, or over each `window` of so many.
+    `prehend calibrate` has it, with up to 6 `passes` over all frames, or over each `window` of so many; `settings` are as `refine` has them.
 
     What is to be said of frames that disagree with the others, and were left out, or that could not be read, is a warning.
     """
     rows, stacked = _rows(poses)
-    rig, left_out, failed = _calibrate(dataset, [row.ids for row in rows], stacked, passes, window)
+    ids = [row.ids for row in rows]
+    rig, left_out, failed = _calibrate(dataset, ids, stacked, passes, window, settings)
     for text in [*left_out, *failed]:
         warnings.warn(text, stacklevel=2)
     found: Rig = rig

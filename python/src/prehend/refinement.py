@@ -9,6 +9,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,6 +100,7 @@ def refine(
     iterations: int | None = None,
     rivals: ArrayLike | None = None,
     noise: Mapping[str, str] | None = None,
+    settings: Mapping[str, Any] | str | PathLike[str] | None = None,
 ) -> Estimate:
     """Refines the pose of an object in one frame: the same as `Frame(rgb, depth, K, mesh, …).refine(pose, …)`.
 
@@ -122,6 +125,7 @@ def refine(
         iterations: At most so many in each stage.
         rivals: n × 4 × 4, the other poses that a search ended with, if `pose` comes from one.
         noise: Sizes of errors by name, as `prehend refine --noise` has them, such as `{"hand.translation": "5mm", "model.scale": "5%"}`.
+        settings: Settings of the estimator: a dict such as `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
 
     Raises:
         Error: What is wrong with the input, or why nothing was found.
@@ -149,7 +153,9 @@ def refine(
         lens=lens,
         rig=rig,
     )
-    estimate: Estimate = frame.refine(pose, method=method, iterations=iterations, rivals=rivals, noise=noise)
+    estimate: Estimate = frame.refine(
+        pose, method=method, iterations=iterations, rivals=rivals, noise=noise, settings=settings
+    )
     for text in estimate.warnings:
         warnings.warn(text, stacklevel=2)
     return estimate

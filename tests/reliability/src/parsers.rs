@@ -7,6 +7,7 @@ use anyhow::Result;
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
+use prehend_refine::Settings;
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
 use prehend_refine::data::{Assets, Journal, Target, Times, find_targets, load_frame_file};
 use prehend_refine::evaluate::study::StudyFile;
@@ -64,6 +65,7 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "glb", form: Form::Glb, read: |s, b| mesh(s, b, "m.glb") },
     Parser { name: "urdf", form: Form::Xml, read: urdf },
     Parser { name: "mjcf", form: Form::Xml, read: mjcf },
+    Parser { name: "settings", form: Form::Text, read: settings },
     Parser { name: "taxels", form: Form::Text, read: taxels },
     Parser { name: "grid", form: Form::Grid, read: grid },
     Parser { name: "png", form: Form::Png, read: image },
@@ -153,6 +155,12 @@ fn mjcf(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     let model = mjcf::Model::from_str(std::str::from_utf8(bytes)?, Some(&small.path("hand")))?;
     model.reference_poses().iter().for_each(finite);
     assert!(model.reference_positions().iter().all(|q| q.is_finite()));
+    Ok(())
+}
+
+fn settings(_: &SmallDataset, bytes: &[u8]) -> Result<()> {
+    let settings = Settings::from_toml(std::str::from_utf8(bytes)?)?;
+    Settings::from_toml(&settings.to_toml()?)?;
     Ok(())
 }
 

@@ -61,12 +61,6 @@ pub struct Calibrator {
     averaged: usize,
 }
 
-/// A rig is on its way while a parameter changes by so many of its deviations.
-const ON_ITS_WAY: f64 = 2.0;
-
-/// A frame that disagrees so many times more than is usual is left out.
-const LEFT_OUT: f64 = 3.5;
-
 #[derive(Clone)]
 struct Model {
     given: Arc<Object>,
@@ -95,7 +89,7 @@ impl Calibrator {
         let mut rig = Rig::nominal(joints, warp, &sigmas, settings.play);
         let mut models = BTreeMap::new();
         for (id, given) in objects {
-            let deviation = SurfaceDeviation::new(&given, &settings.fused.settings.model);
+            let deviation = SurfaceDeviation::new(&given, &settings.fused.settings.patches);
             rig.objects.extend(deviation.map(|deviation| (id, deviation)));
             models.insert(id, Model { corrected: Arc::clone(&given), given });
         }
@@ -136,7 +130,7 @@ impl Calibrator {
         if *is_refined {
             let stages = &mut fused.settings.stages;
             stages.drain(..stages.len().saturating_sub(1));
-            fused.settings.restart_angle = 0.0;
+            fused.settings.hypotheses.restart_angle = 0.0;
         }
         fused.rig = Some(Arc::new(self.rig.clone()));
         let frame = Frame::new(&observation, self.object(*obj_id)?, hand.as_ref())?;
@@ -147,9 +141,10 @@ impl Calibrator {
         let errors = (self.solved == 0).then_some(&self.rig.covariance);
         let disagreement = information.disagreement(&self.prior, errors).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
-        let left_out = times.filter(|times| *times > LEFT_OUT);
+        let left_out = times.filter(|times| *times > self.settings.outlier_ratio);
         let obj_id = *obj_id;
-        Ok(Visit { obj_id, information, disagreement, left_out, has_mask, t_cam_object })
+        let same_view = self.same_view();
+        Ok(Visit { obj_id, information, disagreement, left_out, has_mask, t_cam_object, same_view })
     }
 
     /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
@@ -162,7 +157,7 @@ impl Calibrator {
         let (observation, fused) = self.corrected(frame)?;
         let object = self.object(frame.obj_id)?;
         let corrected = Frame::new(&observation, object, frame.hand.as_ref())?;
-        FrameResiduals::new(&corrected, &frame.initial, &fused.settings.tactile, has_mask)
+        FrameResiduals::new(&corrected, &frame.initial, &fused.settings, has_mask)
     }
 
     /// What a frame shows when the rig is corrected, and how it is refined.
@@ -184,6 +179,10 @@ impl Calibrator {
     /// If there is none of that number.
     pub fn object(&self, obj_id: u32) -> Result<&Arc<Object>, RefineError> {
         Ok(&self.model(obj_id)?.corrected)
+    }
+
+    fn same_view(&self) -> [f64; 2] {
+        [self.settings.same_view_angle, self.settings.same_view_distance]
     }
 
     fn model(&self, obj_id: u32) -> Result<&Model, RefineError> {
@@ -235,7 +234,7 @@ impl Calibrator {
         let mut sums = self.kept.clone();
         sums.merge(pass.sums.clone());
         let mut views = self.kept_views.clone();
-        views.merge(&pass.views);
+        views.merge(&pass.views, self.same_view());
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.
@@ -262,7 +261,7 @@ impl Calibrator {
         pass.expect_play(&change, &covariance, &eliminated);
         self.take_play(pass.squares);
         let deviations = covariance.diagonal().map(f64::sqrt);
-        if self.averaged > 0 || change.component_div(&deviations).amax() < ON_ITS_WAY {
+        if self.averaged > 0 || change.component_div(&deviations).amax() < self.settings.moving {
             self.averaged += 1;
         }
         let share = 1.0 / self.averaged.max(1) as f64;
@@ -290,7 +289,7 @@ impl Calibrator {
     /// linear in the rig from then on, and its memory is free.
     pub fn keep(&mut self, pass: Pass) {
         self.kept.merge(pass.sums);
-        self.kept_views.merge(&pass.views);
+        self.kept_views.merge(&pass.views, self.same_view());
         self.kept_play.merge(&pass.squares);
         self.kept_disagreements.extend(pass.disagreements);
         (self.solved, self.averaged) = (0, 0);

@@ -234,7 +234,7 @@ mod tests {
             state.t_cam_object.translation.z += 1e-3;
             state.t_cam_hand.translation.z += 1e-3;
             let depth = PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap();
-            let hand = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
+            let hand = HandDepthFactor::new(&frame, 500, &HandDepthSettings::default()).unwrap();
             let free = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             (state, [Box::new(depth) as Box<dyn Factor>, Box::new(hand), Box::new(free)])
         };
@@ -305,7 +305,7 @@ mod tests {
             let factor: Box<dyn Factor> = if on_object {
                 Box::new(PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap())
             } else {
-                Box::new(HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap())
+                Box::new(HandDepthFactor::new(&frame, 500, &HandDepthSettings::default()).unwrap())
             };
             let blocks = [Block::ObjectPose, Block::Camera];
             let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));

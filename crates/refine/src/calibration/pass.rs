@@ -20,6 +20,8 @@ pub struct Visit {
     pub has_mask: bool,
     /// Object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
+    /// Turn and motion within which another frame shows the same \[rad, m\].
+    pub(super) same_view: [f64; 2],
 }
 
 /// What the frames of a pass have said. Sums are the same for the same order of frames.
@@ -89,14 +91,15 @@ impl PlaySquares {
 impl Pass {
     /// Adds what a frame has said, unless it is left out.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information, disagreement, left_out, t_cam_object, .. } = visit;
+        let Visit { obj_id, information, disagreement, left_out, t_cam_object, same_view, .. } =
+            visit;
         self.disagreements.push(disagreement);
         if left_out.is_some() {
             return;
         }
         let FrameInformation { hessian, gradient, play } = information;
         self.sums.add(obj_id, hessian, gradient);
-        self.views.add(obj_id, &t_cam_object);
+        self.views.add(obj_id, &t_cam_object, same_view);
         self.play.push((obj_id, play));
     }
 

@@ -6,10 +6,10 @@ use nalgebra::Isometry3;
 
 use crate::MM_PER_M;
 use crate::error::RefineError;
-use crate::factor::{TactileFactor, TactileSettings};
+use crate::factor::TactileFactor;
 use crate::problem::State;
 use crate::scene::{Frame, median};
-use crate::strategy::Pixels;
+use crate::strategy::{FusedSettings, Pixels};
 
 /// What is off in one frame where calibrations are believed.
 #[derive(Clone, Debug)]
@@ -32,20 +32,20 @@ impl FrameResiduals {
     /// If the pose is not finite, or forces do not fit the taxels.
     pub fn of(frame: &Frame<'_>, t_cam_object: &Isometry3<f64>) -> Result<Self, RefineError> {
         let has_mask = frame.observation().mask.count() > 0;
-        Self::new(frame, t_cam_object, &TactileSettings::default(), has_mask)
+        Self::new(frame, t_cam_object, &FusedSettings::default(), has_mask)
     }
 
-    /// As [`Self::of`] has it, with these settings of touch; the mask counts only if there is one.
+    /// As [`Self::of`] has it, with these settings; the mask counts only if there is one.
     pub(super) fn new(
         frame: &Frame<'_>,
         t_cam_object: &Isometry3<f64>,
-        tactile: &TactileSettings,
+        settings: &FusedSettings,
         has_mask: bool,
     ) -> Result<Self, RefineError> {
         let state = State::new(frame, t_cam_object)?;
-        let pixels = Pixels::new(frame, &state);
+        let pixels = Pixels::new(frame, &state, settings.hand_depth.margin);
         let feels = frame.hand().is_some_and(|(_, hand)| !hand.forces.is_empty());
-        let touch = feels.then(|| TactileFactor::new(frame, tactile)).transpose()?;
+        let touch = feels.then(|| TactileFactor::new(frame, &settings.tactile)).transpose()?;
         Ok(Self {
             depth: [pixels.on_object(FEWEST), pixels.on_hand()],
             outline: pixels.outline_distance().filter(|_| has_mask),

@@ -13,12 +13,12 @@ use prehend_geometry::{GridCache, TriMesh};
 use serde::Deserialize;
 
 use crate::data::assets::AssetError;
-use crate::data::frame_input::FrameInput;
 use crate::data::bop::{
     Body, BodyEntry, BodyKind, DatasetError, DepthCamera, DepthWarning, FramePose, Intrinsics,
     LengthUnit, Lens, NonNegative, Numbers, Optics, Positive, Real, Rotation, Stated, Tactile,
     TactileEntry, TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
 };
+use crate::data::frame_input::FrameInput;
 use crate::data::robots::Robots;
 use crate::rig::Rig;
 use crate::scene::{Hand, HandMeasurement, Object, Observation, RemapCache, check_gravity};

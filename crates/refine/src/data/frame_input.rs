@@ -65,7 +65,7 @@ impl FrameInput {
             true => None,
             false => Some(self.segmented(t_cam_object, fused.settings.clone())?),
         };
-        if fused.settings.model_scale <= 0.0 {
+        if fused.settings.model_scale.sigma <= 0.0 {
             return Ok(segmented);
         }
         let input = segmented.unwrap_or_else(|| self.clone());

@@ -157,7 +157,11 @@ impl Rig {
                 let problem = format!("expected {count} rows of {count} numbers");
                 return field(&format!("objects.{id}.covariance"), &problem);
             }
-            let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
+            let settings = ModelErrorSettings {
+                sigma: sigma_m,
+                length_scale: length_scale_m,
+                ..ModelErrorSettings::default()
+            };
             let nodes = nodes_m.into_iter().map(Vector3::from).collect();
             let columns: Vec<Vector3<f64>> = coefficients.into_iter().map(Vector3::from).collect();
             let coefficients = match columns.as_slice() {
@@ -191,7 +195,7 @@ impl Rig {
         }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
             let layout = ObjectLayout {
-                sigma_m: deviation.settings.gp_sigma,
+                sigma_m: deviation.settings.sigma,
                 length_scale_m: deviation.settings.length_scale,
                 covariance: Covariance(deviation.covariance.clone()),
                 nodes_m: deviation.nodes().iter().map(|node| (*node).into()).collect(),

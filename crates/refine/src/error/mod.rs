@@ -93,3 +93,13 @@ pub enum RefineError {
     #[error("the images of the observation cannot be used: {0}")]
     Images(String),
 }
+
+impl RefineError {
+    /// Refuses the first of these settings that is not above zero.
+    pub(crate) fn require_positive(settings: &[(&'static str, f64)]) -> Result<(), Self> {
+        match settings.iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
+            Some((name, value)) => Err(Self::Setting { name, problem: format!("is {value}") }),
+            None => Ok(()),
+        }
+    }
+}

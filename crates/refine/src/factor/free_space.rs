@@ -6,25 +6,30 @@ use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
 use serde::{Deserialize, Serialize};
 
+use super::PointToPlaneSettings;
 use super::facing::facing;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
 
 /// Settings of [`FreeSpaceFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct FreeSpaceSettings {
-    /// Samples of the object's surface used at most.
+    /// Number of samples of the object's surface at most.
     pub samples: usize,
-    /// How far in front of measured depth a sample may be and cost nothing \[m\].
+    /// Distance in front of measured depth up to which a sample costs nothing \[m\].
     pub margin: f64,
-    /// How far beyond that it is \[m\].
+    /// Noise of distances beyond that \[m\]. EXPERIMENTS: Weight of free space.
     pub noise: NoiseModel,
+    /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
+    pub grazing: f64,
 }
 
 impl Default for FreeSpaceSettings {
     fn default() -> Self {
-        Self { samples: 400, margin: 3e-3, noise: NoiseModel::cauchy(2e-3, 10.0) }
+        let PointToPlaneSettings { grazing, .. } = PointToPlaneSettings::default();
+        Self { samples: 400, margin: 3e-3, noise: NoiseModel::cauchy(2e-3, 10.0), grazing }
     }
 }
 
@@ -113,7 +118,8 @@ impl Factor for FreeSpaceFactor {
         let weighting = self.settings.noise.weighting(samples.len());
         for sample in samples {
             let place = state.t_cam_object * sample.point;
-            let facing = facing(&(state.t_cam_object * sample.normal), &place.coords);
+            let normal = state.t_cam_object * sample.normal;
+            let facing = facing(&normal, &place.coords, self.settings.grazing);
             if facing == 0.0 {
                 continue;
             }

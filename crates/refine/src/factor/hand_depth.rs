@@ -14,19 +14,24 @@ use crate::scene::{Frame, Hand};
 
 /// Settings of [`HandDepthFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct HandDepthSettings {
-    /// Depth points used at most, spread evenly over the hand.
-    pub points: usize,
-    /// Distances of depth points from the hand \[m\].
+    /// Noise of distances of depth points from the hand \[m\]. EXPERIMENTS: Depth points of the hand near edges left out.
     pub noise: NoiseModel,
-    /// How far a depth point may be from where the hand is measured to be \[m\]: beyond, it is of something else.
+    /// Distance from where the hand is measured to be up to which a depth point is of it \[m\]: beyond, it is of something else.
     pub reach: f64,
+    /// Margin around the object's mask, and beside other edges, in which pixels are not taken for the hand \[px\]: there depth is of both.
+    pub margin: usize,
+    /// Number of depth points looked at for one that is used, of robots of several bodies: a table may fill the image, and would leave hardly a point to
+    /// the hand.
+    pub candidates: usize,
 }
 
 impl Default for HandDepthSettings {
     fn default() -> Self {
-        Self { points: 500, noise: NoiseModel::cauchy(1e-3, 60.0), reach: 15e-3 }
+        let noise = NoiseModel::cauchy(1e-3, 60.0);
+        Self { noise, reach: 15e-3, margin: 3, candidates: 8 }
     }
 }
 
@@ -50,18 +55,16 @@ struct Point {
     depth: f64,
 }
 
-/// Of robots of several bodies, so many times as many points are looked at as are used of each.
-const CANDIDATES: usize = 8;
-
-/// Pixels around the object's mask that are not taken for the hand.
-const MARGIN: usize = 3;
-
 impl HandDepthFactor {
-    /// Of the depth of `frame` where the hand is. There may be none: the cost is then zero.
+    /// Of at most so many `points` of the depth of `frame` where the hand is, spread evenly over it. There may be none: the cost is then zero.
     ///
     /// # Errors
     /// If the hand is unknown.
-    pub fn new(frame: &Frame<'_>, settings: &HandDepthSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &Frame<'_>,
+        points: usize,
+        settings: &HandDepthSettings,
+    ) -> Result<Self, RefineError> {
         let (robot, measured) = frame.require_hand("hand-depth")?;
         let (observation, hand) = (frame.observation(), frame.hand_depth());
         let (depth, camera) = (&observation.depth, &observation.camera);
@@ -76,7 +79,7 @@ impl HandDepthFactor {
             .map(|(pixel, _)| pixel);
         // Around the mask's outline the object may be what is seen.
         let of_object = |pixel: usize| {
-            let near = [0, MARGIN, MARGIN * width];
+            let near = [0, settings.margin, settings.margin * width];
             near.iter().any(|step| {
                 let (before, after) = (pixel.checked_sub(*step), mask.get(pixel + step));
                 before.is_some_and(|p| mask[p]) || after.is_some_and(|m| *m)
@@ -91,15 +94,15 @@ impl HandDepthFactor {
                 depth: f64::from(depth.pixels()[pixel]),
             }
         };
+        let most = points;
         let points = |limit: usize| {
             let step = of_hand.len().div_ceil(limit.max(1)).max(1);
             of_hand.iter().step_by(step).map(point).collect::<Vec<_>>()
         };
         let first = robot.tree.floating_bodies();
         let points = if first.is_empty() {
-            points(settings.points)
+            points(most)
         } else {
-            // A table may fill the image, and would leave hardly a point to the hand.
             let posed = robot.posed(&measured.t_cam_hand, &measured.joints)?;
             let body = |Point { ray, depth, .. }: &Point| {
                 let (link, _) =
@@ -107,13 +110,13 @@ impl HandDepthFactor {
                 Some(first.partition_point(|first| *first <= link))
             };
             let mut of_bodies: Vec<Vec<Point>> = (0..=first.len()).map(|_| Vec::new()).collect();
-            for point in points(CANDIDATES * settings.points) {
+            for point in points(settings.candidates * most) {
                 if let Some(body) = body(&point) {
                     of_bodies[body].push(point);
                 }
             }
             let evenly = |points: Vec<Point>| {
-                let step = points.len().div_ceil(settings.points.max(1)).max(1);
+                let step = points.len().div_ceil(most.max(1)).max(1);
                 points.into_iter().step_by(step)
             };
             of_bodies.into_iter().flat_map(evenly).collect()
@@ -171,7 +174,7 @@ mod tests {
             let (frame, mut state) = fixture(seed);
             state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3, 1e-3]);
             state.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.01 * (i as f64).sin());
-            let factor = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
+            let factor = HandDepthFactor::new(&frame, 500, &HandDepthSettings::default()).unwrap();
             assert!(factor.points.len() > 100);
             for block in [Block::HandPose, Block::Joints(16), Block::Camera] {
                 assert_gradient(&factor, &state, block, 1e-7, 0.02);
@@ -183,7 +186,7 @@ mod tests {
     fn points_out_of_reach_are_as_bad_as_those_at_its_end() {
         let (frame, state) = fixture(0);
         let settings = HandDepthSettings::default();
-        let factor = HandDepthFactor::new(&frame, &settings).unwrap();
+        let factor = HandDepthFactor::new(&frame, 500, &settings).unwrap();
         let count = factor.points.len();
         let most = settings.noise.weighting(count).cost(2.0 * settings.reach) * count as f64;
         let aside = |z| {

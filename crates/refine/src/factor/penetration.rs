@@ -13,6 +13,7 @@ use crate::scene::{Frame, Hand, Object};
 
 /// Settings of [`PenetrationFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct PenetrationSettings {
     /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of

@@ -13,36 +13,39 @@ use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct PriorSettings {
-    /// The object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
+    /// Standard deviation of the object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
     pub object_translation: f64,
-    /// The object's rotation about each axis \[rad\].
+    /// Standard deviation of the object's rotation about each axis \[rad\].
     pub object_rotation: f64,
     /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
+    /// EXPERIMENTS: Probability of another rotation convention.
     pub object_turned: f64,
-    /// The hand at the object's place, in each direction \[m\].
+    /// Standard deviation of the hand's translation at the object's place, in each direction \[m\].
     pub hand_translation: f64,
-    /// The hand's rotation about each axis \[rad\].
+    /// Standard deviation of the hand's rotation about each axis \[rad\].
     pub hand_rotation: f64,
-    /// Each joint \[rad or m\].
+    /// Standard deviation of each joint position \[rad or m\].
     pub joints: f64,
-    /// Joints of which that is known, in the order of the joints: beyond the end of the list and where there is none, as all others.
+    /// Standard deviations of joints of which they are known, in the order of the joints: beyond the end of the list and where there is none, as all
+    /// others.
     #[serde(skip)]
     pub known_joints: Vec<Option<f64>>,
-    /// Depth, as a part of it.
+    /// Standard deviation of the depth scale, as a part of depth.
     pub depth_scale: f64,
-    /// Depth \[m\].
+    /// Standard deviation of the depth bias \[m\].
     pub depth_bias: f64,
-    /// The principal point, across and down \[focal lengths\].
+    /// Standard deviation of the principal point, across and down \[focal lengths\].
     pub principal_point: f64,
-    /// The size of images, as a part of it: errors of the focal length and of the model's size.
+    /// Standard deviation of the focal length, as a part of it: also that of the model's size, which images tell no better.
     pub focal_scale: f64,
-    /// Half of what the two focal lengths differ by, as a part of them.
+    /// Standard deviation of half of what the two focal lengths differ by, as a part of them.
     pub aspect: f64,
-    /// Where another camera is beside the first, at the object's place, in each direction \[m\].
+    /// Standard deviation of another camera's place beside the first, at the object's place, in each direction \[m\].
     pub view_translation: f64,
-    /// Its rotation about each axis \[rad\].
+    /// Standard deviation of its rotation about each axis \[rad\].
     pub view_rotation: f64,
 }
 
@@ -127,9 +130,6 @@ pub(crate) struct Layout {
     views: usize,
 }
 
-/// Twists of the object, then of the hand.
-const POSES: usize = 12;
-
 impl Layout {
     pub(crate) fn new(joints: usize, views: usize) -> Self {
         Self { joints, views }
@@ -154,11 +154,11 @@ impl Layout {
     pub(crate) fn offset(self, block: Block) -> usize {
         match block {
             Block::ObjectPose => 0,
-            Block::HandPose => 6,
-            Block::Joints(_) => POSES,
-            Block::Camera => POSES + self.joints,
+            Block::HandPose => Block::ObjectPose.dimension(),
+            Block::Joints(_) => self.offset(Block::HandPose) + Block::HandPose.dimension(),
+            Block::Camera => self.offset(Block::Joints(0)) + self.joints,
             Block::View(k) => {
-                let first = POSES + self.joints + CameraCalibrationError::DIMENSION;
+                let first = self.offset(Block::Camera) + CameraCalibrationError::DIMENSION;
                 first + k * ViewCalibrationError::DIMENSION
             }
         }
@@ -371,7 +371,7 @@ impl Factor for GaussianPrior {
                     rows.add(*residual, &weighting(k), |row| {
                         let all: Vec<f64> = whitener.row(k).iter().copied().collect();
                         let object = by_object.tr_mul(&Vector6::from_column_slice(&all[..6]));
-                        let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..POSES]));
+                        let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..12]));
                         row.block(Block::ObjectPose, object.as_slice());
                         row.block(Block::HandPose, hand.as_slice());
                         for &block in &blocks[2..] {

@@ -18,33 +18,32 @@ use crate::scene::{Frame, Object, Occluders};
 
 /// Settings of [`RenderingFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct RenderingSettings {
-    /// The image is made smaller by this factor.
+    /// Factor by which the image is made smaller.
     pub downsample: usize,
-    /// Whether colors are compared.
+    /// True if colors are compared.
     pub color: bool,
-    /// What may hide the object.
+    /// Occluders: what may hide the object.
     pub occluders: Occluders,
-    /// Standard deviation of a color, relative to the object's brightness in the image: exposure is
-    /// unknown, and a dark image is no better evidence than a bright one.
+    /// Standard deviation of a color, relative to the object's brightness in the image: exposure is unknown, and a dark image is no better evidence than
+    /// a bright one. EXPERIMENTS: Weight of color.
     pub sigma: f64,
     /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
     pub mask_sigma: f64,
     /// Width of Cauchy's kernel of a color in units of [`CAUCHY_WIDTH`] standard deviations.
     pub kernel_scale: f64,
-    /// How many independent measurements the pixels amount to: the errors of shading, texture and
-    /// segmentation reach over whole patches.
+    /// Effective sample size of the pixels: the errors of shading, texture and segmentation reach over whole patches.
     pub effective_pixels: f64,
-    /// Pull of the estimated light towards the same from everywhere; see [`Light::fit`].
+    /// Ridge of the estimated light, which pulls it towards the same from everywhere; see [`Light::fit`].
     pub light_ridge: f64,
+    /// Number of pixels that the light is solved from at most, none of them beside one where the object is not seen. EXPERIMENTS: Light from pixels away
+    /// from outlines.
+    pub light_samples: usize,
+    /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
+    pub contour_half_width: f64,
 }
-
-/// Half-width of the contour band \[px\] that is nearest to how a box-filtered edge fades.
-const HALF_WIDTH: f64 = 0.645;
-
-/// Pixels that the light is solved from at most, none of them beside one where the object is not seen.
-const LIGHT_SAMPLES: usize = 1000;
 
 impl Default for RenderingSettings {
     fn default() -> Self {
@@ -57,6 +56,8 @@ impl Default for RenderingSettings {
             kernel_scale: 1.0,
             effective_pixels: 80.0,
             light_ridge: 1e-2,
+            light_samples: 1000,
+            contour_half_width: 0.645,
         }
     }
 }
@@ -75,6 +76,7 @@ pub struct RenderingFactor {
     scale: f64,
     degrees: f64,
     light_ridge: f64,
+    light_samples: usize,
     /// Whether colors are compared.
     color: bool,
     /// Where the object may be off from its model, and the width of the patches' tiles in the image at hand \[px\].
@@ -97,7 +99,8 @@ impl RenderingFactor {
             kernel: RobustKernel::Cauchy { scale: settings.kernel_scale * CAUCHY_WIDTH * sigma },
             ..LossOptions::default()
         };
-        let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
+        let half_width = settings.contour_half_width;
+        let contour = ContourOptions { half_width, ..ContourOptions::default() };
         let object = Arc::clone(frame.object());
         let problem = PoseProblem {
             model: Arc::clone(&object.model),
@@ -112,6 +115,7 @@ impl RenderingFactor {
             scale: settings.effective_pixels / (sigma * sigma),
             degrees: settings.effective_pixels,
             light_ridge: settings.light_ridge,
+            light_samples: settings.light_samples,
             color: settings.color,
             patches: None,
         })
@@ -132,7 +136,7 @@ impl RenderingFactor {
         // Four unknowns a channel do not need every pixel.
         let PoseProblem { model, target, .. } = &self.problem;
         let seen = reprojected(state);
-        let samples = light_samples(model, &seen, target, 1, LIGHT_SAMPLES);
+        let samples = light_samples(model, &seen, target, 1, self.light_samples);
         Light::fit(&samples, self.light_ridge).unwrap_or_else(|_| Light::ambient(1.0))
     }
 

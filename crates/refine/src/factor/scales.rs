@@ -44,11 +44,13 @@ impl ErrorGroup {
 
 /// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ScaleSettings {
-    /// Standard deviation of c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are known.
+    /// Standard deviation of the common logarithm c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are
+    /// known. EXPERIMENTS: Prior of scales.
     pub common: f64,
-    /// Standard deviation of each d.
+    /// Standard deviation of each group's own logarithm d. EXPERIMENTS: Prior of scales.
     pub own: f64,
     /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
     pub noise: f64,

@@ -14,21 +14,22 @@ use crate::scene::{Frame, Hand, Object};
 
 /// Settings of [`SupportFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct SupportSettings {
-    /// Standard deviation of what is left unbalanced, as a share of all that acts on the object.
+    /// Standard deviation of what is left unbalanced, as a share of all that acts on the object. EXPERIMENTS: Support factor.
     pub sigma: f64,
     /// Coefficient of friction: a generous one, since only what no forces could hold is evidence.
     pub friction: f64,
-    /// How far the surface may be from the hand and yet touch it, the less the farther \[m\]: errors of models and joints.
+    /// Distance from the hand up to which the surface may yet touch it, the less the farther \[m\]: errors of models and joints.
     pub reach: f64,
-    /// Samples of the object's surface at most.
+    /// Number of samples of the object's surface at most.
     pub samples: usize,
     /// Contact area that bears half of what it would if it did not yield \[m²\].
     pub area: f64,
     /// Share of the felt forces that certainly acts: taxels' gains are off, and the rest may be more, never less.
     pub felt: f64,
-    /// A taxel that feels so much \[N\] is believed half: those that ring false feel less.
+    /// Force of a taxel at which it is believed half \[N\]: those that ring false feel less.
     pub felt_force: f64,
 }
 
@@ -215,10 +216,6 @@ fn twists(arm: &Vector3<f64>) -> [(Vector3<f64>, Vector3<f64>); 6] {
     })
 }
 
-/// Where the derivatives by the hand's pose and by its joints begin.
-const HAND: usize = 6;
-const JOINTS: usize = 12;
-
 impl Factor for SupportFactor {
     fn name(&self) -> &'static str {
         "support"
@@ -246,7 +243,10 @@ impl SupportFactor {
     /// that are less cost less.
     fn derivatives(&self, held: &Held, state: &State) -> (DMatrix<f64>, DVector<f64>) {
         let (center, mass_center) = (state.center(), held.mass_center);
-        let parameters = JOINTS + state.joints.len();
+        // Where the derivatives by the hand's pose and by its joints begin.
+        let hand = Block::ObjectPose.dimension();
+        let joints = hand + Block::HandPose.dimension();
+        let parameters = joints + state.joints.len();
         let mut jacobian = DMatrix::zeros(6, parameters);
         let mut yielding = DVector::zeros(parameters);
         for (near, force) in held.near.iter().zip(&held.balance.forces) {
@@ -265,10 +265,10 @@ impl SupportFactor {
             for (k, (velocity, turn)) in twists(&(near.point.coords - center)).iter().enumerate() {
                 let distance = near.sample.field.gradient.dot(velocity);
                 add(k, distance, joined(&turn.cross(force), &turn.cross(&torque)));
-                add(HAND + k, -distance, Vector6::zeros());
+                add(hand + k, -distance, Vector6::zeros());
             }
             for (k, distance) in near.sample.joints.iter().enumerate() {
-                add(JOINTS + k, *distance, Vector6::zeros());
+                add(joints + k, *distance, Vector6::zeros());
             }
         }
         for felt in &self.felt {
@@ -285,13 +285,13 @@ impl SupportFactor {
                 add(k, -velocity, Vector3::zeros());
             }
             for (k, (velocity, turn)) in twists(&(point.coords - center)).iter().enumerate() {
-                add(HAND + k, *velocity, turn.cross(&force));
+                add(hand + k, *velocity, turn.cross(&force));
             }
             let end = point + force;
             let tail = held.hand.point_jacobian(felt.link, &point);
             let head = held.hand.point_jacobian(felt.link, &end);
             for ((k, velocity), (_, of_head)) in tail.zip(head) {
-                add(JOINTS + k, velocity, of_head - velocity);
+                add(joints + k, velocity, of_head - velocity);
             }
         }
         (jacobian, yielding)

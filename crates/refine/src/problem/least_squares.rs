@@ -105,11 +105,12 @@ impl QuadraticModel for Linearization {
 
 /// Levenberg–Marquardt over the blocks of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
-    /// Steps tried at most.
+    /// Number of steps tried at most.
     pub iterations: usize,
-    /// The end is reached when the next step promises to lower the cost by less than this \[nat\].
+    /// Decrease of the cost promised by the next step below which a solve ends \[nat\].
     pub min_decrease: f64,
 }
 

@@ -10,11 +10,13 @@ use serde::{Deserialize, Serialize};
 /// n residuals r cost min(1, m/n) / σ² · Σ ρ(r²), where ρ is the kernel's loss (½ r² without one) and m the number of
 /// independent measurements that they amount to at most.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct NoiseModel {
     /// Standard deviation σ of a residual \[the residual's unit\]; infinite for one that says nothing.
     pub sigma: f64,
-    /// What forgives outliers; its width is in the residual's unit.
+    /// Robust kernel, which forgives outliers; its width is in the residual's unit, and is not changed with σ.
+    #[cfg_attr(feature = "cli", schemars(with = "serde_json::Value"))]
     pub kernel: RobustKernel,
     /// Effective sample size m: errors of neighbors are alike, so that thousands of residuals are not thousands of witnesses.
     pub effective_samples: f64,

@@ -4,16 +4,6 @@ use nalgebra::{DMatrix, Point3, Vector3};
 
 use crate::scene::{ModelErrorSettings, Observation, squared_exponential};
 
-/// Patches that would cover the mask if all were full, and at most.
-const FULL_PATCHES: f64 = 30.0;
-const MOST_PATCHES: usize = 64;
-
-/// Width of a patch at least, as a share of the distance over which the deviation changes.
-const LEAST_SIDE: f64 = 0.6;
-
-/// Measured depths that are farther than this share of the object's distance from it are of something else.
-const NEAR: f64 = 0.2;
-
 /// What is independent in patches however near they are, as a share of the variance; keeps their covariance regular.
 const OWN: f64 = 1e-3;
 
@@ -78,8 +68,9 @@ impl SurfacePatches {
         settings: &ModelErrorSettings,
         unit: usize,
     ) -> Option<Self> {
-        let &ModelErrorSettings { gp_sigma, length_scale } = settings;
-        if !(gp_sigma > 0.0 && length_scale > 0.0) {
+        let &ModelErrorSettings { sigma, length_scale, patches, max_patches, min_width, near } =
+            settings;
+        if !(sigma > 0.0 && length_scale > 0.0) {
             return None;
         }
         let (mask, camera) = (&observation.mask, &observation.camera);
@@ -89,8 +80,8 @@ impl SurfacePatches {
         let within = (top..top + rows).flat_map(|y| (left..left + columns).map(move |x| [x, y]));
         let seen = within.filter(|[x, y]| mask.pixels()[y * width + x]);
         let largest = width.max(camera.height);
-        let least = LEAST_SIDE * length_scale * camera.fx / distance;
-        let wanted = (mask.count() as f64 / FULL_PATCHES).sqrt().max(least);
+        let least = min_width * length_scale * camera.fx / distance;
+        let wanted = (mask.count() as f64 / patches).sqrt().max(least);
         let mut side = (wanted.min(largest as f64).ceil() as usize).max(1).next_multiple_of(unit);
         let count = |tiles: &Tiles| {
             let mut shown = vec![false; tiles.len()];
@@ -99,7 +90,7 @@ impl SurfacePatches {
         };
         // Specks of a mask would each have a tile of their own.
         let mut tiles = Tiles::around(bounds, side);
-        while side < largest && count(&tiles) > MOST_PATCHES {
+        while side < largest && count(&tiles) > max_patches {
             side += side.div_ceil(4).next_multiple_of(unit);
             tiles = Tiles::around(bounds, side);
         }
@@ -107,8 +98,8 @@ impl SurfacePatches {
         let mut sums = vec![(Vector3::zeros(), 0.0); tiles.len()];
         for [x, y] in seen {
             let measured = f64::from(observation.depth.pixels()[y * width + x]);
-            let near = (measured - distance).abs() < NEAR * distance;
-            let depth = if near { measured } else { distance };
+            let is_near = (measured - distance).abs() < near * distance;
+            let depth = if is_near { measured } else { distance };
             let place = camera.unproject(x as f64, y as f64, depth);
             if let Some((sum, count)) = tiles.at([x, y]).map(|tile| &mut sums[tile]) {
                 *sum += place.coords;
@@ -126,7 +117,7 @@ impl SurfacePatches {
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             let own = if i == j { OWN } else { 0.0 };
             let [a, b] = [i, j].map(|k| &places[k].coords);
-            gp_sigma.powi(2) * (squared_exponential(a, b, length_scale) + own)
+            sigma.powi(2) * (squared_exponential(a, b, length_scale) + own)
         });
         let patches = Self { tiles, numbers, places, precision: DMatrix::zeros(0, 0) };
         patches.with_covariance(covariance)
@@ -186,11 +177,11 @@ mod tests {
             seen[patches.at(pixel % width, pixel / width).unwrap()] += 1;
         }
         assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
-        assert!((8..=MOST_PATCHES).contains(&seen.len()), "{} patches", seen.len());
+        assert!((8..=settings.max_patches).contains(&seen.len()), "{} patches", seen.len());
         assert_eq!(patches.side() % 4, 0);
         assert_eq!(patches.at(0, 0), None);
         let covariance = patches.precision().clone().cholesky().unwrap().inverse();
-        let variance = settings.gp_sigma.powi(2);
+        let variance = settings.sigma.powi(2);
         assert!(covariance.diagonal().iter().all(|v| (v / variance - 1.0).abs() < 0.01));
         let correlations =
             covariance.upper_triangle() - DMatrix::from_diagonal(&covariance.diagonal());
@@ -201,7 +192,7 @@ mod tests {
     #[test]
     fn an_exact_model_has_none() {
         let scene = default_scene(1).unwrap();
-        let settings = ModelErrorSettings { gp_sigma: 0.0, ..ModelErrorSettings::default() };
+        let settings = ModelErrorSettings { sigma: 0.0, ..ModelErrorSettings::default() };
         assert!(SurfacePatches::new(&scene.observation, 0.5, &settings, 1).is_none());
         let mut unseen = scene.observation.clone();
         unseen.mask = prehend_render::Mask::filled(640, 480, false);
@@ -218,7 +209,7 @@ mod tests {
         specks.mask = prehend_render::Mask::new(640, 480, mask).unwrap();
         let settings = ModelErrorSettings::default();
         let patches = SurfacePatches::new(&specks, 0.5, &settings, 3).unwrap();
-        assert!(patches.count() <= MOST_PATCHES && patches.side().is_multiple_of(3));
+        assert!(patches.count() <= settings.max_patches && patches.side().is_multiple_of(3));
         for (length_scale, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
             let settings = ModelErrorSettings { length_scale, ..settings.clone() };
             let patches = SurfacePatches::new(&scene.observation, distance, &settings, 4).unwrap();

@@ -15,15 +15,16 @@ use crate::scene::{CameraCalibrationError, RemapCache, SurfaceDeviation};
 
 /// Standard deviations of what changes from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Play {
-    /// Place of the hand in each direction \[m\].
+    /// Standard deviation of the hand's place in each direction \[m\].
     #[serde(rename = "hand_translation_m")]
     pub hand_translation: f64,
-    /// Turn of the hand about each axis \[rad\].
+    /// Standard deviation of the hand's rotation about each axis \[rad\].
     #[serde(rename = "hand_rotation_rad")]
     pub hand_rotation: f64,
-    /// Each joint \[rad or m\].
+    /// Standard deviation of each joint \[rad or m\].
     pub joints: f64,
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 use serde::{Deserialize, Serialize};
 
-use super::{Hand, HandMeasurement, Object, Observation, RegionEvidence};
+use super::{ForegroundSettings, Hand, HandMeasurement, Object, Observation, RegionEvidence};
 use crate::error::RefineError;
 
 /// An observation of an object in a hand, checked, with what factors derive from it: each thing is made when it is first asked
@@ -25,7 +25,7 @@ pub struct Frame<'a> {
     /// Root mean square of the colors under the mask.
     brightness: OnceLock<f64>,
     /// Regions by mask and colors.
-    regions: OnceLock<Arc<RegionEvidence>>,
+    regions: OnceLock<(ForegroundSettings, Arc<RegionEvidence>)>,
     /// Regions that were found otherwise.
     given_regions: Option<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
@@ -49,6 +49,7 @@ pub struct CameraView<'a> {
 
 /// What may hide the object in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Occluders {
     /// The hand, where its pose and joints say that it is.
@@ -230,15 +231,22 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// [`RefineError::EmptyMask`].
-    pub(crate) fn regions(&self, count: bool) -> Result<Arc<RegionEvidence>, RefineError> {
-        let known = self.regions.get().filter(|_| count);
-        if let Some(known) = self.given_regions.as_ref().or(known) {
+    pub(crate) fn regions(
+        &self,
+        count: bool,
+        settings: &ForegroundSettings,
+    ) -> Result<Arc<RegionEvidence>, RefineError> {
+        let known = self.regions.get().filter(|(of, _)| count && of == settings);
+        if let Some(known) = self.given_regions.as_ref().or(known.map(|(_, known)| known)) {
             return Ok(Arc::clone(known));
         }
         let Observation { color, mask, .. } = self.observation;
-        let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask);
+        let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask, settings);
         let made = Arc::new(made.ok_or(RefineError::EmptyMask)?);
-        Ok(if count { Arc::clone(self.regions.get_or_init(|| made)) } else { made })
+        if count {
+            self.regions.get_or_init(|| (*settings, Arc::clone(&made)));
+        }
+        Ok(made)
     }
 
     /// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.

@@ -22,9 +22,8 @@ pub(crate) use gaussian_process::{InducingPoints, farthest_points, squared_expon
 pub use hand::Hand;
 pub use object::{Inertial, Object, StatedSize};
 pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
-pub(crate) use region::{
-    COLOR_LIMIT, ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index,
-};
+pub use region::ForegroundSettings;
+pub(crate) use region::{ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index};
 pub(crate) use remap_cache::RemapCache;
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
 pub use target::Target;

@@ -12,18 +12,34 @@ use crate::error::RefineError;
 
 /// Deviation of the surface of an object from that of its model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelErrorSettings {
     /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
-    pub gp_sigma: f64,
-    /// Length scale of its Gaussian process over the surface \[m\].
+    pub sigma: f64,
+    /// Length scale of its Gaussian process over the surface \[m\]. EXPERIMENTS: Number and smoothness of patches.
     pub length_scale: f64,
+    /// Number of patches of what is seen that would cover the mask if all were full. EXPERIMENTS: Number and smoothness of patches.
+    pub patches: f64,
+    /// Number of patches at most.
+    pub max_patches: usize,
+    /// Width of a patch at least, as a share of the length scale: nearer ones are displaced alike.
+    pub min_width: f64,
+    /// Distance from the object, as a share of its distance from the camera, within which a measured depth is where a patch is; beyond, it is of something else.
+    pub near: f64,
 }
 
 impl Default for ModelErrorSettings {
     /// A scan, or a careful model, of a thing that fits into a hand.
     fn default() -> Self {
-        Self { gp_sigma: 7e-4, length_scale: 20e-3 }
+        Self {
+            sigma: 7e-4,
+            length_scale: 20e-3,
+            patches: 30.0,
+            max_patches: 64,
+            min_width: 0.6,
+            near: 0.2,
+        }
     }
 }
 
@@ -75,12 +91,12 @@ impl SurfaceDeviation {
         coefficients: Matrix3xX<f64>,
         covariance: DMatrix<f64>,
     ) -> Option<Self> {
-        let ModelErrorSettings { gp_sigma, length_scale } = settings;
+        let ModelErrorSettings { sigma, length_scale, .. } = settings;
         let sizes = [coefficients.ncols(), covariance.nrows(), covariance.ncols()];
         if sizes != [nodes.len(); 3] {
             return None;
         }
-        let process = InducingPoints::new(nodes, gp_sigma, length_scale, NUGGET)?;
+        let process = InducingPoints::new(nodes, sigma, length_scale, NUGGET)?;
         let mut field = Self { settings, process, coefficients, covariance, left: 0.0 };
         field.left = field.mean_left();
         Some(field)
@@ -98,7 +114,7 @@ impl SurfaceDeviation {
 
     /// Variance of what patches of the surface are off by themselves \[m²\].
     pub(crate) fn own_variance(&self) -> f64 {
-        (OWN * self.settings.gp_sigma).powi(2)
+        (OWN * self.settings.sigma).powi(2)
     }
 
     /// Factors of the coefficients in the displacement at `place` (model coordinates).
@@ -128,7 +144,7 @@ impl SurfaceDeviation {
         let features = self.process.features(places);
         let mut covariance = features.tr_mul(&(&self.covariance * &features));
         (0..places.len()).for_each(|k| covariance[(k, k)] += self.own_variance());
-        covariance.add_scalar_mut((TOGETHER * self.settings.gp_sigma).powi(2));
+        covariance.add_scalar_mut((TOGETHER * self.settings.sigma).powi(2));
         covariance
     }
 
@@ -174,20 +190,20 @@ mod tests {
         assert!((20..=MOST_NODES).contains(&field.count()), "{}", field.count());
         // All but a little of the variance is described at places between the nodes, too.
         for sample in object.samples.iter().step_by(97) {
-            let part = field.features(&sample.point).norm() / settings.gp_sigma;
+            let part = field.features(&sample.point).norm() / settings.sigma;
             assert!((0.9..1.0001).contains(&part), "{part}");
         }
         assert_eq!(field.at(&object.center), Vector3::zeros());
         let size = 3 * field.count();
         let change = DVector::from_fn(size, |k, _| (k as f64).sin());
         field.change(&change, &(DMatrix::identity(size, size) * 0.01));
-        let expected = settings.gp_sigma * (0.01 + OWN * OWN + TOGETHER * TOGETHER).sqrt();
+        let expected = settings.sigma * (0.01 + OWN * OWN + TOGETHER * TOGETHER).sqrt();
         assert!((field.left() / expected - 1.0).abs() < 0.05, "{}", field.left());
         // Places near each other are off alike, and far ones are not.
         let near = field.nodes()[0] + Vector3::new(2e-3, 0.0, 0.0);
         let places = [field.nodes()[0], near, object.center.coords + Vector3::x()];
         let left = field.left_covariance(&places);
-        let together = (TOGETHER * settings.gp_sigma).powi(2);
+        let together = (TOGETHER * settings.sigma).powi(2);
         let alike = |k: usize| left[(0, k)] - together;
         assert!(alike(1) > 0.9 * (alike(0) - field.own_variance()), "{left}");
         assert!(alike(2).abs() < 1e-12 && left[(2, 2)] >= field.own_variance() + together);

@@ -6,15 +6,9 @@ use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{KdTree, SplitMix64};
 use prehend_render::{Camera, DepthImage};
 
+use super::SearchSettings;
 use crate::error::RefineError;
 use crate::scene::{Frame, HandMeasurement, Observation};
-
-/// Depth points that normals are estimated from, at most.
-const POINTS: usize = 2500;
-/// Neighbors that a normal is estimated from.
-const NEIGHBORS: usize = 24;
-/// Columns at most of the map of what is seen where.
-const MAP_WIDTH: usize = 160;
 
 /// Everything in the camera frame \[m\].
 pub(super) struct Evidence {
@@ -29,25 +23,22 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// What `frame` shows; taxels with more than `contact_threshold` \[N\] are touched, and the hand's surface is so many points.
+    /// What `frame` shows; the hand's surface is as many points as stage 2 looks at.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
-    pub(super) fn new(
-        frame: &Frame<'_>,
-        hand_points: usize,
-        contact_threshold: f64,
-    ) -> Result<Self, RefineError> {
-        let places = frame.masked_points(POINTS)?;
+    pub(super) fn new(frame: &Frame<'_>, settings: &SearchSettings) -> Result<Self, RefineError> {
+        let contact_threshold = settings.estimator.tactile.contact_threshold;
+        let places = frame.masked_points(settings.normal_points)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
-        let normals = estimate_normals(&tree, NEIGHBORS, &Point3::origin());
+        let normals = estimate_normals(&tree, settings.normal_neighbors, &Point3::origin());
         let (mut touched, mut outside) = (Vec::new(), Vec::new());
         if let Some((robot, reading)) = frame.hand() {
             if !reading.forces.is_empty() {
                 robot.check_forces(&reading.forces)?;
             }
             let posed = robot.posed(&reading.t_cam_hand, &reading.joints)?;
-            let surface = surface_samples(&posed.mesh(), hand_points, 0);
+            let surface = surface_samples(&posed.mesh(), settings.points, 0);
             outside.extend(surface.iter().map(|s| s.point));
             for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
                 let link = posed.t_world_links()[robot.link_of(taxel)?];
@@ -59,7 +50,7 @@ impl Evidence {
                 list.push(link * taxel.position);
             }
         }
-        let map = SightMap::new(frame.observation(), frame.hand_depth());
+        let map = SightMap::new(frame.observation(), frame.hand_depth(), settings.map_width);
         Ok(Self {
             points: shuffled(places.into_iter().zip(normals).collect()),
             touched,
@@ -94,9 +85,9 @@ struct Sight {
 }
 
 impl SightMap {
-    fn new(observation: &Observation, hand: &DepthImage) -> Self {
+    fn new(observation: &Observation, hand: &DepthImage, most_columns: usize) -> Self {
         let full = &observation.camera;
-        let factor = full.width.div_ceil(MAP_WIDTH).max(1);
+        let factor = full.width.div_ceil(most_columns.max(1)).max(1);
         let (width, height) = ((full.width / factor).max(1), (full.height / factor).max(1));
         let at = |x: usize, y: usize| {
             let (x, y) = (x * factor + factor / 2, y * factor + factor / 2);
@@ -188,7 +179,7 @@ mod tests {
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
         let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
-        let evidence = Evidence::new(&frame, 300, 0.1).unwrap();
+        let evidence = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
             let facing = scene.object.samples.iter().filter_map(|s| {
@@ -212,7 +203,7 @@ mod tests {
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
         let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
-        let unfelt = Evidence::new(&frame, 300, 0.1).unwrap();
+        let unfelt = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();
         assert_eq!((unfelt.outside.len(), unfelt.touched.len()), (all - taxels, 0));

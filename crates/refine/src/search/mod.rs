@@ -80,9 +80,8 @@ impl PoseSearch {
     /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
     pub fn run(&self, frame: &Frame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
         let Self { object, lattice, settings } = self;
-        let threshold = settings.estimator.tactile.contact_threshold;
-        let evidence = Evidence::new(frame, settings.points, threshold)?;
-        let rough = CoarseScorer { object, lattice, evidence: &evidence, scale: settings.scale };
+        let evidence = &Evidence::new(frame, settings)?;
+        let rough = CoarseScorer { object, lattice, evidence, settings };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
         let found = self.descend(frame, &turned)?;

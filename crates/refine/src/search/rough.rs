@@ -5,20 +5,17 @@ use prehend_autodiff::Quadratic;
 use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
 
+use super::SearchSettings;
 use super::distance_lattice::DistanceLattice;
 use super::evidence::Evidence;
 use crate::scene::Object;
-
-/// Damping of a step, as a part of the mean curvature: what is left open by a few points must not lead far.
-const DAMPING: f64 = 0.03;
 
 /// An object and what is known of where it is.
 pub(super) struct CoarseScorer<'a> {
     pub(super) object: &'a Object,
     pub(super) lattice: &'a DistanceLattice,
     pub(super) evidence: &'a Evidence,
-    /// Distances beyond this count alike \[m\].
-    pub(super) scale: f64,
+    pub(super) settings: &'a SearchSettings,
 }
 
 impl CoarseScorer<'_> {
@@ -41,14 +38,14 @@ impl CoarseScorer<'_> {
     /// How badly the pose fits: 0 not at all, 1 and more for one that has nothing to do with what is seen. `points` depth points and as
     /// many surface samples are looked at. A radian between normals counts as the scale of distances.
     pub(super) fn score(&self, pose: &Isometry3<f64>, points: usize) -> f64 {
-        let loss = |r: f64| (r / self.scale).powi(2).min(1.0);
+        let loss = |r: f64| (r / self.settings.scale).powi(2).min(1.0);
         let inverse = pose.inverse();
         let distance = |p: &Point3<f64>| self.lattice.sample(&(inverse * p)).0;
         let depth = mean(self.evidence.points.iter().take(points).map(|(p, normal)| {
             let (distance, gradient) = self.lattice.sample(&(inverse * p));
             let mismatch = match *normal == Vector3::zeros() {
                 true => 0.0,
-                false => (pose.rotation * gradient - normal).norm() * self.scale,
+                false => (pose.rotation * gradient - normal).norm() * self.settings.scale,
             };
             loss(distance.hypot(mismatch))
         }));
@@ -82,7 +79,8 @@ impl CoarseScorer<'_> {
         for _ in 0..steps {
             let center = (pose * self.object.center).coords;
             let equations = self.equations(&pose, &center, points);
-            let step = equations.in_units(&units).damped_step(DAMPING).component_mul(&units);
+            let step =
+                equations.in_units(&units).damped_step(self.settings.damping).component_mul(&units);
             pose = perturb_about(&pose, &center, &step);
             pose.rotation.renormalize();
         }
@@ -95,7 +93,7 @@ impl CoarseScorer<'_> {
         center: &Vector3<f64>,
         points: usize,
     ) -> Quadratic<6> {
-        let kernel = RobustKernel::Cauchy { scale: self.scale };
+        let kernel = RobustKernel::Cauchy { scale: self.settings.scale };
         let inverse = pose.inverse();
         let mut sum = Quadratic::zeros();
         let mut add = |p: &Point3<f64>, share: f64, inside_only: bool| {

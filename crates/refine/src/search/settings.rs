@@ -7,30 +7,40 @@ use crate::strategy::FusedSettings;
 
 /// Settings of [`PoseSearch`](super::PoseSearch), chosen on made-up scenes and on kinematic grasps of nine objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct SearchSettings {
-    /// Rotations tried; 3000 leave no rotation more than some 17° from one of them.
+    /// Number of rotations tried; 3000 leave no rotation more than some 17° from one of them.
     pub rotations: usize,
-    /// Cells of the distance lattice along the object's longest side.
+    /// Number of cells of the distance lattice along the object's longest side.
     pub cells: usize,
-    /// Distances \[m\] beyond this count alike in stages 1 and 2: some millimeters of hand, model and depth, and what a rotation off by half
-    /// the spacing of rotations moves the surface.
+    /// Distance beyond which all count alike in stages 1 and 2 \[m\]: some millimeters of hand, model and depth, and what a rotation off by half the
+    /// spacing of rotations moves the surface.
     pub scale: f64,
-    /// Poses whose surfaces are nearer to each other \[m\] are one hypothesis.
+    /// Surface motion below which two poses are one hypothesis \[m\].
     pub separation: f64,
-    /// Depth points, surface samples and points of the hand that stage 2 looks at; a quarter of them in stage 1.
+    /// Number of depth points, of surface samples and of points of the hand that stage 2 looks at; a quarter of them in stage 1.
     pub points: usize,
-    /// Steps of stage 2; half as many in stage 1.
+    /// Number of steps of stage 2; half as many in stage 1.
     pub steps: usize,
-    /// Hypotheses that stage 1 keeps.
+    /// Number of hypotheses that stage 1 keeps.
     pub placed: usize,
-    /// Hypotheses that stage 2 keeps.
+    /// Number of hypotheses that stage 2 keeps. EXPERIMENTS: Hypotheses after stage 2.
     pub turned: usize,
-    /// Hypotheses that stage 3 solves.
+    /// Number of hypotheses that stage 3 solves.
     pub seen: usize,
-    /// Poses found, at most.
+    /// Number of poses found, at most.
     pub last: usize,
+    /// Number of depth points that normals are estimated from, at most.
+    pub normal_points: usize,
+    /// Number of neighbors that a normal is estimated from.
+    pub normal_neighbors: usize,
+    /// Width of the map of what is seen where, at most \[px\].
+    pub map_width: usize,
+    /// Damping of a step of stages 1 and 2, as a part of the mean curvature: what is left open by a few points must not lead far.
+    pub damping: f64,
     /// Factors of stage 3, and the force above which a taxel counts as touched.
+    #[serde(skip)]
     pub estimator: FusedSettings,
 }
 
@@ -47,6 +57,10 @@ impl Default for SearchSettings {
             turned: 160,
             seen: 24,
             last: 4,
+            normal_points: 2500,
+            normal_neighbors: 24,
+            map_width: 160,
+            damping: 0.03,
             estimator: FusedSettings::default(),
         }
     }

@@ -9,8 +9,8 @@ pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
     Consistency, Diagnosis, DiagnosisSummary, Fit, FitSettings, Fused, FusedSettings, Hypothesis,
-    Inconsistency, Modality, ModelScale, NominalSizeError, Nuisance, Posterior, PosteriorSummary,
-    Stage, UnobservableDirection,
+    HypothesisSettings, Inconsistency, Modality, ModelScale, ModelScaleSettings, NominalSizeError,
+    Nuisance, Posterior, PosteriorSettings, PosteriorSummary, Stage, UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
 pub use trace::{Iteration, Trace};

@@ -5,30 +5,54 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use prehend_render::{DepthImage, draw_depth};
+use serde::{Deserialize, Serialize};
 
-use super::GAIN;
+use super::settings::TrackerSettings;
 use super::sight::Sight;
 use super::sums::Sums;
 use crate::scene::{
-    COLOR_LIMIT, ColorRatios, MaskBorder, Object, Observation, RegionColors, RegionEvidence,
+    ColorRatios, ForegroundSettings, MaskBorder, Object, Observation, RegionColors, RegionEvidence,
     color_index,
 };
 
-/// Distance around the object in which colors are learnt and compared, in radii of it.
-const AROUND: f64 = 0.5;
-/// Distance from the outline within which colors are mixed \[px\].
-const MIXED: f32 = 2.0;
-/// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
-const AGREEMENT: f32 = 0.5;
-/// Distance of the columns and rows of which a lost object is looked for \[px\].
-const STRIDE: usize = 4;
-/// Area with its colors where an object is found, as a share of that seen before.
-const LEAST_FOUND: f64 = 0.2;
-/// Places that are compared where an object is looked for.
-const PLACES: usize = 4;
-/// Standard deviation of the outline of a stated pose \[m\], and of the sides of a box \[px\].
-const STATED: f64 = 5e-3;
-const BOX_SIGMA: f32 = 5.0;
+/// Settings of the object by its colors, where no depth is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct AppearanceSettings {
+    /// Distance around the object in which colors are learnt and compared, in radii of it.
+    pub around: f64,
+    /// Distance from the outline within which colors are mixed \[px\].
+    pub mixed: f64,
+    /// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
+    pub agreement: f64,
+    /// Area with its colors where an object is found, as a share of that seen before.
+    pub least_found: f64,
+    /// Number of places that are compared where an object is looked for.
+    pub places: usize,
+    /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
+    pub stated_sigma: f64,
+    /// Standard deviation of the sides of a box that is given for a mask \[px\].
+    pub box_sigma: f64,
+    /// Number of times that colors and pose are found in turns where no mask tells the object.
+    pub rounds: usize,
+}
+
+impl Default for AppearanceSettings {
+    fn default() -> Self {
+        Self {
+            around: 0.5,
+            mixed: 2.0,
+            agreement: 0.5,
+            least_found: 0.2,
+            places: 4,
+            stated_sigma: 5e-3,
+            box_sigma: 5.0,
+            rounds: 3,
+        }
+    }
+}
+
 /// Share of pixels that is none.
 const LEAST_SHARE: f64 = 1e-3;
 
@@ -41,6 +65,12 @@ pub(super) struct Appearance {
     usual: Option<[f64; 2]>,
     /// Area that rather has its colors, were it flat \[m²\].
     area: f64,
+    settings: AppearanceSettings,
+    foreground: ForegroundSettings,
+    /// See [`TrackerSettings::gain`].
+    gain: f64,
+    /// Distance of the columns and rows of which a lost object is looked for \[px\].
+    stride: usize,
 }
 
 /// Depth of the object in a part of an image, as if nothing else were there.
@@ -53,15 +83,20 @@ struct Silhouette {
 
 impl Silhouette {
     /// Silhouette of `object` at a pose, with what is around it; none if that is not in the image.
-    fn new(sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) -> Option<Self> {
+    fn new(
+        sight: &Sight,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+        settings: &AppearanceSettings,
+    ) -> Option<Self> {
         let camera = &sight.observation.camera;
         let center = t_cam_object * object.center;
         if center.z <= object.radius {
             return None;
         }
         let at = camera.project(&center)?;
-        let extent =
-            (1.0 + AROUND) * object.radius * camera.fx.max(camera.fy) / (center.z - object.radius);
+        let extent = (1.0 + settings.around) * object.radius * camera.fx.max(camera.fy)
+            / (center.z - object.radius);
         let window = sight.part(&at, extent, 1);
         let [columns, rows] = &window;
         if columns.is_empty() || rows.is_empty() {
@@ -94,9 +129,34 @@ fn pixels_per_area(sight: &Sight, place: &Point3<f64>) -> f64 {
 }
 
 impl Appearance {
+    /// Nothing is known of colors yet.
+    pub(super) fn new(settings: &TrackerSettings) -> Self {
+        Self {
+            settings: settings.appearance,
+            foreground: settings.fused.region.foreground,
+            gain: settings.gain,
+            stride: 2 * settings.segmentation.stride(),
+            ..Self::default()
+        }
+    }
+
     /// Colors that were learnt otherwise.
-    pub(super) fn of(colors: &RegionColors) -> Self {
-        Self { colors: colors.clone(), ratios: colors.ratios(COLOR_LIMIT), ..Self::default() }
+    pub(super) fn of(colors: &RegionColors, settings: &TrackerSettings) -> Self {
+        let own = Self { colors: colors.clone(), ..Self::new(settings) };
+        Self { ratios: own.ratios(), ..own }
+    }
+
+    fn ratios(&self) -> ColorRatios {
+        self.colors.ratios(self.foreground.color_limit, self.foreground.unseen)
+    }
+
+    fn silhouette(
+        &self,
+        sight: &Sight,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Option<Silhouette> {
+        Silhouette::new(sight, object, t_cam_object, &self.settings)
     }
 
     /// True once both kinds of colors are known.
@@ -113,7 +173,7 @@ impl Appearance {
         t_cam_object: &Isometry3<f64>,
         about: Option<&Isometry3<f64>>,
     ) -> bool {
-        let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return false };
+        let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return false };
         let color = &sight.observation.color;
         let seen: Vec<usize> = silhouette
             .shown(sight)
@@ -121,18 +181,20 @@ impl Appearance {
             .collect();
         let given = sight.given.pixels();
         let both = seen.iter().filter(|at| given[**at]).count() as f32;
+        let agreement = self.settings.agreement as f32;
         let agrees = sight.tells
-            && both >= AGREEMENT * seen.len() as f32
-            && both >= AGREEMENT * sight.given.count() as f32;
+            && both >= agreement * seen.len() as f32
+            && both >= agreement * sight.given.count() as f32;
         let regions = match agrees {
-            true => RegionEvidence::of_mask(Some(color), &sight.given),
+            true => RegionEvidence::of_mask(Some(color), &sight.given, &self.foreground),
             false => None,
         };
         let mut regions = regions.unwrap_or_else(|| {
-            RegionEvidence::of_colors(color, silhouette.window.clone(), &self.ratios)
+            let window = silhouette.window.clone();
+            RegionEvidence::of_colors(color, window, &self.ratios, &self.foreground)
         });
         if let Some(about) = about {
-            Self::place(&mut regions, sight, object, about);
+            self.place(&mut regions, sight, object, about);
         }
         sight.regions = Some(Arc::new(regions));
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
@@ -146,20 +208,26 @@ impl Appearance {
     }
 
     /// Adds to `regions` that the object was stated to be `about` somewhere, and in the given box, if there is one.
-    fn place(regions: &mut RegionEvidence, sight: &Sight, object: &Object, about: &Isometry3<f64>) {
+    fn place(
+        &self,
+        regions: &mut RegionEvidence,
+        sight: &Sight,
+        object: &Object,
+        about: &Isometry3<f64>,
+    ) {
         let (camera, given) = (&sight.observation.camera, sight.given.pixels());
-        let Some(Silhouette { window, depth }) = Silhouette::new(sight, object, about) else {
+        let Some(Silhouette { window, depth }) = self.silhouette(sight, object, about) else {
             return;
         };
         let set: Vec<bool> = depth.pixels().iter().map(|z| *z > 0.0).collect();
         let border = MaskBorder::within(camera.width, window.clone(), &set);
-        let sigma = STATED * camera.fx / (about * object.center).z;
+        let sigma = self.settings.stated_sigma * camera.fx / (about * object.center).z;
         regions.add_border(&border, sigma as f32, f32::INFINITY);
         if sight.given.count() > 0 {
             let [columns, rows] = window.clone();
             let set = rows.flat_map(|y| columns.clone().map(move |x| given[y * camera.width + x]));
             let border = MaskBorder::within(camera.width, window, &set.collect::<Vec<_>>());
-            regions.add_border(&border, BOX_SIGMA, 0.0);
+            regions.add_border(&border, self.settings.box_sigma as f32, 0.0);
         }
     }
 
@@ -172,7 +240,7 @@ impl Appearance {
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
         let Some(usual) = self.usual else { return 1.0 };
-        let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return 0.0 };
+        let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return 0.0 };
         let shares = self.shares(sight, &silhouette);
         let relative =
             shares.iter().zip(usual).map(|(share, usual)| share / usual.max(LEAST_SHARE));
@@ -189,7 +257,7 @@ impl Appearance {
 
     /// Learns colors from a frame with the object at `t_cam_object`.
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
-        let Some(silhouette) = Silhouette::new(sight, object, t_cam_object) else { return };
+        let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return };
         let set: Vec<bool> = silhouette.depth.pixels().iter().map(|z| *z > 0.0).collect();
         let width = sight.observation.camera.width;
         let border = MaskBorder::within(width, silhouette.window.clone(), &set);
@@ -201,13 +269,14 @@ impl Appearance {
             true => shown[at] && self.ratios.of(&color.pixels()[at]) >= 0.0,
             false => shown[at] && mask[at],
         };
-        self.colors.learn(color, &border, MIXED, shows, GAIN);
-        self.ratios = self.colors.ratios(COLOR_LIMIT);
+        let mixed = self.settings.mixed as f32;
+        self.colors.learn(color, &border, mixed, shows, self.gain as f32);
+        self.ratios = self.ratios();
         let shares = self.shares(sight, &silhouette);
         let drawn = set.iter().filter(|set| **set).count() as f64;
         self.area = drawn * shares[0] / pixels_per_area(sight, &(t_cam_object * object.center));
         let usual = self.usual.unwrap_or(shares);
-        let next = |k: usize| usual[k] + f64::from(GAIN) * (shares[k] - usual[k]);
+        let next = |k: usize| usual[k] + self.gain * (shares[k] - usual[k]);
         self.usual = Some([next(0), next(1)]);
     }
 
@@ -224,27 +293,28 @@ impl Appearance {
             return None;
         }
         let Observation { camera, color, .. } = &sight.observation;
-        let (columns, rows) = (camera.width / STRIDE, camera.height / STRIDE);
+        let stride = self.stride;
+        let (columns, rows) = (camera.width / stride, camera.height / stride);
         if columns == 0 {
             return None;
         }
         let has_color = |k: usize| {
-            let at = (k / columns * camera.width + k % columns) * STRIDE;
+            let at = (k / columns * camera.width + k % columns) * stride;
             let hand = f64::from(sight.hand_depth.pixels()[at]);
             let hidden = hand > 0.0 && hand < center.z;
             f32::from(u8::from(!hidden && self.ratios.of(&color.pixels()[at]) > 0.0))
         };
         let seen: Vec<f32> = (0..columns * rows).map(has_color).collect();
-        let reach = (0.5 * object.radius * camera.fx / center.z) as usize / STRIDE + 1;
+        let reach = (0.5 * object.radius * camera.fx / center.z) as usize / stride + 1;
         let [mut within, mut around] = [Sums::default(), Sums::default()];
         within.find(&seen, (columns, rows), reach);
         around.find(&seen, (columns, rows), 2 * reach);
         let score = |k: &usize| 2.0 * within.all[*k] - around.all[*k];
-        let usual = self.area * pixels_per_area(sight, &center) / STRIDE.pow(2) as f64;
-        let is_enough = |k: &usize| f64::from(within.all[*k]) >= LEAST_FOUND * usual;
+        let usual = self.area * pixels_per_area(sight, &center) / stride.pow(2) as f64;
+        let is_enough = |k: &usize| f64::from(within.all[*k]) >= self.settings.least_found * usual;
         let mut places: Vec<usize> = (0..seen.len()).filter(is_enough).collect();
         let mut best: Option<(f64, Isometry3<f64>)> = None;
-        for _ in 0..PLACES {
+        for _ in 0..self.settings.places {
             let Some(place) = places.iter().copied().max_by(|a, b| score(a).total_cmp(&score(b)))
             else {
                 break;
@@ -253,7 +323,7 @@ impl Appearance {
             places.retain(|k| {
                 (k % columns).abs_diff(column).max((k / columns).abs_diff(row)) > reach
             });
-            let [x, y] = [column, row].map(|at| (at * STRIDE) as f64);
+            let [x, y] = [column, row].map(|at| (at * stride) as f64);
             let moved = Translation3::from(camera.unproject(x, y, center.z) - center) * expected;
             let shown = self.shown(sight, object, &moved);
             if best.as_ref().is_none_or(|(most, _)| shown > *most) {
@@ -278,7 +348,7 @@ mod tests {
         let mut observation = scene.observation.clone();
         observation.depth.pixels_mut().fill(0.0);
         let sight = || Sight::new(observation.clone(), Some(&scene.hand), Images::default());
-        let mut appearance = Appearance::default();
+        let mut appearance = Appearance::new(&TrackerSettings::default());
         assert!(appearance.find(&sight(), &scene.object, &scene.truth).is_none());
         let mut first = sight();
         first.observation.mask.copy_from(&first.given.clone());

@@ -25,9 +25,6 @@ use crate::strategy::{Fused, Posterior, Strategy};
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
-/// How often colors are learnt anew where no mask tells the object.
-const COLOR_ROUNDS: usize = 3;
-
 impl Tracker {
     /// The first frame.
     pub(super) fn begin(
@@ -114,8 +111,8 @@ impl Tracker {
         let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
         let about = is_single.then_some(initial);
         let mut pose = *initial;
-        for _ in 0..COLOR_ROUNDS {
-            self.appearance = Appearance::default();
+        for _ in 0..self.settings.appearance.rounds {
+            self.appearance = Appearance::new(&self.settings);
             if !self.appearance.look(sight, &object, &pose, about) {
                 return Err(RefineError::OutOfView);
             }
@@ -179,7 +176,10 @@ impl Tracker {
         seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
+        let mut ways = [
+            (Recovery::Near, track.allowance(self.settings.gating.growth)),
+            (Recovery::Anywhere, track.level),
+        ];
         if long_lost {
             ways.reverse();
         }
@@ -261,7 +261,7 @@ impl Tracker {
             return self.segmenter.segment(sight, &self.object, t_cam_object);
         }
         if !self.appearance.is_known() {
-            self.appearance = Appearance::of(self.segmenter.colors());
+            self.appearance = Appearance::of(self.segmenter.colors(), &self.settings);
         }
         self.appearance.look(sight, &self.object, t_cam_object, None)
     }

@@ -15,11 +15,13 @@ use crate::scene::Object;
 
 /// Settings of the alignment of images to a keyframe.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct KeyframeSettings {
-    /// Points at most; zero for no alignment.
+    /// Number of points at most; zero for no alignment.
     pub points: usize,
-    /// Independent measurements that their intensities amount to at most: shading and interpolation err alike in neighbors.
+    /// Effective sample size of their intensities at most: shading and interpolation err alike in neighbors. EXPERIMENTS: Image alignment also in a known
+    /// hand.
     pub effective_samples: f64,
     /// Share of the points that must be seen as in the keyframe, or this frame is the next one.
     pub least_inliers: f64,
@@ -27,6 +29,14 @@ pub struct KeyframeSettings {
     pub least_explained: f64,
     /// Drift of an object that seems to stand still, a random walk \[m/√s\]: errors that frames share are not averaged away.
     pub drift: f64,
+    /// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
+    pub degrees: f64,
+    /// Intensity that is resolved: the smallest standard deviation of residuals, and contrast of a point that is of use. About one of 256 levels.
+    pub resolution: f64,
+    /// Margin about a point in which the object must be seen, too \[px\].
+    pub margin: usize,
+    /// Distance from the surface from which depth is of another thing \[m\].
+    pub off_surface: f64,
 }
 
 impl Default for KeyframeSettings {
@@ -37,6 +47,10 @@ impl Default for KeyframeSettings {
             least_inliers: 0.5,
             least_explained: 0.8,
             drift: 8e-4,
+            degrees: 4.0,
+            resolution: 4e-3,
+            margin: 2,
+            off_surface: 10e-3,
         }
     }
 }
@@ -44,14 +58,6 @@ impl Default for KeyframeSettings {
 /// Gauss–Newton steps in a level at most, and the displacement that ends them \[px\].
 const STEPS: usize = 6;
 const STEP: f64 = 0.02;
-/// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
-const DEGREES: f64 = 4.0;
-/// Pixels about a point in which the object must be seen, too.
-const MARGIN: usize = 2;
-/// Depth that is farther from the surface is another thing's \[m\].
-const OFF_SURFACE: f64 = 10e-3;
-/// Intensity that is resolved: the smallest deviation of residuals, and of neighbors of a point that is of use.
-const RESOLUTION: f32 = 4e-3;
 
 /// Points of an object's surface with their intensities in an image.
 #[derive(Clone, Debug)]
@@ -62,6 +68,7 @@ pub(super) struct Keyframe {
     intensities: [Arc<[f32]>; LEVELS],
     /// Object → camera in the last frame, by alignment with the keyframe alone.
     aligned: Isometry3<f64>,
+    settings: KeyframeSettings,
 }
 
 /// Object → camera by alignment.
@@ -95,7 +102,7 @@ impl Keyframe {
             z > 0.0
                 && sight.observation.mask.pixels()[at]
                 && !(hand > 0.0 && hand < z)
-                && !(sensed > 0.0 && off > OFF_SURFACE)
+                && !(sensed > 0.0 && off > settings.off_surface)
         };
         let area = depth.iter().filter(|z| **z > 0.0).count();
         let cell = ((area as f64 / settings.points as f64).sqrt().ceil() as usize).max(1);
@@ -104,9 +111,10 @@ impl Keyframe {
             let across = (pixels[at + 1] - pixels[at - 1]).abs();
             across.max((pixels[at + camera.width] - pixels[at - camera.width]).abs())
         };
+        let margin = settings.margin.max(1);
         let strongest = |(column, row): (usize, usize)| {
             let within = |from: usize, size: usize| {
-                (from * cell).max(MARGIN)..((from + 1) * cell).min(size - MARGIN)
+                (from * cell).max(margin)..((from + 1) * cell).min(size - margin)
             };
             let places = within(row, camera.height)
                 .flat_map(|y| within(column, camera.width).map(move |x| (x, y)));
@@ -115,9 +123,9 @@ impl Keyframe {
                 .max_by(|a, b| contrast(a.0, a.1).total_cmp(&contrast(b.0, b.1)))?;
             let (x, y) = best;
             let around =
-                [(x, y), (x - MARGIN, y), (x + MARGIN, y), (x, y - MARGIN), (x, y + MARGIN)];
+                [(x, y), (x - margin, y), (x + margin, y), (x, y - margin), (x, y + margin)];
             let seen = around.into_iter().all(|(x, y)| shows(x, y));
-            (seen && contrast(x, y) > RESOLUTION).then_some(best)
+            (seen && contrast(x, y) > settings.resolution as f32).then_some(best)
         };
         let to_object = pose.inverse();
         let cells = (0..camera.height.div_ceil(cell))
@@ -139,7 +147,7 @@ impl Keyframe {
             };
             points.iter().map(|point| at(point).unwrap_or(f32::NAN)).collect()
         });
-        Some(Self { points, intensities, aligned: *pose })
+        Some(Self { points, intensities, aligned: *pose, settings: *settings })
     }
 
     /// Where the object is in `sight`, where it has moved by `motion` since the last frame but for an error of that covariance (a left twist about the
@@ -150,8 +158,8 @@ impl Keyframe {
         object: &Object,
         motion: &Isometry3<f64>,
         covariance: &Matrix6<f64>,
-        settings: &KeyframeSettings,
     ) -> Option<Alignment> {
+        let settings = &self.settings;
         let expected = motion * self.aligned;
         let precision = covariance.try_inverse()?;
         let levels = pyramid(sight, &(expected * object.center), 2.0 * object.radius)?;
@@ -201,11 +209,10 @@ impl Tracker {
         let Some(keyframe) = &track.keyframe else { return };
         let before = track.state.t_cam_object;
         let motion = prediction.state.t_cam_object * before.inverse();
-        let settings = &self.settings.keyframe;
         let expected = &prediction.motion_covariance;
-        let aligned = keyframe.align(sight, &self.object, &motion, expected, settings);
+        let aligned = keyframe.align(sight, &self.object, &motion, expected);
         let Some(Alignment { pose, covariance }) = aligned else { return };
-        let drift = settings.drift.powi(2) * prediction.seconds;
+        let drift = self.settings.keyframe.drift.powi(2) * prediction.seconds;
         let turn = drift / self.object.radius.powi(2);
         let drift = Matrix6::from_diagonal(&[drift, drift, drift, turn, turn, turn].into());
         let measured = pose * keyframe.aligned.inverse() * before;
@@ -280,9 +287,10 @@ impl Normal {
             sizes.sort_by(f64::total_cmp);
             variance = sizes.get(sizes.len() / 2).map_or(1.0, |median| (2.0 * median).powi(2));
         }
-        let least = f64::from(RESOLUTION).powi(2);
+        let KeyframeSettings { degrees, resolution, .. } = keyframe.settings;
+        let least = f64::from(resolution as f32).powi(2);
         let weight = |residual: f64, variance: f64| {
-            (DEGREES + 1.0) / (DEGREES + residual * residual / variance)
+            (degrees + 1.0) / (degrees + residual * residual / variance)
         };
         for _ in 0..3 {
             variance = variance.max(least);
@@ -296,7 +304,7 @@ impl Normal {
             let w = weight(*residual, variance);
             hessian.ger(w / variance, row, row, 1.0);
             gradient.axpy(w * residual / variance, row, 1.0);
-            inliers += f64::from(u8::from(residual * residual < 2.0 * DEGREES * variance));
+            inliers += f64::from(u8::from(residual * residual < 2.0 * degrees * variance));
             weights += w;
             sum += w * value;
             squares += w * value * value;
@@ -339,7 +347,7 @@ mod tests {
         let expected = perturb_about(&after, &(after * object.center).coords, &errors.into())
             * before.inverse();
         let covariance = Matrix6::from_diagonal(&[9e-6, 9e-6, 9e-6, 9e-4, 9e-4, 9e-4].into());
-        let aligned = keyframe.align(&second, object, &expected, &covariance, &settings).unwrap();
+        let aligned = keyframe.align(&second, object, &expected, &covariance).unwrap();
         let off = deviation(&aligned.pose, &(truth * before), object);
         let squared = off.dot(&(aligned.covariance.try_inverse().unwrap() * off));
         assert!(squared < 20.0, "χ² of six degrees of freedom: {squared}");
@@ -351,7 +359,7 @@ mod tests {
         let stripes = other.color.pixels_mut().iter_mut().enumerate();
         stripes.for_each(|(k, pixel)| *pixel = [(k % 7) as f32 / 7.0; 3]);
         let other = Sight::new(other, Some(&sequence.hand), Images::default());
-        assert!(keyframe.align(&other, object, &expected, &covariance, &settings).is_none());
+        assert!(keyframe.align(&other, object, &expected, &covariance).is_none());
     }
 
     #[test]
@@ -381,7 +389,8 @@ mod tests {
             let (plus, minus) = (along(step), along(-step));
             let expected: f64 = (0..middle.len())
                 .map(|i| {
-                    let w = (DEGREES + 1.0) / (DEGREES + middle[i] * middle[i] / system.variance);
+                    let w = (settings.degrees + 1.0)
+                        / (settings.degrees + middle[i] * middle[i] / system.variance);
                     w * middle[i] * (plus[i] - minus[i]) / (2.0 * step) / system.variance
                 })
                 .sum();

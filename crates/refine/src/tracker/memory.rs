@@ -12,12 +12,6 @@ use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
 
-/// By how much of itself the level grows with every frame that the object is lost. Slowly, or what is wrong for a moment would soon pass for right.
-const GROWTH: f64 = 0.02;
-
-/// Frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than before.
-const PERIOD: u32 = 6;
-
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
 pub(super) struct TrackState {
@@ -116,28 +110,29 @@ impl TrackState {
         self.lost = self.lost.saturating_add(u32::from(seen));
     }
 
-    /// Whether colors are to be learnt from this frame: they change slowly.
-    pub(super) fn is_time_to_learn(&self) -> bool {
-        self.followed.is_multiple_of(PERIOD)
+    /// Whether colors are to be learnt from this frame, one in a `period` ([`TrackerSettings::period`]): they change slowly.
+    pub(super) fn is_time_to_learn(&self, period: u32) -> bool {
+        self.followed.is_multiple_of(period)
     }
 
     /// Whether it was lost for so long that much may have happened to it.
-    pub(super) fn is_long_lost(&self) -> bool {
-        self.misses >= PERIOD
+    pub(super) fn is_long_lost(&self, period: u32) -> bool {
+        self.misses >= period
     }
 
     /// Whether it is time to look for an object that is lost, and `seen` where it should be or not: often at first, where it comes into sight, and
     /// else every so many frames, because that takes long.
-    pub(super) fn is_due(&self, seen: bool) -> bool {
+    pub(super) fn is_due(&self, seen: bool, period: u32) -> bool {
         if seen && self.unseen {
             return true;
         }
-        self.misses.is_multiple_of(PERIOD) || self.misses.is_power_of_two() && self.misses < PERIOD
+        self.misses.is_multiple_of(period) || self.misses.is_power_of_two() && self.misses < period
     }
 
-    /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.
-    pub(super) fn allowance(&self) -> f64 {
-        self.level * (1.0 + GROWTH * f64::from(self.lost))
+    /// The level that misfits are judged by: it grows while the object is lost ([`GatingSettings::growth`](super::GatingSettings::growth)), because
+    /// circumstances may have changed for good.
+    pub(super) fn allowance(&self, growth: f64) -> f64 {
+        self.level * (1.0 + growth * f64::from(self.lost))
     }
 
     /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.

@@ -26,11 +26,13 @@ use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
 
 use self::appearance::Appearance;
+pub use self::appearance::AppearanceSettings;
 use self::clock::Clock;
 pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
 use self::memory::{Prediction, TrackState};
 use self::modes::{Followed, Modes};
+pub use self::segmentation::SegmentationSettings;
 use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use self::sight::{Images, Sight};
@@ -112,9 +114,6 @@ impl Solved {
     }
 }
 
-/// Part of the way that running means go to the next value.
-const GAIN: f32 = 0.1;
-
 impl Tracker {
     /// A tracker that begins by searching, unless [`start_from`](Self::start_from) says where.
     ///
@@ -133,12 +132,12 @@ impl Tracker {
             backend: None,
             rig: None,
             prior: settings.fused.prior.clone(),
-            settings,
             initial: None,
             track: None,
             search: None,
-            segmenter: Segmenter::default(),
-            appearance: Appearance::default(),
+            segmenter: Segmenter::new(&settings),
+            appearance: Appearance::new(&settings),
+            settings,
             images: Images::default(),
         })
     }
@@ -163,8 +162,8 @@ impl Tracker {
     pub fn start_from(&mut self, t_cam_object: &Isometry3<f64>) {
         self.initial = Some(*t_cam_object);
         self.track = None;
-        self.segmenter = Segmenter::default();
-        self.appearance = Appearance::default();
+        self.segmenter = Segmenter::new(&self.settings);
+        self.appearance = Appearance::new(&self.settings);
     }
 
     /// [`push`](Self::push) of a copy.
@@ -256,7 +255,8 @@ impl Tracker {
         let seen = self.segment(sight, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
-        let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
+        let period = self.settings.period;
+        let long_lost = track.is_long_lost(period) && self.settings.recovery == Recovery::Anywhere;
         let mut rejection = Rejection::Unseen;
         if seen && long_lost {
             rejection = Rejection::LongLost;
@@ -267,14 +267,14 @@ impl Tracker {
             }
         }
         let predicted = &prediction.state;
-        let again = match track.is_due(seen) {
+        let again = match track.is_due(seen, period) {
             true => self.recover(sight, predicted, track, seen, long_lost)?,
             false => None,
         };
         timing.recovery = clock.lap();
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
-            let level = track.level + f64::from(GAIN) * (solved.cost() - track.level);
+            let level = track.level + self.settings.gain * (solved.cost() - track.level);
             let mut next = self.remember(time, &solved, nominal, in_hand, level);
             next.lost = track.lost;
             self.begin_anew(&mut next, sight, &posterior);
@@ -315,7 +315,12 @@ impl Tracker {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
         let mut posterior = self.posterior(&solved, nominal)?;
-        let doubt = self.gate(&solved, &posterior, Some(&prior), track.allowance());
+        let doubt = self.gate(
+            &solved,
+            &posterior,
+            Some(&prior),
+            track.allowance(self.settings.gating.growth),
+        );
         let doubt = doubt.or_else(|| self.other_colors(sight, &solved));
         timing.validation = clock.lap();
         if let Some(rejection) = doubt {
@@ -324,8 +329,8 @@ impl Tracker {
         let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(in_hand));
         let rotation = solved.solution.at.state.t_cam_object.rotation;
         let mut is_turned = false;
-        if modes.is_new_view(&rotation) && clock.has(2 * timing.steps) {
-            let level = track.allowance();
+        if modes.is_new_view(&rotation, self.settings.new_view) && clock.has(2 * timing.steps) {
+            let level = track.allowance(self.settings.gating.growth);
             let followed = Followed { problem: &problem, prediction, nominal, level };
             if let Some(other) = self.weigh(&followed, &solved, &posterior, &mut modes)? {
                 (solved, posterior) = other;
@@ -335,14 +340,14 @@ impl Tracker {
             timing.steps += clock.lap();
         }
         modes.add_to(&mut posterior, self.object.radius);
-        let level = track.level + f64::from(GAIN) * (solved.cost() - track.level);
+        let level = track.level + self.settings.gain * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
         next.modes = modes;
         let keyframe = prediction.keyframe.clone().filter(|_| !is_turned);
         next.keyframe = keyframe.or_else(|| self.keyframe(sight, &next.state.t_cam_object));
-        if next.is_time_to_learn() {
+        if next.is_time_to_learn(self.settings.period) {
             self.learn(sight, &solved);
         }
         timing.validation += clock.lap();
@@ -460,9 +465,14 @@ impl Tracker {
         let stated = GaussianPrior::independent(nominal.clone(), &self.prior)?;
         let degrees = at.equations.gradient().len().saturating_sub(6);
         let distance = chi_square_z(2.0 * stated.cost(&calibrations_of), degrees);
-        let mut posterior = Posterior::new(slice::from_ref(&solved.solution), self.object.radius);
+        let mut posterior = Posterior::new(
+            slice::from_ref(&solved.solution),
+            self.object.radius,
+            &self.settings.fused.posterior,
+        );
         let calibrations = Inconsistency { factor: "calibrations", distance };
-        posterior.inconsistencies.extend(calibrations.is_significant().then_some(calibrations));
+        let is_significant = calibrations.distance > self.settings.fused.posterior.inconsistent;
+        posterior.inconsistencies.extend(is_significant.then_some(calibrations));
         let FusedSettings { scales, fit, .. } = &self.settings.fused;
         let of_calibrations = ("calibration", 2.0 * stated.cost(&calibrations_of), degrees as f64);
         posterior.fit = Some(Fit::of_tracked(at, of_calibrations, scales, fit));

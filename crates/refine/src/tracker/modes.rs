@@ -1,6 +1,5 @@
 //! The other poses that fit: of the last full estimate, and turned about the axis of rotation that is known least.
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
@@ -20,12 +19,6 @@ struct Mode {
     /// Logarithm of its weight over that of the tracked pose.
     log_odds: f64,
 }
-
-/// Rotation from which an object is seen anew \[rad\].
-const NEW_VIEW: f64 = PI / 12.0;
-
-/// Angle of the turned poses \[rad\]. One that is nearer to another mode than half of that is the same.
-const TURN: f64 = PI / 18.0;
 
 /// Poses that the object may have instead of that which is tracked. They move with it. Their weights change with each new view, because frames of one view
 /// err alike.
@@ -53,9 +46,9 @@ impl Modes {
         }
     }
 
-    /// Whether an object turned by `rotation` shows more of which it is.
-    pub(super) fn is_new_view(&self, rotation: &UnitQuaternion<f64>) -> bool {
-        self.seen.angle_to(rotation) > NEW_VIEW
+    /// Whether an object turned by `rotation`, by more than an `angle` \[rad\], shows more of which it is.
+    pub(super) fn is_new_view(&self, rotation: &UnitQuaternion<f64>, angle: f64) -> bool {
+        self.seen.angle_to(rotation) > angle
     }
 
     /// Tracks the one at `index`, and has the tracked one in its place.
@@ -81,13 +74,13 @@ impl Modes {
         }
     }
 
-    /// Leaves out those of hardly any weight, and those turned as the tracked one or another.
-    fn prune(&mut self, least: f64) {
+    /// Leaves out those of hardly any weight, and those turned as the tracked one or another, within an `angle` \[rad\].
+    fn prune(&mut self, least: f64, angle: f64) {
         let mut kept: Vec<Mode> = Vec::new();
         for mode in self.others.drain(..) {
             let rotation = mode.in_object.rotation;
-            let is_same = |other: &Mode| other.in_object.rotation.angle_to(&rotation) < 0.5 * TURN;
-            let is_tracked = rotation.angle() < 0.5 * TURN;
+            let is_same = |other: &Mode| other.in_object.rotation.angle_to(&rotation) < angle;
+            let is_tracked = rotation.angle() < angle;
             if mode.log_odds > least && !is_tracked && !kept.iter().any(is_same) {
                 kept.push(mode);
             }
@@ -127,7 +120,7 @@ impl Tracker {
         let pose = solved.solution.at.state.t_cam_object;
         let (variance, axis) = widest(posterior.covariance().fixed_view::<3, 3>(3, 3).into_owned());
         if variance > self.settings.turn_sigma.powi(2) {
-            let turn = pose.rotation.inverse() * axis * TURN;
+            let turn = pose.rotation.inverse() * axis * self.settings.turn;
             modes.add_turned(&turn, &self.object.center.coords);
         }
         modes.seen = pose.rotation;
@@ -148,7 +141,8 @@ impl Tracker {
                 best = Some((mode.log_odds, mode.in_object, other));
             }
         }
-        modes.prune(-self.settings.fused.prune_margin);
+        let least = -self.settings.fused.hypotheses.prune_margin;
+        modes.prune(least, 0.5 * self.settings.turn);
         let Some((_, in_object, other)) = best else { return Ok(None) };
         let posterior = self.posterior(&other, frame.nominal)?;
         let index = modes.others.iter().position(|mode| mode.in_object == in_object);
@@ -171,6 +165,7 @@ fn widest(covariance: Matrix3<f64>) -> (f64, Vector3<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracker::TrackerSettings;
 
     fn modes(angles: &[(f64, f64)]) -> Modes {
         let mode = |&(angle, log_odds): &(f64, f64)| Mode {
@@ -190,23 +185,24 @@ mod tests {
             assert!((tracked * mode.in_object).rotation.angle_to(&expected) < 1e-12);
             assert!((mode.log_odds - log_odds).abs() < 1e-12);
         }
-        assert!(modes.is_new_view(&UnitQuaternion::from_scaled_axis(Vector3::x() * 0.3)));
-        assert!(!modes.is_new_view(&UnitQuaternion::from_scaled_axis(Vector3::x() * 0.2)));
+        assert!(modes.is_new_view(&UnitQuaternion::from_scaled_axis(Vector3::x() * 0.3), 0.26));
+        assert!(!modes.is_new_view(&UnitQuaternion::from_scaled_axis(Vector3::x() * 0.2), 0.26));
     }
 
     #[test]
     fn turned_poses_keep_the_center_and_what_is_the_same_or_unlikely_goes() {
         let mut modes = modes(&[(0.05, 0.0), (1.0, -20.0), (2.0, -3.0), (2.02, -2.0)]);
         let center = Vector3::new(0.1, 0.2, 0.3);
-        modes.add_turned(&(Vector3::x() * TURN), &center);
-        modes.prune(-15.0);
+        let turn = TrackerSettings::default().turn;
+        modes.add_turned(&(Vector3::x() * turn), &center);
+        modes.prune(-15.0, 0.5 * turn);
         let odds: Vec<f64> = modes.others.iter().map(|mode| mode.log_odds).collect();
         assert_eq!(odds, [-3.0, 0.0, 0.0]);
         for mode in &modes.others[1..] {
             assert!(
                 (mode.in_object * nalgebra::Point3::from(center) - center).coords.norm() < 1e-12
             );
-            assert!((mode.in_object.rotation.angle() - TURN).abs() < 1e-12);
+            assert!((mode.in_object.rotation.angle() - turn).abs() < 1e-12);
         }
     }
 }

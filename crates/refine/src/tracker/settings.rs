@@ -1,42 +1,51 @@
 //! Settings of a tracker.
 
+use std::f64::consts::PI;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
+use super::appearance::AppearanceSettings;
 use super::keyframe::KeyframeSettings;
+use super::segmentation::SegmentationSettings;
 use crate::error::RefineError;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
 /// What is known of how an object moves from frame to frame; in files, all of it or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ProcessNoise {
-    /// Motion that was not foreseen, a random walk in each direction: its variance grows by the square of this in a second \[m/√s\].
+    /// Intensity of the random walk of the place in each direction: the variance of motion that was not foreseen grows by the square of this in a second
+    /// \[m/√s\].
     pub translation: f64,
-    /// Rotation that was not foreseen, about each axis alike \[rad/√s\].
+    /// Intensity of the random walk of the rotation about each axis \[rad/√s\].
     pub rotation: f64,
-    /// How much of the difference between measured and believed velocity is believed, between 0 and 1.
+    /// Gain of the velocity: part of the difference between measured and believed velocity that is believed, between 0 and 1.
     pub gain: f64,
 }
 
 /// When a pose is not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct GatingSettings {
-    /// The cost may be so many times its running mean,
+    /// Ratio of the cost to its running mean up to which a pose is believed, but for the margin below.
     pub cost_ratio: f64,
-    /// and so much more \[nat\].
+    /// Cost beyond that up to which it is believed, too \[nat\].
     pub cost_margin: f64,
-    /// Standard deviations of the prediction that the object may be away from it.
+    /// Mahalanobis distance of the object from its prediction up to which it is believed.
     pub innovation_gate: f64,
-    /// Standard deviation of the pose in the direction in which it is largest \[m of surface motion\].
+    /// Standard deviation of the pose in the direction in which it is largest up to which it is believed \[m of surface motion\].
     pub max_sigma: f64,
     /// Share of the pixels that should show an object found again, which do so, at least; half of it where it was expected. Without depth, also of an object
     /// that is followed, as a share of what is usually seen of its colors.
     pub least_shown: f64,
+    /// Growth of the running mean of costs with every frame that the object is lost, as a part of it, because circumstances may have changed for good:
+    /// slowly, or what is wrong for a moment would soon pass for right.
+    pub growth: f64,
 }
 
 impl Default for GatingSettings {
@@ -47,6 +56,7 @@ impl Default for GatingSettings {
             innovation_gate: 8.0,
             max_sigma: 12e-3,
             least_shown: 0.5,
+            growth: 0.02,
         }
     }
 }
@@ -67,6 +77,7 @@ impl Default for GatingSettings {
     Serialize,
     Deserialize,
 )]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recovery {
@@ -91,33 +102,49 @@ fn unknown(text: &str) -> String {
 
 /// Settings of [`Tracker`](super::Tracker).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerSettings {
-    /// Evidence, nuisances and stated accuracies; its stages serve where a pose has to be found.
+    /// Evidence, nuisances and nominal accuracies; its stages serve where a pose has to be found.
+    #[serde(skip)]
     pub fused: FusedSettings,
-    /// The one stage that follows the object.
+    /// Stage that follows the object.
     pub stage: Stage,
-    /// Motion relative to a hand that is known.
+    /// Process noise relative to a hand that is known.
     pub in_hand: ProcessNoise,
-    /// Motion in the camera frame, where no hand is known.
+    /// Process noise in the camera frame, where no hand is known.
     pub free: ProcessNoise,
     /// Time within which what was learnt of calibrations is forgotten, and an object that is not seen comes to rest, all but 1/e \[s\]. Errors that
-    /// frames share, such as a warp of depth or a wrong model, count as new in every one of them: the longer they are remembered while nothing
-    /// moves, the farther calibrations are led astray.
+    /// frames share, such as a warp of depth or a wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the
+    /// farther calibrations are led astray. EXPERIMENTS: Time constant of calibrations.
     pub time_constant: f64,
-    /// How far the object has moved by the images.
+    /// Motion of the object by the images.
     pub keyframe: KeyframeSettings,
-    /// Poses turned by 10° about the least certain axis of rotation are modes, too, where its standard deviation in
-    /// [`Posterior::covariance`](crate::strategy::Posterior::covariance) exceeds this \[rad\]; infinity for never.
+    /// Segmentation of the object in frames with depth.
+    pub segmentation: SegmentationSettings,
+    /// Appearance of the object, which tells it in frames without depth.
+    pub appearance: AppearanceSettings,
+    /// Gain of running means of costs, colors and masks: part of the way that they go to the next value.
+    pub gain: f64,
+    /// Number of frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than
+    /// before.
+    pub period: u32,
+    /// Rotation from which an object is seen anew, and its other modes are weighed \[rad\].
+    pub new_view: f64,
+    /// Angle of poses that are turned beside the tracked one \[rad\]; a mode that is nearer to another than half of that is the same.
+    pub turn: f64,
+    /// Standard deviation of the least certain rotation in [`Posterior::covariance`](crate::strategy::Posterior::covariance) from which poses turned
+    /// about its axis are modes, too \[rad\]; infinity for never.
     pub turn_sigma: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.
     pub budget: Option<Duration>,
-    /// When a pose is not believed.
+    /// Gating: when a pose is not believed.
     pub gating: GatingSettings,
-    /// What is done then.
+    /// Recovery of an object whose pose is not believed.
     pub recovery: Recovery,
-    /// How poses are searched for.
+    /// Search for poses.
+    #[serde(skip)]
     pub search: SearchSettings,
 }
 
@@ -136,6 +163,12 @@ impl Default for TrackerSettings {
             free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
             time_constant: 0.2,
             keyframe: KeyframeSettings::default(),
+            segmentation: SegmentationSettings::default(),
+            appearance: AppearanceSettings::default(),
+            gain: 0.1,
+            period: 6,
+            new_view: PI / 12.0,
+            turn: PI / 18.0,
             turn_sigma: 0.8f64.to_radians(),
             budget: None,
             gating: GatingSettings::default(),
@@ -165,11 +198,7 @@ impl TrackerSettings {
             ("gating.max_sigma", self.gating.max_sigma),
             ("gating.least_shown", self.gating.least_shown),
         ];
-        for (name, value) in positive {
-            if value.is_nan() || value <= 0.0 {
-                return Err(RefineError::Setting { name, problem: format!("is {value}") });
-            }
-        }
+        RefineError::require_positive(&positive)?;
         if self.time_constant.is_infinite() {
             return Err(RefineError::Setting {
                 name: "time_constant",

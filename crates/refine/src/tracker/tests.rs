@@ -77,9 +77,10 @@ fn a_moment_s_loss_makes_little_pass_for_right() {
     let mut tracker = tracker(TrackerSettings::default());
     track(&mut tracker, 0);
     let level = tracker.track.as_mut().unwrap();
-    assert_eq!(level.allowance(), level.level);
+    let growth = GatingSettings::default().growth;
+    assert_eq!(level.allowance(growth), level.level);
     level.lost = 10;
-    let grown = level.allowance();
+    let grown = level.allowance(growth);
     assert!(grown > 1.1 * level.level && grown < 1.3 * level.level);
 }
 
@@ -209,7 +210,7 @@ fn a_turned_pose_that_fits_better_is_taken() {
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
     let frame = tracker.frame(&sight, &object, Some(&hand)).unwrap();
     let (problem, _) = tracker.prepare(&frame, &prediction).unwrap();
-    let level = remembered.allowance();
+    let level = remembered.allowance(GatingSettings::default().growth);
     let followed =
         Followed { problem: &problem, prediction: &prediction, nominal: &nominal, level };
     let clock = Clock::start(None);

@@ -5,7 +5,6 @@
 mod bad_input;
 mod calibrate;
 mod command;
-mod config;
 mod details;
 mod eval_bop;
 mod export;
@@ -18,6 +17,7 @@ mod masks;
 mod messages;
 mod pages;
 mod resume;
+mod settings;
 mod study;
 mod track;
 mod truth;

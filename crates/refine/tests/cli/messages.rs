@@ -39,9 +39,6 @@ fn levels_choose_what_is_told() {
     assert!(said.contains("invalid value 'loud' for '--log-level <LEVEL>'"), "{said}");
     let said = told("--quiet --verbose", "");
     assert!(said.contains("cannot be used with"), "{said}");
-    place.write("a.toml", "log-level = \"error\"\n");
-    assert_eq!(told("--config a.toml", ""), "");
-    assert!(debugged(&told("--config a.toml -vv", "")));
 }
 
 #[test]
@@ -67,6 +64,4 @@ fn colors_are_for_terminals_or_asked_for() {
     assert!(!colored(&told("--color never --sede", ("CLICOLOR_FORCE", "1"))));
     assert!(!colored(&both("--sede")));
     assert!(place.succeed("--color always refine --help").contains('\u{1b}'));
-    place.write("a.toml", "color = \"always\"\n");
-    assert!(colored(&told("--config a.toml", none)));
 }

@@ -9,7 +9,7 @@ fn every_shell_has_completions() {
     let place = Workplace::empty();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = place.succeed(&format!("completions {shell}"));
-        for word in ["calibrate", "robustness", "no-checkpoint", "print-config"] {
+        for word in ["calibrate", "robustness", "no-checkpoint", "settings"] {
             assert!(script.contains(word), "{shell}: {word}");
         }
     }

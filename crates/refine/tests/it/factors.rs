@@ -34,7 +34,7 @@ fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineE
     Ok(vec![
         Arc::new(ChamferDepthFactor::new(frame, &ChamferDepthSettings::default())?),
         Arc::new(FreeSpaceFactor::new(frame, &FreeSpaceSettings::default())),
-        Arc::new(HandDepthFactor::new(frame, &HandDepthSettings::default())?),
+        Arc::new(HandDepthFactor::new(frame, 500, &HandDepthSettings::default())?),
         Arc::new(PenetrationFactor::new(frame, &PenetrationSettings::default())?),
         Arc::new(PointToPlaneFactor::new(frame, &PointToPlaneSettings::default())?),
         Arc::new(RegionFactor::new(frame, &RegionSettings::default())?),

@@ -170,7 +170,7 @@ fn factors(frame: &Frame<'_>, state: &State) -> Vec<Made> {
     vec![
         made(ChamferDepthFactor::new(frame, &ChamferDepthSettings::default())),
         made(Ok(FreeSpaceFactor::new(frame, &FreeSpaceSettings::default()))),
-        made(HandDepthFactor::new(frame, &HandDepthSettings::default())),
+        made(HandDepthFactor::new(frame, 500, &HandDepthSettings::default())),
         made(PenetrationFactor::new(frame, &PenetrationSettings::default())),
         made(PointToPlaneFactor::new(frame, &PointToPlaneSettings::default())),
         made(RenderingFactor::new(frame, &RenderingSettings::default())),

@@ -1,26 +1,13 @@
 //! Options of all commands.
 
-use std::path::PathBuf;
-
 use clap::{Args, ColorChoice};
 
 use crate::logging::{self, Level, LevelError};
 
-/// Where further options are, and what is printed.
+/// What is printed.
 #[derive(Args)]
 #[command(next_help_heading = "All commands")]
 pub(crate) struct Global {
-    /// Take options from this TOML file, too: options of all commands at its top, those of a command in the table of its name; the
-    /// command line has precedence
-    ///
-    /// Keys are the names of the options: `seed = 1` below `[refine]` is `prehend refine --seed 1`. Options that are given several times are arrays, and
-    /// those without a value are true or false. An option of the file does not count where the command line has it, or one that excludes it. Paths are
-    /// relative to the current folder.
-    #[arg(long, global = true, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// Print the options in effect as such a file, those without a value as comments, and do nothing else
-    #[arg(long, global = true)]
-    print_config: bool,
     /// When to use colors; auto: on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     color: ColorChoice,

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use prehend_refine::Settings;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
@@ -25,6 +26,7 @@ use serde_json::json;
 use crate::options::{
     Masks, RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses,
 };
+use crate::settings::SettingsOptions;
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -45,7 +47,7 @@ pub(crate) struct Initial {
         long,
         value_name = "LEVEL",
         required_unless_present = "search",
-        conflicts_with_all = ["search", "device", "Masks"]
+        conflicts_with_all = ["search", "device", "Masks", "SettingsOptions"]
     )]
     noise: Option<NoiseLevel>,
     /// Seed of the errors
@@ -72,6 +74,8 @@ pub(crate) struct Initial {
     /// Worker threads of the search; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    settings: SettingsOptions,
     #[command(flatten)]
     rendering: Rendering,
 }
@@ -165,7 +169,9 @@ impl Initial {
         let mut assets =
             Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
         let backend = self.rendering.open()?;
-        let identity = self.identity(dataset, &targets, backend.name())?;
+        let settings = self.settings.load()?;
+        let identity = self.identity(dataset, &targets, backend.name(), &settings)?;
+        let settings = settings.search();
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
         let mut searches = BTreeMap::new();
@@ -175,7 +181,8 @@ impl Initial {
             if searched.contains_key(&index) {
                 continue;
             }
-            let found = guard(|| search_one(&mut assets, &mut searches, target, &backend));
+            let found =
+                guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend));
             match found {
                 Ok(found) => {
                     let found: Vec<FoundPose> = found.iter().map(FoundPose::from).collect();
@@ -199,6 +206,7 @@ impl Initial {
         dataset: &Dataset,
         targets: &[Target],
         backend: &str,
+        settings: &Settings,
     ) -> anyhow::Result<Identity> {
         Ok(Identity::of(&json!({
             "command": "initial --search",
@@ -208,6 +216,7 @@ impl Initial {
             "filters": self.selection.filters(),
             "masks": self.masks.identity()?,
             "backend": backend,
+            "settings": settings.to_toml()?,
         })))
     }
 }
@@ -216,13 +225,14 @@ fn search_one(
     assets: &mut Assets<'_>,
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
+    settings: &SearchSettings,
     backend: &Arc<dyn Backend>,
 ) -> Result<Vec<PoseCandidate>, AssetError> {
     let input = assets.load(target, &[])?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => {
-            unknown.insert(PoseSearch::new(Arc::clone(&input.object), SearchSettings::default())?)
+            unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?)
         }
     };
     Ok(search.run(&input.frame()?.with_backend(Arc::clone(backend)))?)

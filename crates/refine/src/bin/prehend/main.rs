@@ -2,7 +2,6 @@
 
 mod calibrate;
 mod check;
-mod config;
 mod eval;
 mod export;
 mod global;
@@ -13,19 +12,17 @@ mod options;
 mod pages;
 mod refine;
 mod report;
+mod settings;
 mod study;
 mod symmetry;
 mod synth;
 mod terminal;
 mod track;
 
-use std::env;
 use std::process::ExitCode;
 
 use anyhow::anyhow;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-
-use self::config::{Asked, ReadError};
+use clap::{ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Refine the poses of objects held in a robot hand, from RGB-D, touch and physics
 ///
@@ -45,7 +42,7 @@ use self::config::{Asked, ReadError};
 ///   prehend refine  --dataset DIR --poses init.csv --out refined.csv --report out
 ///   prehend eval    --dataset DIR --poses refined.csv
 ///
-/// Options may come from a file: `prehend refine --print-config` shows one, --config FILE takes it.
+/// Settings may come from a file: `prehend settings` prints one, --settings FILE takes it, --set NAME=VALUE changes one of them.
 ///
 /// What a hand needs is prepared once and kept in PREHEND_CACHE (default: prehend in the user's cache folder); set it empty to
 /// keep nothing.
@@ -96,6 +93,8 @@ enum Command {
     Check(check::Check),
     /// Say what a file or a folder is, what it holds and what is wrong with it
     Info(info::Info),
+    /// Print the settings of estimator, search, tracker and calibration as TOML, with what each is: a file for --settings
+    Settings(settings::PrintSettings),
     /// Find the symmetries of models, and write them into models_info.json
     ///
     /// Scores that are free of symmetries (MSSD, MSPD, the symmetric OE) take them from there.
@@ -114,17 +113,25 @@ enum Command {
 fn main() -> ExitCode {
     logging::start();
     let command = Prehend::command();
-    let ended = match config::read(&command, env::args_os().collect()) {
-        Ok(Asked::Run(matches)) => run(&matches, command),
-        Ok(Asked::Print(text)) => terminal::say(text.trim_end()).map(|()| ExitCode::SUCCESS),
-        Err(ReadError::Line(error)) => return refuse(&error),
-        Err(ReadError::Config(error)) => Err(error.into()),
+    let matches = match command.clone().color(color(&command)).try_get_matches() {
+        Ok(matches) => matches,
+        Err(error) => return refuse(&error),
     };
-    ended.unwrap_or_else(|error| {
+    run(&matches, command).unwrap_or_else(|error| {
         // The messages of our errors contain those of their causes.
         log::error!("{error}");
         ExitCode::from(1)
     })
+}
+
+/// When clap uses colors, as far as the command line can be read, whatever is wrong or missing.
+fn color(command: &clap::Command) -> ColorChoice {
+    // Help would end it.
+    let command = command.clone().ignore_errors(true).disable_help_flag(true);
+    let command = command.disable_version_flag(true).disable_help_subcommand(true);
+    let given = command.try_get_matches().ok();
+    let color = given.as_ref().and_then(|given| given.get_one("color").copied());
+    color.unwrap_or(ColorChoice::Auto)
 }
 
 /// Runs the command asked for.
@@ -141,6 +148,7 @@ fn run(matches: &clap::ArgMatches, command: clap::Command) -> anyhow::Result<Exi
         Command::Calibrate(calibrate) => calibrate.run(),
         Command::Check(check) => check.run(),
         Command::Info(info) => info.run(),
+        Command::Settings(settings) => settings.run(),
         Command::Symmetry(symmetry) => symmetry.run(),
         Command::Synth(synth) => synth.run(),
         Command::Completions(completions) => completions.run(command),

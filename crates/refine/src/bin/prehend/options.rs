@@ -8,7 +8,7 @@ use anyhow::{anyhow, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
-use prehend_refine::NamedMethod;
+use prehend_refine::Method;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_results,
     read_rivals, share_image_times, write_results,
@@ -294,12 +294,13 @@ pub(crate) fn open_rig(file: Option<&Path>) -> Result<Option<Arc<Rig>>, DatasetE
     file.map(Rig::load).transpose().map(|rig| rig.map(Arc::new))
 }
 
-/// The method called `name`.
-pub(crate) fn named(name: &str) -> Result<&'static NamedMethod, String> {
-    NamedMethod::find(name).ok_or_else(|| {
-        let names: Vec<_> = NamedMethod::all().iter().map(|m| m.name).collect();
-        format!("unknown method: one of {}", names.join(", "))
-    })
+/// `name`, if a method is called so.
+pub(crate) fn named(name: &str) -> Result<String, String> {
+    let names = || Method::all().iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    match Method::named(name) {
+        Some(_) => Ok(name.replace("colour", "color")),
+        None => Err(format!("unknown method: one of {}", names())),
+    }
 }
 
 /// The extension of the file of rivals beside a results file.

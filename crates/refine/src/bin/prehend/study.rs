@@ -12,7 +12,6 @@ use prehend_refine::data::{Assets, Workers};
 use prehend_refine::evaluate::study::{
     Design, InitialPose, Kind, Record, Runner, Shard, StudyFile, Sweep, tables, write_page,
 };
-use prehend_refine::{Method, NamedMethod};
 
 use crate::options::{Selection, limit_threads, named, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
@@ -46,7 +45,7 @@ pub(crate) struct Study {
     restart: bool,
     /// Methods to compare, such as "depth,combined" [default: those of the study]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named)]
-    methods: Option<Vec<&'static NamedMethod>>,
+    methods: Option<Vec<String>>,
     /// Faults that the robustness study sweeps [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true)]
     sweeps: Option<Vec<Sweep>>,
@@ -110,16 +109,14 @@ impl Study {
     }
 
     fn design(&self, dataset: &Dataset) -> anyhow::Result<Design> {
-        let chosen = match &self.methods {
-            Some(methods) => methods.clone(),
-            None => self.kind.methods().into_iter().filter_map(NamedMethod::find).collect(),
-        };
+        let chosen = self.methods.clone().unwrap_or_else(|| self.kind.methods());
         let mut methods: Vec<(String, Method)> = Vec::new();
-        for named in chosen {
-            if methods.iter().any(|(other, _)| other == named.name) {
-                bail!("method {} is named twice", named.name);
+        for name in chosen {
+            if methods.iter().any(|(other, _)| *other == name) {
+                bail!("method {name} is named twice");
             }
-            methods.push((named.name.into(), Design::method(self.kind, named, self.iterations)));
+            let Some(method) = Method::named(&name) else { bail!("{name} is no method") };
+            methods.push((name, Design::method(self.kind, method, self.iterations)));
         }
         let has_steps =
             matches!(&methods[..], [(_, method)] if !matches!(method, Method::Fused(_)));

@@ -10,7 +10,7 @@ use crate::data::bop::{Dataset, DatasetError};
 use crate::data::identity::{
     SENSED, TRUTH as ANNOTATIONS, dataset_fingerprint, file_fingerprint, fingerprint, program,
 };
-use crate::method::{Method, NamedMethod};
+use crate::method::Method;
 use crate::strategy::Strategy;
 
 /// All inputs and settings that determine a study's results, beside the initial poses.
@@ -105,8 +105,7 @@ impl Design {
 
     /// The method of a study, with the settings that it has there; `iterations` replaces the number of iterations of the method
     /// itself. The steps study runs all of them, 1000 unless told otherwise.
-    pub fn method(kind: Kind, method: &NamedMethod, iterations: Option<usize>) -> Method {
-        let mut method = method.method();
+    pub fn method(kind: Kind, mut method: Method, iterations: Option<usize>) -> Method {
         if kind == Kind::Steps {
             method.set_exhaustive();
             method.set_iterations(1000);

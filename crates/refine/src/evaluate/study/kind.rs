@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use strum::Display;
 
-use crate::method::NamedMethod;
+use crate::method::Method;
 
 /// A study; the documentation of the variants is the command's help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Display, ValueEnum)]
@@ -29,22 +29,25 @@ pub enum Kind {
 
 impl Kind {
     /// The methods compared unless others are asked for, by name and in the order of the paper's table.
-    pub fn methods(self) -> Vec<&'static str> {
-        match self {
-            Self::Main => vec!["icp", "icp-best", "robust-icp", "combined", "fused"],
-            Self::Gradients => {
-                let each = ["depth", "tactile", "rendering", "physics", "physics-best"];
-                [&each[..], &["robust-icp", "combined"]].concat()
-            }
-            Self::Noise => vec!["robust-icp", "combined", "fused"],
-            Self::Steps => vec!["combined-free"],
-            Self::Evidence => {
-                let ablations = NamedMethod::ablations().iter().map(|m| m.name);
-                ["fused"].into_iter().chain(ablations).collect()
-            }
-            Self::Confidence => vec!["fused"],
-            Self::Robustness => vec!["robust-icp", "fused"],
-        }
+    pub fn methods(self) -> Vec<String> {
+        let fixed: &[&str] = match self {
+            Self::Main => &["icp", "icp-best", "robust-icp", "combined", "fused"],
+            Self::Gradients => &[
+                "depth",
+                "tactile",
+                "rendering",
+                "physics",
+                "physics-best",
+                "robust-icp",
+                "combined",
+            ],
+            Self::Noise => &["robust-icp", "combined", "fused"],
+            Self::Steps => &["combined-free"],
+            Self::Evidence | Self::Confidence => &["fused"],
+            Self::Robustness => &["robust-icp", "fused"],
+        };
+        let ablations = if self == Self::Evidence { Method::ablations() } else { Vec::new() };
+        fixed.iter().map(|name| (*name).to_owned()).chain(ablations).collect()
     }
 
     /// The levels of noise whose initial poses a dataset brings (`init_low.csv`, `init_high.csv`): those that the paper has in
@@ -65,7 +68,7 @@ mod tests {
     fn all_methods_exist() {
         for kind in Kind::value_variants() {
             for name in kind.methods() {
-                assert!(NamedMethod::find(name).is_some(), "{name}");
+                assert!(Method::named(&name).is_some(), "{name}");
             }
         }
     }

@@ -18,24 +18,39 @@ use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
-use crate::scene::{Frame, Object};
+use crate::scene::{Frame, ModelErrorSettings, Object};
 
 /// Settings of [`PointToPlaneFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct PointToPlaneSettings {
-    /// Depth points used at most, spread evenly over the mask.
+    /// Number of depth points at most, spread evenly over the mask.
     pub points: usize,
-    /// Distances of points from the surface \[m\].
+    /// Noise of distances of points from the surface \[m\].
     pub noise: NoiseModel,
     /// Standard deviation of the smooth field by which neighboring points are off alike \[m\]: errors of the depth camera and, unless
     /// surface patches account for them, of the object's model; zero if there is none.
     pub gp_sigma: f64,
-    /// Length scale of that field, a Gaussian process over space \[m\].
+    /// Length scale of that field, a Gaussian process over space \[m\]. EXPERIMENTS: Settings of the depth field.
     pub length_scale: f64,
-    /// Points so near to the mask's border are left out \[px\], if at least half of all is left then: there depth is of what
-    /// is in front or behind, or of both.
+    /// Margin of the mask in which points are left out \[px\], if at least half of all is left then: there depth is of what is in front or behind, or of
+    /// both. EXPERIMENTS: Mask margin.
     pub margin: usize,
+    /// Distance in front of the hand from which a point is of something else \[m\]: the accuracy of a hand's pose and joints.
+    pub in_front: f64,
+    /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
+    pub grazing: f64,
+    /// Number of inducing points of the smooth field at most (Quiñonero-Candela and Rasmussen, 2005).
+    pub inducing_points: usize,
+    /// Distance between them, as a share of the length scale.
+    pub spacing: f64,
+    /// Number of rounds of iteratively reweighted least squares in which field and weights are found.
+    pub reweightings: usize,
+    /// Number of patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
+    pub noise_patches: f64,
+    /// Number of points from which a patch counts there.
+    pub least_points: f64,
 }
 
 impl Default for PointToPlaneSettings {
@@ -44,8 +59,15 @@ impl Default for PointToPlaneSettings {
             points: 1000,
             noise: NoiseModel::cauchy(1.5e-3, 20.0),
             gp_sigma: 0.0,
-            length_scale: 20e-3,
+            length_scale: ModelErrorSettings::default().length_scale,
             margin: 2,
+            in_front: 6e-3,
+            grazing: 0.2,
+            inducing_points: 24,
+            spacing: 0.5,
+            reweightings: 3,
+            noise_patches: 36.0,
+            least_points: 3.0,
         }
     }
 }
@@ -90,12 +112,6 @@ struct Residual {
     away: Vector3<f64>,
 }
 
-/// How far in front of the hand a point must be to be of something else \[m\].
-const IN_FRONT: f64 = 6e-3;
-
-/// Points that are worth a task of their own.
-const TASK: usize = 64;
-
 impl PointToPlaneFactor {
     /// Of the masked depth of `frame`, but where masks have leaked onto the hand.
     ///
@@ -113,7 +129,7 @@ impl PointToPlaneFactor {
         };
         let of_object = |&(x, y, depth): &(usize, usize, f64)| {
             let hand = hand.get(x, y).map_or(0.0, f64::from);
-            hand == 0.0 || depth < hand - IN_FRONT
+            hand == 0.0 || depth < hand - settings.in_front
         };
         let mut depths = frame.masked_depths(settings.points)?;
         depths.retain(of_object);
@@ -127,7 +143,7 @@ impl PointToPlaneFactor {
             return Err(RefineError::NoDepth);
         }
         let places: Vec<_> = points.iter().map(|p| p.ray.push(1.0) * p.depth).collect();
-        let field = SmoothField::new(&places, settings.gp_sigma, settings.length_scale);
+        let field = SmoothField::new(&places, &settings);
         Ok(Self { object, points, field, patches: None, settings })
     }
 
@@ -152,12 +168,12 @@ impl PointToPlaneFactor {
             let corners = &self.object.corner_normals[closest.face as usize];
             let smooth: Vector3<f64> =
                 corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
-            let facing = facing(&(state.t_cam_object * smooth), &surface);
+            let facing = facing(&(state.t_cam_object * smooth), &surface, self.settings.grazing);
             let away =
                 if distance.abs() > f64::EPSILON.sqrt() { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
-        self.points.par_iter().with_min_len(TASK).map(residual).collect()
+        self.points.par_iter().with_min_len(64).map(residual).collect()
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.

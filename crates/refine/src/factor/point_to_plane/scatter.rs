@@ -17,13 +17,6 @@ pub(crate) struct NoiseEstimate {
     pub effective_samples: f64,
 }
 
-/// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
-const PATCHES: f64 = 36.0;
-
-/// Points and patches by which scatter can be judged.
-const LEAST_POINTS: f64 = 3.0;
-const LEAST_PATCHES: usize = 6;
-
 /// Number, sum and sum of squares of the residuals in a patch.
 #[derive(Clone, Copy, Default)]
 struct Patch {
@@ -42,7 +35,8 @@ impl PointToPlaneFactor {
         let (left, right) = (pixels().map(|p| p.0).min()?, pixels().map(|p| p.0).max()?);
         let (top, bottom) = (pixels().map(|p| p.1).min()?, pixels().map(|p| p.1).max()?);
         let area = ((right - left + 1) * (bottom - top + 1)) as f64;
-        let side = (area / PATCHES).sqrt().max(1.0);
+        let wanted = self.settings.noise_patches;
+        let side = (area / wanted).sqrt().max(1.0);
         let patch = |from: usize, to: usize| ((to - from) as f64 / side) as usize;
         let across = patch(left, right) + 1;
         let mut patches = vec![Patch::default(); across * (patch(top, bottom) + 1)];
@@ -56,11 +50,12 @@ impl PointToPlaneFactor {
             patch.sum += facing * residual;
             patch.squares += facing * residual * residual;
         }
-        patches.retain(|patch| patch.count >= LEAST_POINTS);
+        patches.retain(|patch| patch.count >= self.settings.least_points);
         let total = patches.iter().map(|patch| patch.count).sum::<f64>();
         let of_means = patches.iter().map(|p| p.sum * p.sum / p.count).sum::<f64>() / total;
         let of_points = patches.iter().map(|patch| patch.squares).sum::<f64>() / total;
-        if !(of_means > 0.0 && patches.len() >= LEAST_PATCHES) {
+        // A row of patches at least.
+        if !(of_means > 0.0 && patches.len() as f64 >= wanted.sqrt()) {
             return None;
         }
         let (number, count) = (patches.len() as f64, self.points.len() as f64);

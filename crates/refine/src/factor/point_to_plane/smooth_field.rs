@@ -2,17 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
+use super::PointToPlaneSettings;
 use crate::problem::RIDGE;
 use crate::scene::{InducingPoints, farthest_points};
-
-/// Coefficients that the field is described by, at most.
-const MOST_COEFFICIENTS: usize = 24;
-
-/// Distance between the places that describe the field, as a share of its smoothness.
-const SPACING: f64 = 0.5;
-
-/// Times that weights are found anew: they depend on what the field leaves.
-const ROUNDS: usize = 3;
 
 /// A Gaussian process over space, with covariance τ² exp(−d²/2ℓ²) at distance d, through a few places that describe all others
 /// (Quiñonero-Candela and Rasmussen, 2005).
@@ -22,6 +14,8 @@ const ROUNDS: usize = 3;
 pub(super) struct SmoothField {
     /// A column for each place \[m\]: the field there is its product with coefficients, which are independent and of unit variance.
     features: DMatrix<f64>,
+    /// Times that weights are found: they depend on what the field leaves.
+    reweightings: usize,
 }
 
 /// The field that fits residuals best, or none.
@@ -45,11 +39,12 @@ impl Fit {
 }
 
 impl SmoothField {
-    /// At `places` \[m\], with standard deviation `deviation` \[m\] and length `smoothness` \[m\]; `None` if there is none.
-    pub(super) fn new(places: &[Vector3<f64>], deviation: f64, smoothness: f64) -> Option<Self> {
-        let chosen = farthest_points(places, SPACING * smoothness, MOST_COEFFICIENTS);
-        let process = InducingPoints::new(chosen, deviation, smoothness, RIDGE)?;
-        Some(Self { features: process.features(places) })
+    /// At `places` \[m\]; `None` if there is none.
+    pub(super) fn new(places: &[Vector3<f64>], settings: &PointToPlaneSettings) -> Option<Self> {
+        let &PointToPlaneSettings { gp_sigma, length_scale, spacing, .. } = settings;
+        let chosen = farthest_points(places, spacing * length_scale, settings.inducing_points);
+        let process = InducingPoints::new(chosen, gp_sigma, length_scale, RIDGE)?;
+        Some(Self { features: process.features(places), reweightings: settings.reweightings })
     }
 
     /// The field that is most likely where `residuals` are seen, of which `weight` says from index and residual how much
@@ -74,7 +69,7 @@ impl SmoothField {
             Some(Fit { left, weights, cost, information })
         };
         let mut fit = round(residuals)?;
-        for _ in 1..ROUNDS {
+        for _ in 1..self.reweightings {
             fit = round(&fit.left)?;
         }
         Some(fit)
@@ -109,7 +104,8 @@ mod tests {
         let mut random = SplitMix64::new(3);
         let place = |i: usize| Vector3::new(0.003 * i as f64, 0.01 * (i as f64).sin(), 0.5);
         let places: Vec<_> = (0..40).map(place).collect();
-        let field = SmoothField::new(&places, 1e-3, 20e-3).unwrap();
+        let settings = |gp_sigma| PointToPlaneSettings { gp_sigma, ..Default::default() };
+        let field = SmoothField::new(&places, &settings(1e-3)).unwrap();
         let residuals: Vec<f64> = (0..40).map(|_| 1e-3 * random.normal()).collect();
         let rows: Vec<[f64; 2]> = (0..40).map(|_| [random.normal(), random.normal()]).collect();
         let weight = 1.0 / 0.5e-3f64.powi(2);
@@ -135,6 +131,6 @@ mod tests {
                 < 0.02
         );
         assert!(alike(0, 39) < 1e-3);
-        assert!(SmoothField::new(&places, 0.0, 20e-3).is_none());
+        assert!(SmoothField::new(&places, &settings(0.0)).is_none());
     }
 }

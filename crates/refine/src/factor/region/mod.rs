@@ -14,29 +14,32 @@ use super::patch_sums::PatchSums;
 use super::rendering::{reprojected, seen_by_state};
 use crate::error::RefineError;
 use crate::problem::{Factor, NormalEquations, State};
-use crate::scene::{Frame, Object, RegionEvidence};
+use crate::scene::{ForegroundSettings, Frame, Object, RegionEvidence};
 
 /// Settings of [`RegionFactor`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct RegionSettings {
-    /// The image is made smaller by this factor.
+    /// Factor by which the image is made smaller.
     pub downsample: usize,
-    /// Colors count beside the mask.
+    /// True if colors count beside the mask.
     pub color: bool,
     /// Standard deviation of the outline beside what the pixels tell \[px of the reduced image\].
     pub sigma: f64,
     /// Standard deviation of the object's surface about its model \[m\].
     pub surface: f64,
-    /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn away are
-    /// darker, masks are drawn too small or too large \[px of the reduced image\].
+    /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn
+    /// away are darker, masks are drawn too small or too large \[px of the reduced image\]. EXPERIMENTS: Offset of the outline.
     pub offset: f64,
-    /// How many independent measurements the outline amounts to.
+    /// Effective sample size of the outline.
     pub effective_samples: f64,
     /// Cost of a part of the outline that nothing is seen of where it should be: something hides it \[nat\].
     pub hidden: f64,
     /// Cost of a part of the outline beyond which the object goes on \[nat\].
     pub exceeded: f64,
+    /// Evidence of masks and colors that pixels are the object's.
+    pub foreground: ForegroundSettings,
 }
 
 impl Default for RegionSettings {
@@ -50,26 +53,21 @@ impl Default for RegionSettings {
             effective_samples: 40.0,
             hidden: 2.0,
             exceeded: 8.0,
+            foreground: ForegroundSettings::default(),
         }
     }
 }
 
 impl RegionSettings {
     fn check(&self) -> Result<(), RefineError> {
-        let named = [
-            ("sigma", self.sigma),
-            ("offset", self.offset),
-            ("effective_samples", self.effective_samples),
-            ("hidden", self.hidden),
-            ("exceeded", self.exceeded),
-            ("downsample", self.downsample as f64),
-        ];
-        let Some((name, value)) =
-            named.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0)
-        else {
-            return Ok(());
-        };
-        Err(RefineError::Setting { name: "region", problem: format!("has {name} = {value}") })
+        RefineError::require_positive(&[
+            ("region.sigma", self.sigma),
+            ("region.offset", self.offset),
+            ("region.effective_samples", self.effective_samples),
+            ("region.hidden", self.hidden),
+            ("region.exceeded", self.exceeded),
+            ("region.downsample", self.downsample as f64),
+        ])
     }
 }
 
@@ -104,7 +102,8 @@ impl RegionFactor {
         settings.check()?;
         let observation = frame.observation();
         let factor = settings.downsample;
-        let evidence = frame.regions(settings.color && observation.has_colors())?.reduced(factor);
+        let color = settings.color && observation.has_colors();
+        let evidence = frame.regions(color, &settings.foreground)?.reduced(factor);
         Ok(Self {
             object: Arc::clone(frame.object()),
             camera: observation.camera.scaled(1.0 / factor as f64),

@@ -5,27 +5,27 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::probes::{Distance, Probe, Probes};
-use super::{NO_CONTACT_SIGMA, TOUCH_SAMPLES};
+use super::{ProximitySettings, TactileSettings};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{BinaryContact, Frame, TouchReading};
 
 /// Settings of [`BinaryTouchFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct BinaryTouchSettings {
-    /// Distances of touched places from the surface \[m\]: coarser than of forces, which tell where between taxels a contact is.
+    /// Noise of distances of touched places from the surface \[m\]: coarser than of forces, which tell where between taxels a contact is.
     pub contact: NoiseModel,
-    /// Depths of other places inside the object \[m\].
+    /// Noise of depths of other places inside the object \[m\].
     pub no_contact: NoiseModel,
 }
 
 impl Default for BinaryTouchSettings {
     fn default() -> Self {
-        Self {
-            contact: NoiseModel::cauchy(2.5e-3, TOUCH_SAMPLES),
-            no_contact: NoiseModel::cauchy(NO_CONTACT_SIGMA, f64::INFINITY),
-        }
+        let TactileSettings { no_contact, .. } = TactileSettings::default();
+        let samples = ProximitySettings::default().noise.effective_samples;
+        Self { contact: NoiseModel::cauchy(2.5e-3, samples), no_contact }
     }
 }
 

@@ -12,15 +12,16 @@ use crate::scene::Hand;
 
 /// How touched taxels become contacts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ContactSettings {
-    /// Taxels of one link that feel force are of one contact if each is no farther from the next \[m\], and none is twice as far from the
-    /// strongest, or faces away from it.
+    /// Distance within which taxels of one link that feel force are of one contact \[m\]: each from the next, and none twice as far from the strongest,
+    /// or facing away from it.
     pub reach: f64,
-    /// Distances of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of
-    /// its taxels, and how far the object is off from its model.
+    /// Noise of distances of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of its taxels, and how
+    /// far the object is off from its model. EXPERIMENTS: Standard deviation of a contact.
     pub noise: NoiseModel,
-    /// A contact of this force \[N\] counts half: taxels that ring false feel less.
+    /// Force of a contact that counts half \[N\]: taxels that ring false feel less. EXPERIMENTS: Contacts instead of single taxels.
     pub force: f64,
 }
 

@@ -24,6 +24,7 @@ use crate::scene::{Frame, Hand};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TouchModel {
     /// Nothing: they are as good as dead.
@@ -35,21 +36,16 @@ pub enum TouchModel {
     Contacts(ContactSettings),
 }
 
-/// Independent measurements that the places of one sensor amount to at most: neighbors are off alike, by the skin and the object's model.
-const TOUCH_SAMPLES: f64 = 10.0;
-
-/// Standard deviation of the depth of skin that feels nothing inside the object \[m\].
-const NO_CONTACT_SIGMA: f64 = 1e-3;
-
 /// Settings of [`TactileFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TactileSettings {
     /// Force above which a taxel counts as touched, the paper's γ \[N\].
     pub contact_threshold: f64,
-    /// What touched taxels say.
+    /// Model of touched taxels.
     pub touch: TouchModel,
-    /// Depths of inactive taxels inside the object \[m\]; the dead ones are outliers.
+    /// Noise of depths of inactive taxels inside the object \[m\]; the dead ones are outliers.
     pub no_contact: NoiseModel,
 }
 
@@ -58,7 +54,7 @@ impl Default for TactileSettings {
         Self {
             contact_threshold: 0.1,
             touch: TouchModel::Contacts(ContactSettings::default()),
-            no_contact: NoiseModel::cauchy(NO_CONTACT_SIGMA, f64::INFINITY),
+            no_contact: NoiseModel::cauchy(1e-3, f64::INFINITY),
         }
     }
 }

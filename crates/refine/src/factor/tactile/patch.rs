@@ -7,7 +7,7 @@ use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::ArticulatedRobot;
 use serde::{Deserialize, Serialize};
 
-use super::TOUCH_SAMPLES;
+use super::ProximitySettings;
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
@@ -15,23 +15,22 @@ use crate::scene::{Frame, TouchReading};
 
 /// Settings of [`ContactPatchFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ContactPatchSettings {
-    /// Points used at most of a patch.
+    /// Number of points of a patch at most.
     pub points: usize,
-    /// Distances of points from the surface \[m\].
+    /// Noise of distances of points from the surface \[m\].
     pub position: NoiseModel,
-    /// Angles between the object's normals and those against the skin's, about each of two axes \[rad\].
+    /// Noise of angles between the object's normals and those against the skin's, about each of two axes \[rad\].
     pub normal: NoiseModel,
 }
 
 impl Default for ContactPatchSettings {
     fn default() -> Self {
-        Self {
-            points: 60,
-            position: NoiseModel::cauchy(4e-4, TOUCH_SAMPLES),
-            normal: NoiseModel::cauchy(6f64.to_radians(), TOUCH_SAMPLES),
-        }
+        let samples = ProximitySettings::default().noise.effective_samples;
+        let noise = |sigma| NoiseModel::cauchy(sigma, samples);
+        Self { points: 60, position: noise(4e-4), normal: noise(6f64.to_radians()) }
     }
 }
 

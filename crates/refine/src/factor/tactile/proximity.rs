@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::TOUCH_SAMPLES;
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
@@ -12,9 +11,10 @@ use crate::scene::{Frame, ProximityReading, TouchReading};
 
 /// Settings of [`ProximityFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ProximitySettings {
-    /// Errors of short distances \[m\].
+    /// Noise of short distances \[m\]; neighbors are off alike, by the skin and the object's model.
     pub noise: NoiseModel,
     /// Standard deviation of long ones, as a part of the distance.
     pub relative: f64,
@@ -22,7 +22,8 @@ pub struct ProximitySettings {
 
 impl Default for ProximitySettings {
     fn default() -> Self {
-        Self { noise: NoiseModel::cauchy(1e-3, TOUCH_SAMPLES), relative: 0.05 }
+        // Neighbors are off alike, by the skin and the object's model.
+        Self { noise: NoiseModel::cauchy(1e-3, 10.0), relative: 0.05 }
     }
 }
 

@@ -5,13 +5,10 @@ use std::ops::Range;
 
 use prehend_render::Mask;
 
-/// By how much a mask is shrunk or grown everywhere at most, and half the width of the distribution of that \[px\].
+use super::ForegroundSettings;
+
+/// By how much a mask is shrunk or grown everywhere at most \[px\]: the length of arrays.
 pub(super) const MOST_GROWTH: usize = 4;
-const TYPICAL_GROWTH: f32 = 0.5;
-/// Distance at which nothing is of a border \[px\].
-const FAR: f32 = 1e6;
-/// Independent measurements of growth that all pixels about a border amount to: shadows and shades err alike along it.
-const EFFECTIVE_SAMPLES: f32 = 5.0;
 
 /// Distances to the border of a mask, of the pixels about it.
 pub(crate) struct MaskBorder {
@@ -25,9 +22,6 @@ pub(crate) struct MaskBorder {
 }
 
 impl MaskBorder {
-    /// Standard deviation of a border that is drawn with care \[px\].
-    pub(super) const SIGMA: f32 = 1.5;
-
     /// Border of `mask`, with as much of what is around the object as it is large; none of an empty mask. Chamfer distances (Borgefors, 1986) of pixel
     /// centers to the border, which is between pixels.
     pub(super) fn new(mask: &Mask) -> Option<Self> {
@@ -70,12 +64,17 @@ impl MaskBorder {
 
     /// Probability of each whole number of pixels from −[`MOST_GROWTH`] on that the mask is grown by everywhere; of its pixels, `colors` are the log-likelihood
     /// ratios of object and others, and `edges` those of a border \[nat\]. The prior of growth is a Cauchy distribution.
-    pub(super) fn growth(&self, colors: &[f32], edges: &[f32]) -> [f32; 2 * MOST_GROWTH + 1] {
+    pub(super) fn growth(
+        &self,
+        colors: &[f32],
+        edges: &[f32],
+        settings: &ForegroundSettings,
+    ) -> [f32; 2 * MOST_GROWTH + 1] {
+        let [samples, typical] = [settings.effective_samples, settings.growth].map(|v| v as f32);
         // Sums of the pixels at about one distance: number, evidence of edges, of colors.
         let mut levels = [[0.0_f32; 3]; 2 * MOST_GROWTH + 2];
         for (distance, (color, edge)) in self.distances.iter().zip(colors.iter().zip(edges)) {
-            let nearest = distance.floor().clamp(-FAR, FAR);
-            let level = nearest as i32 + MOST_GROWTH as i32 + 1;
+            let level = (distance.floor() as i32).saturating_add(MOST_GROWTH as i32 + 1);
             let level = usize::try_from(level).ok().and_then(|level| levels.get_mut(level));
             let Some(level) = level else { continue };
             level.iter_mut().zip([1.0, *edge, *color]).for_each(|(sum, value)| *sum += value);
@@ -86,7 +85,7 @@ impl MaskBorder {
             let growth = k as f32 - MOST_GROWTH as f32;
             let inside: f32 = colors[k + 1..].iter().sum();
             let edge = 0.5 * (edges[k] + edges[k + 1]);
-            EFFECTIVE_SAMPLES * (inside + edge) - (growth / TYPICAL_GROWTH).powi(2).ln_1p()
+            samples * (inside + edge) - (growth / typical).powi(2).ln_1p()
         };
         let logs: [f32; 2 * MOST_GROWTH + 1] = std::array::from_fn(log_likelihood);
         let largest = logs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -160,10 +159,12 @@ mod tests {
             let border = MaskBorder::new(&disk(15.0 + growth).0).unwrap();
             let mut colors = RegionColors::default();
             colors.learn(&picture, &border, 4.0, |_| true, 1.0);
-            let ratios = colors.ratios(1.0);
+            let settings = ForegroundSettings::default();
+            let ratios = colors.ratios(1.0, settings.unseen);
             let told: Vec<f32> =
                 border.pixels().map(|(at, _)| ratios.of(&picture.pixels()[at])).collect();
-            let found = border.growth(&told, &edges(&picture, &border.window()));
+            let edges = edges(&picture, &border.window(), &settings);
+            let found = border.growth(&told, &edges, &settings);
             let steps = -(MOST_GROWTH as i32)..;
             let mean: f64 =
                 found.iter().zip(steps).map(|(p, g)| f64::from(*p) * f64::from(g)).sum();
@@ -172,7 +173,7 @@ mod tests {
         // Without any evidence it is the prior.
         let border = MaskBorder::new(&disk(15.0).0).unwrap();
         let nothing = vec![0.0; border.distances.len()];
-        let found = border.growth(&nothing, &nothing);
+        let found = border.growth(&nothing, &nothing, &ForegroundSettings::default());
         assert!(found[MOST_GROWTH] > 0.4 && found[0] > 1e-3, "{found:?}");
     }
 }

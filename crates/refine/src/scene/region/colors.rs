@@ -8,8 +8,6 @@ use super::border::MaskBorder;
 const LEVELS: u16 = 16;
 /// Levels of a channel of histograms that are compared.
 const COARSE: usize = 4;
-/// Share of a color that was never seen.
-const UNSEEN: f32 = 1e-4;
 
 /// Shares of the colors of a part of pictures.
 #[derive(Clone, Debug)]
@@ -21,7 +19,8 @@ pub(crate) struct ColorHistogram {
 
 impl Default for ColorHistogram {
     fn default() -> Self {
-        Self { shares: vec![0.0; usize::from(LEVELS).pow(3)], known: false }
+        let colors = usize::from(color_index(&[1.0; 3])) + 1;
+        Self { shares: vec![0.0; colors], known: false }
     }
 }
 
@@ -92,13 +91,14 @@ impl RegionColors {
         self.others.learn(others.into_iter(), gain);
     }
 
-    /// Log-likelihood ratio of each color, `limit` at most \[nat\]; nothing before both are known.
-    pub(crate) fn ratios(&self, limit: f32) -> ColorRatios {
+    /// Log-likelihood ratio of each color, `limit` at most \[nat\], of which `unseen` ones have that probability; nothing before both are known.
+    pub(crate) fn ratios(&self, limit: f64, unseen: f64) -> ColorRatios {
+        let [limit, unseen] = [limit, unseen].map(|v| v as f32);
         let Self { object, others } = self;
         if !(object.known && others.known) {
             return ColorRatios::default();
         }
-        let ratio = |(own, other): (&f32, &f32)| ((own + UNSEEN) / (other + UNSEEN)).ln();
+        let ratio = |(own, other): (&f32, &f32)| ((own + unseen) / (other + unseen)).ln();
         let pairs = object.shares.iter().zip(&others.shares).map(ratio);
         ColorRatios { values: pairs.map(|ratio| ratio.clamp(-limit, limit)).collect(), limit }
     }

@@ -2,6 +2,7 @@
 
 mod border;
 mod colors;
+mod settings;
 
 use std::ops::Range;
 
@@ -11,13 +12,8 @@ use prehend_render::{Mask, RgbImage};
 use self::border::MOST_GROWTH;
 pub(crate) use self::border::MaskBorder;
 pub(crate) use self::colors::{ColorRatios, RegionColors, color_index};
+pub use self::settings::ForegroundSettings;
 use super::MASK_MARGIN;
-
-/// Largest evidence of the mask, and of a color beside it \[nat\].
-const MASK_LIMIT: f32 = 3.0;
-pub(crate) const COLOR_LIMIT: f32 = 1.0;
-/// Contrast beside the mean that a border has at least: some are seen of which nothing is.
-const LEAST_CONTRAST: f32 = 0.2;
 
 /// Log-likelihood ratios of object and others at each pixel of an image, and of a border of the object \[nat\], within a window of it.
 #[derive(Clone, Debug)]
@@ -27,13 +23,19 @@ pub(crate) struct RegionEvidence {
     window: [Range<usize>; 2],
     values: Vec<f32>,
     edges: Vec<f32>,
-    /// The value outside of the window.
+    /// The value outside of the window, and that of an edge.
     outside: f32,
+    no_edge: f32,
+    mask_limit: f32,
 }
 
 impl RegionEvidence {
     /// From `mask`, and from how often colors of `color`, if there is any, occur within and around it. None of an empty mask.
-    pub(crate) fn of_mask(color: Option<&RgbImage>, mask: &Mask) -> Option<Self> {
+    pub(crate) fn of_mask(
+        color: Option<&RgbImage>,
+        mask: &Mask,
+        settings: &ForegroundSettings,
+    ) -> Option<Self> {
         let border = MaskBorder::new(mask)?;
         let window = border.window();
         let (told, edges) = match color {
@@ -41,27 +43,31 @@ impl RegionEvidence {
                 let mut colors = RegionColors::default();
                 // At the border colors are mixed, and are no more one's than the other's.
                 colors.learn(color, &border, MASK_MARGIN as f32, |_| true, 1.0);
-                let ratios = colors.ratios(COLOR_LIMIT);
+                let ratios = colors.ratios(settings.color_limit, settings.unseen);
                 let told = border.pixels().map(|(at, _)| ratios.of(&color.pixels()[at]));
-                (told.collect(), edges(color, &window))
+                (told.collect(), edges(color, &window, settings))
             }
             None => {
                 let nothing = vec![0.0_f32; border.pixels().count()];
                 (nothing.clone(), nothing)
             }
         };
-        let growth = border.growth(&told, &edges);
+        let growth = border.growth(&told, &edges, settings);
+        let sigma = settings.border_sigma as f32;
         let within = |distance: f32| {
             let growths = growth.iter().zip(-(MOST_GROWTH as i32)..);
-            let inside = |growth: i32| (distance - growth as f32) / MaskBorder::SIGMA;
+            let inside = |growth: i32| (distance - growth as f32) / sigma;
             growths.map(|(p, growth)| p * inside(growth).clamp(-1.0, 1.0)).sum::<f32>()
         };
         let pixels = border.pixels().zip(&told);
-        let values = pixels.map(|((_, distance), told)| told + MASK_LIMIT * within(distance));
+        let [mask_limit, color_limit] =
+            [settings.mask_limit, settings.color_limit].map(|limit| limit as f32);
+        let values = pixels.map(|((_, distance), told)| told + mask_limit * within(distance));
         let values = values.collect();
         // What is far away is not the object.
-        let outside = -MASK_LIMIT - COLOR_LIMIT;
-        Some(Self { size: [mask.width(), mask.height()], window, values, edges, outside })
+        let outside = -mask_limit - color_limit;
+        let (size, no_edge) = ([mask.width(), mask.height()], no_edge(settings));
+        Some(Self { size, window, values, edges, outside, no_edge, mask_limit })
     }
 
     /// From `color` alone, within a window of the image.
@@ -69,13 +75,16 @@ impl RegionEvidence {
         color: &RgbImage,
         window: [Range<usize>; 2],
         ratios: &ColorRatios,
+        settings: &ForegroundSettings,
     ) -> Self {
         let [columns, rows] = &window;
         let line = |y: usize| &color.pixels()[y * color.width()..][columns.clone()];
         let values = rows.clone().flat_map(line).map(|pixel| ratios.of(pixel)).collect();
         let size = [color.width(), color.height()];
-        let edges = edges(color, &window);
-        Self { size, window, values, edges, outside: -ratios.limit() }
+        let edges = edges(color, &window, settings);
+        let (outside, no_edge) = (-ratios.limit(), no_edge(settings));
+        let mask_limit = settings.mask_limit as f32;
+        Self { size, window, values, edges, outside, no_edge, mask_limit }
     }
 
     /// Adds that pixels within `border`, which is known within `sigma` \[px\], are the object's and others are not, by `most` at most where they are \[nat\].
@@ -85,7 +94,7 @@ impl RegionEvidence {
         for (at, distance) in border.pixels() {
             let (x, y) = (at % width, at / width);
             if columns.contains(&x) && rows.contains(&y) {
-                let told = MASK_LIMIT * (distance / sigma).clamp(-1.0, 1.0);
+                let told = self.mask_limit * (distance / sigma).clamp(-1.0, 1.0);
                 self.values[(y - rows.start) * columns.len() + x - columns.start] += told.min(most);
             }
         }
@@ -114,8 +123,8 @@ impl RegionEvidence {
         let [columns, rows] = window.clone();
         let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
         let values = places.clone().map(|(x, y)| mean(x, y, &self.values, self.outside)).collect();
-        let edges = places.map(|(x, y)| mean(x, y, &self.edges, LEAST_CONTRAST.ln())).collect();
-        Self { size, window, values, edges, outside: self.outside }
+        let edges = places.map(|(x, y)| mean(x, y, &self.edges, self.no_edge)).collect();
+        Self { size, window, values, edges, ..*self }
     }
 
     /// Value of an image of the window at a column and row, and `outside` elsewhere.
@@ -135,7 +144,7 @@ impl RegionEvidence {
 
     /// Log-likelihood ratio of a border of the object at a place of the image \[nat\].
     pub(crate) fn edge_at(&self, place: &Vector2<f64>) -> f64 {
-        self.sample(place, &self.edges, LEAST_CONTRAST.ln())
+        self.sample(place, &self.edges, self.no_edge)
     }
 
     /// Value of an image of the window at a place, linear between pixels; that of the image's border beyond it.
@@ -153,7 +162,7 @@ impl RegionEvidence {
 }
 
 /// Log-likelihood ratio of a border at the pixels of a window: borders are where colors change, in proportion to how much \[nat\].
-fn edges(color: &RgbImage, window: &[Range<usize>; 2]) -> Vec<f32> {
+fn edges(color: &RgbImage, window: &[Range<usize>; 2], settings: &ForegroundSettings) -> Vec<f32> {
     let (width, height, pixels) = (color.width(), color.height(), color.pixels());
     let [columns, rows] = window.clone();
     let change = |(x, y): (usize, usize)| {
@@ -168,8 +177,14 @@ fn edges(color: &RgbImage, window: &[Range<usize>; 2]) -> Vec<f32> {
     let mut changes: Vec<f32> = places.map(change).collect();
     let mean = changes.iter().sum::<f32>() / changes.len().max(1) as f32;
     let mean = mean.max(f32::MIN_POSITIVE);
-    changes.iter_mut().for_each(|change| *change = (LEAST_CONTRAST + *change / mean).ln());
+    let least = settings.least_contrast as f32;
+    changes.iter_mut().for_each(|change| *change = (least + *change / mean).ln());
     changes
+}
+
+/// Log-likelihood ratio of a border where no color changes \[nat\].
+fn no_edge(settings: &ForegroundSettings) -> f32 {
+    (settings.least_contrast as f32).ln()
 }
 
 #[cfg(test)]
@@ -182,8 +197,9 @@ mod tests {
         let mut colors = RegionColors::default();
         colors.object.learn([color_index(&[0.5; 3])].into_iter(), 1.0);
         colors.others.learn([0].into_iter(), 1.0);
-        let ratios = colors.ratios(1.0);
-        let evidence = RegionEvidence::of_colors(&color, [10..30, 5..25], &ratios);
+        let settings = ForegroundSettings::default();
+        let ratios = colors.ratios(1.0, settings.unseen);
+        let evidence = RegionEvidence::of_colors(&color, [10..30, 5..25], &ratios, &settings);
         for (factor, evidence) in [(1.0, evidence.clone()), (2.0, evidence.reduced(2))] {
             let at = |x: f64, y: f64| evidence.at(&Vector2::new(x / factor, y / factor));
             assert!((at(20.0, 15.0) - 1.0).abs() < 1e-6);

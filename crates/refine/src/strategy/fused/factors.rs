@@ -49,7 +49,7 @@ pub(crate) fn surface_patches(
     }
     let distance = initial.center().z;
     let unit = settings.rendering.downsample * stage.downsample;
-    let patches = SurfacePatches::new(frame.observation(), distance, &settings.model, unit)?;
+    let patches = SurfacePatches::new(frame.observation(), distance, &settings.patches, unit)?;
     let Some(deviation) = &frame.object().deviation else { return Some(Arc::new(patches)) };
     let on_model = |place: &Point3<f64>| seen.t_cam_object.inverse_transform_point(place).coords;
     let places: Vec<_> = patches.places().iter().map(on_model).collect();
@@ -103,7 +103,7 @@ fn view_factors(
     let mut settings = settings.clone();
     settings.modalities.retain(|modality| SEEN.contains(modality));
     if with_patches {
-        settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.model.gp_sigma);
+        settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.patches.sigma);
     }
     let view = |view: &CameraView<'_>| {
         let factors = factors_of(&view.frame, stage, &settings, None)?;
@@ -179,7 +179,7 @@ fn other_factors(
     }
     if region {
         let mut region = settings.region;
-        region.surface = region.surface.hypot(settings.model.gp_sigma);
+        region.surface = region.surface.hypot(settings.patches.sigma);
         region.downsample *= stage.downsample.div_ceil(2);
         region.color &= wanted(Modality::Color);
         factors.push(Arc::new(RegionFactor::new(frame, &region)?));
@@ -189,12 +189,11 @@ fn other_factors(
     }
     let Some((_, hand)) = frame.hand() else { return Ok(factors) };
     if wanted(Modality::HandDepth) {
-        let mut depth = settings.hand_depth.clone();
-        depth.points = stage.points / 3;
-        factors.push(Arc::new(HandDepthFactor::new(frame, &depth)?));
+        let points = stage.points / 3;
+        factors.push(Arc::new(HandDepthFactor::new(frame, points, &settings.hand_depth)?));
     }
     let is_uncertain = patches.is_some() && settings.blurred_contact;
-    let surface = if is_uncertain { settings.model.gp_sigma } else { 0.0 };
+    let surface = if is_uncertain { settings.patches.sigma } else { 0.0 };
     let blurred = |noise: NoiseModel| noise.with_sigma(noise.sigma.hypot(surface));
     let touch = wanted(Modality::Touch);
     let inactive = stage.contact && wanted(Modality::Quiet);

@@ -9,6 +9,7 @@ use crate::problem::{Contribution, Linearization};
 
 /// Settings of the test of fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct FitSettings {
     /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
@@ -49,9 +50,6 @@ pub struct Fit {
     /// What was compared.
     pub consistency: Vec<Consistency>,
 }
-
-/// Probability from which a kind of evidence counts as a misfit.
-const MISFIT: f64 = 0.5;
 
 impl Fit {
     /// Of the solution `point` with these scales; `noise` is that of depth with the nominal deviation of a point.
@@ -104,7 +102,7 @@ impl Fit {
     /// Evidence that is more probably of something else than not, and how probably, the most probable first.
     pub fn misfits(&self) -> Vec<(&'static str, f64)> {
         let mut misfits: Vec<_> = self.consistency.iter().map(|of| (of.name, of.fault)).collect();
-        misfits.retain(|(_, fault)| *fault > MISFIT);
+        misfits.retain(|(_, fault)| *fault > 0.5);
         misfits.sort_by(|a, b| b.1.total_cmp(&a.1));
         misfits
     }

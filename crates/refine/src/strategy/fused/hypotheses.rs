@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::so3_log;
 
 use super::posterior::principal_directions;
+use super::settings::HypothesisSettings;
 use crate::factor::NoiseEstimate;
 use crate::problem::{Block, Linearization, Solution, State};
 use crate::scene::Object;
@@ -34,31 +35,36 @@ pub(super) fn hypotheses(initial: &State, others: &[Isometry3<f64>]) -> Vec<Stat
     std::iter::once(initial.clone()).chain(seen.filter(differs)).collect()
 }
 
-/// Other rotations that files of other conventions have in place of `rotation`: half a turn about each axis of the model, and the transpose.
-pub(super) fn conventions(rotation: &UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>> {
+/// Other rotations that files of other conventions have in place of `rotation`: half a turn about each axis of the model, and the transpose if that is
+/// `another` \[rad\].
+pub(super) fn conventions(
+    rotation: &UnitQuaternion<f64>,
+    another: f64,
+) -> Vec<UnitQuaternion<f64>> {
     let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
     let mut all = axes.map(|axis| rotation * UnitQuaternion::from_axis_angle(&axis, PI)).to_vec();
     let transposed = rotation.inverse();
-    if all.iter().chain([rotation]).all(|other| transposed.angle_to(other) > ANOTHER) {
+    if all.iter().chain([rotation]).all(|other| transposed.angle_to(other) > another) {
         all.push(transposed);
     }
     all
 }
 
-/// `state` with the object turned to each of `rotations` about its center, where that is not as it is turned there or by those before.
-pub(super) fn with_rotations(state: &State, rotations: &[UnitQuaternion<f64>]) -> Vec<State> {
+/// `state` with the object turned to each of `rotations` about its center, where that is `another` \[rad\] than it is turned there or by those before.
+pub(super) fn with_rotations(
+    state: &State,
+    rotations: &[UnitQuaternion<f64>],
+    another: f64,
+) -> Vec<State> {
     let mut states: Vec<State> = Vec::new();
     for rotation in rotations {
-        let is_other = |known: &State| rotation.angle_to(&known.t_cam_object.rotation) > ANOTHER;
+        let is_other = |known: &State| rotation.angle_to(&known.t_cam_object.rotation) > another;
         if states.iter().chain([state]).all(is_other) {
             states.push(State { t_cam_object: state.rotated_to(rotation), ..state.clone() });
         }
     }
     states
 }
-
-/// Rotations farther apart are not the same mode \[rad\].
-const ANOTHER: f64 = 0.2;
 
 /// What `motions` in object coordinates make of `states`, where it is turned otherwise than these and each other.
 pub(super) fn turned(states: &[State], motions: &[Isometry3<f64>]) -> Vec<State> {
@@ -74,33 +80,26 @@ pub(super) fn lowest(states: &[State], costs: &[f64], count: usize) -> Vec<State
     order.into_iter().take(count).map(|k| states[k].clone()).collect()
 }
 
-/// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
-/// for a first solution that needs no others beside it.
-const SETTLED_WIDTH: f64 = 6e-3;
-const SETTLED_SCATTER: f64 = 1.5e-3;
-
-/// Surface motion between poses that are the same solution \[m\].
-const SAME: f64 = 2e-3;
-
-/// Whether `point` leaves no direction open and the surface lies where depth was measured.
+/// Whether `point` leaves no direction open by more than `width` \[m of surface motion\], and depth scatters by less than `scatter` \[m\] about the surface.
 pub(super) fn settled(
     point: &Linearization,
     noise: impl FnOnce() -> Option<NoiseEstimate>,
     radius: f64,
+    [width, scatter]: [f64; 2],
 ) -> bool {
     let widest = principal_directions(point, radius)[0].1;
-    widest < SETTLED_WIDTH && noise().is_some_and(|noise| noise.sigma < SETTLED_SCATTER)
+    widest < width && noise().is_some_and(|noise| noise.sigma < scatter)
 }
 
-/// Solutions of which no two are the same pose, the one of the lowest value first.
-pub(super) fn distinct(mut found: Vec<Solution>, object: &Object) -> Vec<Solution> {
+/// Solutions of which no two are the same pose, `same` \[m of surface motion\] apart, the one of the lowest value first.
+pub(super) fn distinct(mut found: Vec<Solution>, object: &Object, same: f64) -> Vec<Solution> {
     found.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
     let mut kept: Vec<Solution> = Vec::new();
     for solution in found {
         let pose = &solution.at.state.t_cam_object;
-        let same =
-            |other: &Solution| object.surface_motion(pose, &other.at.state.t_cam_object) < SAME;
-        if !kept.iter().any(same) {
+        let is_same =
+            |other: &Solution| object.surface_motion(pose, &other.at.state.t_cam_object) < same;
+        if !kept.iter().any(is_same) {
             kept.push(solution);
         }
     }
@@ -108,17 +107,18 @@ pub(super) fn distinct(mut found: Vec<Solution>, object: &Object) -> Vec<Solutio
 }
 
 /// At most `count` states along the directions in which the posterior about `point` is open so far, the widest first: at multiples of
-/// `distance` of surface motion from where such a direction comes nearest to `initial`.
+/// [`HypothesisSettings::spacing`] from where such a direction comes nearest to `initial`.
 ///
-/// Geometry that leaves a turn open drifts along it, tens of degrees from where the initial pose was, so that is where to look first. And four
-/// deviations wide, since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
+/// Geometry that leaves a turn open drifts along it, tens of degrees from where the initial pose was, so that is where to look first. And some
+/// deviations wide ([`HypothesisSettings::reach`]), since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
 pub(super) fn spread(
     point: &Linearization,
     initial: &State,
-    distance: f64,
+    settings: &HypothesisSettings,
     radius: f64,
     count: usize,
 ) -> Vec<State> {
+    let &HypothesisSettings { spacing: distance, reach, .. } = settings;
     let state = &point.state;
     let moved = initial.center() - state.center();
     let turned = so3_log(&(initial.t_cam_object.rotation * state.t_cam_object.rotation.inverse()));
@@ -127,7 +127,7 @@ pub(super) fn spread(
         let (place, turn) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
         // The direction is a unit vector where turns count as what they move the surface by.
         let nearest = place.dot(&moved) + radius * radius * turn.dot(&turned);
-        let reach = ((4.0 * deviation / distance) as i32).min(4);
+        let reach = ((reach * deviation / distance) as i32).min(reach as i32);
         if reach == 0 {
             break;
         }

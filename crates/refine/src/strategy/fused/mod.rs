@@ -23,13 +23,15 @@ use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
 pub use self::fit::{Consistency, Fit, FitSettings};
 use self::hypotheses::conventions;
-pub use self::model_scale::ModelScale;
+pub use self::model_scale::{ModelScale, ModelScaleSettings};
 pub use self::nominal::NominalSizeError;
 pub(crate) use self::pixels::Pixels;
-pub use self::posterior::{Hypothesis, Inconsistency, Posterior, UnobservableDirection};
+pub use self::posterior::{
+    Hypothesis, Inconsistency, Posterior, PosteriorSettings, UnobservableDirection,
+};
 pub(crate) use self::posterior::{ScaleMixture, chi_square_z};
 use self::run::Run;
-pub use self::settings::{FusedSettings, Modality, Nuisance, Stage};
+pub use self::settings::{FusedSettings, HypothesisSettings, Modality, Nuisance, Stage};
 pub use self::summary::PosteriorSummary;
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
@@ -86,8 +88,10 @@ impl Fused {
             settings.object_rotation = PI;
         }
         let turned = settings.object_turned;
+        let rotation = initial.t_cam_object.rotation;
+        let another = self.settings.hypotheses.another;
         let with_others = |prior: GaussianPrior| match turned > 0.0 && !unknown {
-            true => prior.with_others(conventions(&initial.t_cam_object.rotation), turned),
+            true => prior.with_others(conventions(&rotation, another), turned),
             false => prior,
         };
         let Some(rig) = &self.rig else {
@@ -183,7 +187,7 @@ impl Fused {
         let prior = self.prior(frame, initial, &Scales::default())?;
         let at = last.problem.with_prior(Arc::new(prior)).linearize(state);
         let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
-        Ok(Some(Posterior::new(&[solution], frame.object().radius)))
+        Ok(Some(Posterior::new(&[solution], frame.object().radius, &self.settings.posterior)))
     }
 
     /// The problem of the last stage about `state`, from where noise is measured; `None` without stages.
@@ -217,13 +221,10 @@ impl Fused {
     }
 }
 
-/// The smallest standard deviation of depth points that is believed when measured \[m\].
-const FINEST: f64 = 2e-4;
-
 /// Takes the noise of depth as it was measured. The model's part of what neighbors have in common is that of the patches, where there are any.
 fn take_noise(settings: &mut FusedSettings, measured: &NoiseEstimate, with_patches: bool) {
-    settings.depth.noise.sigma = measured.independent.max(FINEST);
-    let model = if with_patches { settings.model.gp_sigma } else { 0.0 };
+    settings.depth.noise.sigma = measured.independent.max(settings.min_depth_sigma);
+    let model = if with_patches { settings.patches.sigma } else { 0.0 };
     let correlated = (measured.correlated.powi(2) - model.powi(2)).max(0.0).sqrt();
     settings.depth.gp_sigma = correlated;
     settings.depth.noise.effective_samples =

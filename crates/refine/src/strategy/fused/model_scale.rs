@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
 
 use super::{Fused, Stage, StageProblem};
 use crate::error::RefineError;
@@ -21,13 +22,26 @@ pub struct ModelScale {
     pub sigma: f64,
 }
 
-/// Scales that are compared first, to either side of that of the model, in standard deviations of the prior; the step between them.
-const REACH: i32 = 3;
-/// Largest standard deviation of the prior: scales remain above zero.
-const MOST_SIGMA: f64 = 0.3;
-/// Steps to scales that are compared next, as a share of the one before, and how often.
-const FINER: f64 = 0.3;
-const ROUNDS: usize = 2;
+/// Settings of the estimate of an object's size ([`Fused::model_scale`]).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct ModelScaleSettings {
+    /// Standard deviation of the object's size, as a share of the model's; zero of a model whose size is known, which is then not estimated.
+    pub sigma: f64,
+    /// Reach of the scales that are compared first to either side of one, in standard deviations; they are one standard deviation apart.
+    pub reach: u32,
+    /// Number of times that scales about the best one are compared, nearer to it each time.
+    pub refinements: usize,
+    /// Distance of those from it, as a share of the distance before.
+    pub ratio: f64,
+}
+
+impl Default for ModelScaleSettings {
+    fn default() -> Self {
+        Self { sigma: 0.0, reach: 3, refinements: 2, ratio: 0.3 }
+    }
+}
 
 impl Fused {
     /// Size of the object by the profile likelihood: the least cost of geometry (depth, silhouette, free space, the hand's depth) of all poses near the one
@@ -40,23 +54,24 @@ impl Fused {
         frame: &Frame<'_>,
         initial: &Isometry3<f64>,
     ) -> Result<ModelScale, RefineError> {
-        let sigma = self.settings.model_scale;
-        if !(0.0..=MOST_SIGMA).contains(&sigma) {
-            let problem = format!("is {sigma}, not between 0 and {MOST_SIGMA}");
+        let ModelScaleSettings { sigma, reach, refinements, ratio } = self.settings.model_scale;
+        // Scales remain above zero.
+        if !(0.0..1.0).contains(&(f64::from(reach) * sigma)) {
+            let problem = format!("has the standard deviation {sigma}, not from 0 to 1/{reach}");
             return Err(RefineError::Setting { name: "model_scale", problem });
         }
         let start = State::new(frame, initial)?;
         let found = self.run(frame, &start, &mut |_| ControlFlow::Continue(()))?;
         let mut known: Vec<(f64, f64)> = Vec::new();
         let mut step = sigma;
-        for k in -REACH..=REACH {
-            let scale = 1.0 + f64::from(k) * step;
+        for k in 0..=2 * reach {
+            let scale = 1.0 + (f64::from(k) - f64::from(reach)) * step;
             known.push((scale, self.cost_at_scale(frame, &start, found.t_cam_object(), scale)?));
         }
         let mut best =
             vertex(&known, step).unwrap_or_else(|| ModelScale { scale: lowest(&known), sigma });
-        for _ in 0..ROUNDS {
-            step *= FINER;
+        for _ in 0..refinements {
+            step *= ratio;
             let mut near = Vec::new();
             for off in [-step, 0.0, step] {
                 let scale = best.scale + off;
@@ -92,7 +107,7 @@ impl Fused {
         let prior: GaussianPrior = self.prior(&frame, initial, &Scales::default())?;
         let problem = problem.with_prior(Arc::new(prior));
         let solved = problem.solve_all(std::slice::from_ref(&state), &geometry.solver);
-        let of_scale = 0.5 * ((scale - 1.0) / self.settings.model_scale).powi(2);
+        let of_scale = 0.5 * ((scale - 1.0) / self.settings.model_scale.sigma).powi(2);
         let least = solved.iter().map(|solution| solution.at.cost).fold(f64::INFINITY, f64::min);
         Ok(least + of_scale)
     }
@@ -127,7 +142,7 @@ mod tests {
             let object = Arc::new(scene.object.scaled(size).unwrap());
             let frame = Frame::new(&scene.observation, &object, None).unwrap();
             let mut fused = Fused::default();
-            fused.settings.model_scale = 0.05;
+            fused.settings.model_scale.sigma = 0.05;
             let found = fused.model_scale(&frame, &scene.initial).unwrap();
             assert!((found.scale * size - 1.0).abs() < 0.02, "{size}: {found:?}");
             assert!(found.sigma < 0.03, "{size}: {found:?}");

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::FusedSettings;
+use crate::MM_PER_M;
 use crate::factor::TouchModel;
 use crate::problem::NoiseModel;
 
@@ -37,10 +38,9 @@ enum Quantity {
 impl Quantity {
     /// Its units, with their values in SI units.
     fn units(self) -> &'static [(&'static str, f64)] {
-        const DEGREE: f64 = std::f64::consts::PI / 180.0;
         match self {
-            Self::Length => &[("mm", 1e-3), ("m", 1.0)],
-            Self::Angle => &[("deg", DEGREE), ("rad", 1.0)],
+            Self::Length => &[("mm", 1.0 / MM_PER_M), ("m", 1.0)],
+            Self::Angle => &[("deg", std::f64::consts::PI / 180.0), ("rad", 1.0)],
             Self::Ratio => &[("%", 1e-2), ("", 1.0)],
         }
     }
@@ -63,8 +63,8 @@ const SIZES: [(&str, Quantity, Field); 16] = [
     ("camera.aspect", Quantity::Ratio, |s| Some(&mut s.prior.aspect)),
     ("view.translation", Quantity::Length, |s| Some(&mut s.prior.view_translation)),
     ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
-    ("model", Quantity::Length, |s| Some(&mut s.model.gp_sigma)),
-    ("model.scale", Quantity::Ratio, |s| Some(&mut s.model_scale)),
+    ("model", Quantity::Length, |s| Some(&mut s.patches.sigma)),
+    ("model.scale", Quantity::Ratio, |s| Some(&mut s.model_scale.sigma)),
     ("touch", Quantity::Length, |s| touch_noise(s).map(|noise| &mut noise.sigma)),
 ];
 

@@ -9,10 +9,12 @@ use crate::scene::{CameraCalibrationError, Frame, Pixel, View, eroded};
 pub(crate) struct Pixels<'a> {
     view: View<'a>,
     camera_error: CameraCalibrationError,
+    /// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
+    margin: usize,
 }
 
 impl<'a> Pixels<'a> {
-    pub(crate) fn new(frame: &Frame<'a>, state: &State) -> Self {
+    pub(crate) fn new(frame: &Frame<'a>, state: &State, margin: usize) -> Self {
         let observation = frame.observation();
         let camera = state.camera.corrected(&observation.camera);
         let hand = frame.hand().map(|(hand, _)| {
@@ -20,7 +22,7 @@ impl<'a> Pixels<'a> {
         });
         let (object, pose) = (frame.object(), &state.t_cam_object);
         let view = View::new(observation, &camera, object, hand, pose);
-        Self { view, camera_error: state.camera }
+        Self { view, camera_error: state.camera, margin }
     }
 
     /// Whether each pixel, row by row, is so; those that neither object nor hand nor mask cover are as `others`.
@@ -51,7 +53,7 @@ impl<'a> Pixels<'a> {
 
     /// Whether each pixel, row by row, is away from the hand.
     fn away_from_hand(&self) -> Vec<bool> {
-        eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), MARGIN)
+        eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), self.margin)
     }
 
     /// How far the outlines of mask and object are apart, away from the hand \[px\]: the area between them by the length of the object's.
@@ -82,7 +84,7 @@ impl<'a> Pixels<'a> {
         is_there: impl Fn(Pixel) -> bool,
     ) -> Vec<([usize; 2], f64)> {
         let width = self.view.size().0;
-        let inside = eroded(width, &self.marked(false, |_, p| is_there(p)), MARGIN);
+        let inside = eroded(width, &self.marked(false, |_, p| is_there(p)), self.margin);
         let CameraCalibrationError { depth_scale, depth_bias, .. } = self.camera_error;
         let residual = |(place, pixel): ([usize; 2], Pixel)| {
             let z = depth_scale * f64::from(pixel.sensor) + depth_bias;
@@ -92,6 +94,3 @@ impl<'a> Pixels<'a> {
         seen.filter(|([x, y], p)| inside[y * width + x] && p.sensor > 0.0).map(residual).collect()
     }
 }
-
-/// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
-const MARGIN: usize = 3;

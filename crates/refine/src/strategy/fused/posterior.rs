@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::fit::Fit;
 use super::model_scale::ModelScale;
@@ -45,10 +46,33 @@ pub struct Inconsistency {
     pub distance: f64,
 }
 
-impl Inconsistency {
-    /// Whether it is farther away than chance has it.
-    pub(crate) fn is_significant(&self) -> bool {
-        self.distance > DISAGREES
+/// Settings of what is said of a posterior.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct PosteriorSettings {
+    /// Distance of the object's center from the true one within which a pose is right \[m\]: what a grasp forgives.
+    pub right_distance: f64,
+    /// Angle of its rotation from the true one within which a pose is right \[rad\].
+    pub right_angle: f64,
+    /// Number of random poses of each mode that the probability of a right pose is the share of: its standard error is 2.2 % at most.
+    pub samples: usize,
+    /// Standard deviation of surface motion from which a direction is reported as hardly observable \[m\].
+    pub unobservable_sigma: f64,
+    /// Threshold of [`Inconsistency::distance`] from which a factor is reported, in standard deviations: a rule of thumb. EXPERIMENTS: Widening by
+    /// inconsistent factors.
+    pub inconsistent: f64,
+}
+
+impl Default for PosteriorSettings {
+    fn default() -> Self {
+        Self {
+            right_distance: 5e-3,
+            right_angle: 5f64.to_radians(),
+            samples: 512,
+            unobservable_sigma: 8e-3,
+            inconsistent: 5.0,
+        }
     }
 }
 
@@ -76,6 +100,7 @@ pub struct Posterior {
     center: Vector3<f64>,
     /// Uncertainty of scales in each mode's density.
     mixture: ScaleMixture,
+    settings: PosteriorSettings,
 }
 
 /// Density of a mode as a mixture over scales of errors in place of a normal density.
@@ -87,18 +112,9 @@ pub(crate) struct ScaleMixture {
     excess: Matrix6<f64>,
 }
 
-/// Random poses that stand for the posterior.
-const SAMPLES: usize = 512;
-
-/// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
-const UNOBSERVED: f64 = 8e-3;
-
-/// [`Inconsistency::distance`] from which a sense counts as disagreeing: a rule of thumb.
-const DISAGREES: f64 = 5.0;
-
 impl Posterior {
     /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion.
-    pub(crate) fn new(found: &[Solution], radius: f64) -> Self {
+    pub(crate) fn new(found: &[Solution], radius: f64, settings: &PosteriorSettings) -> Self {
         let best = &found[0];
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|solution| laplace(&solution.at)).collect();
@@ -124,8 +140,8 @@ impl Posterior {
             })
             .collect();
         Self {
-            unobservable: unobservable(&hypotheses[0].covariance, radius),
-            inconsistencies: inconsistencies(&best.at),
+            unobservable: unobservable(&hypotheses[0].covariance, radius, settings),
+            inconsistencies: inconsistencies(&best.at, settings.inconsistent),
             fit: None,
             scales: Scales::default(),
             model_scale: None,
@@ -134,6 +150,7 @@ impl Posterior {
             cramer_rao_bound: bounds[0].0,
             center: best.at.state.center(),
             mixture: ScaleMixture::default(),
+            settings: *settings,
         }
     }
 
@@ -159,7 +176,7 @@ impl Posterior {
             self.hypotheses.iter_mut().for_each(|h| h.covariance += excess);
             self.mixture = mixture.clone();
         }
-        self.unobservable = unobservable(&self.hypotheses[0].covariance, radius);
+        self.unobservable = unobservable(&self.hypotheses[0].covariance, radius, &self.settings);
     }
 
     /// Uncertainty of scales.
@@ -201,10 +218,11 @@ impl Posterior {
         directions(&self.covariance(), radius)[0].1
     }
 
-    /// Probability that model, data and pose are right, the last within 5 mm and 5° of the true one.
+    /// Probability that model, data and pose are right, the last within 5 mm and 5° of the true one
+    /// ([`PosteriorSettings::right_distance`], [`PosteriorSettings::right_angle`]).
     pub fn probability(&self) -> f64 {
         let fit = self.fit.as_ref().map_or(1.0, |fit| fit.probability);
-        fit * self.probability_within(5e-3, 5f64.to_radians())
+        fit * self.probability_within(self.settings.right_distance, self.settings.right_angle)
     }
 
     /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, if model and data are right; all
@@ -222,7 +240,8 @@ impl Posterior {
                     Some((*off, (hypothesis.covariance + more).cholesky()?.l()))
                 })
                 .collect();
-            let inside = (0..SAMPLES).filter(|k| {
+            let samples = self.settings.samples.max(1);
+            let inside = (0..samples).filter(|k| {
                 let Some((off, root)) = roots.get(k % roots.len().max(1)) else { return false };
                 let twist = off + root * Vector6::from_fn(|_, _| random.normal());
                 let center = (hypothesis.t_cam_object * place).coords;
@@ -230,7 +249,7 @@ impl Posterior {
                 let (off, turn) = self.deviation(&pose);
                 off.norm() <= distance && turn.norm() <= angle
             });
-            inside.count() as f64 / SAMPLES as f64
+            inside.count() as f64 / samples as f64
         };
         self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
     }
@@ -307,10 +326,14 @@ fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)
     found
 }
 
-fn unobservable(covariance: &Matrix6<f64>, radius: f64) -> Vec<UnobservableDirection> {
+fn unobservable(
+    covariance: &Matrix6<f64>,
+    radius: f64,
+    settings: &PosteriorSettings,
+) -> Vec<UnobservableDirection> {
     directions(covariance, radius)
         .into_iter()
-        .filter(|(_, deviation)| *deviation > UNOBSERVED)
+        .filter(|(_, deviation)| *deviation > settings.unobservable_sigma)
         .map(|(twist, deviation)| UnobservableDirection { twist, deviation })
         .collect()
 }
@@ -320,8 +343,8 @@ pub(crate) fn chi_square_z(squared: f64, degrees: usize) -> f64 {
     (2.0 * squared.max(0.0)).sqrt() - (2.0 * degrees as f64 - 1.0).max(0.0).sqrt()
 }
 
-/// Which evidence, the prior included, has its own optimum far away.
-fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
+/// Which evidence, the prior included, has its own optimum farther away than `least` standard deviations.
+fn inconsistencies(point: &Linearization, least: f64) -> Vec<Inconsistency> {
     let distance = |equations: &NormalEquations| {
         let factor = ScaledCholesky::new(equations.hessian(), 1e-3)?;
         // As many degrees of freedom as the modality says something of, at most.
@@ -335,7 +358,7 @@ fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
     };
     let of = |part: &Contribution| {
         let distance = distance(marginalized(part).as_ref().unwrap_or(&part.equations))?;
-        Some(Inconsistency { factor: part.name, distance }).filter(Inconsistency::is_significant)
+        Some(Inconsistency { factor: part.name, distance }).filter(|found| found.distance > least)
     };
     let parts: Vec<&Contribution> = point.prior.iter().chain(&point.factors).collect();
     parts.into_par_iter().filter_map(of).collect()

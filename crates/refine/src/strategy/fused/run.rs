@@ -13,16 +13,13 @@ use super::hypotheses::{
 };
 use super::posterior::{Posterior, log_mass};
 use super::scales::{ScaleEvidence, noise_scale};
-use super::settings::{FusedSettings, Stage};
+use super::settings::{FusedSettings, HypothesisSettings, Stage};
 use crate::error::RefineError;
 use crate::factor::{ErrorGroup, GaussianPrior, Scales};
 use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
 use crate::scene::Frame;
 use crate::strategy::{Estimate, Iteration, Observer, Recorder};
 
-/// Steps of geometry alone that a pose of another convention is given before it is compared, and from how many times the best one's cost on it is given up.
-const ALTERNATIVE_STEPS: usize = 4;
-const HOPELESS: f64 = 4.0;
 /// The factor of color and silhouette.
 const IMAGE: &str = "rendering";
 
@@ -65,7 +62,7 @@ impl<'a> Run<'a> {
         let mut recorder = Recorder::new(names, self.initial, count, None, observe);
         let mut states = hypotheses(self.initial, self.frame.rivals().unwrap_or_default());
         if !self.is_rotation_unknown && states.len() == 1 {
-            states = restarts(self.initial, self.settings.restart_angle);
+            states = restarts(self.initial, self.hypotheses().restart_angle);
         }
         let mut found = Vec::new();
         let mut flow = ControlFlow::Continue(());
@@ -75,7 +72,7 @@ impl<'a> Run<'a> {
             found = self.solve(index, &problem, &states);
             if let (1, Some(geometry)) = (index, &before) {
                 found.extend(self.other_conventions(geometry, &problem, &found[0]));
-                found = distinct(found, self.frame.object());
+                found = self.distinct(found);
             }
             found = self.conclude(index, found)?;
             states = self.next_starts(index, self.initial, &found);
@@ -93,7 +90,7 @@ impl<'a> Run<'a> {
         if let Some(evidence) = &evidence {
             self.scales = evidence.learn(&self.scales).unwrap_or(self.scales);
         }
-        let mut posterior = Posterior::new(&found, radius);
+        let mut posterior = Posterior::new(&found, radius, &self.settings.posterior);
         let moments = evidence.and_then(|evidence| evidence.pose_moments(&self.scales));
         if let Some(moments) = moments {
             posterior.mix(&moments, radius);
@@ -112,6 +109,14 @@ impl<'a> Run<'a> {
 
     fn stages(&self) -> &'a [Stage] {
         &self.fused.settings.stages
+    }
+
+    fn hypotheses(&self) -> &'a HypothesisSettings {
+        &self.fused.settings.hypotheses
+    }
+
+    fn distinct(&self, found: Vec<Solution>) -> Vec<Solution> {
+        distinct(found, self.frame.object(), self.hypotheses().same)
     }
 
     fn radius(&self) -> f64 {
@@ -137,10 +142,10 @@ impl<'a> Run<'a> {
             let mut at = problem.rescale(solution.at, &noise);
             let image = at.factors.iter().filter(|part| part.name == IMAGE);
             let of_image: f64 = image.map(|part| part.cost + part.noise.cost).sum();
-            at.cost += (self.settings.image_between_modes - 1.0) * of_image;
+            at.cost += (self.hypotheses().image_between_modes - 1.0) * of_image;
             Solution { at, ..solution }
         };
-        distinct(found.into_iter().map(with_own).collect(), self.frame.object())
+        self.distinct(found.into_iter().map(with_own).collect())
     }
 
     /// Learns scales at `solution`, and takes errors to be of these sizes from here on.
@@ -156,8 +161,8 @@ impl<'a> Run<'a> {
         };
         self.scales = learnt;
         self.prior = Arc::new(self.fused.prior(self.frame, self.initial, &self.scales)?);
-        let nominal = self.fused.settings_for(self.frame).model.gp_sigma;
-        self.settings.model.gp_sigma = nominal * self.scales.get(ErrorGroup::Surface);
+        let nominal = self.fused.settings_for(self.frame).patches.sigma;
+        self.settings.patches.sigma = nominal * self.scales.get(ErrorGroup::Surface);
         Ok(())
     }
 
@@ -180,11 +185,13 @@ impl<'a> Run<'a> {
         // Not so in the first stage, which sees no colors.
         let first = if self.is_rotation_unknown { states.len() } else { 1 };
         let mut found = problem.solve_all(&states[..first], solver);
-        let noise = || depth_noise(self.frame, &found[0].at.state, &self.fused.settings);
-        if first < states.len() && !settled(&found[0].at, noise, self.radius()) {
+        let nominal = &self.fused.settings;
+        let noise = || depth_noise(self.frame, &found[0].at.state, nominal);
+        let limits = [self.hypotheses().settled_sigma, nominal.depth.noise.sigma];
+        if first < states.len() && !settled(&found[0].at, noise, self.radius(), limits) {
             found.extend(problem.solve_all(&states[first..], solver));
         }
-        distinct(found, self.frame.object())
+        self.distinct(found)
     }
 
     /// Modes among those `found` by stage `index` that are taken further, the best one first; sizes of errors are learnt there.
@@ -195,7 +202,7 @@ impl<'a> Run<'a> {
     ) -> Result<Vec<Solution>, RefineError> {
         if index > 0 {
             self.noise = self.noise_at(&found[0]);
-            let limit = found[0].at.cost + self.settings.prune_margin;
+            let limit = found[0].at.cost + self.hypotheses().prune_margin;
             // One that is still on its way down is not judged yet, and the best stays whatever its cost.
             let mut best = true;
             found.retain(|solution| {
@@ -227,27 +234,29 @@ impl<'a> Run<'a> {
         if self.is_rotation_unknown {
             return Vec::new();
         }
-        let others =
-            with_rotations(self.initial, &conventions(&self.initial.t_cam_object.rotation));
+        let &HypothesisSettings { another, alternative_steps: iterations, .. } = self.hypotheses();
+        let conventions = |state: &State| conventions(&state.t_cam_object.rotation, another);
+        let others = with_rotations(self.initial, &conventions(self.initial), another);
         let state = &best.at.state;
-        let of_best = with_rotations(state, &conventions(&state.t_cam_object.rotation)[..3]);
+        let of_best = with_rotations(state, &conventions(state)[..3], another);
         let starts = [others.clone(), of_best].concat();
-        let steps = Solver { iterations: ALTERNATIVE_STEPS, ..self.stages()[0].solver };
+        let steps = Solver { iterations, ..self.stages()[0].solver };
         let near = geometry.solve_all(&starts, &steps).into_iter().map(|found| found.at.state);
         let near: Vec<State> = near.collect();
-        let (costs, limit) = (problem.cost_all(&near), HOPELESS * problem.cost(&best.at.state));
+        let limit = self.hypotheses().hopeless * problem.cost(&best.at.state);
+        let costs = problem.cost_all(&near);
         let hopeful = near.into_iter().zip(costs).filter(|(_, cost)| *cost < limit);
         let (near, costs): (Vec<State>, Vec<f64>) = hopeful.unzip();
         let near = lowest(&near, &costs, others.len());
         let mut found = self.compared(problem, problem.solve_all(&near, &self.stages()[1].solver));
-        let limit = best.at.cost + 2.0 * self.settings.prune_margin;
+        let limit = best.at.cost + 2.0 * self.hypotheses().prune_margin;
         found.retain(|other| other.at.cost < limit);
         if let Some(winner) = found.first().filter(|other| other.at.cost < best.at.cost) {
             let rotation = winner.at.state.t_cam_object.rotation;
             let angle = |state: &&State| state.t_cam_object.rotation.angle_to(&rotation);
             let start = others.iter().min_by(|a, b| angle(a).total_cmp(&angle(b)));
             if let Some(start) = start {
-                let starts = restarts(start, self.settings.restart_angle);
+                let starts = restarts(start, self.hypotheses().restart_angle);
                 let first = self.solve(0, geometry, &starts);
                 found.extend(self.solve(1, problem, &self.next_starts(0, start, &first)));
             }
@@ -287,8 +296,8 @@ impl<'a> Run<'a> {
         turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
         states.extend([turned_back, initial.clone()]);
         let more = next.hypotheses.saturating_sub(states.len());
-        let (best, spacing) = (&found[0].at, self.settings.restart_spacing);
-        states.extend(spread(best, initial, spacing, self.radius(), more));
+        let (best, settings) = (&found[0].at, self.hypotheses());
+        states.extend(spread(best, initial, settings, self.radius(), more));
         states
     }
 }

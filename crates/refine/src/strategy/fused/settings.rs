@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::fit::FitSettings;
+use super::model_scale::ModelScaleSettings;
+use super::posterior::PosteriorSettings;
 use crate::factor::{
     BinaryTouchSettings, ContactPatchSettings, FreeSpaceSettings, HandDepthSettings,
     PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RegionSettings,
@@ -14,6 +16,7 @@ use crate::scene::{Frame, ModelErrorSettings};
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case")]
 #[serde(rename_all = "kebab-case")]
 pub enum Modality {
@@ -59,6 +62,7 @@ impl Modality {
 
 /// A group of quantities that are estimated beside the pose because they are not known exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case")]
 #[serde(rename_all = "kebab-case")]
 pub enum Nuisance {
@@ -94,25 +98,26 @@ impl Nuisance {
 
 /// One level of the way from coarse to fine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
-    /// Images are made smaller by this factor.
+    /// Factor by which images are made smaller.
     pub downsample: usize,
-    /// Depth points used at most.
+    /// Number of depth points at most.
     pub points: usize,
-    /// Kernels of depth, color and touch are so many times as wide as at the end: graduated non-convexity.
+    /// Width of the kernels of depth, color and touch, as a multiple of that at the end: graduated non-convexity (Blake and Zisserman, 1987).
     pub kernel_scale: f64,
-    /// When a solve ends.
+    /// Solver, and when it ends.
     pub solver: Solver,
-    /// How many of the best hypotheses the stage takes up.
+    /// Number of hypotheses, the best ones, that the stage takes up.
     pub hypotheses: usize,
-    /// Whether colors are compared, which have many minima.
+    /// True if colors are compared, which have many minima.
     pub color: bool,
-    /// Whether the scatter of depth points about the best solution so far says how much depth is to be trusted.
+    /// True if the scatter of depth points about the best solution so far takes the place of their nominal noise.
     pub measured_noise: bool,
-    /// Whether the object may differ from its model, where it is asked: [`Nuisance::Model`].
+    /// True if the object may differ from its model, where that is estimated: [`Nuisance::Model`].
     pub model_error: bool,
-    /// Whether hand and object may not be in the same place, which bars ways that lead through the hand.
+    /// True if hand and object may not be in the same place, which bars ways that lead through the hand.
     pub contact: bool,
 }
 
@@ -142,52 +147,99 @@ impl Stage {
     }
 }
 
-/// Settings of [`Fused`](super::Fused).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Settings of the hypotheses from which the estimator starts, and of which it keeps the best.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
-pub struct FusedSettings {
-    /// Modality to use, where the observation brings it.
-    pub modalities: Vec<Modality>,
-    /// Whether other cameras' images are used, where there are any.
-    pub views: bool,
-    /// What is estimated beside the pose; the rest is believed as it is said to be.
-    pub nuisances: Vec<Nuisance>,
-    /// Stated accuracies.
-    pub prior: PriorSettings,
-    /// From coarse to fine.
-    pub stages: Vec<Stage>,
+pub struct HypothesisSettings {
     /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose where that alone leaves
     /// something open \[rad\]; zero for none.
     pub restart_angle: f64,
-    /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
-    pub restart_spacing: f64,
-    /// Independent measurements that depth points amount to beside the errors that neighbors share, at most.
-    pub max_effective_samples: f64,
-    /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
+    /// Distance of further hypotheses where the first stage leaves the pose open \[m of surface motion\]. EXPERIMENTS: More restarts.
+    pub spacing: f64,
+    /// Reach of these to both sides, in standard deviations of the pose and in multiples of the distance. Wide, since first solutions of hardly any
+    /// difference in cost lie farther apart than the curvature about the best of them has it. EXPERIMENTS: More restarts.
+    pub reach: f64,
+    /// Standard deviation of the pose \[m of surface motion\] below which the first solution needs no others beside it, if depth scatters about the
+    /// surface by less than its nominal noise. EXPERIMENTS: Restarts only where the first solution leaves a direction open.
+    pub settled_sigma: f64,
+    /// Cost behind the best hypothesis after a stage, colors considered, from which another is given up \[nat\]: its weight would be 3·10⁻⁷. EXPERIMENTS:
+    /// Pruning of unconverged hypotheses 15 nat behind.
     pub prune_margin: f64,
-    /// By how much more color and silhouette tell of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as errors of
-    /// light and shape, is nearly the same in all modes.
+    /// Factor by which color and silhouette tell more of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as
+    /// errors of light and shape, is nearly the same in all modes. EXPERIMENTS: Weight of the image between modes.
     pub image_between_modes: f64,
-    /// Independent measurements that the hand's depth amounts to at most in frames of a known rig: what depth is off by in all frames is in the rig.
+    /// Surface motion below which two poses are the same solution \[m\].
+    pub same: f64,
+    /// Angle from which a rotation is that of another mode \[rad\].
+    pub another: f64,
+    /// Number of steps of geometry alone that a pose of another convention of rotations is given before it is compared.
+    pub alternative_steps: usize,
+    /// Ratio of such a pose's cost to that of the best one from which it is given up.
+    pub hopeless: f64,
+}
+
+impl Default for HypothesisSettings {
+    fn default() -> Self {
+        Self {
+            restart_angle: 20f64.to_radians(),
+            spacing: 10e-3,
+            reach: 4.0,
+            settled_sigma: 6e-3,
+            prune_margin: 15.0,
+            image_between_modes: 2.0,
+            same: 2e-3,
+            another: 0.2,
+            alternative_steps: 4,
+            hopeless: 4.0,
+        }
+    }
+}
+
+/// Settings of [`Fused`](super::Fused).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct FusedSettings {
+    /// Modalities to use, where the observation brings them.
+    pub modalities: Vec<Modality>,
+    /// True if other cameras' images are used, where there are any.
+    pub views: bool,
+    /// Groups of quantities that are estimated beside the pose; the rest is believed as it is said to be.
+    pub nuisances: Vec<Nuisance>,
+    /// Prior: nominal standard deviations of the initial pose and of calibrations.
+    pub prior: PriorSettings,
+    /// Stages, from coarse to fine.
+    pub stages: Vec<Stage>,
+    /// Initial and alternative poses.
+    pub hypotheses: HypothesisSettings,
+    /// Smallest standard deviation of depth points that is believed when measured \[m\]: a rendered image has none.
+    pub min_depth_sigma: f64,
+    /// Effective sample size of depth points at most, beside the errors that neighbors share. EXPERIMENTS: Settings of the depth field.
+    pub max_effective_samples: f64,
+    /// Effective sample size of the hand's depth in frames of a known rig: what depth is off by in all frames is in the rig. EXPERIMENTS: Depth points of
+    /// the hand near edges left out.
     pub samples_with_rig: f64,
-    /// Where the surface may be elsewhere than the model has it, contact says as much less of the pose; a rig has the surface as it is.
+    /// True if contact says less of the pose where the surface may be elsewhere than the model has it; a rig has the surface as it is.
     pub blurred_contact: bool,
-    /// Whether nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
+    /// True if nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
     pub rotation_unknown: bool,
-    /// By which factors errors may be larger or smaller than their nominal sizes.
+    /// Hyperprior of scales: factors by which errors may be larger or smaller than their nominal sizes.
     pub scales: ScaleSettings,
-    /// The test of fit.
+    /// Test of fit.
     pub fit: FitSettings,
-    /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
-    pub model: ModelErrorSettings,
-    /// Standard deviation of the model's size as a share of it; zero of a model whose size is known.
-    pub model_scale: f64,
+    /// Posterior.
+    pub posterior: PosteriorSettings,
+    /// Patches of the surface: how far that may be from the model's, with [`Nuisance::Model`].
+    pub patches: ModelErrorSettings,
+    /// Size of the object beside the model's.
+    pub model_scale: ModelScaleSettings,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
-    /// Regions within and around the outline.
+    /// Regions within and around the outline, where no depth tells it.
     pub region: RegionSettings,
-    /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured in stages with
-    /// [`Stage::measured_noise`], from this number of points; stages have a number of their own.
+    /// Depth on the object. In stages with [`Stage::measured_noise`], what is measured takes the place of its standard deviations and effective sample
+    /// size, from this number of points; stages have a number of their own.
     pub depth: PointToPlaneSettings,
     /// Depth on the hand.
     pub hand_depth: HandDepthSettings,
@@ -195,7 +247,7 @@ pub struct FusedSettings {
     pub free_space: FreeSpaceSettings,
     /// Taxels that feel forces.
     pub tactile: TactileSettings,
-    /// Sensors that feel contact alone.
+    /// Touch sensors that feel contact alone.
     pub binary_touch: BinaryTouchSettings,
     /// Proximity.
     pub proximity: ProximitySettings,
@@ -212,7 +264,7 @@ impl FusedSettings {
     pub(crate) fn for_frame(&self, frame: &Frame<'_>, is_rig_known: bool) -> Self {
         let mut settings = self.clone();
         if let Some(deviation) = &frame.object().deviation {
-            settings.model.gp_sigma = settings.model.gp_sigma.min(deviation.left());
+            settings.patches.sigma = settings.patches.sigma.min(deviation.left());
         }
         if is_rig_known {
             settings.hand_depth.noise.effective_samples = settings.samples_with_rig;
@@ -240,18 +292,17 @@ impl Default for FusedSettings {
             nuisances: Nuisance::ALL.to_vec(),
             prior: PriorSettings::default(),
             stages: Stage::coarse_to_fine(),
-            restart_angle: 20f64.to_radians(),
-            restart_spacing: 10e-3,
+            hypotheses: HypothesisSettings::default(),
+            min_depth_sigma: 2e-4,
             max_effective_samples: 50.0,
-            prune_margin: 15.0,
-            image_between_modes: 2.0,
             samples_with_rig: 200.0,
             blurred_contact: true,
             rotation_unknown: false,
             scales: ScaleSettings::default(),
             fit: FitSettings::default(),
-            model: ModelErrorSettings::default(),
-            model_scale: 0.0,
+            posterior: PosteriorSettings::default(),
+            patches: ModelErrorSettings::default(),
+            model_scale: ModelScaleSettings::default(),
             rendering: RenderingSettings::default(),
             region: RegionSettings::default(),
             depth: PointToPlaneSettings::default(),

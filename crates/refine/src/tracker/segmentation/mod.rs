@@ -1,6 +1,7 @@
 //! What of a picture shows the object, told by where it should be, depth, colors, and a mask if there is one.
 
 mod parts;
+mod settings;
 mod window;
 
 use std::mem;
@@ -9,30 +10,21 @@ use nalgebra::Isometry3;
 use prehend_render::Mask;
 
 use self::parts::large_parts;
+pub use self::settings::SegmentationSettings;
 use self::window::{Label, Pixel, Window};
-use super::GAIN;
+use super::TrackerSettings;
 use super::sight::Sight;
 use crate::scene::{ColorRatios, Object, RegionColors};
-
-/// Pixels of which each colors, depth and masks are asked: every so many of rows and columns.
-const STRIDE: usize = 2;
-/// How far from where it should be the object is looked for \[m\].
-const REACH: f64 = 0.04;
-/// What a color tells at most \[nat\].
-const COLOR_LIMIT: f32 = 2.0;
-/// Evidence of a color \[nat\] below which it is another thing's, whatever depth says: what is found may lie flush with a wall.
-const OTHERS_COLOR: f32 = -0.5 * COLOR_LIMIT;
-/// Pixels that are needed to judge by.
-const ENOUGH: f32 = 30.0;
-/// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
-const LEAST_SHARE: f32 = 0.1;
-/// How often a mask errs at least.
-const MASK_ERROR: f32 = 0.02;
 
 /// Tells the object from everything else by its colors and those around it, which are learnt from frames in which its pose was
 /// believed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Segmenter {
+    settings: SegmentationSettings,
+    /// See [`TrackerSettings::gain`].
+    gain: f32,
+    /// Probability of a color that was never seen.
+    unseen: f64,
     colors: RegionColors,
     ratios: ColorRatios,
     /// How often masks say so of pixels that show the object, and of others.
@@ -45,6 +37,12 @@ pub(super) struct Segmenter {
 }
 
 impl Segmenter {
+    pub(super) fn new(settings: &TrackerSettings) -> Self {
+        let TrackerSettings { segmentation, gain, fused, .. } = settings;
+        let unseen = fused.region.foreground.unseen;
+        Self { settings: *segmentation, gain: *gain as f32, unseen, ..Self::default() }
+    }
+
     /// Takes the pixels of `sight` that show `object`, which should be at `t_cam_object`, for its mask, and says whether there are any: far less
     /// than those that should is nothing.
     ///
@@ -56,8 +54,9 @@ impl Segmenter {
         t_cam_object: &Isometry3<f64>,
     ) -> bool {
         let mut window = mem::take(&mut self.window);
-        let seen = window.look(sight, object, t_cam_object, REACH).is_some()
-            && self.segment_within(&window, sight);
+        let seen =
+            window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_some()
+                && self.segment_within(&window, sight);
         self.window = window;
         seen
     }
@@ -65,6 +64,7 @@ impl Segmenter {
     fn segment_within(&mut self, window: &Window, sight: &mut Sight) -> bool {
         self.judge_masks(window);
         let [set, unset] = self.mask_evidence(sight);
+        let settings = &self.settings;
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mask = &mut sight.observation.mask;
         mask.refill(width, height, false);
@@ -72,25 +72,27 @@ impl Segmenter {
         for pixel in window.pixels() {
             expected += pixel.share;
             // Most pixels.
-            if pixel.is_elsewhere() {
+            if pixel.is_elsewhere(settings) {
                 continue;
             }
             let color = self.ratios.of_index(pixel.color);
             let told = if pixel.masked { set } else { unset };
-            if pixel.prior() + pixel.depth_evidence() + color + told <= 0.0 {
+            let evidence = pixel.prior(settings) + pixel.depth_evidence(settings);
+            if evidence + color + told <= 0.0 {
                 continue;
             }
             seen += 1.0;
-            fill(mask, pixel.at);
+            fill(mask, pixel.at, settings.stride());
         }
         sight.focus = Some(window.range());
-        seen >= LEAST_SHARE * expected && seen > 0.0
+        seen >= settings.least_share as f32 * expected && seen > 0.0
     }
 
     /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
     /// an object in a hand, near what of the hand is seen, but not on it. None if they are far less than was seen of it before.
     pub(super) fn anywhere(&self, sight: &Sight) -> Option<Mask> {
-        let window = Window::whole(sight);
+        let settings = &self.settings;
+        let window = Window::whole(sight, settings);
         let [set, unset] = self.mask_evidence(sight);
         let center = window.hand_center();
         // Nothing is known at all.
@@ -100,20 +102,22 @@ impl Segmenter {
         let may_show = |pixel: &Pixel| {
             let color = self.ratios.of_index(pixel.color);
             let told = if pixel.masked { set } else { unset };
-            let evidence = pixel.near_hand(center, &window.place(pixel)) + color + told;
+            let near = pixel.near_hand(center, &window.place(pixel), settings);
+            let evidence = near + color + told;
             // Before any color is known, all that is near the hand may be the object.
             evidence > 0.0 || evidence == 0.0 && !self.ratios.are_known()
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
-        let columns = sight.observation.camera.width.div_ceil(STRIDE);
-        let parts = large_parts(&may_show, columns);
+        let columns = sight.observation.camera.width.div_ceil(settings.stride());
+        let parts = large_parts(&may_show, columns, settings.least_share);
         let shown =
             || window.pixels().zip(&parts).filter(|(_, part)| **part).map(|(pixel, _)| pixel);
         let area: f32 = shown().map(Pixel::seen_area).sum();
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mut mask = Mask::filled(width, height, false);
-        shown().for_each(|pixel| fill(&mut mask, pixel.at));
-        let enough = shown().count() as f32 >= ENOUGH && area >= LEAST_SHARE * self.seen_area;
+        shown().for_each(|pixel| fill(&mut mask, pixel.at, settings.stride()));
+        let enough = shown().count() >= settings.enough
+            && area >= settings.least_share as f32 * self.seen_area;
         enough.then_some(mask)
     }
 
@@ -125,16 +129,16 @@ impl Segmenter {
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
         let mut window = Window::default();
-        if window.look(sight, object, t_cam_object, 0.0).is_none() {
+        if window.look(sight, object, t_cam_object, 0.0, &self.settings).is_none() {
             return 0.0;
         }
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
             let color = self.ratios.of_index(pixel.color);
-            let told = pixel.depth_evidence() + color;
+            let told = pixel.depth_evidence(&self.settings) + color;
             if told != 0.0 {
                 expected += pixel.share;
-                let is_seen = told > 0.0 && color > OTHERS_COLOR;
+                let is_seen = told > 0.0 && color > -0.5 * self.settings.color_limit as f32;
                 seen += pixel.share * f32::from(u8::from(is_seen));
             }
         }
@@ -149,7 +153,7 @@ impl Segmenter {
     /// Learns colors from a frame with the object at `t_cam_object`.
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let mut window = mem::take(&mut self.window);
-        if window.look(sight, object, t_cam_object, REACH).is_some() {
+        if window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_some() {
             self.learn_within(&window);
         }
         self.window = window;
@@ -157,15 +161,15 @@ impl Segmenter {
 
     fn learn_within(&mut self, window: &Window) {
         let area: f32 = window.pixels().map(Pixel::expected_area).sum();
-        let gain = if self.seen_area > 0.0 { GAIN } else { 1.0 };
+        let gain = if self.seen_area > 0.0 { self.gain } else { 1.0 };
         self.seen_area += gain * (area - self.seen_area);
         for (label, colors) in
             [(Label::Object, &mut self.colors.object), (Label::Other, &mut self.colors.others)]
         {
-            let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
-            colors.learn(pixels.map(|pixel| pixel.color), GAIN);
+            let pixels = window.pixels().filter(|pixel| pixel.label(&self.settings) == Some(label));
+            colors.learn(pixels.map(|pixel| pixel.color), self.gain);
         }
-        self.ratios = self.colors.ratios(COLOR_LIMIT);
+        self.ratios = self.colors.ratios(self.settings.color_limit, self.unseen);
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.
@@ -175,19 +179,22 @@ impl Segmenter {
         let mut counts = [[0.0_f32; 2]; 2];
         for pixel in window.pixels() {
             expected += pixel.share;
-            if let Some(label) = pixel.label() {
+            if let Some(label) = pixel.label(&self.settings) {
                 counts[label as usize][usize::from(pixel.masked)] += 1.0;
             }
         }
         let share = |label: Label, least: f32| {
             let [unset, set] = counts[label as usize];
-            (unset + set >= ENOUGH.max(least)).then(|| set / (unset + set))
+            (unset + set >= (self.settings.enough as f32).max(least)).then(|| set / (unset + set))
         };
-        let shares = (share(Label::Object, LEAST_SHARE * expected), share(Label::Other, 0.0));
+        let shares = (
+            share(Label::Object, self.settings.least_share as f32 * expected),
+            share(Label::Other, 0.0),
+        );
         (self.hits, self.false_alarms) = match shares {
             (Some(hits), Some(false_alarms)) => (hits, false_alarms),
             // What they were worth is forgotten while they cannot be judged.
-            _ => ((1.0 - GAIN) * self.hits, (1.0 - GAIN) * self.false_alarms),
+            _ => ((1.0 - self.gain) * self.hits, (1.0 - self.gain) * self.false_alarms),
         };
     }
 
@@ -196,7 +203,8 @@ impl Segmenter {
         if !sight.tells {
             return [0.0; 2];
         }
-        let rate = |share: f32| share.clamp(MASK_ERROR, 1.0 - MASK_ERROR);
+        let error = self.settings.mask_error as f32;
+        let rate = |share: f32| share.max(error).min(1.0 - error);
         let (hits, false_alarms) = (rate(self.hits), rate(self.false_alarms));
         // One that is wrong more often than right is of something else, and does not tell where the object is not.
         [(hits / false_alarms).ln().max(0.0), ((1.0 - hits) / (1.0 - false_alarms)).ln().min(0.0)]
@@ -204,11 +212,11 @@ impl Segmenter {
 }
 
 /// Sets the pixels that the one at a column and row stands for.
-fn fill(mask: &mut Mask, at: [u32; 2]) {
+fn fill(mask: &mut Mask, at: [u32; 2], stride: usize) {
     let [x, y] = at.map(|k| k as usize);
     let (width, height) = (mask.width(), mask.height());
-    for row in y..(y + STRIDE).min(height) {
-        let end = (x + STRIDE).min(width);
+    for row in y..(y + stride).min(height) {
+        let end = (x + stride).min(width);
         mask.pixels_mut()[row * width + x..row * width + end].fill(true);
     }
 }
@@ -237,7 +245,7 @@ mod tests {
             fill.iter().for_each(|fill| observation.mask.pixels_mut().fill(*fill));
             Sight::new(observation, Some(&scene.hand), Images::default())
         };
-        let mut segmenter = Segmenter::default();
+        let mut segmenter = Segmenter::new(&TrackerSettings::default());
         segmenter.learn(&sight(None), &scene.object, &scene.truth);
         // As far off as an object that slips between two frames.
         let off = Isometry3::translation(6e-3, -4e-3, 3e-3) * scene.truth;

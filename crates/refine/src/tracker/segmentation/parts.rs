@@ -1,9 +1,8 @@
 //! Connected parts of a mask.
 
-use super::LEAST_SHARE;
-
 /// The pixels of the largest connected part of what is `set`, and of others that are not far smaller, for fingers part what they hold, in rows of so many columns.
-pub(super) fn large_parts(set: &[bool], columns: usize) -> Vec<bool> {
+pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec<bool> {
+    let least = least_share as f32;
     let mut part = vec![0_u32; set.len()];
     let mut sizes = vec![0_u32];
     let mut left = Vec::new();
@@ -34,8 +33,7 @@ pub(super) fn large_parts(set: &[bool], columns: usize) -> Vec<bool> {
         sizes.push(size);
     }
     let largest = sizes.iter().copied().max().unwrap_or_default();
-    let kept =
-        |part: &u32| *part > 0 && sizes[*part as usize] as f32 >= LEAST_SHARE * largest as f32;
+    let kept = |part: &u32| *part > 0 && sizes[*part as usize] as f32 >= least * largest as f32;
     part.iter().map(kept).collect()
 }
 
@@ -53,14 +51,14 @@ mod tests {
         for k in [66, 67, 76, 77, 99] {
             set[k] = true;
         }
-        let kept = large_parts(&set, 10);
+        let kept = large_parts(&set, 10, 0.1);
         assert_eq!(kept.iter().filter(|k| **k).count(), 20);
         assert!(!kept[99] && kept[66] && kept[33]);
         // The end of a row and the start of the next are no neighbors.
-        let row = large_parts(&[true, true, true, false, false, true, true, false, false], 3);
+        let row = large_parts(&[true, true, true, false, false, true, true, false, false], 3, 0.1);
         assert_eq!(row.iter().filter(|k| **k).count(), 5);
-        let apart = large_parts(&[false, false, true, true, false, false], 3);
+        let apart = large_parts(&[false, false, true, true, false, false], 3, 0.1);
         assert_eq!(apart.iter().filter(|k| **k).count(), 2);
-        assert!(large_parts(&[], 1).is_empty());
+        assert!(large_parts(&[], 1, 0.1).is_empty());
     }
 }

@@ -6,28 +6,11 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
-use super::{COLOR_LIMIT, STRIDE};
+use super::SegmentationSettings;
 use crate::scene::{Object, color_index};
 
 use crate::tracker::sight::Sight;
 use crate::tracker::sums::{Sums, squares};
-
-/// Outlines are expected within so many pixels of the window to either side.
-const BAND: usize = 4;
-/// Depth of the surface is carried on over so many pixels of the window beyond its outline.
-const BEYOND: usize = 16;
-/// How sure it is that the object is where it should be.
-const SURE: f32 = 0.85;
-/// Standard deviation of depth about where the object should be, and at the hand \[m\].
-const DEPTH_SIGMA: f32 = 5e-3;
-/// Depth that is so far from the object's surface is not of it \[m\].
-const OFF_OBJECT: f32 = 15e-3;
-/// Density of depths of what is not known \[1/m\], and how often depth that is not in front of the object is so, too, where the object is seen.
-const ANYWHERE: f32 = 3.0;
-const OUTLIERS: f32 = 0.03;
-
-/// How far from the middle of a hand it holds something \[m\].
-const HELD: f32 = 0.2;
 
 /// What a pixel surely shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +48,7 @@ pub(super) struct Window {
     shown: Sums,
     near: Sums,
     count: Sums,
+    settings: SegmentationSettings,
 }
 
 impl Window {
@@ -75,7 +59,10 @@ impl Window {
         object: &Object,
         t_cam_object: &Isometry3<f64>,
         reach: f64,
+        settings: &SegmentationSettings,
     ) -> Option<()> {
+        self.settings = *settings;
+        let (stride, band) = (settings.stride(), settings.band);
         let full = &sight.observation.camera;
         let center = t_cam_object * object.center;
         if center.z <= 0.0 {
@@ -85,15 +72,15 @@ impl Window {
         let nearest = (center.z - object.radius).max(f64::MIN_POSITIVE);
         let at = full.project(&center)?;
         let extent = (object.radius + reach) * full.fx.max(full.fy) / nearest;
-        let [across, down] = sight.part(&at, extent, STRIDE);
+        let [across, down] = sight.part(&at, extent, stride);
         let (left, columns, top, rows) = (across.start, across.len(), down.start, down.len());
         if columns == 0 || rows == 0 {
             return None;
         }
-        let coarse = full.scaled(1.0 / STRIDE as f64);
+        let coarse = full.scaled(1.0 / stride as f64);
         let camera: Camera = coarse.cropped(left, top, columns, rows);
         draw_depth(&mut self.drawn, &camera, &[(&object.model, *t_cam_object)]);
-        let picture = |column: usize, row: usize| [(left + column) * STRIDE, (top + row) * STRIDE];
+        let picture = |column: usize, row: usize| [(left + column) * stride, (top + row) * stride];
         self.pixels.clear();
         for (row, line) in self.drawn.pixels().chunks(columns).enumerate() {
             self.pixels.extend(line.iter().enumerate().map(|(column, &own)| {
@@ -110,34 +97,34 @@ impl Window {
         let Self { pixels, values, .. } = self;
         values.clear();
         values.extend(pixels.iter().map(|pixel| pixel.share));
-        self.shown.find(values, size, BAND);
-        self.near.find(self.drawn.pixels(), size, BEYOND);
+        self.shown.find(values, size, band);
+        self.near.find(self.drawn.pixels(), size, 4 * band);
         let drawn = |z: &f32| f32::from(u8::from(*z > 0.0));
         values.clear();
         values.extend(self.drawn.pixels().iter().map(drawn));
-        self.count.find(values, size, BEYOND);
+        self.count.find(values, size, 4 * band);
         let (shown, near, count) = (&self.shown.all, &self.near.all, &self.count.all);
         let middle = center.z as f32;
         for (i, pixel) in pixels.iter_mut().enumerate() {
-            let across = squares(i % columns, columns, BAND);
-            pixel.share = shown[i] / (across * squares(i / columns, rows, BAND)) as f32;
+            let across = squares(i % columns, columns, band);
+            pixel.share = shown[i] / (across * squares(i / columns, rows, band)) as f32;
             if pixel.object == 0.0 {
                 pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
             }
         }
         let ends = picture(columns, rows);
-        self.range = [left * STRIDE..ends[0], top * STRIDE..ends[1]];
+        self.range = [left * stride..ends[0], top * stride..ends[1]];
         Some(())
     }
 
     /// Of a whole picture, in which nothing is known of the object.
-    pub(super) fn whole(sight: &Sight) -> Self {
-        let full = &sight.observation.camera;
-        let (columns, rows) = (full.width.div_ceil(STRIDE), full.height.div_ceil(STRIDE));
-        let pixel = |k: usize| Pixel::sensed(sight, [k % columns * STRIDE, k / columns * STRIDE]);
+    pub(super) fn whole(sight: &Sight, settings: &SegmentationSettings) -> Self {
+        let (full, stride) = (&sight.observation.camera, settings.stride());
+        let (columns, rows) = (full.width.div_ceil(stride), full.height.div_ceil(stride));
+        let pixel = |k: usize| Pixel::sensed(sight, [k % columns * stride, k / columns * stride]);
         let range = [0..full.width, 0..full.height];
         let pixels = (0..columns * rows).map(pixel).collect();
-        Self { pixels, range, camera: Some(*full), ..Self::default() }
+        Self { pixels, range, camera: Some(*full), settings: *settings, ..Self::default() }
     }
 
     /// Where what is seen at a pixel of a whole picture is, camera frame \[m\].
@@ -149,7 +136,7 @@ impl Window {
 
     /// The middle of what of the hand is seen, camera frame \[m\]; none without one.
     pub(super) fn hand_center(&self) -> Option<Vector3<f32>> {
-        let on_hand = self.pixels.iter().filter(|pixel| pixel.is_on_hand());
+        let on_hand = self.pixels.iter().filter(|pixel| pixel.is_on_hand(&self.settings));
         let (sum, count) = on_hand.fold((Vector3::zeros(), 0.0), |(sum, count), pixel| {
             (sum + self.place(pixel), count + 1.0)
         });
@@ -183,9 +170,9 @@ impl Pixel {
     }
 
     /// Whether this pixel is left out whatever its color and masks: beyond the object's outline, and far from it in depth.
-    pub(super) fn is_elsewhere(&self) -> bool {
+    pub(super) fn is_elsewhere(&self, settings: &SegmentationSettings) -> bool {
         let off = (self.sensor - self.object).abs();
-        self.share == 0.0 && self.sensor > 0.0 && off > OFF_OBJECT
+        self.share == 0.0 && self.sensor > 0.0 && off > settings.off_object()
     }
 
     /// The area of what is seen here, and of what should show the object, in squares of depth.
@@ -199,51 +186,59 @@ impl Pixel {
     }
 
     /// Whether the object should be seen here \[nat\].
-    pub(super) fn prior(&self) -> f32 {
-        let sure = (1.0 - SURE) + (2.0 * SURE - 1.0) * self.share;
+    pub(super) fn prior(&self, settings: &SegmentationSettings) -> f32 {
+        let prior = settings.prior as f32;
+        let sure = (1.0 - prior) + (2.0 * prior - 1.0) * self.share;
         (sure / (1.0 - sure)).ln()
     }
 
     /// Whether depth is rather the object's than that of the hand or of something else \[nat\].
-    pub(super) fn depth_evidence(&self) -> f32 {
+    pub(super) fn depth_evidence(&self, settings: &SegmentationSettings) -> f32 {
         if !(self.sensor > 0.0 && self.sensor.is_finite()) {
             return 0.0;
         }
-        let bell = |off: f32| {
-            (-0.5 * (off / DEPTH_SIGMA).powi(2)).exp() / ((2.0 * PI).sqrt() * DEPTH_SIGMA)
-        };
+        let [sigma, background, outliers] =
+            [settings.depth_sigma, settings.background, settings.outliers].map(|v| v as f32);
+        let bell = |off: f32| (-0.5 * (off / sigma).powi(2)).exp() / ((2.0 * PI).sqrt() * sigma);
         let own = bell(self.sensor - self.object);
-        let outliers = if self.sensor < self.object { 0.0 } else { OUTLIERS };
-        let own = (1.0 - outliers) * own + outliers * ANYWHERE;
+        let outliers = if self.sensor < self.object { 0.0 } else { outliers };
+        let own = (1.0 - outliers) * own + outliers * background;
         let other = match self.hand > 0.0 {
-            true => 0.5 * (bell(self.sensor - self.hand) + ANYWHERE),
-            false => ANYWHERE,
+            true => 0.5 * (bell(self.sensor - self.hand) + background),
+            false => background,
         };
         (own / other).ln()
     }
 
     /// Whether depth is the hand's.
-    fn is_on_hand(&self) -> bool {
-        self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < 2.0 * DEPTH_SIGMA
+    fn is_on_hand(&self, settings: &SegmentationSettings) -> bool {
+        let reach = 2.0 * settings.depth_sigma as f32;
+        self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < reach
     }
 
     /// Whether what is seen here, at `place`, may be held by a hand about that place \[nat\].
-    pub(super) fn near_hand(&self, center: Option<Vector3<f32>>, place: &Vector3<f32>) -> f32 {
+    pub(super) fn near_hand(
+        &self,
+        center: Option<Vector3<f32>>,
+        place: &Vector3<f32>,
+        settings: &SegmentationSettings,
+    ) -> f32 {
         let Some(center) = center else { return 0.0 };
-        match self.sensor > 0.0 && !self.is_on_hand() && (place - center).norm() < HELD {
+        let is_held = (place - center).norm() < settings.held as f32;
+        match self.sensor > 0.0 && !self.is_on_hand(settings) && is_held {
             true => 0.0,
-            false => -2.0 * COLOR_LIMIT,
+            false => -2.0 * settings.color_limit as f32,
         }
     }
 
     /// What it surely shows, where that is known.
-    pub(super) fn label(&self) -> Option<Label> {
+    pub(super) fn label(&self, settings: &SegmentationSettings) -> Option<Label> {
         let off = (self.sensor - self.object).abs();
         let measured = self.sensor > 0.0;
-        if self.share >= 1.0 && measured && off < DEPTH_SIGMA {
+        if self.share >= 1.0 && measured && off < settings.depth_sigma as f32 {
             return Some(Label::Object);
         }
-        let elsewhere = self.share == 0.0 || measured && off > OFF_OBJECT;
+        let elsewhere = self.share == 0.0 || measured && off > settings.off_object();
         elsewhere.then_some(Label::Other)
     }
 }

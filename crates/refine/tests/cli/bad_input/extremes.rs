@@ -178,7 +178,7 @@ fn texts_beyond_the_limit_are_not_read() {
         ("ds/test/000001/scene_camera.json", REFINE),
         ("ds/hand/taxels.csv", REFINE),
         ("ds/hand/hand.urdf", REFINE),
-        ("options.toml", "info ds --config options.toml"),
+        ("options.toml", "settings --settings options.toml"),
     ] {
         let whole = place.read(name);
         let file = fs::File::options().write(true).open(place.path(name)).unwrap();
@@ -220,7 +220,7 @@ fn what_is_no_plain_file_is_not_waited_for() {
         place.write(name, &whole);
     }
     for command in
-        ["refine --frame /dev/zero", "info pipe.json", "refine --config /dev/zero --frame f.json"]
+        ["refine --frame /dev/zero", "info pipe.json", "refine --settings /dev/zero --frame f.json"]
     {
         let _ = fs::remove_file(place.path("pipe.json"));
         place.write("pipe.json", "");

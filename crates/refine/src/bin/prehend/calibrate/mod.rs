@@ -11,7 +11,7 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::calibration::{Calibrator, CalibratorSettings};
+use prehend_refine::calibration::Calibrator;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{ResultRow, check_writable};
 use prehend_refine::data::identity::canonical;
@@ -20,6 +20,7 @@ use prehend_refine::evaluate::report::Report;
 use prehend_refine::scene::Object;
 
 use crate::options::{Input, Job, limit_threads, write_poses};
+use crate::settings::SettingsOptions;
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -48,6 +49,8 @@ pub(crate) struct Calibrate {
     /// Worker threads; the rig is the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    settings: SettingsOptions,
 }
 
 impl Calibrate {
@@ -76,7 +79,7 @@ impl Calibrate {
         if joints.is_none() {
             log::warn!("no frame has a hand: camera and models are calibrated alone");
         }
-        let settings = CalibratorSettings::default();
+        let settings = self.settings.load()?.calibration();
         let nominal = Calibrator::new(joints.unwrap_or(0), size, objects.clone(), settings)?;
         let bar = progress(self.passes.get() * jobs.len(), "calibrating");
         let passes = Passes::new(&frames, self.passes, self.window);

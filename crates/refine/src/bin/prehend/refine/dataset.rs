@@ -22,7 +22,7 @@ use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::options::{MethodOptions, OutputOptions};
+use super::options::{MethodOptions, OutputOptions, record};
 use crate::options::{Job, Masks, Selection, beside, open_rig, write_poses};
 use crate::report;
 use crate::terminal::{cache, exit_code, progress, say, warn};
@@ -71,7 +71,7 @@ struct RefinedFrame {
 
 impl DatasetRun<'_> {
     pub(super) fn run(&self) -> anyhow::Result<ExitCode> {
-        let name = self.options.method().name;
+        let name = self.options.method();
         let json = self.output.json;
         let DatasetInputs { selection, poses, rivals, masks, neighbors, rig } = &self.inputs;
         let dataset = selection.open()?;
@@ -165,7 +165,8 @@ impl DatasetRun<'_> {
         if json {
             let frames: Vec<_> =
                 refined.iter().map(|(&i, r)| summary(&jobs[i], r, seconds(i))).collect();
-            let document = json!({ "frames": frames, "failures": failures });
+            let settings = record(&self.method)?;
+            let document = json!({ "frames": frames, "failures": failures, "settings": settings });
             say(format!("{document:#}"))?;
         }
         journal.discard()?;
@@ -188,8 +189,8 @@ impl DatasetRun<'_> {
             "neighbors": neighbors.map(file_fingerprint).transpose()?,
             "rig": rig.map(file_fingerprint).transpose()?,
             "filters": selection.filters(),
-            "method": self.options.method().name,
-            "settings": format!("{:?}", self.method),
+            "method": self.options.method(),
+            "settings": record(&self.method)?,
             "seed": self.options.seed,
             "backend": self.backend.name(),
             "history kept": self.keeps_trace(),
@@ -237,7 +238,7 @@ impl DatasetRun<'_> {
         let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
         let scorer = Scorer::new(dataset);
         report.add_fact("dataset", dataset.split_dir().display().to_string());
-        report.add_fact("method", self.options.method().name);
+        report.add_fact("method", self.options.method());
         report.add_fact("version", env!("CARGO_PKG_VERSION"));
         let is_fused = matches!(self.method, Method::Fused(_));
         let drawn = least_sure(refined);

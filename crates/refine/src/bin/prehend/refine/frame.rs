@@ -13,7 +13,7 @@ use prehend_refine::{Method, RefineJob, Refined};
 use prehend_render::Backend;
 use serde_json::json;
 
-use super::options::{MethodOptions, OutputOptions};
+use super::options::{MethodOptions, OutputOptions, record};
 use crate::options::open_rig;
 use crate::terminal::{cache, progress, say};
 
@@ -25,6 +25,7 @@ pub(super) fn refine_frame(
     backend: Arc<dyn Backend>,
     rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
+    let mut configured = method.configured()?;
     let (rig, cache) = (open_rig(rig)?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
     let mut configured = method.configured()?;
@@ -60,6 +61,7 @@ pub(super) fn refine_frame(
         "warnings": warnings,
         "confidence": refined.posterior.as_ref().map(PosteriorSummary::from),
         "trace": refined.trace,
+        "settings": record(&configured)?,
     });
     let text = format!("{document:#}");
     if let Some(out) = &output.out {

@@ -58,7 +58,7 @@ impl Refine {
         let Self { selection, poses, rivals, masks, neighbors, .. } = &self;
         let Self { frame, rig, output, method, rendering, .. } = &self;
         let named = |out: &PathBuf| match selection {
-            Some(selection) => selection.results_file(out, method.method().name),
+            Some(selection) => selection.results_file(out, method.method()),
             None => Ok(out.clone()),
         };
         let out = output.out.as_ref().map(named).transpose()?;

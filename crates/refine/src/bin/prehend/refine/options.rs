@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use prehend_refine::Method;
 use prehend_refine::baselines::GradientKind;
-use prehend_refine::{Method, NamedMethod};
 
 use crate::options::named;
+use crate::settings::{SettingsOptions, assignment};
 
 /// What to write, and where.
 #[derive(Args)]
@@ -61,14 +62,16 @@ const MODEL_SCALE: f64 = 0.05;
 pub(super) struct MethodOptions {
     /// How to refine, with settings that the options below change [default: fused; with --terms, combined]
     #[arg(long, value_name = "NAME", value_parser = named, long_help = method_help())]
-    method: Option<&'static NamedMethod>,
+    method: Option<String>,
+    #[command(flatten)]
+    settings: SettingsOptions,
     /// Largest number of iterations, fused: in each of its stages; the search ends earlier when the steps become negligible
     /// [default: up to 10 a stage; robust-icp: 60; others: 400]
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// How large errors of one kind are if nothing else is known, of the fused method: such as hand.translation=5mm, joints=0.3deg, depth.scale=1% or
     /// model=0 for an exact one; may be repeated. By what factor they are larger or smaller in a frame is learnt from it
-    #[arg(long, value_name = "NAME=SIZE", value_parser = name_and_size)]
+    #[arg(long, value_name = "NAME=SIZE", value_parser = assignment)]
     noise: Vec<(String, String)>,
     /// Estimate the size of the object with its pose, for models that are off by some percent such as reconstructions from images: --noise model.scale=5%.
     /// Needs depth
@@ -95,38 +98,42 @@ pub(super) struct MethodOptions {
     pub(super) threads: Option<NonZeroUsize>,
 }
 
+/// The settings of `method`, as the records of a run have them: those of the fused estimator as TOML, a file's table `estimator`.
+pub(super) fn record(method: &Method) -> anyhow::Result<String> {
+    Ok(match method {
+        Method::Fused(fused) => toml::to_string(&fused.settings)?,
+        other => format!("{other:?}"),
+    })
+}
+
 /// What `--help` says of the methods.
 fn method_help() -> String {
     let mut text = "How to refine, with settings that the options below change:\n".to_owned();
-    for method in NamedMethod::all() {
-        text += &format!("\n  {:<19} {}", method.name, method.summary);
+    for (name, summary) in Method::all() {
+        text += &format!("\n  {name:<19} {summary}");
     }
     text + "\n\n[default: fused; with --terms, combined]"
         + "\n\nAlso fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
 }
 
-/// A name and a size with = between them.
-fn name_and_size(text: &str) -> Result<(String, String), String> {
-    let parts = text.split_once('=').ok_or("not of the form NAME=SIZE")?;
-    Ok((parts.0.to_owned(), parts.1.to_owned()))
-}
-
 impl MethodOptions {
-    /// The method asked for, or the default.
-    pub(super) fn method(&self) -> &'static NamedMethod {
+    /// The name of the method asked for, or of the default.
+    pub(super) fn method(&self) -> &str {
         // Only the heuristic takes its evidence apart by terms.
-        let default =
-            if self.terms.is_some() { &NamedMethod::COMBINED } else { &NamedMethod::FUSED };
-        self.method.unwrap_or(default)
+        let default = if self.terms.is_some() { "combined" } else { "fused" };
+        self.method.as_deref().unwrap_or(default)
     }
 
     /// The settings of the method, changed by the other options.
     pub(super) fn configured(&self) -> anyhow::Result<Method> {
-        let named = self.method();
-        let mut method = named.method();
+        let (name, given) = (self.method(), self.settings.given()?);
+        let estimator = given.as_ref().map(|given| given.estimator.clone()).unwrap_or_default();
+        let Some(mut method) = Method::with_settings(name, &estimator) else {
+            bail!("--method {name}: there is none");
+        };
         if let Some(terms) = &self.terms {
             let Method::Heuristic(heuristic) = &mut method else {
-                bail!("--terms: the method {} does not combine gradients", named.name);
+                bail!("--terms: the method {name} does not combine gradients");
             };
             heuristic.gradients.clone_from(terms);
         }
@@ -136,7 +143,7 @@ impl MethodOptions {
                 Method::Icp(icp) => icp.checkpoint = false,
                 Method::RobustIcp(_) => {}
                 Method::Fused(_) => {
-                    bail!("--no-checkpoint: the method {} returns its last pose anyway", named.name)
+                    bail!("--no-checkpoint: the method {name} returns its last pose anyway")
                 }
             }
         }
@@ -150,15 +157,16 @@ impl MethodOptions {
             ("--rotation-unknown", self.rotation_unknown),
             ("--fit-scale", self.fit_scale),
             ("--noise", !self.noise.is_empty()),
+            ("--settings, --set", given.is_some()),
         ];
         if let Some((option, _)) = fused_only.iter().find(|(_, given)| *given) {
             let Method::Fused(fused) = &mut method else {
-                bail!("{option}: is of the fused method, not of {}", named.name);
+                bail!("{option}: is of the fused method, not of {name}");
             };
             if self.fit_scale {
-                fused.settings.model_scale = MODEL_SCALE;
+                fused.settings.model_scale.sigma = MODEL_SCALE;
             }
-            fused.settings.rotation_unknown = self.rotation_unknown;
+            fused.settings.rotation_unknown |= self.rotation_unknown;
             for (name, size) in &self.noise {
                 let set = fused.settings.set_nominal_size(name, size);
                 set.map_err(|error| anyhow!("--noise {name}={size}: {error}"))?;

@@ -44,6 +44,7 @@ use self::report::FilmReport;
 use crate::options::{
     Masks, Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
 };
+use crate::settings::SettingsOptions;
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -116,9 +117,11 @@ pub(crate) struct Track {
     /// [default: none]
     #[arg(long, value_name = "MS", help_heading = "Method")]
     budget: Option<f64>,
-    /// What to do when an object is lost, whatever time it takes: off, near (look about where it should be), or anywhere
-    #[arg(long, value_name = "HOW", default_value = "anywhere", help_heading = "Method")]
-    recovery: Recovery,
+    /// What to do when an object is lost, whatever time it takes: off, near (look about where it should be), or anywhere [default: anywhere]
+    #[arg(long, value_name = "HOW", help_heading = "Method")]
+    recovery: Option<Recovery>,
+    #[command(flatten)]
+    settings: SettingsOptions,
     /// Worker threads; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N", help_heading = "Method")]
     threads: Option<NonZeroUsize>,
@@ -186,11 +189,11 @@ impl Track {
             bail!("--rate: {} is no number of images a second", self.rate);
         }
         let budget = self.budget.map(|ms| Duration::try_from_secs_f64(ms * 1e-3)).transpose();
-        let settings = TrackerSettings {
-            budget: budget.map_err(|e| anyhow!("--budget: {e}"))?,
-            recovery: self.recovery,
-            ..TrackerSettings::default()
-        };
+        let mut settings = self.settings.load()?;
+        let TrackerSettings { budget: in_time, recovery, .. } = &mut settings.tracker;
+        *in_time = budget.map_err(|e| anyhow!("--budget: {e}"))?.or(*in_time);
+        *recovery = self.recovery.unwrap_or(*recovery);
+        let (record, settings) = (settings.to_toml()?, settings.tracker());
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let rig = open_rig(self.rig.as_deref())?;
@@ -243,7 +246,7 @@ impl Track {
         });
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
-            let document = json!({ "frames": frames, "failures": failures });
+            let document = json!({ "frames": frames, "failures": failures, "settings": record });
             say(format!("{document:#}"))?;
         } else if !frames.is_empty() {
             say(format!("{}, written to {}", told(&frames), self.out.display()))?;
