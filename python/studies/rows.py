@@ -39,6 +39,8 @@ def read(arguments):
         runs = rows.groupby([*GROUP, "method"])[RUN].nunique()
         if (runs > 1).any(axis=None):
             raise ValueError(f"rows of different runs are mixed:\n{runs[(runs > 1).any(axis=1)]}")
+    # Intervals are then the same for any order of the files.
+    rows = rows.sort_values("frame", kind="stable", ignore_index=True)
     # The errors that the posterior is of are those of the object's center.
     position = rows["distance_mm"].fillna(10.0 * rows["pe_cm"])
     orientation = rows["angle_deg"].fillna(rows["oe_deg"])

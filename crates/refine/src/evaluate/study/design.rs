@@ -137,7 +137,7 @@ mod tests {
     /// Labels of the rows of a study.
     fn labels(kind: Kind, methods: &[&str], iterations: Option<usize>) -> Vec<String> {
         let method = |name: &&str| {
-            let named = NamedMethod::find(name).unwrap();
+            let named = Method::named(name).unwrap();
             ((*name).to_owned(), Design::method(kind, named, iterations))
         };
         let methods: Vec<_> = methods.iter().map(method).collect();

@@ -35,9 +35,10 @@ mod tests {
         let mut count = 0;
         for study in [Kind::Main, Kind::Gradients, Noise, Steps] {
             for level in ["low", "high"] {
-                let names = study.methods().into_iter().chain(["truth", "initial"]);
+                let names =
+                    study.methods().into_iter().chain(["truth", "initial"].map(str::to_owned));
                 let steps = [100, 200, 400, 600, 1000].map(|n| format!("{n} steps"));
-                for label in names.map(str::to_owned).chain(steps) {
+                for label in names.chain(steps) {
                     let Some(means) = published(study, level, &label) else { continue };
                     count += 1;
                     let [ca, iv, delta_ca, delta_iv] = [7, 8, 9, 10].map(|k| means[k]);
