@@ -43,6 +43,8 @@ pub(super) const MASK_AREA: Range<f64> = 0.4..2.5;
 /// Largest shares of the mask on the hand, and on what is behind the object: segmentations leak.
 pub(super) const MASK_ON_HAND: f64 = 0.2;
 pub(super) const MASK_BEHIND: f64 = 0.05;
+/// Largest share of the mask's border along which the same surface goes on outside of it.
+pub(super) const MASK_CUT: f64 = 0.12;
 
 /// Largest force of a taxel, and of all together \[N\]; smallest of the largest one where an object is held.
 pub(super) const TAXEL_FORCE: f64 = 50.0;

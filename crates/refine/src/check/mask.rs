@@ -1,7 +1,8 @@
 //! The mask against the object at the pose, and against what depth shows under it.
 
+use super::border::cut_share;
 use super::limits::{
-    HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_ON_HAND, MASK_OVERLAP, MASK_SHIFT,
+    HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_CUT, MASK_ON_HAND, MASK_OVERLAP, MASK_SHIFT,
 };
 use super::warning::{Subject, Warning};
 use crate::scene::{Object, View, median};
@@ -53,7 +54,7 @@ pub(super) fn at_pose(
     Some(Warning::new(subject, value, finding, hint))
 }
 
-/// Warning of what depth shows under the mask that is not the object; and whether all of this was asked and nothing found. The hand is not asked
+/// Warning of what depth shows under the mask, and across its border, that is not the object; and whether all of this was asked and nothing found. The hand is not asked
 /// unless `hand_fits`.
 pub(super) fn off_object(
     view: &View<'_>,
@@ -68,14 +69,20 @@ pub(super) fn off_object(
     let behind = share(masked().filter(|p| f64::from(p.sensor) > beyond).count());
     let of_hand = || masked().filter(|p| p.is_on_hand(HAND_REACH_AT_OBJECT) && !p.shows_object());
     let on_hand = if hand_fits { share(of_hand().count()) } else { 0.0 };
-    if behind <= MASK_BEHIND && on_hand <= MASK_ON_HAND {
-        return (None, hand_fits);
+    if behind > MASK_BEHIND || on_hand > MASK_ON_HAND {
+        let finding = format!(
+            "{:.0} % of the mask's pixels are on the hand and {:.0} % on what is behind the object",
+            on_hand * 1e2,
+            behind * 1e2
+        );
+        let hint = "does it leak, is it shifted, or of the whole object (mask, not mask_visib)?";
+        return (Some(Warning::new(Subject::Mask, (on_hand + behind, ""), finding, hint)), false);
     }
-    let finding = format!(
-        "{:.0} % of the mask's pixels are on the hand and {:.0} % on what is behind the object",
-        on_hand * 1e2,
-        behind * 1e2
-    );
-    let hint = "does it leak, is it shifted, or of the whole object (mask, not mask_visib)?";
-    (Some(Warning::new(Subject::Mask, (on_hand + behind, ""), finding, hint)), false)
+    let cut = if hand_fits { cut_share(view) } else { None };
+    let Some(cut) = cut.filter(|cut| *cut > MASK_CUT) else { return (None, cut.is_some()) };
+    let percent = cut * 1e2;
+    let finding =
+        format!("along {percent:.0} % of the mask's border the same surface goes on outside of it");
+    let hint = "is the mask shifted, or too small?";
+    (Some(Warning::new(Subject::Mask, (cut, ""), finding, hint)), false)
 }

@@ -3,6 +3,7 @@
 //!
 //! One cause should make one warning: what a hand, a mesh or depth is needed for is not judged if that is at fault itself.
 
+mod border;
 mod correction;
 mod depth;
 mod hand;
