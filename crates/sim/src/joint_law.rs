@@ -1,12 +1,12 @@
 //! What acts along a joint: springs, dampers, friction, limits, motors and servos, one a file.
 
-pub(crate) mod activation;
 pub(crate) mod affine_actuator;
 pub(crate) mod damper;
 pub(crate) mod dynamic;
 pub(crate) mod friction;
 pub(crate) mod limits;
 pub(crate) mod motor;
+pub(crate) mod muscle;
 pub(crate) mod polynomial;
 pub(crate) mod position_servo;
 pub(crate) mod registry;

@@ -27,10 +27,12 @@ pub(super) fn content(
         "ply" | "obj" | "stl" | "gltf" | "glb" => {
             MeshInfo::read(path, options, warnings).map(Content::Mesh)
         }
-        "urdf" => RobotInfo::of_urdf(path, warnings).map(Content::Robot),
+        "urdf" => RobotInfo::of_urdf(path, &options.robot, warnings).map(Content::Robot),
         "xml" => match outermost(&text(path)?) {
-            Some("robot") => RobotInfo::of_urdf(path, warnings).map(Content::Robot),
-            Some("mujoco") => RobotInfo::of_mjcf(path, warnings).map(Content::Robot),
+            Some("robot") => RobotInfo::of_urdf(path, &options.robot, warnings).map(Content::Robot),
+            Some("mujoco") => {
+                RobotInfo::of_mjcf(path, &options.robot, warnings).map(Content::Robot)
+            }
             _ => Err(InfoError::unknown(path, "the outermost element is neither robot nor mujoco")),
         },
         "json" => {

@@ -17,6 +17,7 @@ mod robot;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use prehend_geometry::ReadOptions;
 use serde::Serialize;
 
 pub use self::dataset::{DatasetInfo, SceneInfo};
@@ -37,11 +38,13 @@ pub struct DescribeOptions {
     pub density: Option<f64>,
     /// Split of a dataset; `test` or the only one without.
     pub split: Option<String>,
+    /// How a robot is read.
+    pub robot: ReadOptions,
 }
 
 impl Default for DescribeOptions {
     fn default() -> Self {
-        Self { mesh_unit: 1.0, density: None, split: None }
+        Self { mesh_unit: 1.0, density: None, split: None, robot: ReadOptions::default() }
     }
 }
 

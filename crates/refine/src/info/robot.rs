@@ -3,10 +3,10 @@
 use std::fmt;
 use std::path::Path;
 
-use prehend_geometry::KinematicTree;
 use prehend_geometry::mass::mass_properties;
 use prehend_geometry::mjcf::{JointKind, Model};
 use prehend_geometry::robot::{Drive, Motion};
+use prehend_geometry::{KinematicTree, ReadOptions};
 use serde::Serialize;
 
 use super::InfoError;
@@ -49,8 +49,12 @@ pub struct JointInfo {
 }
 
 impl RobotInfo {
-    pub(super) fn of_urdf(path: &Path, warnings: &mut Vec<String>) -> Result<Self, InfoError> {
-        let tree = KinematicTree::from_urdf_file(path)?;
+    pub(super) fn of_urdf(
+        path: &Path,
+        options: &ReadOptions,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, InfoError> {
+        let tree = KinematicTree::from_urdf_file_with(path, options)?;
         warnings.extend_from_slice(tree.warnings());
         let mut joints = Vec::new();
         for joint in tree.joints() {
@@ -92,8 +96,12 @@ impl RobotInfo {
         })
     }
 
-    pub(super) fn of_mjcf(path: &Path, warnings: &mut Vec<String>) -> Result<Self, InfoError> {
-        let model = Model::from_file(path)?;
+    pub(super) fn of_mjcf(
+        path: &Path,
+        options: &ReadOptions,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, InfoError> {
+        let model = Model::from_file_with(path, options)?;
         warnings.extend(model.warnings.iter().map(ToString::to_string));
         let joints = model.bodies.iter().flat_map(|body| {
             body.joints.iter().map(|joint| JointInfo {

@@ -9,6 +9,7 @@ use prehend_refine::info::{DescribeOptions, describe};
 use serde_json::json;
 
 use crate::options::Unit;
+use crate::robot_options::RobotOptions;
 use crate::terminal::say;
 
 #[derive(Args)]
@@ -27,6 +28,8 @@ pub(crate) struct Info {
     /// Split of a dataset [default: test, or the only one]
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    #[command(flatten)]
+    robot: RobotOptions,
     /// Print JSON, warnings included
     #[arg(long, help_heading = "Output")]
     json: bool,
@@ -41,6 +44,7 @@ impl Info {
             mesh_unit: self.mesh_unit.meters(),
             density: self.density,
             split: self.split,
+            robot: self.robot.read()?,
         };
         let described = describe(&self.path, &options)?;
         if self.json {

@@ -13,6 +13,7 @@ mod options;
 mod pages;
 mod refine;
 mod report;
+mod robot_options;
 mod study;
 mod symmetry;
 mod synth;
