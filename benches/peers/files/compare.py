@@ -3,18 +3,21 @@
     pip install mujoco pin
     cargo build --release -p prehend-sim --example robot_dynamics
     python compare.py FOLDER... [--list] [--states 20] [--tolerance 1e-6]
+    python compare.py FOLDER... --times CACHE
 
 For each file: whether both load it; degrees of freedom, masses, inertias, joint ranges and actuators; poses of all bodies in random
 positions; mass matrix, forward and inverse dynamics with contacts, limits, equalities and dry friction off and without a medium, relative
 to the scale of the mass matrix. Pinocchio reads no collision shapes with a model, so that a URDF whose shapes are not there is read without.
 Of MJCF only rigid models count: those without flex and plugin in MuJoCo's own model. `--list` prints
-what becomes of each file.
+what becomes of each file. `--times` instead reads all that loads with its shapes, twice, and prints the most processor time: distance grids are made
+the first time and kept in CACHE.
 """
 
 import argparse
 import collections
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 
@@ -249,10 +252,31 @@ def compare_urdf(file, model, prehend, states, tolerance):
         compare_dynamics(found, mass, forward, effort, a, tolerance)
 
 
+def processor_time():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def times(options, folder, files):
+    taken = {}
+    for run in ("made", "kept"):
+        for file in files:
+            start = processor_time()
+            arguments = [options.command, file, "--root", folder, "--shapes", options.times, "--partial"]
+            done = subprocess.run(arguments, stdin=subprocess.DEVNULL, capture_output=True)
+            if done.returncode == 0:
+                taken.setdefault(file, {})[run] = processor_time() - start
+    for run in ("made", "kept"):
+        slowest = sorted(taken, key=lambda file: -taken[file].get(run, 0))[:5]
+        print(f"{folder}, {run}: {len(taken)} files, at most "
+              + ", ".join(f"{file.relative_to(folder)} {taken[file].get(run, 0):.1f} s" for file in slowest), flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folders", nargs="+", type=pathlib.Path)
     parser.add_argument("--list", action="store_true", help="what becomes of each file")
+    parser.add_argument("--times", metavar="CACHE", help="how long files take to read with their shapes")
     parser.add_argument("--states", type=int, default=20)
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--command", default=REPOSITORY / "target/release/examples/robot_dynamics")
@@ -260,6 +284,9 @@ def main():
     kinds = {".xml": (mjcf_model, compare_mjcf), ".urdf": (urdf_model, compare_urdf)}
     for folder in options.folders:
         files = sorted(f for f in folder.rglob("*") if f.suffix in kinds)
+        if options.times:
+            times(options, folder, files)
+            continue
         outcome = collections.Counter()
         for file in files:
             read, compare = kinds[file.suffix]

@@ -1,10 +1,12 @@
 """Small models of each kind that is read, with what MuJoCo makes of them, for crates/sim/tests/it/robots/kinds.rs.
 
-    pip install mujoco
+    pip install mujoco pin
     python kinds.py > ../../../crates/sim/tests/it/golden/mjcf_kinds.json
+    python kinds.py --urdf > ../../../crates/sim/tests/it/golden/urdf_kinds.json
 
 For each model: masses, centers of mass and inertias of its bodies; in some random states the poses of all bodies and the accelerations, with
-limits, equalities, dry friction and contacts off. Robots are simulated for a second, too.
+limits, equalities, dry friction and contacts off. Robots are simulated for a second, too. With `--urdf`, the mass matrix and what holds a robot
+in URDF still, by Pinocchio.
 """
 
 import json
@@ -122,6 +124,8 @@ MODELS = {
     "polynomials": spatial(site("w") + site("l"), "stiffness='5 -4 9' damping='.1 .2 .3' springlength='0 .2'").replace('name="a" axis="0 1 0" damping="0.1"', 'name="a" axis="0 1 0" damping="0.1 .2 .3" stiffness="1 2 3" springref="10"'),
     "activations": arm("""<actuator><intvelocity joint="a" kp="7" kv=".3" actrange="-2 2"/><cylinder joint="b" timeconst=".1" area=".3" bias=".1 .2 -.3"/>
       <general joint="a" dyntype="filterexact" dynprm=".2" gainprm="2" actearly="true"/><general joint="b" dyntype="integrator" gear="4"/></actuator>"""),
+    "muscles": arm("""<actuator><muscle joint="a" lengthrange="-1 2"/><muscle joint="b" gear="-.5" lengthrange="-2 1" force="30" timeconst=".02 .05" tausmooth=".4" range=".6 1.1" lmin=".4" lmax="1.7" vmax="2" fpmax="1.5" fvmax="1.3"/>
+      <general joint="b" dyntype="muscle" gaintype="muscle" biastype="muscle" dynprm=".01 .04 0" gainprm=".7 1 20 100 .5 1.6 1.5 1.3 1.2" biasprm=".7 1 20 100 .5 1.6 1.5 1.3 1.2" lengthrange="-3 3"/></actuator>"""),
     "ranges and gears": arm("""<actuator><motor joint="a" gear="-3" ctrlrange="-.1 .1"/><position joint="b" kp="50" kv="2" forcerange="-1 2"/><damper joint="a" kv="3" ctrlrange="0 1"/>
       <velocity joint="b" kv="4" group="3"/></actuator>""", compiler='<option actuatorgroupdisable="3"/>'),
     "bounded actuators": """<mujoco><default><joint actuatorfrcrange="-.5 .5" actuatorgravcomp="true" axis="0 1 0"/></default><worldbody><body gravcomp="1"><joint name="a"/><geom type="capsule" size=".05" fromto="0 0 0 .5 0 0"/>
@@ -168,7 +172,47 @@ def bodies(model):
         yield [model.body_mass[i], *model.body_ipos[i], *inertia.flatten()]
 
 
+def inertial(xyz, rpy, mass, more="ixy='.001' ixz='-.002' iyz='.0005'"):
+    return f"<inertial><origin xyz='{xyz}' rpy='{rpy}'/><mass value='{mass}'/><inertia ixx='.02' {more} iyy='.03' izz='.04'/></inertial>"
+
+
+def joint(name, kind, parent, child, more):
+    return f"<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{more}</joint>"
+
+
+URDF = {
+    "strict": ("<robot name='r'><link name='a'/>" + "".join(f"<link name='{n}'>{inertial(x, r, m)}</link>" for n, x, r, m in [
+        ("b", ".1 0 .2", "0 0 0", 2), ("c", "0 .3 .1", ".1 .2 .3", 1), ("d", ".2 0 0", "1 0 -1", .5), ("e", "0 0 .1", "0 2 0", .3)])
+        + joint("p", "revolute", "a", "b", "<origin xyz='0 0 1' rpy='.3 .2 .1'/><axis xyz='0 1 0'/><limit lower='-1' upper='2' effort='1' velocity='1'/>")
+        + joint("q", "prismatic", "b", "c", "<origin xyz='.4 0 0' rpy='0 1 0'/><axis xyz='1 2 0'/><limit lower='-1' upper='2' effort='1' velocity='1'/>")
+        + joint("r", "fixed", "c", "d", "<origin xyz='.1 .2 .3' rpy='.3 .2 .1'/>")
+        + joint("s", "revolute", "d", "e", "<origin xyz='.1 0 0'/><limit lower='-1' upper='2' effort='1' velocity='1'/>") + "</robot>"),
+}
+# The same with faults that are put right.
+URDF["lenient"] = (URDF["strict"].replace("<axis xyz='0 1 0'/>", "<axis xyz='0 1 0'/><axis xyz='1 0 0'/>").replace("xyz='0 0 1'", "xyz='0 0 1 5'")
+                   .replace("rpy='0 2 0'/>", "rpy='0 2 0'/><material name='gone'/>"))
+
+
+def urdf():
+    import pinocchio
+
+    result = {}
+    model = pinocchio.buildModelFromXML(URDF["strict"])
+    data, random = model.createData(), np.random.default_rng(5)
+    states = []
+    for _ in range(3):
+        q = random.normal(size=model.nq)
+        mass = pinocchio.crba(model, data, q)
+        mass = np.triu(mass) + np.triu(mass, 1).T
+        states.append({"q": q.tolist(), "mass": mass.flatten().tolist(), "effort": pinocchio.computeGeneralizedGravity(model, data, q).tolist()})
+    for name, text in URDF.items():
+        result[name] = {"urdf": text, "joints": list(model.names)[1:], "states": states}
+    json.dump(result, sys.stdout, separators=(",", ":"))
+
+
 def main():
+    if sys.argv[1:] == ["--urdf"]:
+        return urdf()
     result = {}
     for name, source in {**MODELS, **ROBOTS}.items():
         files, model = load(source)

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 ///
 /// Attribute vectors, where present, have one entry a vertex; a position on a texture seam is stored
 /// once for each of its UVs (weld by position before asking topological questions).
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions \[m\].
     pub vertices: Vec<Point3<f64>>,

@@ -16,13 +16,41 @@ pub struct ReadOptions {
     pub root: Option<PathBuf>,
     /// Whether files that a description names may lie anywhere.
     pub allow_outside: bool,
-    /// Folders of ROS packages, by name, for `package://` names; without one they are looked for in the folders above the description.
+    /// Folders of ROS packages, by name, for `package://` names; others are looked for in [`package_paths`](Self::package_paths), and then in the
+    /// folders above the description.
     pub packages: BTreeMap<String, PathBuf>,
+    /// Folders that ROS packages lie in, up to two levels below.
+    pub package_paths: Vec<PathBuf>,
     /// Whether inertias that no body can have are replaced by those of the collision shapes with the mass that is given.
     pub inertia_from_geometry: bool,
 }
 
 impl ReadOptions {
+    /// With the packages that ROS has: in the folders of `ROS_PACKAGE_PATH`, and in `share` of those of `AMENT_PREFIX_PATH`.
+    pub fn with_ros_packages(mut self) -> Self {
+        for (variable, below) in [("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")] {
+            let folders = std::env::var_os(variable).unwrap_or_default();
+            let folders = std::env::split_paths(&folders).filter(|f| !f.as_os_str().is_empty());
+            self.package_paths.extend(folders.map(|folder| folder.join(below)));
+        }
+        self
+    }
+
+    /// The folder of the package of that name.
+    pub(crate) fn package(&self, name: &str) -> Option<PathBuf> {
+        let is_package = |folder: &PathBuf| folder.ends_with(name) && folder.is_dir();
+        let below = |folder: &PathBuf| -> Vec<PathBuf> {
+            let entries = folder.read_dir().into_iter().flatten().flatten();
+            entries.map(|entry| entry.path().join(name)).collect()
+        };
+        let within = |folder: &PathBuf| {
+            let near = [folder.clone(), folder.join(name)];
+            near.into_iter().find(is_package).or_else(|| below(folder).into_iter().find(is_package))
+        };
+        let known = self.packages.get(name).cloned();
+        known.or_else(|| self.package_paths.iter().find_map(within))
+    }
+
     /// The folder of the description at `path`, and what may be read beside it.
     pub(crate) fn folder(&self, path: &Path) -> Folder {
         let own = match path.parent() {
@@ -44,4 +72,25 @@ fn package_root(folder: &Path) -> Option<PathBuf> {
     let folder = folder.canonicalize().ok()?;
     let is_root = |f: &&Path| ["package.xml", ".git"].iter().any(|name| f.join(name).exists());
     folder.ancestors().find(is_root).map(Path::to_path_buf)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packages_lie_in_the_folders_of_their_paths() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        for name in ["work/src/arm", "opt/share/hand"] {
+            std::fs::create_dir_all(at(name)).unwrap();
+        }
+        let package_paths = vec![at("none"), at("work"), at("opt/share")];
+        let packages = BTreeMap::from([("own".to_owned(), at("opt"))]);
+        let options = ReadOptions { packages, package_paths, ..ReadOptions::default() };
+        let found = ["arm", "hand", "own", "other"].map(|name| options.package(name));
+        let expected =
+            [Some(at("work/src/arm")), Some(at("opt/share/hand")), Some(at("opt")), None];
+        assert_eq!(found, expected);
+    }
 }

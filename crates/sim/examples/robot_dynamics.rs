@@ -1,10 +1,11 @@
 //! A robot's bodies, joints and actuators, and its smooth dynamics in given states, as JSON for comparison with other programs.
 //!
-//! `cargo run --release -p prehend-sim --example robot_dynamics -- robot.xml [--partial] [--root DIR] < states.jsonl`
+//! `cargo run --release -p prehend-sim --example robot_dynamics -- robot.xml [--partial] [--root DIR] [--shapes CACHE] < states.jsonl`
 //!
 //! MJCF by default, URDF by the file's extension. The first line printed describes the model. For each line read, an object of `qpos`, `qvel`, `qacc`,
 //! `ctrl` and `act` as MuJoCo has them (of a URDF `q`, `v` and `a` by joint), one is printed with the poses of all bodies, the mass matrix, the
-//! accelerations without limits, equalities, dry friction and contacts, and the efforts that `qacc` takes.
+//! accelerations without limits, equalities, dry friction and contacts, and the efforts that `qacc` takes. With `--shapes`, shapes that collide are made,
+//! too: convex hulls, and distance grids that are kept in the folder.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
@@ -13,8 +14,8 @@ use std::path::Path;
 use anyhow::Context;
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use prehend_geometry::mjcf::{EqualityKind, Model, Transmission};
-use prehend_geometry::robot::{Drive, KinematicTree, Motion};
-use prehend_geometry::{Inertial, ReadOptions};
+use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
+use prehend_geometry::{GridCache, Inertial, ReadOptions};
 use prehend_sim::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
 use prehend_sim::{BodyId, State, World};
 use serde_json::{Value, json};
@@ -25,19 +26,20 @@ const LARGEST_PRINTED: usize = 400;
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     let file = arguments.next().context("give a robot's file")?;
-    let mut options = ReadOptions::default();
+    let (mut options, mut cache) = (ReadOptions::default(), None);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--partial" => options.partial = true,
             "--inertia-from-geometry" => options.inertia_from_geometry = true,
+            "--shapes" => cache = arguments.next(),
             "--root" => options.root = arguments.next().map(Into::into),
             other => anyhow::bail!("unknown option {other}"),
         }
     }
     let mut out = std::io::stdout().lock();
     let robot: Box<dyn Robot> = match Path::new(&file).extension() {
-        Some(e) if e == "urdf" => Box::new(Urdf::new(&file, &options)?),
-        _ => Box::new(Mjcf::new(&file, &options)?),
+        Some(e) if e == "urdf" => Box::new(Urdf::new(&file, &options, cache)?),
+        _ => Box::new(Mjcf::new(&file, &options, cache.is_some())?),
     };
     writeln!(out, "{}", robot.description())?;
     for line in std::io::stdin().lock().lines() {
@@ -59,7 +61,7 @@ struct Mjcf {
 }
 
 impl Mjcf {
-    fn new(file: &str, read: &ReadOptions) -> anyhow::Result<Self> {
+    fn new(file: &str, read: &ReadOptions, shapes: bool) -> anyhow::Result<Self> {
         let whole = Model::from_file_with(file, read)?;
         let mut model = whole.clone();
         // Smooth dynamics alone.
@@ -70,7 +72,7 @@ impl Mjcf {
         }
         let mut world = World::new(model.gravity);
         let partial = read.partial;
-        let options = MjcfOptions { shapes: false, partial, ..MjcfOptions::default() };
+        let options = MjcfOptions { shapes, partial, ..MjcfOptions::default() };
         let robot = world.add_mjcf(&model, &options)?;
         // Ranges are part of the description.
         Ok(Self { model: whole, world, robot })
@@ -136,8 +138,12 @@ struct Urdf {
 }
 
 impl Urdf {
-    fn new(file: &str, read: &ReadOptions) -> anyhow::Result<Self> {
+    fn new(file: &str, read: &ReadOptions, cache: Option<String>) -> anyhow::Result<Self> {
         let tree = KinematicTree::from_urdf_file_with(file, read)?;
+        if let Some(folder) = cache {
+            let (spacing, margin) = (RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN);
+            RobotShape::cached(&tree, spacing, margin, Some(&GridCache::new(folder)))?;
+        }
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
         // Where joints move no mass, next to none.
         let [plain, least] =

@@ -1,12 +1,12 @@
 //! Laws along a joint: springs, dampers, friction, limits, motors and servos, one a file.
 
-pub(crate) mod activation;
 pub(crate) mod affine_actuator;
 pub(crate) mod damper;
 pub(crate) mod dynamic;
 pub(crate) mod friction;
 pub(crate) mod limits;
 pub(crate) mod motor;
+pub(crate) mod muscle;
 pub(crate) mod polynomial;
 pub(crate) mod position_servo;
 pub(crate) mod registry;
@@ -16,13 +16,13 @@ pub(crate) mod spring;
 mod tests;
 pub(crate) mod velocity_servo;
 
-pub use self::activation::Activation;
 pub use self::affine_actuator::AffineActuator;
 pub use self::damper::JointDamper;
 pub use self::dynamic::DynJointLaw;
 pub use self::friction::JointFriction;
 pub use self::limits::JointLimits;
 pub use self::motor::Motor;
+pub use self::muscle::{Muscle, MuscleActivation};
 pub use self::polynomial::{PolynomialDamper, PolynomialSpring};
 pub use self::position_servo::PositionServo;
 pub use self::registry::{JointLawEntry, joint_laws};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
+use prehend_refine::data::user_cache;
 use prehend_sim::JointAxis;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::{MjcfOptions, UrdfOptions};
@@ -116,7 +117,11 @@ impl World {
     ) -> PyResult<Robot> {
         let robot = KinematicTree::from_urdf_file(&path).raise()?;
         let [spacing, margin] = LINK_GRID;
-        let shape = || shapes.then(|| RobotShape::new(&robot, spacing, margin)).transpose();
+        let cache = user_cache();
+        let shape = || {
+            let shape = || RobotShape::cached(&robot, spacing, margin, cache.as_ref());
+            shapes.then(shape).transpose()
+        };
         let shape = py.detach(shape).raise()?;
         let t_world_base = self::pose(pose.as_ref(), "pose")?;
         let options = UrdfOptions { t_world_base, base: base(floating), ..UrdfOptions::default() };

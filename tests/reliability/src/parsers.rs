@@ -61,6 +61,7 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "obj", form: Form::Text, read: |s, b| mesh(s, b, "m.obj") },
     Parser { name: "mtl", form: Form::Text, read: mtl },
     Parser { name: "stl", form: Form::Stl, read: |s, b| mesh(s, b, "m.stl") },
+    Parser { name: "dae", form: Form::Xml, read: |s, b| mesh(s, b, "m.dae") },
     Parser { name: "gltf", form: Form::Json, read: |s, b| mesh(s, b, "m.gltf") },
     Parser { name: "glb", form: Form::Glb, read: |s, b| mesh(s, b, "m.glb") },
     Parser { name: "urdf", form: Form::Xml, read: urdf },

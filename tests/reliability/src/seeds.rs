@@ -31,6 +31,7 @@ pub fn write() -> Result<()> {
     keep("ply", "ascii.ply", include_bytes!("seeds/ascii.ply"))?;
     keep("obj", "quads.obj", include_bytes!("seeds/quads.obj"))?;
     keep("gltf", "triangle.gltf", include_bytes!("seeds/triangle.gltf"))?;
+    keep("dae", "tetrahedron.dae", include_bytes!("seeds/tetrahedron.dae"))?;
     keep("stl", "ascii.stl", include_bytes!("seeds/ascii.stl"))?;
     keep("stl", "binary.stl", &stl(&SmallDataset::object()))?;
     keep("urdf", "hand.urdf", HAND.as_bytes())?;

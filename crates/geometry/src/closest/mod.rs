@@ -7,12 +7,14 @@ mod pack;
 mod search;
 mod topology;
 pub(crate) mod triangle;
+mod walk;
 mod winding;
 
 use nalgebra::{Point3, Vector3};
 
 pub use self::derivative::ClosestDerivative;
 pub use self::triangle::Feature;
+pub(crate) use self::walk::Walk;
 
 use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
@@ -130,8 +132,10 @@ impl ClosestPoints {
     pub fn new(mesh: &TriMesh) -> Result<Self, ClosestError> {
         let bvh = build(mesh)?;
         let sign = match PseudoNormals::new(mesh) {
-            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh), Winding::new(&bvh)),
-            None => Sign::Winding(Winding::new(&bvh)),
+            Some(normals) => {
+                Sign::PseudoNormal(normals, orientation(mesh), Winding::new(mesh, &bvh))
+            }
+            None => Sign::Winding(Winding::new(mesh, &bvh)),
         };
         Ok(Self::from_parts(bvh, sign))
     }
@@ -142,7 +146,7 @@ impl ClosestPoints {
     /// As [`Self::new`].
     pub fn with_winding_sign(mesh: &TriMesh) -> Result<Self, ClosestError> {
         let bvh = build(mesh)?;
-        let sign = Sign::Winding(Winding::new(&bvh));
+        let sign = Sign::Winding(Winding::new(mesh, &bvh));
         Ok(Self::from_parts(bvh, sign))
     }
 

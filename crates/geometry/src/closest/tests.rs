@@ -163,7 +163,7 @@ fn far_groups_hardly_change_the_winding_number() {
     let mut mesh = ball(40);
     mesh.faces.truncate(mesh.faces.len() / 2);
     let tree = Bvh::new(&mesh);
-    let winding = Winding::new(&tree);
+    let winding = Winding::new(&mesh, &tree);
     let mut random = SplitMix64::new(17);
     for _ in 0..200 {
         let p = point(&mut random) * 3.0;

@@ -3,10 +3,13 @@
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
+use wide::f64x4;
 
 use super::bvh::{Bvh, Child, child};
 use super::pack::LANES;
 use super::triangle::Triangle;
+use crate::mesh::TriMesh;
+use crate::topology::edges;
 
 /// A group of triangles seen from afar: its area vector at its center of area.
 #[derive(Clone, Copy, Debug)]
@@ -24,12 +27,29 @@ struct Dipole {
 #[derive(Clone, Debug)]
 pub(super) struct Winding {
     dipoles: Vec<[Dipole; LANES]>,
+    /// Edges at which the surface ends; none where they are more than [`MOST_ENDS`].
+    ends: Option<Vec<End>>,
+}
+
+/// An edge at which more faces end that run along it one way than the other.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    middle: Vector3<f64>,
+    half: f64,
+    /// Its length times how many.
+    length: f64,
 }
 
 const FAR: f64 = 4.0;
 
+/// More ends would take longer to look at than the number itself.
+const MOST_ENDS: usize = 1000;
+
+/// How far from one half the number has to be for its error not to matter.
+const CERTAIN: f64 = 0.1;
+
 impl Winding {
-    pub(super) fn new(bvh: &Bvh) -> Self {
+    pub(super) fn new(mesh: &TriMesh, bvh: &Bvh) -> Self {
         let none = Dipole { center: Vector3::zeros(), area_vector: Vector3::zeros(), radius: 0.0 };
         let mut dipoles = vec![[none; LANES]; bvh.nodes.len()];
         // (area, area-weighted center, area vector) of each node; children come after their parents.
@@ -59,7 +79,7 @@ impl Winding {
                 *dipole = Dipole { center, area_vector, radius };
             }
         }
-        Self { dipoles }
+        Self { dipoles, ends: ends(mesh) }
     }
 
     /// Winding number of the mesh about `p`: 1 inside and 0 outside of a closed mesh, between for an open one.
@@ -78,26 +98,61 @@ impl Winding {
                 }
                 match child(node.child[lane]) {
                     Child::Node(index) => open.push(index),
-                    Child::Pack(pack) => {
-                        solid_angle += bvh
-                            .triangles_of(pack)
-                            .iter()
-                            .map(|t| solid_angle_of(t, p))
-                            .sum::<f64>();
-                    }
+                    Child::Pack(pack) => solid_angle += solid_angle_of(bvh.triangles_of(pack), p),
                 }
             }
         }
         solid_angle / (4.0 * PI)
     }
+
+    /// Whether `p`, at this distance from the surface, is inside, and the radius of a ball around it of which the same is true.
+    ///
+    /// Off the surface the number changes as the potential of currents along the ends does (Biot and Savart's law): by less than the sum of their
+    /// lengths over 4π times their squared distances.
+    pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>, distance: f64) -> (bool, f64) {
+        let number = self.at(bvh, p).abs();
+        let spare = ((number - 0.5).abs() - CERTAIN) * 4.0 * PI;
+        let changes_less = |radius: &f64| {
+            let rate = |end: &End| {
+                let nearest = (end.middle - p).norm() - end.half - radius;
+                end.length / nearest.max(0.0).powi(2)
+            };
+            self.ends
+                .as_ref()
+                .is_some_and(|ends| ends.iter().map(rate).sum::<f64>() * radius < spare)
+        };
+        let radii = [distance, 0.5 * distance, 0.25 * distance];
+        (number > 0.5, radii.into_iter().find(changes_less).unwrap_or(0.0))
+    }
 }
 
-/// Signed solid angle of a triangle seen from `p` \[sr\] (van Oosterom and Strackee 1983).
-fn solid_angle_of(t: &Triangle, p: &Vector3<f64>) -> f64 {
-    let a = t.a - p;
-    let (b, c) = (a + t.ab, a + t.ac);
-    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-    let numerator = a.dot(&b.cross(&c));
-    let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-    2.0 * numerator.atan2(denominator)
+fn ends(mesh: &TriMesh) -> Option<Vec<End>> {
+    let weld = mesh.weld_within(0.0);
+    let mut ends = Vec::new();
+    for edge in edges(&weld.faces(mesh)) {
+        let forward = edge.uses.iter().filter(|side| side.forward).count();
+        let surplus = forward.abs_diff(edge.uses.len() - forward);
+        let [a, b] = edge.vertices.map(|v| weld.positions[v as usize].coords);
+        let length = (b - a).norm();
+        if surplus > 0 {
+            let length_of_all = length * surplus as f64;
+            ends.push(End { middle: (a + b) * 0.5, half: 0.5 * length, length: length_of_all });
+        }
+    }
+    (ends.len() <= MOST_ENDS).then_some(ends)
+}
+
+/// Signed solid angle of at most [`LANES`] triangles seen from `p` \[sr\] (van Oosterom and Strackee 1983).
+fn solid_angle_of(triangles: &[Triangle], p: &Vector3<f64>) -> f64 {
+    let (mut numerators, mut denominators) = ([0.0; LANES], [1.0; LANES]);
+    for (k, t) in triangles.iter().enumerate().take(LANES) {
+        let a = t.a - p;
+        let (b, c) = (a + t.ab, a + t.ac);
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        numerators[k] = a.dot(&b.cross(&c));
+        denominators[k] = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+    }
+    let (numerators, denominators) = (numerators.as_chunks().0, denominators.as_chunks().0);
+    let halves = numerators.iter().zip(denominators);
+    2.0 * halves.map(|(n, d)| f64x4::from(*n).atan2(f64x4::from(*d)).reduce_add()).sum::<f64>()
 }

@@ -21,8 +21,8 @@ pub enum MeshError {
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The extension is none of ply, obj, stl, gltf, glb.
-    #[error("{path}: not a known mesh format (expected .ply, .obj, .stl, .gltf or .glb)")]
+    /// The extension is none of ply, obj, stl, gltf, glb, dae.
+    #[error("{path}: not a known mesh format (expected .ply, .obj, .stl, .gltf, .glb or .dae)")]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -57,7 +57,7 @@ pub enum MeshError {
         /// The feature.
         feature: String,
     },
-    /// A texture that the mesh names is missing, outside its folder or not an image.
+    /// A texture is missing or not an image.
     #[error("{path}: texture {texture}: {reason}")]
     Texture {
         /// The mesh file.

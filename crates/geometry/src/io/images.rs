@@ -1,4 +1,4 @@
-//! The images of one mesh: each decoded once, and not more of them than the limit allows.
+//! The images of one mesh: each decoded once, and not more of them than the limit allows. One that cannot be read costs the colors, not the mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::mesh::Texture;
 /// Images decoded so far, by name.
 pub(super) struct Images<'a> {
     path: &'a Path,
-    known: BTreeMap<String, Arc<Texture>>,
+    known: BTreeMap<String, Option<Arc<Texture>>>,
     left: usize,
 }
 
@@ -20,22 +20,24 @@ impl<'a> Images<'a> {
         Self { path, known: BTreeMap::new(), left: MAX_PIXELS }
     }
 
-    /// The image `name`, decoded from what `bytes` gives unless it is known.
+    /// The image `name`, decoded from what `bytes` gives unless it is known; none, with a warning, where that cannot be.
     pub(super) fn get(
         &mut self,
         name: &str,
         bytes: impl FnOnce() -> Result<Vec<u8>, String>,
-    ) -> Result<Arc<Texture>, MeshError> {
+    ) -> Option<Arc<Texture>> {
         if let Some(known) = self.known.get(name) {
-            return Ok(known.clone());
+            return known.clone();
         }
         // Names may be whole `data:` URIs.
         let shown: String = name.chars().take(64).collect();
-        let bytes = bytes().map_err(|e| MeshError::texture(self.path, &shown, e))?;
-        let image = Arc::new(texture::decode(&bytes, self.path, &shown, self.left)?);
-        self.left = self.left.saturating_sub(image.pixels.len());
+        let bytes = bytes().map_err(|e| MeshError::texture(self.path, &shown, e));
+        let image = bytes.and_then(|bytes| texture::decode(&bytes, self.path, &shown, self.left));
+        let image = image.inspect_err(|error| log::warn!("{error}: the mesh is read without it"));
+        let image = image.ok().map(Arc::new);
+        self.left = self.left.saturating_sub(image.as_ref().map_or(0, |image| image.pixels.len()));
         self.known.insert(name.into(), image.clone());
-        Ok(image)
+        image
     }
 }
 
@@ -50,10 +52,7 @@ mod tests {
         let a = images.get("a", || Ok(png.clone())).unwrap();
         assert!(Arc::ptr_eq(&a, &images.get("a", || Err("read twice".into())).unwrap()));
         images.get("b", || Ok(png.clone())).unwrap();
-        let error = images.get("c", || Ok(png.clone())).unwrap_err().to_string();
-        assert_eq!(error, "m.glb: texture c: 8 pixels, more than the limit of 4 that is left");
-        assert!(
-            images.get("d", || Err("gone".into())).unwrap_err().to_string().contains("d: gone")
-        );
+        assert_eq!(images.get("c", || Ok(png.clone())), None);
+        assert_eq!(images.get("d", || Err("gone".into())), None);
     }
 }

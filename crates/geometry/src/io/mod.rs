@@ -1,10 +1,11 @@
-//! Mesh files: PLY, OBJ + MTL, STL, glTF in; PLY, OBJ + MTL and GLB out.
+//! Mesh files: PLY, OBJ + MTL, STL, glTF, COLLADA in; PLY, OBJ + MTL and GLB out.
 //!
 //! Companion files (materials, textures, buffers) are read from the folder of the mesh only, see [`folder::inside`];
 //! [`limits`] bound what a file may ask for. Lengths stay in the unit of the file: scale the result where a file is not in meters
 //! (`mesh.scaled(1e-3)` for BOP models in millimeters).
 
 mod atomic;
+mod dae;
 mod error;
 pub(crate) mod folder;
 mod gltf;
@@ -28,15 +29,16 @@ pub use plain::{open_plain, plain_target, read_plain};
 pub use save::{FilmBody, FilmCamera, FilmKey, GlbFilm};
 
 impl TriMesh {
-    /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf` or `.glb`, in the file's unit.
+    /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`, or `.dae` without its colors; in the file's unit, a `.dae` in
+    /// meters.
     ///
     /// Polygons become fans of triangles, glTF node transforms are applied, and textures are read from
     /// the folder of the mesh (never from outside it). A vertex on a texture seam is stored once for each of
-    /// its coordinates. Stored normals are brought to unit length; where one is zero, the surface's own stands in.
+    /// its coordinates. An image or a library of materials that cannot be read costs the colors alone, with a warning in the log. Stored normals are brought to unit length; where one is zero, the surface's own stands in.
     ///
     /// # Errors
     /// Every error names the file, and the element or field at fault: unreadable or truncated files,
-    /// counts or indices that do not fit, non-finite numbers, missing textures, meshes without triangles, and whatever
+    /// counts or indices that do not fit, non-finite numbers, meshes without triangles, and whatever
     /// is larger than [`limits`](crate::limits) allow.
     pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
         let bytes = read(path)?;
@@ -55,6 +57,7 @@ impl TriMesh {
             "obj" => obj::parse(bytes, path)?,
             "stl" => stl::parse(bytes, path)?,
             "gltf" | "glb" => gltf::parse(bytes, path)?,
+            "dae" => dae::parse(bytes, path)?,
             _ => return Err(MeshError::UnknownFormat { path: path.into() }),
         };
         checked(mesh, path)
@@ -156,10 +159,10 @@ mod tests {
 
     #[test]
     fn unknown_extension_and_missing_file_name_the_path() {
-        let error = TriMesh::from_bytes(b"", Path::new("a/b.dae")).unwrap_err();
+        let error = TriMesh::from_bytes(b"", Path::new("a/b.fbx")).unwrap_err();
         assert!(
             matches!(&error, MeshError::UnknownFormat { .. })
-                && error.to_string().contains("a/b.dae")
+                && error.to_string().contains("a/b.fbx")
         );
         let error = TriMesh::load(Path::new("no/such.ply")).unwrap_err();
         assert!(

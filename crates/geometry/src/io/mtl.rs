@@ -4,8 +4,11 @@ use std::collections::HashMap;
 
 use tobj::Material;
 
-/// The materials of a library, and their places by name; an error says in which line.
-pub(super) fn parse(bytes: &[u8]) -> Result<(Vec<Material>, HashMap<String, usize>), String> {
+/// The materials of a library, and their places by name.
+pub(super) type Library = (Vec<Material>, HashMap<String, usize>);
+
+/// The materials of a library; an error says in which line.
+pub(super) fn parse(bytes: &[u8]) -> Result<Library, String> {
     let text = String::from_utf8_lossy(bytes);
     let (mut materials, mut places) = (Vec::<Material>::new(), HashMap::new());
     for (number, line) in text.lines().enumerate() {

@@ -1,6 +1,6 @@
 //! Wavefront OBJ with MTL materials, through `tobj` (coordinates in single precision).
 
-use std::cell::RefCell;
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -16,34 +16,24 @@ const OPTIONS: LoadOptions =
     LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    let bytes = &*plain_text(bytes);
     check_indices(bytes, path)?;
-    // The name of the material library, and why it could not be read.
-    let library = RefCell::new((String::new(), String::new()));
     let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OPTIONS, |name| {
-        let name = name.display().to_string();
-        texture::beside(path, &name).and_then(|content| mtl::parse(&content)).map_err(|reason| {
-            *library.borrow_mut() = (name, reason);
+        library(path, &name.display().to_string()).map_err(|reason| {
+            log::warn!("{}: mtllib {}: {reason}: no colors", path.display(), name.display());
             LoadError::MaterialParseError
         })
     })
     .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
-    let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
-    let materials = match materials {
-        Ok(materials) => materials,
-        // Collision meshes often name materials that were never shipped; without UVs nothing is lost.
-        Err(_) if !textured => Vec::new(),
-        Err(_) => {
-            let (name, reason) = library.into_inner();
-            return Err(MeshError::malformed(path, format!("mtllib {name}"), reason));
-        }
-    };
+    // Collision meshes often name materials that were never shipped.
+    let materials = materials.unwrap_or_default();
     let mut images = Images::new(path);
     let mut parts = Vec::new();
     for model in &models {
         let material = model.mesh.material_id.and_then(|id| materials.get(id));
         let image = match material.and_then(image_name) {
             Some(name) if !model.mesh.texcoords.is_empty() => {
-                Some(images.get(name, || texture::beside(path, name))?)
+                images.get(name, || texture::beside(path, name))
             }
             _ => None,
         };
@@ -55,8 +45,45 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     join(parts, path)
 }
 
+/// Materials of the library `name`, or of several with spaces between.
+fn library(path: &Path, name: &str) -> Result<mtl::Library, String> {
+    let read = |name: &str| texture::beside(path, name).and_then(|content| mtl::parse(&content));
+    read(name).or_else(|reason| {
+        let mut all = mtl::Library::default();
+        for name in name.split_whitespace() {
+            let (materials, places) = read(name).map_err(|_| reason.clone())?;
+            let first = all.0.len();
+            all.0.extend(materials);
+            all.1.extend(places.into_iter().map(|(name, place)| (name, first + place)));
+        }
+        Ok(all)
+    })
+}
+
+/// The text in UTF-8 without a byte order mark, each line whole where a backslash broke it.
+fn plain_text(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let wide = |decode: fn([u8; 2]) -> u16| {
+        let units = bytes[2..].as_chunks().0.iter().map(|pair| decode(*pair));
+        let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+        Cow::Owned(text.collect::<String>())
+    };
+    let text = match bytes {
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        _ => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
+    };
+    if !text.contains('\\') {
+        return match text {
+            Cow::Borrowed(text) => Cow::Borrowed(text.as_bytes()),
+            Cow::Owned(text) => Cow::Owned(text.into_bytes()),
+        };
+    }
+    text.replace("\\\r\n", " ").replace("\\\n", " ").into_bytes().into()
+}
+
 /// Positions and faces alone.
 pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    let bytes = &*plain_text(bytes);
     check_indices(bytes, path)?;
     // Corners share their position whatever their normals are.
     let options = LoadOptions { single_index: false, ..OPTIONS };
@@ -75,6 +102,7 @@ pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErro
 
 /// The positions alone, with no faces.
 pub(super) fn points(bytes: &[u8]) -> TriMesh {
+    let bytes = plain_text(bytes);
     let lines = bytes.split(|b| *b == b'\n').filter_map(|line| std::str::from_utf8(line).ok());
     let points = lines.filter_map(|line| {
         let mut words = line.strip_prefix("v ")?.split_whitespace().map(str::parse::<f64>);
@@ -178,21 +206,18 @@ mod tests {
     fn texture_and_seams() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.obj");
-        let error = load(CUBE_CORNER, &path).unwrap_err().to_string();
-        assert!(error.contains("mtllib m.mtl: ") && error.contains("No such file"), "{error}");
-        let escaping = CUBE_CORNER.replace("m.mtl", "../m.mtl");
-        let error = load(&escaping, &path).unwrap_err().to_string();
-        assert!(error.contains("leaves the folder"), "{error}");
+        // A library that is missing, outside of the folder or broken costs the colors.
+        std::fs::write(folder.path().join("broken.mtl"), "newmtl painted\nKd 1\nKd x\n").unwrap();
+        for name in ["m.mtl", "../m.mtl", "broken.mtl"] {
+            let mesh = load(&CUBE_CORNER.replace("m.mtl", name), &path).unwrap();
+            assert!(mesh.faces.len() == 2 && mesh.texture.is_none(), "{name}");
+        }
         std::fs::write(
             folder.path().join("m.mtl"),
             "newmtl painted\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\n",
         )
         .unwrap();
-        let error = load(CUBE_CORNER, &path).unwrap_err();
-        assert!(
-            matches!(&error, MeshError::Texture { texture, .. } if texture == "t.png"),
-            "{error}"
-        );
+        assert!(load(CUBE_CORNER, &path).unwrap().texture.is_none());
         image::RgbImage::from_raw(1, 2, vec![9, 9, 9, 7, 7, 7])
             .unwrap()
             .save(folder.path().join("t.png"))
@@ -208,6 +233,36 @@ mod tests {
         assert_eq!(at(1, 0), (Point3::origin(), [0.5, 0.5]));
         assert_eq!(at(0, 2), at(1, 1));
         assert_eq!(mesh.texture.unwrap().pixels.len(), 2);
+    }
+
+    #[test]
+    fn texts_of_all_kinds() {
+        // Interleaved and negative indices, a line in two, names with spaces.
+        let text = "mtllib a b.mtl c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red one\nf -3 \\\n-2 -1\nv 0 0 1\nusemtl blue\nf 1 2 -1\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.obj");
+        let material = |name: &str, color: &str| format!("newmtl {name}\nKd {color}\n");
+        std::fs::write(folder.path().join("a b.mtl"), material("red one", "1 0 0")).unwrap();
+        let wide = |bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+            text.replace('\n', "\r\n").encode_utf16().flat_map(bytes).collect()
+        };
+        let big = [&[0xfe, 0xff][..], &wide(u16::to_be_bytes)].concat();
+        let little = [&[0xff, 0xfe][..], &wide(u16::to_le_bytes)].concat();
+        let marked = [b"\xef\xbb\xbf", text.as_bytes()].concat();
+        for bytes in [big, little, marked, text.as_bytes().to_vec()] {
+            let mesh = TriMesh::from_bytes(&bytes, &path).unwrap();
+            assert_eq!(mesh.faces, [[0, 1, 2], [0, 1, 3]]);
+            assert_eq!(mesh.vertices[3], Point3::new(0.0, 0.0, 1.0));
+        }
+        let alone = text.replace("a b.mtl c.mtl", "a b.mtl");
+        assert_eq!(load(&alone, &path).unwrap().colors.unwrap()[0], [1.0, 0.0, 0.0]);
+        std::fs::write(folder.path().join("a"), material("red one", "1 0 0")).unwrap();
+        std::fs::write(folder.path().join("b.mtl"), material("blue", "0 0 1")).unwrap();
+        let several = load(&text.replace(" c.mtl", ""), &path).unwrap();
+        assert_eq!(several.colors.unwrap()[0], [1.0, 0.0, 0.0]);
+        std::fs::remove_file(folder.path().join("a b.mtl")).unwrap();
+        let several = load(&text.replace(" c.mtl", ""), &path).unwrap();
+        assert_eq!(several.colors.unwrap()[3], [0.0, 0.0, 1.0]);
     }
 
     #[test]
@@ -243,6 +298,7 @@ mod tests {
         let error = load("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", path).unwrap_err().to_string();
         assert!(error.contains("m.obj: vertex 1: coordinate is not finite"), "{error}");
         assert!(TriMesh::from_bytes(&[0xff, 0xfe, b'\n', 0x80], path).is_err());
+        assert!(TriMesh::from_bytes(&[0xff], path).is_err());
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! What drives joints, tendons and sites.
 
-use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use nalgebra::Isometry3;
@@ -11,7 +10,6 @@ use super::drive::{Drive, DriveKind, Drives};
 use super::element::Element;
 use super::error::MjcfError;
 use super::names::{Names, Taken};
-use super::reflected::Reflected;
 use super::value::Limited;
 use super::{JointIndex, Model};
 
@@ -66,6 +64,30 @@ pub enum Dynamics {
     Integrator,
     /// The input follows the control with this time constant \[s\].
     Filter(f64),
+    /// The activation of a muscle: time constants upwards and downwards \[s\], and over what difference one becomes the other.
+    Muscle([f64; 3]),
+}
+
+/// How a muscle pulls: by its fiber's length, that of the actuator from `origin` over `unit`, and the rate of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Muscle {
+    /// Active force at a fiber's length of one, at rest; without it `scale` times the inertia: one over the size of the acceleration that a unit of
+    /// force gives with all joints at their references.
+    pub force: Option<f64>,
+    /// See `force`.
+    pub scale: f64,
+    /// Length at which the fiber's is zero.
+    pub origin: f64,
+    /// Length of a fiber of length one.
+    pub unit: f64,
+    /// Fiber's lengths between which there is active force.
+    pub lengths: [f64; 2],
+    /// Rate of shortening at which there is none \[1/s\].
+    pub fastest: f64,
+    /// Passive force, as part of the active one.
+    pub passive: f64,
+    /// Active force where the fiber is stretched fast, as part of that at rest.
+    pub stretching: f64,
 }
 
 /// An actuator. At the length `l` (the joint's position or the tendon's length times `gear`) and its rate `v` its force is
@@ -92,8 +114,10 @@ pub struct Actuator {
     pub activation_range: Option<(f64, f64)>,
     /// How far ahead the input is by which it drives \[s\]: by the model's time step where it is to act early.
     pub ahead: f64,
-    /// Share of critical damping by which the rate's bias is still to be found, where the length is that of a cable or of a site: with all
-    /// joints at their references the bias is −2 times it times √(gain · inertia at the length).
+    /// How it pulls, where it is a muscle: gain and bias are zero then.
+    pub muscle: Option<Muscle>,
+    /// Share of critical damping that gives the rate's bias of a servo: −2 times it times √(gain · inertia at the length), with all joints at their
+    /// references and everything else free to move.
     pub damping_ratio: Option<f64>,
 }
 
@@ -109,6 +133,7 @@ pub(super) struct Spec {
     activation: ([f64; 2], Limited),
     drives: Drives,
     group: i32,
+    length_range: Option<[f64; 2]>,
 }
 
 impl Default for Spec {
@@ -124,6 +149,7 @@ impl Default for Spec {
             activation: free,
             drives: Drives::default(),
             group: 0,
+            length_range: None,
         }
     }
 }
@@ -141,6 +167,7 @@ impl Spec {
         self.is_early = e.switch("actearly")?.unwrap_or(self.is_early);
         self.rod = e.number("cranklength")?.unwrap_or(self.rod);
         self.group = e.integer("group")?.unwrap_or(self.group);
+        self.length_range = e.numbers("lengthrange")?.or(self.length_range);
         for field in ["armature", "damping"] {
             if e.list(field, 3)?.is_some_and(|list| list.iter().any(|x| *x != 0.0)) {
                 e.refuse_attribute(field, "of actuators is not read");
@@ -166,8 +193,6 @@ pub(super) fn read(
     model: &Model,
     names: &Names,
 ) -> Result<(Vec<Actuator>, Vec<Option<usize>>), MjcfError> {
-    // Known when the first damping ratio asks for it.
-    let reflected = OnceCell::new();
     let (mut all, mut taken) = (Vec::new(), Taken::default());
     let mut written = Vec::new();
     let mut disabled = BTreeSet::new();
@@ -176,7 +201,7 @@ pub(super) fn read(
         disabled.extend(groups.into_iter().map(|group| group as i32));
     }
     for e in root.in_sections("actuator") {
-        let built = build(e, compilers, classes, (model, names), &reflected, &disabled)?;
+        let built = build(e, compilers, classes, (model, names), &disabled)?;
         written.push(built.is_some().then_some(all.len()));
         let Some(actuator) = built else { continue };
         taken.add(e, "actuator")?;
@@ -190,7 +215,6 @@ fn build(
     compilers: &Compilers,
     classes: &Classes,
     (model, names): (&Model, &Names),
-    reflected: &OnceCell<Option<Reflected>>,
     disabled: &BTreeSet<i32>,
 ) -> Result<Option<Actuator>, MjcfError> {
     let Some(kind) = DriveKind::of(&e.tag) else {
@@ -205,18 +229,14 @@ fn build(
         e.refuse("left out: gains, biases or dynamics of its kind are not read");
         return Ok(None);
     };
-    let (gear, compiler) = (spec.gear, compilers.of(e));
-    let mut damping_ratio = None;
-    if drive.has_damping_ratio() {
-        let reflected = reflected.get_or_init(|| Reflected::new(model)).as_ref();
-        let reflected = reflected.ok_or_else(|| {
-            e.invalid("dampratio", "needs mass: some of what moves weighs nothing")
-        })?;
-        match reflected.of(model, transmission, &gear) {
-            Some(mass) => bias[2] = -2.0 * bias[2] * (gain[0] * mass).sqrt(),
-            None => (damping_ratio, bias[2]) = (Some(bias[2]), 0.0),
-        }
+    let [is_partly, is_wholly] = drive.is_muscle();
+    let muscle = drive.muscle(spec.length_range).filter(|_| is_wholly);
+    if is_partly && muscle.is_none() {
+        e.refuse("left out: a muscle needs a lengthrange, and gain, bias and dynamics of its own");
+        return Ok(None);
     }
+    let (gear, compiler) = (spec.gear, compilers.of(e));
+    let damping_ratio = drive.has_damping_ratio().then(|| std::mem::take(&mut bias[2]));
     // The rate of a filter that is integrated exactly fades within the step.
     let ahead = match dynamics {
         Dynamics::Filter(time) if drive.is_exact() && time > 0.0 => {
@@ -263,6 +283,7 @@ fn build(
         force_range: range(["forcelimited", "forcerange"], spec.force)?,
         activation_range,
         ahead,
+        muscle,
         damping_ratio,
     }))
 }

@@ -1,6 +1,6 @@
 //! Gains and biases of actuators, and the shorthands for them.
 
-use super::actuator::Dynamics;
+use super::actuator::{Dynamics, Muscle};
 use super::element::Element;
 use super::error::MjcfError;
 
@@ -15,10 +15,11 @@ pub(super) enum DriveKind {
     Damper,
     Cylinder,
     Adhesion,
+    Muscle,
 }
 
 impl DriveKind {
-    const ALL: [(&str, Self); 8] = [
+    const ALL: [(&str, Self); 9] = [
         ("general", Self::General),
         ("motor", Self::Motor),
         ("position", Self::Position),
@@ -27,6 +28,7 @@ impl DriveKind {
         ("damper", Self::Damper),
         ("cylinder", Self::Cylinder),
         ("adhesion", Self::Adhesion),
+        ("muscle", Self::Muscle),
     ];
 
     pub(super) fn of(tag: &str) -> Option<Self> {
@@ -42,7 +44,8 @@ enum Form {
     Fixed,
     /// Three parameters: constant, by length, by rate.
     Affine,
-    /// Muscles, motors with electrical parts, functions of users.
+    Muscle,
+    /// Motors with electrical parts, functions of users.
     Other,
 }
 
@@ -52,6 +55,7 @@ enum Activation {
     Integrator,
     Filter,
     ExactFilter,
+    Muscle,
     Other,
 }
 
@@ -65,6 +69,8 @@ pub(super) struct Drive {
     bias: [f64; 3],
     activation: Activation,
     time_constant: f64,
+    /// Of a muscle: two time constants and the width between, and the parameters of its gain.
+    muscle: ([f64; 3], [f64; 9]),
     /// The control's range in half ranges of what the actuator pulls at; zero does not set it.
     pub(super) inherit_range: f64,
 }
@@ -77,13 +83,14 @@ impl Drive {
         bias: [0.0; 3],
         activation: Activation::None,
         time_constant: 1.0,
+        muscle: ([0.01, 0.04, 0.0], [0.75, 1.05, -1.0, 200.0, 0.5, 1.6, 1.5, 1.3, 1.2]),
         inherit_range: 0.0,
     };
 
     /// Gain, bias and dynamics; `None` where they are of a form that is not read.
     pub(super) fn resolved(&self) -> Option<([f64; 3], [f64; 3], Dynamics)> {
         let of = |form, values: [f64; 3]| match form {
-            Form::None => Some([0.0; 3]),
+            Form::None | Form::Muscle => Some([0.0; 3]),
             Form::Fixed => Some([values[0], 0.0, 0.0]),
             Form::Affine => Some(values),
             Form::Other => None,
@@ -92,9 +99,38 @@ impl Drive {
             Activation::None => Dynamics::Direct,
             Activation::Integrator => Dynamics::Integrator,
             Activation::Filter | Activation::ExactFilter => Dynamics::Filter(self.time_constant),
+            Activation::Muscle => Dynamics::Muscle(self.muscle.0),
             Activation::Other => return None,
         };
         Some((of(self.gain_form, self.gain)?, of(self.bias_form, self.bias)?, dynamics))
+    }
+
+    /// The muscle that it is, where it is one wholly, whose lengths have this range.
+    pub(super) fn muscle(&self, length_range: Option<[f64; 2]>) -> Option<Muscle> {
+        let [low, high, force, scale, shortest, longest, fastest, passive, stretching] =
+            self.muscle.1;
+        let [from, to] = length_range.filter(|[from, to]| from < to && low < high)?;
+        let unit = (to - from) / (high - low);
+        Some(Muscle {
+            force: (force >= 0.0).then_some(force),
+            scale,
+            origin: from - low * unit,
+            unit,
+            lengths: [shortest, longest],
+            fastest,
+            passive,
+            stretching,
+        })
+    }
+
+    /// Whether its gain, bias or dynamics are a muscle's, and whether all are.
+    pub(super) fn is_muscle(&self) -> [bool; 2] {
+        let parts = [
+            self.gain_form == Form::Muscle,
+            self.bias_form == Form::Muscle,
+            self.activation == Activation::Muscle,
+        ];
+        [parts.contains(&true), !parts.contains(&false)]
     }
 
     /// Whether its filter is integrated exactly.
@@ -112,13 +148,13 @@ impl Drive {
         let gains = [
             ("fixed", Form::Fixed),
             ("affine", Form::Affine),
-            ("muscle", Form::Other),
+            ("muscle", Form::Muscle),
             ("user", Form::Other),
         ];
         let biases = [
             ("none", Form::None),
             ("affine", Form::Affine),
-            ("muscle", Form::Other),
+            ("muscle", Form::Muscle),
             ("user", Form::Other),
         ];
         let dynamics = [
@@ -126,7 +162,7 @@ impl Drive {
             ("integrator", Activation::Integrator),
             ("filter", Activation::Filter),
             ("filterexact", Activation::ExactFilter),
-            ("muscle", Activation::Other),
+            ("muscle", Activation::Muscle),
             ("user", Activation::Other),
         ];
         self.gain_form = e.keyword("gaintype", &gains)?.unwrap_or(self.gain_form);
@@ -139,6 +175,27 @@ impl Drive {
         }
         let constant = e.list("dynprm", 10)?.and_then(|list| list.first().copied());
         self.time_constant = constant.unwrap_or(self.time_constant);
+        if self.is_muscle()[0] {
+            let (times, gain) = &mut self.muscle;
+            for (field, values) in [("dynprm", &mut times[..]), ("gainprm", &mut gain[..])] {
+                let list = e.list(field, 10)?.unwrap_or_default();
+                values.iter_mut().zip(list).for_each(|(old, new)| *old = new);
+            }
+        }
+        Ok(())
+    }
+
+    fn read_muscle(&mut self, e: &Element) -> Result<(), MjcfError> {
+        (self.gain_form, self.bias_form) = (Form::Muscle, Form::Muscle);
+        self.activation = Activation::Muscle;
+        let (times, gain) = &mut self.muscle;
+        e.leading("timeconst", &mut times[..2])?;
+        e.leading("range", &mut gain[..2])?;
+        times[2] = e.magnitude("tausmooth")?.unwrap_or(times[2]);
+        let fields = ["force", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax"];
+        for (field, value) in fields.into_iter().zip(&mut gain[2..]) {
+            *value = e.number(field)?.unwrap_or(*value);
+        }
         Ok(())
     }
 
@@ -166,11 +223,11 @@ impl Drive {
 /// What a default class says of one of the shorthands also is what `general` begins with, and what it says of `general`
 /// all of them begin with.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Drives([Drive; 8]);
+pub(super) struct Drives([Drive; 9]);
 
 impl Default for Drives {
     fn default() -> Self {
-        Self([Drive::GENERAL; 8])
+        Self([Drive::GENERAL; 9])
     }
 }
 
@@ -215,6 +272,7 @@ impl Drives {
                 let gain = e.magnitude("gain")?.unwrap_or(drive.gain[0]);
                 *drive = Drive { gain: [gain, 0.0, 0.0], ..Drive::GENERAL };
             }
+            DriveKind::Muscle => drive.read_muscle(e)?,
             DriveKind::Damper => {
                 let damping = e.magnitude("kv")?.unwrap_or(-drive.gain[2]);
                 let gain = [0.0, 0.0, -damping];
@@ -287,13 +345,12 @@ mod tests {
     }
 
     #[test]
-    fn damping_ratios_and_ranges_come_from_the_joint() {
+    fn damping_ratios_and_ranges_of_the_joint() {
         let servo = |more: &str| {
             actuators("", &format!("<position joint=\"y\" kp=\"8\" {more}/>")).unwrap()
         };
-        // Twice the ratio times the root of stiffness and mass.
-        assert!((servo("dampratio=\"0.5\"")[0].bias[2] + 4.0).abs() < 1e-12);
-        assert!((servo("dampratio=\"1\" gear=\"2\"")[0].bias[2] + 4.0).abs() < 1e-12);
+        let damped = &servo("dampratio=\"0.5\"")[0];
+        assert_eq!((damped.damping_ratio, damped.bias), (Some(0.5), [0.0, -8.0, 0.0]));
         assert_eq!(servo("inheritrange=\"0.5\"")[0].control_range, Some((0.0, 2.0)));
         assert_eq!(servo("timeconst=\"0.1\"")[0].dynamics, Dynamics::Filter(0.1));
         let both = actuators("", "<position joint=\"y\" kv=\"1\" dampratio=\"1\"/>").unwrap_err();

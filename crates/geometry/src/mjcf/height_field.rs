@@ -1,15 +1,10 @@
 //! Height fields: terrain over a rectangle.
 
-use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
-use super::compiler::Compilers;
+use super::asset::{Assets, Files};
 use super::element::Element;
 use super::error::MjcfError;
-use super::submodel;
-use crate::io::folder::Folder;
 use crate::io::read_plain;
 use crate::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use crate::mesh::Texture;
@@ -29,70 +24,40 @@ pub struct HeightField {
     pub heights: Vec<f64>,
 }
 
-/// The height fields of a model by name.
+/// The height fields of a model.
 pub(super) struct HeightFields<'a> {
-    assets: BTreeMap<String, &'a Element>,
-    folder: Option<&'a Folder>,
-    compilers: &'a Compilers,
-    read: RefCell<BTreeMap<String, Arc<HeightField>>>,
+    assets: Assets<'a, Arc<HeightField>>,
+    files: Files<'a>,
 }
 
 impl<'a> HeightFields<'a> {
-    pub(super) fn new(
-        root: &'a Element,
-        folder: Option<&'a Folder>,
-        compilers: &'a Compilers,
-    ) -> Result<Self, MjcfError> {
-        let mut assets = BTreeMap::new();
-        for e in root.in_sections("asset").filter(|e| e.tag == "hfield") {
-            e.take();
-            let stem = |file| Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
-            let name = e.text("name").map(str::to_owned);
-            let name = name.or_else(|| e.text("file").and_then(stem)).unwrap_or_default();
-            for field in ["nrow", "ncol", "elevation", "size", "content_type"] {
-                e.text(field);
-            }
-            if assets.insert(name, e).is_some() {
-                return Err(e.duplicate("hfield"));
-            }
-        }
-        Ok(Self { assets, folder, compilers, read: RefCell::default() })
+    pub(super) fn new(root: &'a Element, files: Files<'a>) -> Result<Self, MjcfError> {
+        let fields = ["nrow", "ncol", "elevation", "size", "content_type"];
+        Ok(Self { assets: Assets::new(root, "hfield", &fields)?, files })
     }
 
     /// The height field that the attribute `hfield` of `geom` names.
     pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Arc<HeightField>, MjcfError> {
-        if let Some(known) = self.read.borrow().get(name) {
-            return Ok(known.clone());
-        }
-        let e = *self.assets.get(name).ok_or_else(|| geom.unknown("hfield", name))?;
-        let [x, y, height, base] = e.numbers::<4>("size")?.ok_or_else(|| e.missing("size"))?;
-        if [x, y, height, base].iter().any(|s| *s <= 0.0) {
-            return Err(e.invalid("size", "must be positive"));
-        }
-        let (counts, mut heights) = match e.text("file") {
-            Some(file) => self.load(e, file)?,
-            None => written(e)?,
-        };
-        let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
-        let span = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-        let scale = if span > 0.0 { height / span } else { 0.0 };
-        heights.iter_mut().for_each(|h| *h = (*h - low) * scale);
-        let field = Arc::new(HeightField { half_extents: [x, y], height, base, counts, heights });
-        self.read.borrow_mut().insert(name.to_owned(), field.clone());
-        Ok(field)
+        self.assets.get(geom, name, |e| {
+            let [x, y, height, base] = e.numbers::<4>("size")?.ok_or_else(|| e.missing("size"))?;
+            if [x, y, height, base].iter().any(|s| *s <= 0.0) {
+                return Err(e.invalid("size", "must be positive"));
+            }
+            let (counts, mut heights) = match e.text("file") {
+                Some(file) => self.load(e, file)?,
+                None => written(e)?,
+            };
+            let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+            let span = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+            let scale = if span > 0.0 { height / span } else { 0.0 };
+            heights.iter_mut().for_each(|h| *h = (*h - low) * scale);
+            let half_extents = [x, y];
+            Ok(Arc::new(HeightField { half_extents, height, base, counts, heights }))
+        })
     }
 
     fn load(&self, e: &Element, name: &str) -> Result<([usize; 2], Vec<f64>), MjcfError> {
-        let Some(folder) = self.folder else {
-            return Err(e.unusable(name, "height fields need a folder to be looked for in"));
-        };
-        let compiler = self.compilers.of(e);
-        let file = match Path::new(name).file_name() {
-            Some(file) if compiler.strip_path => Path::new(file),
-            _ => Path::new(name),
-        };
-        let relative = Path::new(&compiler.mesh_folder).join(file);
-        let path = submodel::found(folder, e, &relative).map_err(|r| e.unusable(name, r))?;
+        let path = self.files.path(e, name)?;
         let is_png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         let wrong = |reason: String| e.unusable(name, reason);
         if is_png {

@@ -2,11 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use super::Model;
 use super::compiler::Compiler;
 use super::element::Element;
 use super::error::MjcfError;
-use super::reflected::Reflected;
 use super::solver::SolverParameters;
 use super::value::Limited;
 
@@ -80,28 +78,9 @@ pub struct Joint {
     pub limit_margin: f64,
     /// Whether the weight that is carried along it counts as an actuator's.
     pub carries_by_actuator: bool,
-    /// Time constant \[s\] and damping ratio \[1\] that its stiffness and damping follow from, once the model is whole.
-    pub(super) spring_damper: Option<[f64; 2]>,
-}
-
-/// Gives joints that tell a time constant and a damping ratio their stiffness and damping: those of the inertia that each moves with all joints at
-/// their references, everything else free to move.
-pub(super) fn settle(root: &Element, model: &mut Model) -> Result<(), MjcfError> {
-    let told = |joint: &Joint| joint.spring_damper.is_some_and(|[t, r]| t > 0.0 && r > 0.0);
-    if !model.bodies.iter().flat_map(|b| &b.joints).any(told) {
-        return Ok(());
-    }
-    let reflected = Reflected::new(model)
-        .ok_or_else(|| root.misplaced("springdamper needs mass: some of what moves has none"))?;
-    for index in model.joint_indices().collect::<Vec<_>>() {
-        let inertia = reflected.of_joint(index, model.joint(index).kind.velocities());
-        let joint = &mut model.bodies[index.body].joints[index.joint];
-        if let Some([time, ratio]) = joint.spring_damper.filter(|_| told(joint)) {
-            joint.stiffness = inertia / (time * ratio).powi(2);
-            joint.damping = 2.0 * inertia / time;
-        }
-    }
-    Ok(())
+    /// Time constant \[s\] and damping ratio \[1\], both positive, that take the place of stiffness and damping: those of the inertia that the joint
+    /// moves with all joints at their references, everything else free to move.
+    pub spring_damper: Option<[f64; 2]>,
 }
 
 /// What is known of a joint before it is complete.
@@ -226,7 +205,7 @@ impl Spec {
             limit_solver: self.limit,
             limit_margin: self.margin,
             carries_by_actuator: self.carries_by_actuator,
-            spring_damper: self.spring_damper,
+            spring_damper: self.spring_damper.filter(|of| of.iter().all(|x| *x > 0.0)),
         })
     }
 

@@ -1,21 +1,18 @@
 //! Mesh assets: read once, when the first geom asks for them.
 
-use std::cell::{OnceCell, RefCell};
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
+use super::asset::{Assets, Files};
 use super::class::{Classes, MAIN};
-use super::compiler::{Compiler, Compilers};
 use super::element::Element;
 use super::error::MjcfError;
 use super::mesh_mass::{self, MeshInertia};
-use super::{builtin_mesh, msh, orientation, submodel};
+use super::{builtin_mesh, msh, orientation};
 use crate::inertial::Inertial;
-use crate::io::folder::Folder;
 use crate::io::load_shape;
 use crate::limits::MAX_ELEMENTS;
 use crate::mesh::TriMesh;
@@ -81,84 +78,51 @@ impl Mesh {
     }
 }
 
-struct Asset<'a> {
-    element: &'a Element,
-    spec: Spec,
-}
-
-/// The meshes of a model by name.
+/// The meshes of a model.
 pub(super) struct Meshes<'a> {
-    assets: BTreeMap<String, Asset<'a>>,
-    folder: Option<&'a Folder>,
-    compilers: &'a Compilers,
-    read: RefCell<BTreeMap<String, Rc<Mesh>>>,
+    assets: Assets<'a, Rc<Mesh>>,
+    files: Files<'a>,
+    classes: &'a Classes,
 }
 
 impl<'a> Meshes<'a> {
     pub(super) fn new(
         root: &'a Element,
-        classes: &Classes,
-        folder: Option<&'a Folder>,
-        compilers: &'a Compilers,
+        classes: &'a Classes,
+        files: Files<'a>,
     ) -> Result<Self, MjcfError> {
-        let mut assets = BTreeMap::new();
-        for element in root.in_sections("asset").filter(|e| e.tag == "mesh") {
-            element.take();
-            let mut spec = classes.of(element, MAIN)?.mesh.clone();
-            spec.read(element)?;
-            let name = match element.text("name") {
-                Some(name) => name.to_owned(),
-                None => {
-                    let file = element.text("file").ok_or_else(|| element.missing("name"))?;
-                    let stem = Path::new(file).file_stem().unwrap_or_default();
-                    stem.to_string_lossy().into_owned()
-                }
-            };
-            for field in ["file", "vertex", "face", "builtin", "params"] {
-                element.text(field);
-            }
-            if assets.insert(name, Asset { element, spec }).is_some() {
-                return Err(element.duplicate("mesh"));
-            }
-        }
-        Ok(Self { assets, folder, compilers, read: RefCell::default() })
+        let assets = Assets::new(root, "mesh", &["file", "vertex", "face", "builtin", "params"])?;
+        let meshes = Self { assets, files, classes };
+        meshes.assets.elements().try_for_each(|e| meshes.spec(e).map(|_| ()))?;
+        Ok(meshes)
+    }
+
+    fn spec(&self, e: &Element) -> Result<Spec, MjcfError> {
+        let mut spec = self.classes.of(e, MAIN)?.mesh.clone();
+        spec.read(e)?;
+        Ok(spec)
     }
 
     /// The mesh that `geom` names.
     pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Rc<Mesh>, MjcfError> {
-        if let Some(mesh) = self.read.borrow().get(name) {
-            return Ok(mesh.clone());
-        }
-        let asset = self.assets.get(name).ok_or_else(|| geom.unknown("mesh", name))?;
-        let e = asset.element;
-        let mut raw = match (e.text("file"), e.text("builtin")) {
-            (Some(file), _) => self.load(e, file, self.compilers.of(e))?,
-            (None, Some(kind)) => builtin_mesh::made(e, kind)?,
-            (None, None) => written(e)?,
-        };
-        if raw.faces.is_empty() {
-            let flat = || e.invalid("vertex", "is in a plane: it has no convex hull");
-            raw = raw.convex_hull().ok_or_else(flat)?;
-        }
-        let spec = &asset.spec;
-        let (mesh, inertia) = (Arc::new(spec.apply(raw)), spec.inertia);
-        let mesh = Rc::new(Mesh { mesh, inertia, unit: OnceCell::new() });
-        self.read.borrow_mut().insert(name.to_owned(), mesh.clone());
-        Ok(mesh)
+        self.assets.get(geom, name, |e| {
+            let mut raw = match (e.text("file"), e.text("builtin")) {
+                (Some(file), _) => self.load(e, file)?,
+                (None, Some(kind)) => builtin_mesh::made(e, kind)?,
+                (None, None) => written(e)?,
+            };
+            if raw.faces.is_empty() {
+                let flat = || e.invalid("vertex", "is in a plane: it has no convex hull");
+                raw = raw.convex_hull().ok_or_else(flat)?;
+            }
+            let spec = self.spec(e)?;
+            let (mesh, inertia) = (Arc::new(spec.apply(raw)), spec.inertia);
+            Ok(Rc::new(Mesh { mesh, inertia, unit: OnceCell::new() }))
+        })
     }
 
-    fn load(&self, e: &Element, name: &str, compiler: &Compiler) -> Result<TriMesh, MjcfError> {
-        let Some(folder) = self.folder else {
-            return Err(e.unusable(name, "mesh files need a folder to be looked for in"));
-        };
-        let file = match Path::new(name).file_name() {
-            Some(file) if compiler.strip_path => Path::new(file),
-            _ => Path::new(name),
-        };
-        let relative = Path::new(&compiler.mesh_folder).join(file);
-        // Meshes of an included file may lie beside it.
-        let path =
-            submodel::found(folder, e, &relative).map_err(|reason| e.unusable(name, reason))?;
+    fn load(&self, e: &Element, name: &str) -> Result<TriMesh, MjcfError> {
+        let path = self.files.path(e, name)?;
         if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("msh")) {
             return msh::load(&path).map_err(|reason| e.unusable(name, reason));
         }
@@ -190,6 +154,8 @@ fn written(e: &Element) -> Result<TriMesh, MjcfError> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::super::{Model, Shape};
     use super::*;
 

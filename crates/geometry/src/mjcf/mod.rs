@@ -24,6 +24,7 @@
 //! ```
 
 mod actuator;
+mod asset;
 mod body;
 mod builtin_mesh;
 mod class;
@@ -50,7 +51,6 @@ mod msh;
 mod names;
 mod orientation;
 mod reference;
-mod reflected;
 mod shape;
 mod site;
 mod solver;
@@ -60,7 +60,7 @@ mod tendon;
 mod value;
 mod warning;
 
-pub use actuator::{Actuator, Dynamics, PlacedFrame, Transmission};
+pub use actuator::{Actuator, Dynamics, Muscle, PlacedFrame, Transmission};
 pub use body::Body;
 pub use equality::{Equality, EqualityKind};
 pub use error::{MjcfError, Place};

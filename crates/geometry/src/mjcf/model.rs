@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Vector3};
 
 use super::actuator::{self, Actuator};
+use super::asset::Files;
 use super::body::{self, Body};
 use super::class::Classes;
 use super::compiler::Compiler;
@@ -22,7 +23,7 @@ use super::names::Names;
 use super::site::Site;
 use super::tendon::{self, Tendon};
 use super::warning::{self, Warning};
-use super::{joint, material, source, submodel};
+use super::{material, source, submodel};
 use crate::io::folder::Folder;
 use crate::read_options::ReadOptions;
 
@@ -118,9 +119,10 @@ impl Model {
         let compilers = submodel::unfold(&mut root, folder)?;
         let root = &root;
         let classes = Classes::read(root, &compilers)?;
+        let files = Files { folder, compilers: &compilers };
         let assets = Assets {
-            meshes: Meshes::new(root, &classes, folder, &compilers)?,
-            height_fields: HeightFields::new(root, folder, &compilers)?,
+            meshes: Meshes::new(root, &classes, files)?,
+            height_fields: HeightFields::new(root, files)?,
             materials: material::read(root, &classes)?,
         };
         let tree = body::read(root, &compilers, &classes, &assets)?;
@@ -151,7 +153,6 @@ impl Model {
         model.exclusions = contact::exclusions(root, &names)?;
         model.tendons = tendon::read(root, &compilers, &classes, &model, &names)?;
         names.add_tendons(root, &model.tendons);
-        joint::settle(root, &mut model)?;
         model.equalities = equality::read(root, &classes, &model, &names)?;
         let (actuators, written) = actuator::read(root, &compilers, &classes, &model, &names)?;
         model.actuators = actuators;

@@ -8,7 +8,7 @@ use super::height_field::HeightField;
 use crate::mesh::TriMesh;
 
 /// A shape in its own frame; round ones are about the z axis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// The half space below z = 0.
     Plane {

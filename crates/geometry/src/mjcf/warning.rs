@@ -90,7 +90,7 @@ const DYNAMIC: &[&str] = &[
 ];
 
 /// Elements and attributes below `root` that nothing has asked for, and those asked for in vain, each kind once. What only draws or measures is
-/// passed over, and so is how MuJoCo solves.
+/// passed over, and so is how MuJoCo solves, which is logged.
 pub(super) fn warnings(root: &Element) -> Vec<Warning> {
     let mut found: Vec<Warning> = Vec::new();
     let mut known: BTreeMap<(String, Option<String>, &'static str), usize> = BTreeMap::new();
@@ -106,10 +106,12 @@ pub(super) fn warnings(root: &Element) -> Vec<Warning> {
             }
         }
     };
+    let mut passed: BTreeMap<&str, usize> = BTreeMap::new();
     let mut open = vec![(root, false)];
     while let Some((element, in_default)) = open.pop() {
         let tag = element.tag.as_str();
         if HARMLESS.contains(&tag) {
+            *passed.entry(tag).or_default() += 1;
             continue;
         }
         // A class changes nothing but what is of it.
@@ -129,14 +131,22 @@ pub(super) fn warnings(root: &Element) -> Vec<Warning> {
         for (name, used) in element.attributes() {
             let changes = !in_default && DYNAMIC.contains(&name);
             match used {
-                Use::None if LOOKS.contains(&name) => {}
-                Use::None if matches!(tag, "option" | "compiler") && !MEDIUM.contains(&name) => {}
+                Use::None if LOOKS.contains(&name) => *passed.entry(name).or_default() += 1,
+                Use::None if matches!(tag, "option" | "compiler") && !MEDIUM.contains(&name) => {
+                    *passed.entry(name).or_default() += 1;
+                }
                 Use::None => add(element, Some(name), "not read", changes),
                 Use::Refused(reason) => add(element, Some(name), reason, changes),
                 Use::Read => {}
             }
         }
         open.extend(element.children.iter().rev().map(|child| (child, in_default)));
+    }
+    if !passed.is_empty() {
+        let passed: Vec<String> = passed.iter().map(|(name, n)| format!("{name} ({n})")).collect();
+        let file = root.place().file.map(|file| format!("{}: ", file.display()));
+        let (file, passed) = (file.unwrap_or_default(), passed.join(", "));
+        log::info!("{file}passed over, as only drawn, measured or of MuJoCo's solver: {passed}");
     }
     found
 }

@@ -109,8 +109,8 @@ fn resolve(file: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result
     let candidates: Vec<String> = match package {
         Some(rest) => {
             let (name, path) = rest.split_once('/').unwrap_or(("", rest));
-            if let Some(own) = options.packages.get(name) {
-                let path = Folder::own(own).file(path)?;
+            if let Some(own) = options.package(name) {
+                let path = Folder::own(&own).file(path)?;
                 let known = path.is_file().then_some(path);
                 return known.ok_or_else(|| format!("no such file in {}", own.display()));
             }

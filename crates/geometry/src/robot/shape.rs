@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use super::{KinematicTree, RobotError};
-use crate::closest::ClosestPoints;
+use crate::closest::{ClosestPoints, Walk};
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
 use crate::sdf::{GridCache, SdfGrid};
@@ -38,8 +38,14 @@ impl LinkShape {
             .map(|bounds| {
                 let spacing = spacing.max((bounds.1 - bounds.0).max() / MOST_CELLS);
                 let build = || {
-                    SdfGrid::from_fn(bounds, spacing, margin, |p, bound| {
-                        union_distance(&closest, p, bound)
+                    let closest = &closest;
+                    SdfGrid::from_fn(bounds, spacing, margin, || {
+                        let mut walks: Vec<Walk<'_>> = closest.iter().map(Walk::new).collect();
+                        move |p: &Point3<f64>, bound: f64| {
+                            union_distance(closest, p, bound, |k, most| {
+                                walks[k].signed_distance_within(p, most)
+                            })
+                        }
                     })
                 };
                 match cache {
@@ -72,7 +78,9 @@ impl LinkShape {
     /// The smallest of the bodies' own distances: exact outside; inside where bodies overlap it
     /// understates the depth, which never exceeds the depth in the union.
     pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
-        union_distance(&self.closest, point, f64::INFINITY)
+        union_distance(&self.closest, point, f64::INFINITY, |k, most| {
+            self.closest[k].signed_distance_within(point, most).map(|(distance, _)| distance)
+        })
     }
 }
 
@@ -95,16 +103,21 @@ impl DistanceField for LinkShape {
     }
 }
 
-/// Smallest signed distance to any of the bodies, where it is at most `bound` from zero.
-fn union_distance(bodies: &[ClosestPoints], point: &Point3<f64>, bound: f64) -> f64 {
-    bodies.iter().fold(f64::INFINITY, |best, body| {
+/// Smallest signed distance to any of the bodies, where it is at most `bound` from zero; `within` gives that to a body.
+fn union_distance(
+    bodies: &[ClosestPoints],
+    point: &Point3<f64>,
+    bound: f64,
+    mut within: impl FnMut(usize, f64) -> Option<f64>,
+) -> f64 {
+    bodies.iter().enumerate().fold(f64::INFINITY, |best, (k, body)| {
         let gap = box_distance(&body.bounds(), point);
         if gap > best.max(0.0) {
             return best;
         }
         // Outside its box a body matters only if nearer than the best; inside it may also be deeper.
         let limit = if gap > 0.0 { best.max(0.0).min(bound) } else { bound };
-        body.signed_distance_within(point, limit).map_or(best, |(distance, _)| best.min(distance))
+        within(k, limit).map_or(best, |distance| best.min(distance))
     })
 }
 

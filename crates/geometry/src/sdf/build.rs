@@ -60,26 +60,30 @@ impl SdfGrid {
 
     /// Samples any signed distance of a shape within `bounds` \[m\].
     ///
-    /// `distance` gets a point and an upper bound of the unsigned distance there (infinite where none
-    /// is known): that of the neighboring sample plus the step between them.
+    /// `start` begins a walk from sample to sample, of which there are several at once. It gets a point and an upper bound of the unsigned
+    /// distance there (infinite where none is known): that of the sample before plus the step between them.
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn from_fn(
+    pub fn from_fn<D: FnMut(&Point3<f64>, f64) -> f64>(
         bounds: (Point3<f64>, Point3<f64>),
         spacing: f64,
         margin: f64,
-        distance: impl Fn(&Point3<f64>, f64) -> f64 + Sync,
+        start: impl Fn() -> D + Sync,
     ) -> Result<Self, SdfError> {
         let lattice = Lattice::around(bounds, spacing, margin)?;
         let [_, ny, nz] = lattice.dims();
         let mut values = vec![0.0; lattice.dims().iter().product()];
-        values.par_chunks_mut(nz).enumerate().for_each(|(row, line)| {
-            let mut bound = f64::INFINITY;
-            for (k, value) in line.iter_mut().enumerate() {
-                *value = distance(&lattice.position([row / ny, row % ny, k]), bound);
-                // A distance changes by at most the length of the step; the rest is rounding.
-                bound = (value.abs() + spacing) * (1.0 + 1e-9);
+        values.par_chunks_mut(ny * nz).enumerate().for_each(|(i, slab)| {
+            let (mut distance, mut bound) = (start(), f64::INFINITY);
+            for (j, line) in slab.chunks_mut(nz).enumerate() {
+                for step in 0..nz {
+                    // To and fro, so that each sample is next to the one before.
+                    let k = if j % 2 == 0 { step } else { nz - 1 - step };
+                    line[k] = distance(&lattice.position([i, j, k]), bound);
+                    // A distance changes by at most the length of the step; the rest is rounding.
+                    bound = (line[k].abs() + spacing) * (1.0 + 1e-9);
+                }
             }
         });
         Ok(Self::from_samples(lattice, &values, bounds, f64::INFINITY))

@@ -19,12 +19,19 @@ const VERSION: u32 = 1;
 #[derive(Clone, Debug)]
 pub struct GridCache {
     folder: PathBuf,
+    /// Told before a grid is built.
+    tell: Option<fn(&str)>,
 }
 
 impl GridCache {
     /// The cache in `folder`, which is made when the first grid is written.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into() }
+        Self { folder: folder.into(), tell: None }
+    }
+
+    /// With a function that is told of each grid that is not here and has to be built, which may take seconds.
+    pub fn telling(self, tell: fn(&str)) -> Self {
+        Self { tell: Some(tell), ..self }
     }
 
     /// Where its grids are.
@@ -46,6 +53,10 @@ impl GridCache {
         // Grids of another shape by chance of the hash, one in 2⁶⁴, would need to have the same box besides.
         if let Some(grid) = kept.filter(|g| g.bounds() == bounds && g.spacing() == spacing) {
             return Ok(grid);
+        }
+        if let Some(tell) = self.tell {
+            let faces: usize = parts.iter().map(|part| part.faces.len()).sum();
+            tell(&format!("building a distance grid of {faces} faces, kept for later runs"));
         }
         let grid = build()?;
         // What cannot be kept is made again next time.

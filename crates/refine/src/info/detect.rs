@@ -24,10 +24,10 @@ pub(super) fn read(
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     Ok(match extension.to_ascii_lowercase().as_str() {
         "ply" | "obj" | "stl" | "gltf" | "glb" => ("mesh", mesh::read(path, options, warnings)?),
-        "urdf" => ("robot", robot::of_urdf(path, warnings)?),
+        "urdf" => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
         "xml" => match outermost(&read_text(path)?) {
-            Some("robot") => ("robot", robot::of_urdf(path, warnings)?),
-            Some("mujoco") => ("robot", robot::of_mjcf(path, warnings)?),
+            Some("robot") => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
+            Some("mujoco") => ("robot", robot::of_mjcf(path, &options.robot, warnings)?),
             _ => return Err(unknown(path, "the outermost element is neither robot nor mujoco")),
         },
         "json" => {

@@ -17,6 +17,7 @@ mod text;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use prehend_geometry::ReadOptions;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -31,11 +32,13 @@ pub struct DescribeOptions {
     pub density: Option<f64>,
     /// Split of a dataset; `test` or the only one without.
     pub split: Option<String>,
+    /// How a robot is read.
+    pub robot: ReadOptions,
 }
 
 impl Default for DescribeOptions {
     fn default() -> Self {
-        Self { mesh_unit: 1.0, density: None, split: None }
+        Self { mesh_unit: 1.0, density: None, split: None, robot: ReadOptions::default() }
     }
 }
 

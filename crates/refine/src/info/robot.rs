@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use prehend_geometry::KinematicTree;
 use prehend_geometry::mass::mass_properties;
 use prehend_geometry::mjcf::{JointKind, Model};
 use prehend_geometry::robot::{Drive, Motion};
+use prehend_geometry::{KinematicTree, ReadOptions};
 use serde_json::{Value, json};
 
 use super::InfoError;
@@ -15,8 +15,12 @@ use super::InfoError;
 type Joint<'a> = (&'a str, &'static str, &'a str, Option<(f64, f64)>, Option<&'a str>);
 
 /// Name, links, colliding shapes, mass of all links \[kg\], joints but for fixed ones, and how many of each motion there are.
-pub(super) fn of_urdf(path: &Path, warnings: &mut Vec<String>) -> Result<Value, InfoError> {
-    let tree = KinematicTree::from_urdf_file(path)?;
+pub(super) fn of_urdf(
+    path: &Path,
+    options: &ReadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Value, InfoError> {
+    let tree = KinematicTree::from_urdf_file_with(path, options)?;
     warnings.extend_from_slice(tree.warnings());
     let joint = |joint: &prehend_geometry::robot::Joint| {
         let motion = match joint.motion {
@@ -54,8 +58,12 @@ pub(super) fn of_urdf(path: &Path, warnings: &mut Vec<String>) -> Result<Value, 
 }
 
 /// The same of bodies, geoms and joints of MJCF, with its actuators and keyframes.
-pub(super) fn of_mjcf(path: &Path, warnings: &mut Vec<String>) -> Result<Value, InfoError> {
-    let model = Model::from_file(path)?;
+pub(super) fn of_mjcf(
+    path: &Path,
+    options: &ReadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Value, InfoError> {
+    let model = Model::from_file_with(path, options)?;
     warnings.extend(model.warnings.iter().map(ToString::to_string));
     let joints = model.bodies.iter().flat_map(|body| body.joints.iter().map(move |j| (body, j)));
     let joints = joints.map(|(body, joint)| {

@@ -3,39 +3,33 @@
 use prehend_autodiff::Scalar;
 
 use super::JointLaw;
-use crate::contact::parameters::Parameters;
+use crate::contact::error::LawError;
+use crate::contact::parameters::law_part;
 
-/// A spring with force −(a x + b x² + c x³) by its deflection x beyond the ends of a range, as MuJoCo's polynomial springs are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PolynomialSpring {
-    /// a, b and c.
-    pub coefficients: [f64; 3],
-    /// The positions between which it is slack.
-    pub slack: [f64; 2],
+law_part! {
+    /// A spring with force −(a x + b x² + c x³) by its deflection x beyond the ends of a range, as MuJoCo's polynomial springs are.
+    pub struct PolynomialSpring: "spring with a force of the third degree" {
+        linear ["N m/rad or N/m"] Finite "a";
+        quadratic ["N m/rad² or N/m²"] Finite "b";
+        cubic ["N m/rad³ or N/m³"] Finite "c";
+        lower ["rad or m"] Finite "position below which it pulls up";
+        upper ["rad or m"] Finite "position above which it pulls down";
+    }
+    where in_order
 }
 
-impl Parameters for PolynomialSpring {
-    type Params<T: Copy> = [T; 0];
-
-    fn values(&self) -> [f64; 0] {
-        []
-    }
-
-    fn names(&self) -> Vec<&'static str> {
-        Vec::new()
-    }
+fn in_order(&[.., lower, upper]: &[f64; 5]) -> Result<(), LawError> {
+    super::in_order(lower, upper)
 }
 
 impl JointLaw for PolynomialSpring {
-    fn effort<S: Scalar>(&self, _: [S; 0], position: S, _: S) -> S {
-        let [low, high] = self.slack;
+    fn effort<S: Scalar>(&self, [a, b, c, low, high]: [S; 5], position: S, _: S) -> S {
         let x = match position.value() {
-            value if value < low => position.plus(-low),
-            value if value > high => position.plus(-high),
+            x if x < low.value() => position - low,
+            x if x > high.value() => position - high,
             _ => return S::zero(),
         };
-        let [a, b, c] = self.coefficients;
-        -(x * ((x.times(c).plus(b)) * x).plus(a))
+        -(x * ((x * c + b) * x + a))
     }
 
     fn is_passive(&self) -> bool {
@@ -43,29 +37,18 @@ impl JointLaw for PolynomialSpring {
     }
 }
 
-/// A damper with force −(a v + b v|v| + c v³) by the rate v, as MuJoCo's polynomial dampers are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PolynomialDamper {
-    /// a, b and c.
-    pub coefficients: [f64; 3],
-}
-
-impl Parameters for PolynomialDamper {
-    type Params<T: Copy> = [T; 0];
-
-    fn values(&self) -> [f64; 0] {
-        []
-    }
-
-    fn names(&self) -> Vec<&'static str> {
-        Vec::new()
+law_part! {
+    /// A damper with force −(a v + b v|v| + c v³) by the rate v, as MuJoCo's polynomial dampers are.
+    pub struct PolynomialDamper: "damper with a force of the third degree" {
+        linear ["N m s/rad or N s/m"] Finite "a";
+        quadratic ["N m s²/rad² or N s²/m²"] Finite "b";
+        cubic ["N m s³/rad³ or N s³/m³"] Finite "c";
     }
 }
 
 impl JointLaw for PolynomialDamper {
-    fn effort<S: Scalar>(&self, _: [S; 0], _: S, velocity: S) -> S {
-        let [a, b, c] = self.coefficients;
+    fn effort<S: Scalar>(&self, [a, b, c]: [S; 3], _: S, velocity: S) -> S {
         let size = velocity.abs();
-        -(velocity * ((size.times(c).plus(b)) * size).plus(a))
+        -(velocity * ((size * c + b) * size + a))
     }
 }

@@ -53,20 +53,26 @@ impl World {
 
     /// The inertia along a sum of joints of the last articulation, whose mobility this is.
     pub(super) fn inertia_along(&self, mobility: &Mobility, axes: &[(JointAxis, f64)]) -> f64 {
-        let mut along = DMatrix::zeros(mobility.dofs, 1);
+        let along = self.slopes_along(axes, mobility.dofs);
+        1.0 / along.dot(&mobility.times(&along))
+    }
+
+    /// Slopes of a sum of joints by the degrees of freedom of their articulation, one column.
+    pub(super) fn slopes_along(&self, axes: &[(JointAxis, f64)], dofs: usize) -> DMatrix<f64> {
+        let mut along = DMatrix::zeros(dofs, 1);
         for (JointAxis { link, index }, factor) in axes {
             if let Ok((articulation, own)) = self.link_of(*link) {
                 let [_, dofs] = self.articulations[articulation].tree.range(own);
                 along[dofs.start + index] += factor;
             }
         }
-        1.0 / along.dot(&mobility.times(&along))
+        along
     }
 
-    /// The mobility of the last articulation, with its joints at their neutral coordinates.
-    pub(super) fn mobility(&self) -> Mobility {
+    /// The mobility of the last articulation, with its joints at coordinates `q`.
+    pub(super) fn mobility(&self, q: &[f64]) -> Mobility {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
-        let mass = tree.kinematics(&tree.neutral(), &vec![0.0; tree.nv()]).mass_matrix();
+        let mass = tree.kinematics(q, &vec![0.0; tree.nv()]).mass_matrix();
         let factor = TreeFactor::new(&mass, tree.carriers().to_vec());
         Mobility { dofs: tree.nv(), factor }
     }

@@ -84,7 +84,8 @@ impl World {
         bodies: &[BodyId],
         options: &UrdfOptions,
     ) -> Result<(), BuildError> {
-        let mobility = self.mobility();
+        let tree = &self.articulations[self.articulations.len() - 1].tree;
+        let mobility = self.mobility(&tree.neutral());
         for joint in robot.joints().iter().filter(|joint| joint.motion != Motion::Fixed) {
             let axis = JointAxis::from(bodies[joint.child]);
             let own = [(axis, 1.0)];

@@ -5,9 +5,11 @@
 use std::path::Path;
 
 use ::gltf::accessor::DataType;
+use ::gltf::accessor::sparse::IndexType;
 use ::gltf::{Accessor, buffer};
 
 use crate::io::MeshError;
+use crate::io::limits::MAX_ELEMENTS;
 
 /// The content of a file's buffers.
 pub(super) struct Buffers<'a> {
@@ -44,41 +46,76 @@ impl Buffers<'_> {
         let bad = |reason: &str| {
             MeshError::malformed(self.path, format!("accessor {}", accessor.index()), reason)
         };
-        if accessor.sparse().is_some() {
-            return Err(MeshError::Unsupported {
-                path: self.path.into(),
-                feature: "sparse accessors".into(),
-            });
-        }
         let components = accessor.dimensions().multiplicity();
         if components < width {
             return Err(bad("too few components"));
         }
         let number = accessor.data_type();
+        let own = Layout { number, components, normalized: accessor.normalized() };
+        let mut all = match accessor.view() {
+            Some(view) => self.read(&view, accessor.offset(), accessor.count(), own, &f),
+            // Without a view all are zero.
+            None => {
+                MeshError::within(self.path, "accessor", accessor.count(), MAX_ELEMENTS)?;
+                Ok((0..accessor.count()).map(|_| f(&vec![0.0; components])).collect())
+            }
+        }
+        .map_err(bad)?;
+        if let Some(sparse) = accessor.sparse() {
+            let (indices, values, count) = (sparse.indices(), sparse.values(), sparse.count());
+            let number = match indices.index_type() {
+                IndexType::U8 => DataType::U8,
+                IndexType::U16 => DataType::U16,
+                IndexType::U32 => DataType::U32,
+            };
+            let layout = Layout { number, components: 1, normalized: false };
+            let places =
+                self.read(&indices.view(), indices.offset(), count, layout, &|v| v[0] as usize);
+            let values = self.read(&values.view(), values.offset(), count, own, &f);
+            for (place, value) in places.map_err(bad)?.into_iter().zip(values.map_err(bad)?) {
+                *all.get_mut(place).ok_or_else(|| bad("a sparse index is out of range"))? = value;
+            }
+        }
+        Ok(all)
+    }
+
+    /// The elements of a view from `offset` on.
+    fn read<T>(
+        &self,
+        view: &buffer::View,
+        offset: usize,
+        count: usize,
+        Layout { number, components, normalized }: Layout,
+        f: &impl Fn(&[f64]) -> T,
+    ) -> Result<Vec<T>, &'static str> {
         let (size, element) = (number.size(), number.size() * components);
-        let view = accessor.view().ok_or_else(|| bad("no buffer view"))?;
         let stride = view.stride().unwrap_or(element);
-        let bytes = self
-            .view(&view)
-            .and_then(|v| v.get(accessor.offset()..))
-            .ok_or_else(|| bad("outside its buffer"))?;
-        let needed = match accessor.count() {
+        let bytes = self.view(view).and_then(|v| v.get(offset..)).ok_or("outside its buffer")?;
+        let needed = match count {
             0 => Some(0),
             n => (n - 1).checked_mul(stride).and_then(|b| b.checked_add(element)),
         };
         if needed.is_none_or(|n| n > bytes.len()) {
-            return Err(bad("outside its buffer view"));
+            return Err("outside its buffer view");
         }
         let mut values = vec![0.0; components];
         let read = |i: usize| {
             for (k, value) in values.iter_mut().enumerate() {
                 let at = i * stride + k * size;
-                *value = component(&bytes[at..at + size], number, accessor.normalized());
+                *value = component(&bytes[at..at + size], number, normalized);
             }
             f(&values)
         };
-        Ok((0..accessor.count()).map(read).collect())
+        Ok((0..count).map(read).collect())
     }
+}
+
+/// How the numbers of an element are stored.
+#[derive(Clone, Copy)]
+struct Layout {
+    number: DataType,
+    components: usize,
+    normalized: bool,
 }
 
 fn component(bytes: &[u8], number: DataType, normalized: bool) -> f64 {

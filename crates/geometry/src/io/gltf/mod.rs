@@ -20,7 +20,7 @@ use self::accessor::Buffers;
 use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
-use super::{MeshError, texture};
+use super::{MeshError, dae, texture};
 use crate::mesh::{Texture, TriMesh};
 
 /// Some writers leave the padding of data URIs out.
@@ -31,13 +31,7 @@ const DATA_URI: GeneralPurpose = GeneralPurpose::new(
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
-    let mut gltf = document(bytes).map_err(|e| MeshError::malformed(path, "document", e))?;
-    if let Some(required) = gltf.extensions_required().find(|e| !e.starts_with("KHR_materials_")) {
-        return Err(MeshError::Unsupported {
-            path: path.into(),
-            feature: format!("extension {required}"),
-        });
-    }
+    let mut gltf = document(bytes, path)?;
     // The crate unwraps what the standard requires of an image.
     let whole = |i: &::gltf::json::Image| match i.buffer_view {
         Some(_) => i.mime_type.is_some(),
@@ -79,18 +73,28 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     join(reader.parts, path)
 }
 
+/// Extensions that are read, beside those of materials, of which nothing but the base color is.
+const EXTENSIONS: [&str; 2] = ["KHR_mesh_quantization", "KHR_texture_transform"];
+
 /// The document, validated.
-fn document(bytes: &[u8]) -> Result<Gltf, String> {
+fn document(bytes: &[u8], path: &Path) -> Result<Gltf, MeshError> {
+    let malformed = |reason: String| MeshError::malformed(path, "document", reason);
     let Gltf { document, blob } =
-        Gltf::from_slice_without_validation(bytes).map_err(|e| e.to_string())?;
-    let json = document.into_json();
+        Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
+    let mut json = document.into_json();
+    for required in std::mem::take(&mut json.extensions_required) {
+        if !required.starts_with("KHR_materials_") && !EXTENSIONS.contains(&&*required) {
+            let feature = format!("extension {required}");
+            return Err(MeshError::Unsupported { path: path.into(), feature });
+        }
+    }
     // The crate's validation takes for granted that accessors of positions are there.
     let primitives = json.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut positions = primitives.filter_map(|p| p.attributes.get(&Valid(Semantic::Positions)));
     if positions.any(|accessor| accessor.value() >= json.accessors.len()) {
-        return Err("an accessor of positions is not there".into());
+        return Err(malformed("an accessor of positions is not there".into()));
     }
-    let document = Document::from_json(json).map_err(|e| e.to_string())?;
+    let document = Document::from_json(json).map_err(|e| malformed(e.to_string()))?;
     Ok(Gltf { document, blob })
 }
 
@@ -208,13 +212,7 @@ impl Reader<'_> {
             Mode::Triangles => {
                 indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>()
             }
-            // Every other triangle of a strip runs the other way round.
-            Mode::TriangleStrip => {
-                let alternate = |(k, w): (usize, &[u32])| {
-                    if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] }
-                };
-                indices.windows(3).enumerate().map(alternate).collect()
-            }
+            Mode::TriangleStrip => dae::strip(&indices).collect(),
             Mode::TriangleFan => {
                 indices.windows(2).skip(1).map(|w| [indices[0], w[0], w[1]]).collect()
             }
@@ -254,12 +252,22 @@ impl Reader<'_> {
         let mut part = Part { mesh, texture: None, color: [r, g, b] };
         let info = pbr.base_color_texture();
         if let Some(info) = &info {
-            part.texture = Some(self.image(&info.texture().source())?);
+            part.texture = self.image(&info.texture().source());
         }
-        let uv_set = info.map_or(0, |info| info.tex_coord());
+        let transform = info.as_ref().and_then(|info| info.texture_transform());
+        let uv_set = transform.as_ref().and_then(|transform| transform.tex_coord());
+        let uv_set = uv_set.or(info.map(|info| info.tex_coord())).unwrap_or(0);
         if let Some(accessor) = primitive.get(&Semantic::TexCoords(uv_set)) {
+            let mut uvs = self.buffers.floats::<2>(&accessor)?;
+            if let Some(transform) = transform {
+                let ([x, y], [sx, sy]) = (transform.offset(), transform.scale());
+                let (sin, cos) = transform.rotation().sin_cos();
+                for [u, v] in &mut uvs {
+                    let (a, b) = (*u * sx, *v * sy);
+                    (*u, *v) = (x + cos * a + sin * b, y + cos * b - sin * a);
+                }
+            }
             // glTF measures v from the top of the image.
-            let uvs = self.buffers.floats::<2>(&accessor)?;
             let uvs = uvs.iter().map(|[u, v]| [*u, 1.0 - v]).collect();
             part.mesh.uvs = self.one_each(uvs, n, "TEXCOORD")?;
         }
@@ -287,7 +295,7 @@ impl Reader<'_> {
         Ok(Some(values))
     }
 
-    fn image(&mut self, image: &image::Image) -> Result<Arc<Texture>, MeshError> {
+    fn image(&mut self, image: &image::Image) -> Option<Arc<Texture>> {
         match image.source() {
             image::Source::View { view, .. } => {
                 let bytes = || self.buffers.view(&view).map(<[u8]>::to_vec);
@@ -391,8 +399,8 @@ mod tests {
         let error = TriMesh::from_bytes(json.as_bytes(), &path).unwrap_err().to_string();
         assert!(error.contains("buffer 0: b.bin"), "{error}");
         std::fs::write(folder.path().join("b.bin"), &bin).unwrap();
-        let error = TriMesh::from_bytes(json.as_bytes(), &path).unwrap_err().to_string();
-        assert!(error.contains("texture my%20tex.png"), "{error}");
+        // An image that is missing costs the colors.
+        assert!(TriMesh::from_bytes(json.as_bytes(), &path).unwrap().texture.is_none());
         std::fs::write(folder.path().join("my tex.png"), texture().encode_png().unwrap()).unwrap();
         check(&TriMesh::from_bytes(json.as_bytes(), &path).unwrap());
         std::fs::write(folder.path().join("b.bin"), &bin[..40]).unwrap();
@@ -402,6 +410,58 @@ mod tests {
                 .to_string()
                 .contains("buffer 0: 40 bytes")
         );
+    }
+
+    #[test]
+    fn extensions_and_sparse_accessors() {
+        let path = Path::new("m.glb");
+        let mut bin = payload();
+        let json = document(r#"{"bufferView": 3, "mimeType": "image/png"}"#, "", bin.len());
+        let required = |names: &str| {
+            json.replacen(
+                '{',
+                &format!(r#"{{"extensionsUsed": [{names}], "extensionsRequired": [{names}],"#),
+                1,
+            )
+        };
+        for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
+            let json = required(&format!("\"{name}\""));
+            let error = TriMesh::from_bytes(&glb(&json, &bin), path).unwrap_err().to_string();
+            assert_eq!(error, format!("m.glb: extension {name} not supported"));
+        }
+        // A quarter turn, by the inverse of which the image turns on the surface, and half of the image.
+        let moved = r#""baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform":
+            {"offset": [0.25, 1], "rotation": 1.5707963267948966, "scale": [0.5, 1]}}}"#;
+        let json = required(r#""KHR_texture_transform", "KHR_mesh_quantization""#)
+            .replace(r#""baseColorTexture": {"index": 0}"#, moved);
+        let uvs = TriMesh::from_bytes(&glb(&json, &bin), path).unwrap().uvs.unwrap();
+        for (found, expected) in uvs.iter().zip([[0.25, 0.0], [0.25, 0.5], [1.25, 0.0]]) {
+            let off = (found[0] - expected[0]).abs().max((found[1] - expected[1]).abs());
+            assert!(off < 1e-6, "{uvs:?}");
+        }
+        // Positions of zero but for one that is replaced, in integers.
+        let at = bin.len().next_multiple_of(4);
+        bin.resize(at, 0);
+        bin.extend([1_u8, 0, 0, 0, 3, 0, 0, 0]);
+        let view = |from: usize, size| {
+            format!(r#"{{"buffer": 0, "byteOffset": {from}, "byteLength": {size}}}"#)
+        };
+        let views = format!(r#""bufferViews": [{}, {}, "#, view(at, 1), view(at + 4, 3));
+        let sparse = r#"{"componentType": 5120, "count": 3, "type": "VEC3", "min": [0,0,0], "max": [3,0,0],
+            "sparse": {"count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {"bufferView": 1, "componentType": 5120}}}"#;
+        let json = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "extensionsUsed": ["KHR_mesh_quantization"], "extensionsRequired": ["KHR_mesh_quantization"],
+            "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+            "buffers": [{{"byteLength": {}}}], {views}{}], "accessors": [{sparse}]}}"#,
+            bin.len(),
+            view(0, 1),
+        );
+        let mesh = TriMesh::from_bytes(&glb(&json, &bin), path).unwrap();
+        let expected = [Point3::origin(), Point3::new(3.0, 0.0, 0.0), Point3::origin()];
+        assert_eq!(mesh.vertices, expected);
+        bin[at] = 3;
+        let error = TriMesh::from_bytes(&glb(&json, &bin), path).unwrap_err().to_string();
+        assert!(error.contains("accessor 0: a sparse index is out of range"), "{error}");
     }
 
     #[test]

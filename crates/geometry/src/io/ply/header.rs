@@ -174,7 +174,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
                 element.properties.push(Property { name: (*name).into(), count, item });
             }
             [] | ["comment" | "obj_info", ..] => {}
-            _ => return Err(bad(format!("cannot read `{line}`"))),
+            _ => log::warn!("{}: header: `{line}` is passed over", path.display()),
         }
     }
     let encoding = encoding.ok_or_else(|| bad("no format line".into()))?;

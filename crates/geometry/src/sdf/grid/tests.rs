@@ -5,7 +5,8 @@ use crate::shapes::cuboid;
 
 fn sphere(radius: f64, spacing: f64, margin: f64) -> SdfGrid {
     let corner = Point3::new(radius, radius, radius);
-    SdfGrid::from_fn((-corner, corner), spacing, margin, |p, _| p.coords.norm() - radius).unwrap()
+    let distance = |p: &Point3<f64>, _: f64| p.coords.norm() - radius;
+    SdfGrid::from_fn((-corner, corner), spacing, margin, || distance).unwrap()
 }
 
 #[test]
@@ -218,5 +219,8 @@ fn senseless_grids_are_refused() {
     assert_eq!(lattice(f64::NAN, [2; 3]), SdfError::Origin);
     assert_eq!(lattice(0.0, [2, 1, 2]), SdfError::Dims { axis: 1, count: 1 });
     assert!(matches!(lattice(0.0, [1 << 20; 3]), SdfError::TooLarge { .. }));
-    assert_eq!(SdfGrid::from_fn(wrong, 0.1, 0.1, |_, _| 0.0).unwrap_err(), SdfError::Bounds);
+    assert_eq!(
+        SdfGrid::from_fn(wrong, 0.1, 0.1, || |_: &Point3<f64>, _| 0.0).unwrap_err(),
+        SdfError::Bounds
+    );
 }

@@ -9,6 +9,7 @@ use prehend_refine::info::{DescribeOptions, describe};
 use serde_json::json;
 
 use crate::options::Unit;
+use crate::robot_options::RobotOptions;
 use crate::terminal::say;
 
 #[derive(Args)]
@@ -27,6 +28,8 @@ pub(crate) struct Info {
     /// Split of a dataset [default: test, or the only one]
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    #[command(flatten)]
+    robot: RobotOptions,
     /// List all joints of a robot, all scenes of a dataset and all parameters of a rig
     #[arg(long, help_heading = "Output")]
     all: bool,
@@ -44,6 +47,7 @@ impl Info {
             mesh_unit: self.mesh_unit.meters(),
             density: self.density,
             split: self.split,
+            robot: self.robot.read()?,
         };
         let described = describe(&self.path, &options)?;
         if self.json {

@@ -12,6 +12,7 @@ mod options;
 mod pages;
 mod refine;
 mod report;
+mod robot_options;
 mod settings;
 mod study;
 mod symmetry;

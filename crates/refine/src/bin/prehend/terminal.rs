@@ -1,12 +1,19 @@
 //! Standard output, standard error, progress and exit codes; and where preparations are kept between runs.
 
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-pub(crate) use prehend_refine::data::user_cache as cache;
+use prehend_geometry::GridCache;
+use prehend_refine::data::user_cache;
 
 use crate::logging;
+
+/// Where preparations are kept between runs; grids that are built are told of on a terminal.
+pub(crate) fn cache() -> Option<GridCache> {
+    let is_seen = std::io::stderr().is_terminal() && !logging::is_quiet();
+    user_cache().map(|cache| if is_seen { cache.telling(|text| complain(text)) } else { cache })
+}
 
 /// Prints `text` and a line break. That the reader has gone away (`prehend … | head`) is no error.
 pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {

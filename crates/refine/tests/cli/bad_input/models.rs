@@ -23,14 +23,6 @@ fn models_and_hands() {
                 &["ds/models/obj_000006.ply: "],
             ),
             (
-                "texture missing",
-                |p| {
-                    other_object(p, |_| ());
-                    p.remove("ds/models/obj_000006.png");
-                },
-                &["ds/models/obj_000006.ply: texture obj_000006.png: "],
-            ),
-            (
                 "all faces flat",
                 |p| {
                     other_object(p, |m| {

@@ -2,18 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{DMatrix, Isometry3};
 use prehend_geometry::mjcf::{
-    Actuator, Dynamics, Joint, JointIndex, JointKind, Model, SolverParameters, Tendon, Transmission,
+    EqualityKind, Joint, JointIndex, JointKind, Model, SolverParameters, Tendon,
 };
 
 use super::super::constraints::{Mobility, limits, losses};
 use super::MjcfError;
-use super::lengths::{Along, Lengths, length_and_inertia};
-use crate::handle::BodyId;
-use crate::handle::JointForceId;
-use crate::joint_law::activation::Activation;
-use crate::joint_law::affine_actuator::AffineActuator;
+use super::lengths::{Along, Lengths};
+use crate::handle::{BodyId, JointForceId};
+use crate::joint_law::damper::JointDamper;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::polynomial::{PolynomialDamper, PolynomialSpring};
 use crate::joint_law::slack_spring::SlackSpring;
@@ -32,15 +30,31 @@ pub(super) struct Forces<'a> {
     pub(super) link: BodyId,
     /// The axis whose velocity is the state of each actuator that has one.
     pub(super) activations: Vec<Option<BodyId>>,
+    /// With all joints at their references.
     pub(super) mobility: &'a Mobility,
+    /// Time constants of couplings as a part of those in the file.
+    pub(super) softness: f64,
     /// Coordinates with all joints at their references, and at the references of their springs.
-    pub(super) references: [Vec<f64>; 2],
+    pub(super) references: &'a [Vec<f64>; 2],
+    /// Inertias that move with tendons, and the slopes of their lengths by all degrees of freedom at the references.
+    pub(super) rotors: Vec<(f64, DMatrix<f64>)>,
     pub(super) actuators: Vec<(String, JointForceId)>,
 }
 
 impl Forces<'_> {
     pub(super) fn add_all(&mut self) -> Result<(), MjcfError> {
         let model = self.model;
+        for tendon in model.tendons.iter().filter(|tendon| tendon.armature > 0.0) {
+            let along = self.lengths.of_tendon(tendon, 1.0);
+            self.rotors.push((tendon.armature, self.length(&along, &self.references[0]).1));
+            let (axes, path) = match along {
+                Along::Joints(axes) => (axes, None),
+                Along::Path(path) => (Vec::new(), Some(path)),
+                Along::Contacts => continue,
+            };
+            let (link, inertia) = (self.link, tendon.armature);
+            self.world.transmissions.rotors.push(Rotor { link, axes, path, inertia });
+        }
         for (place, index) in model.joint_indices().enumerate() {
             let (_, axis, link) = self.lengths.axes[place];
             self.add_joint(index, model.joint(index), axis, link)?;
@@ -48,13 +62,18 @@ impl Forces<'_> {
         for tendon in &model.tendons {
             self.add_tendon(tendon)?;
         }
+        for equality in model.equalities.iter().filter(|equality| equality.active) {
+            if let EqualityKind::Tendon { tendons, polynomial } = &equality.kind {
+                self.couple(*tendons, polynomial, &equality.solver)?;
+            }
+        }
         for (index, actuator) in model.actuators.iter().enumerate() {
             self.add_actuator(actuator, self.activations[index])?;
         }
         Ok(())
     }
 
-    fn add(
+    pub(super) fn add(
         &mut self,
         along: &Along,
         law: Arc<dyn DynJointLaw>,
@@ -69,16 +88,63 @@ impl Forces<'_> {
         })
     }
 
-    /// The inertia along a length with all joints at their references, and the length there where it is a path.
-    fn inertia(&self, along: &Along) -> [f64; 2] {
+    /// A length with the joints at coordinates `q`, and its slopes by all degrees of freedom.
+    pub(super) fn length(&self, along: &Along, q: &[f64]) -> (f64, DMatrix<f64>) {
+        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let n = tree.nv();
         match along {
-            Along::Joints(axes) => [0.0, self.world.inertia_along(self.mobility, axes)],
-            Along::Path(path) => {
-                let own = &self.world.articulations[self.world.articulations.len() - 1];
-                length_and_inertia(&own.tree, &self.references[0], path)
+            Along::Joints(axes) => {
+                let slopes = self.world.slopes_along(axes, n);
+                let position = |(axis, factor): &(JointAxis, f64)| {
+                    let (_, link) = self.world.link_of(axis.link).ok()?;
+                    Some(factor * q[tree.range(link)[0].start + axis.index])
+                };
+                (axes.iter().filter_map(position).sum(), slopes)
             }
-            Along::Contacts => [0.0; 2],
+            Along::Path(path) => {
+                let length = path.length(&tree.kinematics(q, &vec![0.0; n]), false);
+                (length.value, DMatrix::from_vec(n, 1, length.slopes))
+            }
+            Along::Contacts => (0.0, DMatrix::zeros(n, 1)),
         }
+    }
+
+    /// The inertia along a length with all joints at their references: 1/(J M⁻¹ Jᵀ), everything else free to move.
+    pub(super) fn inertia(&self, along: &Along) -> f64 {
+        self.inertia_of(&self.length(along, &self.references[0]).1)
+    }
+
+    fn inertia_of(&self, slopes: &DMatrix<f64>) -> f64 {
+        let moved = self.mobility.times(slopes);
+        let mut mobility = slopes.dot(&moved);
+        if !self.rotors.is_empty() {
+            // By Woodbury's identity.
+            let columns: Vec<_> = self.rotors.iter().map(|(_, own)| own.column(0)).collect();
+            let rotors = DMatrix::from_columns(&columns);
+            let mut within = rotors.transpose() * self.mobility.times(&rotors);
+            for (k, (inertia, _)) in self.rotors.iter().enumerate() {
+                within[(k, k)] += 1.0 / inertia;
+            }
+            let along = rotors.transpose() * moved;
+            mobility -= within.lu().solve(&along).map_or(f64::NAN, |share| along.dot(&share));
+        }
+        if mobility == 0.0 { 0.0 } else { 1.0 / mobility }
+    }
+
+    /// Stiffness and damping of a joint, whose link this is.
+    fn spring_and_damper(&self, joint: &Joint, link: usize) -> [f64; 2] {
+        let Some([time, ratio]) = joint.spring_damper else {
+            return [joint.stiffness, joint.damping];
+        };
+        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let [_, dofs] = tree.range(link);
+        let count = dofs.len() as f64;
+        let mobility = dofs.map(|dof| {
+            let unit = DMatrix::from_fn(tree.nv(), 1, |k, _| f64::from(k == dof));
+            1.0 / self.inertia_of(&unit)
+        });
+        let inertia = count / mobility.sum::<f64>();
+        [inertia / (time * ratio).powi(2), 2.0 * inertia / time]
     }
 
     fn add_joint(
@@ -92,16 +158,15 @@ impl Forces<'_> {
             return self.add_turning_joint(index, joint, link);
         }
         let along = Along::Joints(vec![(first, 1.0)]);
+        let [stiffness, damping] = self.spring_and_damper(joint, link);
         let rest = joint.spring_reference;
         if joint.higher_stiffness != [0.0; 2] {
-            let ([b, c], slack) = (joint.higher_stiffness, [rest; 2]);
-            let coefficients = [joint.stiffness, b, c];
-            self.add(&along, Arc::new(PolynomialSpring { coefficients, slack }))?;
-        } else if joint.stiffness > 0.0 {
-            let stiffness = joint.stiffness;
+            let law = polynomial(stiffness, joint.higher_stiffness, (rest, rest));
+            self.add(&along, Arc::new(law))?;
+        } else if stiffness > 0.0 {
             self.add(&along, Arc::new(JointSpring { stiffness, rest }))?;
         }
-        self.add_losses(&along, (joint.damping, joint.higher_damping), joint.friction_loss)?;
+        self.add_losses(&along, (damping, joint.higher_damping), joint.friction_loss)?;
         if let Some((low, high)) = joint.actuator_force_range {
             let bound = (first, [low, high], joint.carries_by_actuator);
             self.world.transmissions.bounds.push(bound);
@@ -120,12 +185,13 @@ impl Forces<'_> {
         link: usize,
     ) -> Result<(), MjcfError> {
         let is_free = joint.kind == JointKind::Free;
+        let [stiffness, damping] = self.spring_and_damper(joint, link);
         let reference = match is_free {
             true => self.model.bodies[index.body].t_parent_body,
             false => Isometry3::identity(),
         };
         for k in 0..joint.kind.velocities() {
-            if joint.damping <= 0.0 && joint.stiffness <= 0.0 {
+            if damping <= 0.0 && stiffness <= 0.0 {
                 break;
             }
             let mut gear = [0.0; 6];
@@ -133,12 +199,11 @@ impl Forces<'_> {
             let (in_parent, reference) = (false, Some(reference));
             let part = PathPart::Turn { link, gear, is_free, in_parent, reference };
             let along = Along::Path(Arc::new(Path(vec![part])));
-            for law in losses(joint.damping, 0.0) {
+            for law in losses(damping, 0.0) {
                 self.add(&along, law)?;
             }
-            if joint.stiffness > 0.0 {
-                let law = JointSpring { stiffness: joint.stiffness, rest: 0.0 };
-                self.add(&along, Arc::new(law))?;
+            if stiffness > 0.0 {
+                self.add(&along, Arc::new(JointSpring { stiffness, rest: 0.0 }))?;
             }
         }
         if let Some(range) = joint.range {
@@ -156,7 +221,8 @@ impl Forces<'_> {
     ) -> Result<(), MjcfError> {
         let is_linear = [b, c] == [0.0; 2];
         if !is_linear {
-            self.add(along, Arc::new(PolynomialDamper { coefficients: [damping, b, c] }))?;
+            let law = PolynomialDamper { linear: damping, quadratic: b, cubic: c };
+            self.add(along, Arc::new(law))?;
         }
         for law in losses(if is_linear { damping } else { 0.0 }, friction) {
             self.add(along, law)?;
@@ -170,8 +236,7 @@ impl Forces<'_> {
         range: (f64, f64),
         solver: &SolverParameters,
     ) -> Result<(), MjcfError> {
-        let [_, inertia] = self.inertia(along);
-        let [stiffness, _] = stiffness(solver, inertia, 1.0);
+        let [stiffness, _] = stiffness(solver, self.inertia(along), 1.0);
         self.add(along, limits(range, stiffness)).map(|_| ())
     }
 
@@ -180,99 +245,50 @@ impl Forces<'_> {
         self.add_losses(&along, (tendon.damping, tendon.higher_damping), tendon.friction_loss)?;
         if tendon.stiffness > 0.0 || tendon.higher_stiffness != [0.0; 2] {
             let (lower, upper) = tendon.spring_range.unwrap_or_else(|| {
-                let own = &self.world.articulations[self.world.articulations.len() - 1];
-                let [length, _] = match &along {
-                    Along::Path(path) => length_and_inertia(&own.tree, &self.references[1], path),
-                    _ => [0.0; 2],
-                };
+                let (length, _) = self.length(&along, &self.references[1]);
                 (length, length)
             });
-            let (stiffness, [b, c]) = (tendon.stiffness, tendon.higher_stiffness);
-            let law: Arc<dyn DynJointLaw> = match [b, c] == [0.0; 2] {
+            let stiffness = tendon.stiffness;
+            let law: Arc<dyn DynJointLaw> = match tendon.higher_stiffness == [0.0; 2] {
                 true => Arc::new(SlackSpring { stiffness, lower, upper }),
-                false => {
-                    let (coefficients, slack) = ([stiffness, b, c], [lower, upper]);
-                    Arc::new(PolynomialSpring { coefficients, slack })
-                }
+                false => Arc::new(polynomial(stiffness, tendon.higher_stiffness, (lower, upper))),
             };
             self.add(&along, law)?;
         }
         if let Some(range) = tendon.range {
             self.add_limits(&along, range, &tendon.limit_solver)?;
         }
-        if tendon.armature > 0.0 {
-            let (axes, path) = match along {
-                Along::Joints(axes) => (axes, None),
-                Along::Path(path) => (Vec::new(), Some(path)),
-                Along::Contacts => return Ok(()),
-            };
-            let (link, inertia) = (self.link, tendon.armature);
-            self.world.transmissions.rotors.push(Rotor { link, axes, path, inertia });
-        }
         Ok(())
     }
 
-    fn add_actuator(
+    /// Holds the length of a tendon where that of another has it.
+    fn couple(
         &mut self,
-        actuator: &Actuator,
-        activation: Option<BodyId>,
+        (first, second): (usize, Option<usize>),
+        &[constant, slope, ..]: &[f64; 5],
+        solver: &SolverParameters,
     ) -> Result<(), MjcfError> {
-        const EVERYTHING: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
-        let range = |range: Option<(f64, f64)>| range.map_or(EVERYTHING, |(a, b)| [a, b]);
-        let along = self.lengths.of_actuator(actuator);
-        let mut bias = actuator.bias;
-        if let Some(ratio) = actuator.damping_ratio {
-            let [_, inertia] = self.inertia(&along);
-            bias[2] = -2.0 * ratio * (actuator.gain[0] * inertia).sqrt();
-        }
-        let bound = match actuator.transmission {
-            Transmission::Tendon(index) => {
-                let bound = self.model.tendons[index].actuator_force_range;
-                bound.map(|(low, high)| (index, [low, high]))
-            }
-            _ => None,
+        let tendons = &self.model.tendons;
+        let own = self.lengths.of_tendon(&tendons[first], 1.0);
+        let both = second.map(|second| self.lengths.of_tendon(&tendons[second], -slope));
+        let both = match both {
+            Some(other) => own.plus(other),
+            None => Some(own),
         };
-        let mut law = AffineActuator {
-            control: 0.0,
-            gain: actuator.gain,
-            bias,
-            control_range: range(actuator.control_range),
-            force_range: range(actuator.force_range),
-            period: period(actuator, self.model),
-        };
-        let mut controlled = None;
-        if let Some(link) = activation {
-            let time_constant = match actuator.dynamics {
-                Dynamics::Filter(constant) => constant,
-                _ => 0.0,
-            };
-            let (control_range, range) = (law.control_range, range(actuator.activation_range));
-            let state = Activation { control: 0.0, time_constant, control_range, range };
-            controlled = Some(self.world.add_joint_force(link, state)?);
-            law.control_range = EVERYTHING;
-        }
-        let Some(id) = self.add(&along, Arc::new(law))? else { return Ok(()) };
-        let force = self.world.joint_force_mut(id);
-        force.is_actuator = true;
-        force.input = activation.map(|link| (link.into(), actuator.ahead));
-        force.bound = bound;
-        self.actuators.push((actuator.name.clone(), controlled.unwrap_or(id)));
-        Ok(())
+        let Some(along) = both else { return Ok(()) };
+        let (reference, slopes) = self.length(&along, &self.references[0]);
+        let [stiffness, damping] = stiffness(solver, self.inertia_of(&slopes), self.softness);
+        self.add(&along, Arc::new(JointSpring { stiffness, rest: reference + constant }))?;
+        self.add(&along, Arc::new(JointDamper { damping })).map(|_| ())
     }
 }
 
-/// Once around in the length of a servo that turns something; zero of others.
-fn period(actuator: &Actuator, model: &Model) -> f64 {
-    let [a, b, c, u, v, w] = actuator.gear;
-    let torque = match &actuator.transmission {
-        Transmission::Joint { joint, .. } if model.joint(*joint).kind == JointKind::Ball => {
-            [a, b, c]
-        }
-        Transmission::Site { reference: Some(_), .. } if [a, b, c] == [0.0; 3] => [u, v, w],
-        _ => [0.0; 3],
-    };
-    let is_servo = actuator.gain[1..] == [0.0; 2] && actuator.gain[0] == -actuator.bias[1];
-    f64::from(is_servo) * std::f64::consts::TAU * nalgebra::Vector3::from(torque).norm()
+fn polynomial(
+    linear: f64,
+    [quadratic, cubic]: [f64; 2],
+    (lower, upper): (f64, f64),
+) -> PolynomialSpring {
+    PolynomialSpring { linear, quadratic, cubic, lower, upper }
 }
 
 /// Stiffness and damping of a constraint on what has this inertia, with time constants of a part of those in the file.

@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use prehend_geometry::mjcf::{
     Actuator, JointIndex, JointKind, Model, PlacedFrame, Tendon, TendonPart, Transmission,
 };
 
-use crate::articulated::Articulation;
-use crate::articulated::tree_factor::TreeFactor;
 use crate::world::joint_force::JointAxis;
 use crate::world::path::{Anchor, Frame, Obstacle, Path, PathPart};
 
@@ -19,6 +16,19 @@ pub(super) enum Along {
     Path(Arc<Path>),
     /// Nothing: the contacts of a body.
     Contacts,
+}
+
+impl Along {
+    /// The sum of two lengths; `None` of a sum of joints and a path.
+    pub(super) fn plus(self, other: Self) -> Option<Self> {
+        match (self, other) {
+            (Self::Joints(a), Self::Joints(b)) => Some(Self::Joints([a, b].concat())),
+            (Self::Path(a), Self::Path(b)) => {
+                Some(Self::Path(Arc::new(Path([a.0.as_slice(), &b.0].concat()))))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// What lengths are found by.
@@ -125,19 +135,4 @@ impl Lengths<'_> {
             Transmission::Adhesion(_) => Along::Contacts,
         }
     }
-}
-
-/// The length of a path, and the inertia along it, with the joints at coordinates `q`.
-pub(super) fn length_and_inertia(tree: &Articulation, q: &[f64], path: &Path) -> [f64; 2] {
-    let at = tree.kinematics(q, &vec![0.0; tree.nv()]);
-    let length = path.length(&at, false);
-    let slopes = DMatrix::from_row_slice(1, length.slopes.len(), &length.slopes);
-    let mass = at.mass_matrix();
-    let Some(factor) = TreeFactor::new(&mass, tree.carriers().to_vec()) else {
-        return [length.value, f64::NAN];
-    };
-    let mut solved = slopes.clone();
-    factor.solve_transposed(&mut solved);
-    let mobility = slopes.dot(&solved);
-    [length.value, if mobility > 0.0 { 1.0 / mobility } else { 0.0 }]
 }

@@ -28,14 +28,13 @@ fn placed(
 }
 
 impl World {
-    /// Adds the equality constraints of a model that act from the beginning.
+    /// Adds the equality constraints of a model that act from the beginning, with stiffness by its mobility at coordinates, both of which are `at`.
     pub(super) fn add_loops(
         &mut self,
         model: &Model,
         robot: &MjcfRobot,
         options: &MjcfOptions,
-        mobility: &Mobility,
-        warnings: &mut Vec<String>,
+        at: (&Mobility, &[f64]),
     ) -> Result<(), MjcfError> {
         let ground = std::cell::OnceCell::new();
         for equality in model.equalities.iter().filter(|equality| equality.active) {
@@ -50,8 +49,7 @@ impl World {
                     let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
                     let frames = placed(anchors, fixed, &options.t_world_model);
-                    let held =
-                        self.held(bodies, &frames, mobility, &equality.solver, options.softness);
+                    let held = self.held(bodies, &frames, at, &equality.solver, options.softness);
                     self.add_bushing(Bushing { bodies, frames, stiffness: bushing(held, 0.0) })?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
@@ -60,22 +58,15 @@ impl World {
                     let mut frames = placed(anchors, fixed, &options.t_world_model);
                     // Axes of the second body as the first has them.
                     frames[0].rotation *= *rotation;
-                    let held =
-                        self.held(bodies, &frames, mobility, &equality.solver, options.softness);
+                    let held = self.held(bodies, &frames, at, &equality.solver, options.softness);
                     let stiffness = bushing(held, *torque_scale);
                     self.add_bushing(Bushing { bodies, frames, stiffness })?;
                 }
-                EqualityKind::Tendon { .. } => {
-                    let name = &equality.name;
-                    warnings.push(format!("equality '{name}': of tendons"));
-                }
+                // Among the forces.
+                EqualityKind::Tendon { .. } => {}
                 EqualityKind::Joint { joints: (first, second), polynomial } => {
                     let [constant, slope, rest @ ..] = *polynomial;
                     if rest != [0.0; 3] {
-                        let name = &equality.name;
-                        warnings.push(format!(
-                            "equality '{name}': a polynomial of joints beyond the first power"
-                        ));
                         continue;
                     }
                     let place = |joint| model.joint_indices().position(|own| own == joint);
@@ -87,7 +78,7 @@ impl World {
                         axes.extend(axis(*second).map(|axis| (axis, -slope)));
                         target -= slope * model.joint(*second).reference;
                     }
-                    let inertia = self.inertia_along(mobility, &axes);
+                    let inertia = self.inertia_along(at.0, &axes);
                     let held = stiffness(&equality.solver, inertia, options.softness);
                     self.add_coupling(&axes, target, held)?;
                 }
@@ -101,12 +92,12 @@ impl World {
         &self,
         bodies: [BodyId; 2],
         frames: &[Isometry3<f64>; 2],
-        mobility: &Mobility,
+        at: (&Mobility, &[f64]),
         solver: &SolverParameters,
         softness: f64,
     ) -> [f64; 2] {
         let points = frames.map(|frame| frame.translation.vector.into());
-        stiffness(solver, self.mass_between(bodies, points, mobility), softness)
+        stiffness(solver, self.mass_between(bodies, points, at), softness)
     }
 
     /// What a force between points of two bodies of the last articulation has to accelerate at most \[kg\].
@@ -114,11 +105,11 @@ impl World {
         &self,
         bodies: [BodyId; 2],
         points: [Point3<f64>; 2],
-        mobility: &Mobility,
+        (mobility, q): (&Mobility, &[f64]),
     ) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
         let rest = vec![0.0; tree.nv()];
-        let at = tree.kinematics(&tree.neutral(), &rest);
+        let at = tree.kinematics(q, &rest);
         let mut relative = DMatrix::zeros(3, tree.nv());
         for ((body, point), sign) in bodies.into_iter().zip(points).zip([1.0, -1.0]) {
             if let Ok((_, link)) = self.link_of(body) {

@@ -1,5 +1,6 @@
 //! Robots in MJCF.
 
+mod actuators;
 mod forces;
 mod lengths;
 mod links;
@@ -8,7 +9,9 @@ mod motion;
 mod shapes;
 
 use nalgebra::Isometry3;
-use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Shape as MjcfShape, Transmission};
+use prehend_geometry::mjcf::{
+    Dynamics, EqualityKind, JointKind, Model, Shape as MjcfShape, Transmission,
+};
 use thiserror::Error;
 
 use crate::articulated::Joint;
@@ -99,9 +102,11 @@ pub enum MjcfError {
     /// A state does not fit.
     #[error(transparent)]
     State(#[from] SimulationError),
-    /// Positions that are too few or too many.
-    #[error("{given} positions for a model of {expected}")]
-    Positions {
+    /// Positions, velocities or activations that are too few or too many.
+    #[error("{given} {what} for a model of {expected}")]
+    Count {
+        /// Quantity.
+        what: &'static str,
         /// How many were given.
         given: usize,
         /// How many it has.
@@ -112,22 +117,6 @@ pub enum MjcfError {
     NoCounterpart {
         /// What, with its name.
         what: String,
-    },
-    /// States of actuators that are too few or too many.
-    #[error("{given} activations for a model of {expected}")]
-    Activations {
-        /// How many were given.
-        given: usize,
-        /// How many it has.
-        expected: usize,
-    },
-    /// Velocities that are too few or too many.
-    #[error("{given} velocities for a model of {expected}")]
-    Velocities {
-        /// How many were given.
-        given: usize,
-        /// How many it has.
-        expected: usize,
     },
 }
 
@@ -196,7 +185,6 @@ impl World {
         let joints = model.joint_indices().zip(&chain.joints);
         let axes: Vec<_> =
             joints.map(|(index, own)| (index, links[own.link].into(), own.link)).collect();
-        let mobility = self.mobility();
         let lengths = lengths::Lengths {
             model,
             bodies: &chain.bodies,
@@ -204,6 +192,7 @@ impl World {
             t_world_model: options.t_world_model,
         };
         let references = self.reference_coordinates(model, &robot)?;
+        let mobility = self.mobility(&references[0]);
         let mut forces = forces::Forces {
             world: self,
             model,
@@ -211,12 +200,14 @@ impl World {
             link,
             activations,
             mobility: &mobility,
-            references,
+            references: &references,
+            softness: options.softness,
+            rotors: Vec::new(),
             actuators: Vec::new(),
         };
         forces.add_all()?;
         let actuators = forces.actuators;
-        self.add_loops(model, &robot, options, &mobility, &mut warnings)?;
+        self.add_loops(model, &robot, options, (&mobility, &references[0]))?;
         Ok(MjcfRobot { actuators, warnings, ..robot })
     }
 }
@@ -239,6 +230,10 @@ fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (Strin
         let left = left.into_iter().filter(|(is, ..)| *is);
         left.map(move |(_, what, changes)| (format!("joint '{name}': {what}"), changes))
     });
+    let bounded = model.actuators.iter().filter(|own| {
+        own.muscle.is_some() && (own.force_range.is_some() || own.activation_range.is_some())
+    });
+    let bounded = bounded.map(|own| (format!("actuator '{}': bounds of a muscle", own.name), true));
     let actuators = model.actuators.iter().filter_map(|own| match own.transmission {
         Transmission::Adhesion(_) => {
             Some((format!("actuator '{}': its hold on what touches a body", own.name), true))
@@ -250,7 +245,25 @@ fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (Strin
         let is_terrain = matches!(geom.shape, MjcfShape::HeightField(_));
         is_terrain.then(|| (format!("geom '{}': contacts of a height field", geom.name), true))
     });
-    joints.chain(actuators).chain(terrain)
+    let equalities = model.equalities.iter().filter(|equality| equality.active);
+    let equalities = equalities.filter_map(|equality| {
+        let is_cable = |tendon: usize| !model.tendons[tendon].parts.is_empty();
+        let what = match equality.kind {
+            EqualityKind::Joint { polynomial, .. } | EqualityKind::Tendon { polynomial, .. }
+                if polynomial[2..] != [0.0; 3] =>
+            {
+                "a polynomial beyond the first power"
+            }
+            EqualityKind::Tendon { tendons: (first, Some(second)), .. }
+                if is_cable(first) != is_cable(second) =>
+            {
+                "a cable and a sum of joints"
+            }
+            _ => return None,
+        };
+        Some((format!("equality '{}': {what}", equality.name), true))
+    });
+    joints.chain(actuators).chain(bounded).chain(terrain).chain(equalities)
 }
 
 fn named(joints: &[links::ChainJoint], body: impl Fn(usize) -> BodyId) -> Vec<(String, JointAxis)> {

@@ -7,6 +7,12 @@ use super::{MjcfError, MjcfRobot};
 use crate::state::State;
 use crate::world::World;
 
+/// Whether there are as many numbers as there should be.
+fn check(what: &'static str, numbers: &[f64], expected: usize) -> Result<(), MjcfError> {
+    let given = numbers.len();
+    if given == expected { Ok(()) } else { Err(MjcfError::Count { what, given, expected }) }
+}
+
 impl MjcfRobot {
     /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
     ///
@@ -19,9 +25,7 @@ impl MjcfRobot {
         positions: &[f64],
     ) -> Result<(), MjcfError> {
         let expected = self.moved.iter().map(|(kind, _)| kind.positions()).sum();
-        if positions.len() != expected {
-            return Err(MjcfError::Positions { given: positions.len(), expected });
-        }
+        check("positions", positions, expected)?;
         let mut rest = positions;
         for (kind, link) in &self.moved {
             let (own, after) = rest.split_at(kind.positions());
@@ -53,9 +57,7 @@ impl MjcfRobot {
         velocities: &[f64],
     ) -> Result<(), MjcfError> {
         let expected = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
-        if velocities.len() != expected {
-            return Err(MjcfError::Velocities { given: velocities.len(), expected });
-        }
+        check("velocities", velocities, expected)?;
         let mut rest = velocities;
         for (kind, link) in &self.moved {
             let (own, after) = rest.split_at(kind.velocities());
@@ -83,10 +85,7 @@ impl MjcfRobot {
         states: &mut [State],
         activations: &[f64],
     ) -> Result<(), MjcfError> {
-        let (given, expected) = (activations.len(), self.activations.len());
-        if given != expected {
-            return Err(MjcfError::Activations { given, expected });
-        }
+        check("activations", activations, self.activations.len())?;
         for (link, activation) in self.activations.iter().zip(activations) {
             world.write_joint(states, *link, &[0.0], &[*activation])?;
         }

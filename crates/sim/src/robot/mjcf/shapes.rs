@@ -25,9 +25,20 @@ impl World {
         robot: &MjcfRobot,
         options: &MjcfOptions,
     ) -> Result<(), MjcfError> {
+        // Bodies of the same geoms share their shape.
+        let mut made: Vec<(&[Geom], Option<Shape>)> = Vec::new();
         for (body, id) in model.bodies.iter().zip(&robot.bodies) {
             let wrong = |error| MjcfError::Shape { body: body.name.clone(), error };
-            if let Some(shape) = shape(&body.geoms, &options.shape_options).map_err(wrong)? {
+            let known = made.iter().find(|(geoms, _)| same(geoms, &body.geoms));
+            let shape = match known {
+                Some((_, shape)) => shape.clone(),
+                None => {
+                    let new = shape(&body.geoms, &options.shape_options).map_err(wrong)?;
+                    made.push((&body.geoms, new.clone()));
+                    new
+                }
+            };
+            if let Some(shape) = shape {
                 let own = &mut self.bodies[*id];
                 own.surface = shape.surface().cloned();
                 own.field = Some(shape.field().clone());
@@ -73,6 +84,14 @@ fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeE
         return Ok(None);
     }
     Ok(Some(Shape::from_parry_with(&Compound::new(parts), options)?))
+}
+
+/// True if geoms that collide are of the same shapes at the same places.
+fn same(a: &[Geom], b: &[Geom]) -> bool {
+    let touching = |geoms: &[Geom]| geoms.iter().filter(|geom| touches(geom)).count();
+    let pairs = || a.iter().filter(|g| touches(g)).zip(b.iter().filter(|g| touches(g)));
+    let is_same = |(a, b): (&Geom, &Geom)| a.t_body_geom == b.t_body_geom && a.shape == b.shape;
+    touching(a) == touching(b) && pairs().all(is_same)
 }
 
 /// True if a geom collides and has a shape here: terrain has none.

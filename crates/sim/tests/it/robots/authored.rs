@@ -107,7 +107,7 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
     }
 
     let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
-    assert_eq!(refused, Err(MjcfError::Positions { given: 13, expected: 14 }));
+    assert_eq!(refused, Err(MjcfError::Count { what: "positions", given: 13, expected: 14 }));
 }
 
 #[test]

@@ -1,8 +1,9 @@
-//! A small model of each kind that is read. Masses, poses and accelerations are MuJoCo 4.0's, written by `benches/peers/files/kinds.py`.
+//! A small model of each kind that is read. Masses, poses and accelerations are MuJoCo 4.0's, those of URDF Pinocchio 4.1's, written by `benches/peers/files/kinds.py`.
 
 use nalgebra::Vector3;
 use prehend_geometry::mjcf::Model;
-use prehend_sim::robot::{MjcfOptions, MjcfRobot};
+use prehend_geometry::robot::KinematicTree;
+use prehend_sim::robot::{MjcfError, MjcfOptions, MjcfRobot, UrdfOptions};
 use prehend_sim::{RungeKutta4, State, TimeSteps, World};
 use serde_json::Value;
 
@@ -90,6 +91,62 @@ fn each_kind_is_as_mujoco_has_it() {
                 let expected = numbers(&state["end"]["xpos"]);
                 near(&format!("{name}: after a second"), &places(&robot, end), &expected, 1e-4);
             }
+        }
+    }
+}
+
+#[test]
+fn tendons_follow_each_other() {
+    let bodies = "<body name='a'><joint name='a' type='slide' axis='0 0 1' damping='5'/><geom size='.1' mass='1'/><site name='a'/></body>
+        <body name='b' pos='1 0 0'><joint name='b' type='slide' axis='0 0 1' damping='1'/><geom size='.1' mass='2'/><site name='b'/></body>
+        <site name='u' pos='0 0 1'/><site name='v' pos='1 0 2'/>";
+    let cable = |name: &str, from: &str, to: &str| {
+        format!("<spatial name='{name}'><site site='{from}'/><site site='{to}'/></spatial>")
+    };
+    let cables = cable("a", "u", "a") + &cable("b", "v", "b");
+    let sums = "<fixed name='a'><joint joint='a' coef='-1'/></fixed><fixed name='b'><joint joint='b' coef='-1'/></fixed>";
+    let scene = |tendons: &str, polynomial: &str| {
+        let xml = format!(
+            "<mujoco><worldbody>{bodies}</worldbody><tendon>{tendons}</tendon>
+            <equality><tendon tendon1='a' tendon2='b' polycoef='{polynomial}'/></equality></mujoco>"
+        );
+        let model = Model::from_str(&xml, None).unwrap();
+        let mut world = World::new(model.gravity);
+        let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
+        world.add_mjcf(&model, &options).map(|robot| (world, robot))
+    };
+    for tendons in [&cables, sums] {
+        let (world, robot) = scene(tendons, "0.1 0.5").unwrap();
+        let end = world.simulate(&world.neutral_states(), 0.2).unwrap();
+        let place = |joint: &str| {
+            let [position, _] = world.joint_motion(&end, robot.joint(joint).unwrap()).unwrap();
+            position
+        };
+        let (a, b) = (place("a"), place("b"));
+        assert!(b < -0.1 && (-a - (0.1 - 0.5 * b)).abs() < 2e-3, "{a} {b}");
+    }
+    let mixed = cable("a", "u", "a") + "<fixed name='b'><joint joint='b' coef='-1'/></fixed>";
+    for refused in [scene(&cables, "0 1 2"), scene(&mixed, "0 1")] {
+        assert!(matches!(refused, Err(MjcfError::NoCounterpart { .. })));
+    }
+}
+
+#[test]
+fn urdf_is_as_pinocchio_has_it() {
+    let golden: Value = serde_json::from_str(include_str!("../golden/urdf_kinds.json")).unwrap();
+    for (name, golden) in golden.as_object().unwrap() {
+        let tree = KinematicTree::from_urdf_str(golden["urdf"].as_str().unwrap(), None).unwrap();
+        assert_eq!(tree.warnings().is_empty(), name == "strict");
+        assert_eq!(serde_json::json!(tree.joint_names()), golden["joints"]);
+        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        world.add_articulated_robot(&tree, None, &UrdfOptions::default()).unwrap();
+        for state in golden["states"].as_array().unwrap() {
+            let q = numbers(&state["q"]);
+            let own = &world.articulations[0].tree;
+            let at = own.kinematics(&q, &vec![0.0; q.len()]).under(world.gravity);
+            near(name, at.mass_matrix().as_slice(), &numbers(&state["mass"]), 1e-12);
+            let effort = at.inverse_dynamics(&vec![0.0; q.len()]);
+            near(name, effort.as_slice(), &numbers(&state["effort"]), 1e-12);
         }
     }
 }
