@@ -38,7 +38,7 @@ pub use mask_source::MaskSource;
 pub use pose::PlainPose;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
-pub use times::{Times, join_times};
+pub use times::Times;
 pub use workers::Workers;
 
 pub use crate::scene::Target;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use prehend_geometry::limits::MAX_NUMBER;
 
-use crate::data::bop::{DatasetError, read_text, write_atomically};
+use crate::data::bop::{DatasetError, read_text};
 
 const HEADER: &str = "index,frame,method,seconds\n";
 
@@ -99,16 +99,6 @@ fn write(path: &Path, rows: &[TimeRow]) -> Result<(), DatasetError> {
     write_atomically(path, format!("{HEADER}{body}").as_bytes())
 }
 
-/// Joins such files into one.
-///
-/// # Errors
-/// If the new one cannot be written; files that are absent are left out.
-pub fn join_times(files: &[PathBuf], out: &Path) -> Result<(), DatasetError> {
-    let mut all: Vec<TimeRow> = files.iter().flat_map(|file| rows(file)).flatten().collect();
-    all.sort_by_key(|row| row.0);
-    write(out, &all)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,9 +121,6 @@ mod tests {
         assert_eq!(times.of(1, "depth"), Some(2.0));
         assert_eq!(times.of(1, "physics"), None);
         drop(times);
-        let joined = dir.path().join("joined.csv");
-        join_times(&[path.clone(), dir.path().join("absent")], &joined).unwrap();
-        assert_eq!(fs::read_to_string(joined).unwrap().lines().count(), 3);
         assert!(Times::open(&path, false).unwrap().means().is_empty());
     }
 

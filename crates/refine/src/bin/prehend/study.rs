@@ -7,6 +7,7 @@ use std::sync::Mutex;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
+use prehend_refine::Method;
 use prehend_refine::data::bop::Dataset;
 use prehend_refine::data::{Assets, Workers};
 use prehend_refine::evaluate::study::{

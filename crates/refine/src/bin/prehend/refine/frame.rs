@@ -28,7 +28,6 @@ pub(super) fn refine_frame(
     let mut configured = method.configured()?;
     let (rig, cache) = (open_rig(rig)?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
-    let mut configured = method.configured()?;
     // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
     if method.terms.is_none() {
         configured = input.supported(&configured);
