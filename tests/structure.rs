@@ -7,10 +7,10 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_610),
-    ("geometry", 15_800),
-    ("sim", 17_130),
+    ("geometry", 16_060),
+    ("sim", 16_110),
     ("render", 10_900),
-    ("refine", 33_170),
+    ("refine", 31_510),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use prehend_geometry::limits::MAX_NUMBER;
 
-use crate::data::bop::{DatasetError, read_text};
+use crate::data::bop::{DatasetError, read_text, write_atomically};
 
 const HEADER: &str = "index,frame,method,seconds\n";
 

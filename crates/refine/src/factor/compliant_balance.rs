@@ -34,17 +34,14 @@ pub(super) struct CompliantBalance {
 
 const MOST_STEPS: usize = 100;
 
-/// Below this the dual problem overflows.
-const LEAST_COMPLIANCE: f64 = 1e-12;
+/// Relative accuracy of the residual, and the least compliance: below, the dual problem overflows.
+const EPSILON: f64 = 1e-12;
 
 impl Support {
     fn cost(&self) -> f64 {
-        self.compliance.max(LEAST_COMPLIANCE)
+        self.compliance.max(EPSILON)
     }
 }
-
-/// A residual is right to this share of the load.
-const TOLERANCE: f64 = 1e-12;
 
 impl CompliantBalance {
     /// Balances `load`, a force \[N\] and a torque about `center` over `length` \[m\], by `supports`. A length that is not positive counts as 1 m.
@@ -63,7 +60,7 @@ impl CompliantBalance {
         let mut residual = *load;
         let mut at = dual.at(&residual);
         for _ in 0..MOST_STEPS {
-            if at.gradient.norm() <= TOLERANCE * load.norm() {
+            if at.gradient.norm() <= EPSILON * load.norm() {
                 break;
             }
             let Some(step) = at.hessian.cholesky().map(|factor| factor.solve(&at.gradient)) else {

@@ -19,7 +19,7 @@ fn a_rig_its_models_its_poses_and_a_report_are_written() {
     assert!(told.contains("rig of 2 frames written to rig.json, models to rig.models"), "{told}");
     assert!(told.contains("report: open r/index.html"), "{told}");
     assert!(place.path("rig.models/obj_000005.ply").is_file());
-    let rig = place.succeed("info rig.json");
+    let rig = place.succeed("info rig.json --all");
     assert!(rig.starts_with("rig.json: rig\n") && rig.contains("depth scale"), "{rig}");
     let page = place.read("r/index.html");
     for what in ["Residuals by sensor", "depth on the hand [mm]", "touched skin", "outlines of"] {

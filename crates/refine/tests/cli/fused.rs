@@ -85,7 +85,7 @@ fn sizes_of_errors_are_taken_from_the_command_line() {
     for (options, expected) in [
         ("--noise hand.translation=5", "--noise hand.translation=5: \"5\" is not a size: "),
         ("--noise hand=5mm", "there is no size \"hand\": one of object.translation, "),
-        ("--noise joints", "not of the form NAME=SIZE"),
+        ("--noise joints", "not of the form NAME=VALUE"),
         ("--method icp --noise joints=1deg", "--noise: is of the fused method, not of icp"),
         ("--method icp --rotation-unknown", "--rotation-unknown: is of the fused method"),
     ] {

@@ -307,7 +307,7 @@ fn robot_touch_and_truth_fields_are_named() {
             .contains("scene_bodies.json: 0.bodies[0].cam_R_b2c: not orthonormal")
     );
     let other = dataset.frame(4, 3).unwrap().bodies().unwrap_err();
-    assert!(message(other).contains("3.bodies[0].joints.j: number out of range"));
+    assert!(message(other).contains("3.bodies[0].joints.j: invalid type: string"));
     assert!(
         message(frame.tactile().unwrap_err())
             .contains("scene_tactile.json: 0.force[1]: expected 3 numbers, found 2")
@@ -340,9 +340,8 @@ fn images_that_cannot_serve() {
     assert!(error.ends_with("000003.jpg is 4x3"), "{error}");
     let bytes = fs::read(&odd).unwrap();
     fs::write(&odd, &bytes[..bytes.len() - 20]).unwrap();
-    assert!(
-        matches!(dataset.frame(4, 3).unwrap().depth(), Err(DatasetError::Unusable { file, .. }) if file == odd)
-    );
+    let error = dataset.frame(4, 3).unwrap().depth().unwrap_err().to_string();
+    assert!(error.starts_with(&odd.display().to_string()), "{error}");
 }
 
 #[test]

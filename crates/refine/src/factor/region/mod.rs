@@ -292,7 +292,7 @@ mod tests {
         let (frame, _) = fixture(0);
         let settings = RegionSettings { offset: 0.0, ..RegionSettings::default() };
         let refused = RegionFactor::new(&frame, &settings).err().unwrap();
-        assert!(refused.to_string().contains("offset = 0"), "{refused}");
+        assert!(refused.to_string().contains("region.offset is 0"), "{refused}");
     }
 
     #[test]

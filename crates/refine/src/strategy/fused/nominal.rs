@@ -40,7 +40,7 @@ impl Quantity {
     fn units(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Length => &[("mm", 1.0 / MM_PER_M), ("m", 1.0)],
-            Self::Angle => &[("deg", std::f64::consts::PI / 180.0), ("rad", 1.0)],
+            Self::Angle => const { &[("deg", 1_f64.to_radians()), ("rad", 1.0)] },
             Self::Ratio => &[("%", 1e-2), ("", 1.0)],
         }
     }

@@ -64,7 +64,11 @@ fn keys_that_are_there_twice() {
     assert!(said.code == 2 && said.err.contains(expected), "{}", said.err);
     assert_eq!(place.poses("refined.csv").len(), 1);
     let place = workplace();
-    place.replace(&format!("{SCENE}/scene_camera.json"), "\"cam_K\"", "\"cam_K\":[],\"cam_K\"");
+    place.replace(
+        &format!("{SCENE}/scene_camera.json"),
+        "\"cam_K\"",
+        "\"cam_K\":[9,0,1,0,9,1,0,0,1],\"cam_K\"",
+    );
     let said = place.prehend(REFINE);
     let expected = "scene_camera.json: 0: duplicate field `cam_K`";
     assert!(said.code == 2 && said.err.contains(expected), "{}", said.err);
