@@ -67,7 +67,7 @@ impl<S: Scalar> Body<S> {
 
     /// The numbers of its shape's dimensions.
     pub(crate) fn dimensions(&self) -> &[S] {
-        self.matter.as_ref().map_or(&[], |matter| &matter.shape.dimension_values())
+        self.matter.as_ref().map_or(&[], |matter| matter.shape.dimension_values())
     }
 
     /// The shape that it is made of, if any.

@@ -35,7 +35,7 @@ impl StudyFile {
         let header = format!("{COLUMNS}\n").into_bytes();
         // What a killed process left of its last line does not count.
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-        if !bytes.starts_with(&header) && !(whole == 0 && header.starts_with(&bytes)) {
+        if !(bytes.starts_with(&header) || whole == 0 && header.starts_with(&bytes)) {
             let problem = "is no table of a study by this program (--restart replaces it)";
             return Err(DatasetError::unusable(path, problem));
         }
