@@ -5,7 +5,7 @@ pub use crate::contact::{
     BristleFriction, ContactCalibration, ContactForce, ContactKinematics, ContactLaw, Coulomb,
     DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
 };
-pub use crate::fields::HalfSpace;
+pub use crate::fields::{Cuboid, HalfSpace};
 pub use crate::joint_law::{
     JointDamper, JointFriction, JointLaw, JointLimits, JointSpring, Motor, PositionServo,
     VelocityServo,
