@@ -269,7 +269,7 @@
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! use prehend_autodiff::{Fwd, Recording, Scalar};
-//! use prehend_sim::{Motion, SimulationError};
+//! use prehend_sim::{BuildError, Motion, SimulationError};
 //! # use prehend_sim::{Body, RigidBody, State, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
