@@ -412,6 +412,8 @@
 //! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+//! use prehend_sim::contact::LeakSteps;
+//!
 //! let smoothing = GapSmoothing::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
 //! world.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
 //! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 1e-3));
@@ -420,35 +422,6 @@
 //! lifted[stool].pose.translation.z.derivative = [1.0];
 //! let force = world.cast().wrenches(&lifted, 0)[stool].z;
 //! assert!(force.value == 0.0 && force.derivative[0] < 0.0);
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! [`Smoothing`](crate::Smoothing) averages over perturbations instead, and gives a gradient that is true of the average:
-//!
-//! ```
-//! # use std::sync::Arc;
-//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
-//! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_sim::prelude::*;
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
-//! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
-//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
-//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
-//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-//! # let bodies = ContactBodies { samples: stool, field: floor };
-//! # world.add_contact(bodies, law, GapSmoothing::Hard)?;
-//! let smoothing = Smoothing::new(Vector1::new(1e-3), 200, 7)?;
-//! let force = |height: &Vector1<f64>| {
-//!     let body = rigid.at_rest(&Isometry3::translation(0.0, 0.0, height.x));
-//!     let states = [State::at_rest(Isometry3::identity()), body];
-//!     Ok::<_, SimulationError>(world.wrenches(&states, 0)[stool].z)
-//! };
-//! let estimate = smoothing.zeroth_order(&Vector1::new(1e-3), force)?;
-//! assert!(estimate.value > 0.0 && estimate.gradient.x < 0.0);
 //! # Ok(())
 //! # }
 //! ```
