@@ -2,12 +2,12 @@
 //!
 //! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and
-//! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`] and a
-//! [`FrictionLaw`]. Forces and their derivatives are gathered into one wrench a step ([`contact::wrench`]), so that a
+//! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`](contact::NormalLaw) and a
+//! [`FrictionLaw`](contact::FrictionLaw). Forces and their derivatives are gathered into one wrench a step, so that a
 //! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
 //!
 //! Links that joints hold together are [`articulated`]: they are bodies of a world like others, with laws along their joints
-//! ([`JointLaw`]), contacts, loops ([`Bushing`]) and sensors, from code, URDF or MJCF.
+//! ([`JointLaw`](joint_law::JointLaw)), contacts, loops ([`Bushing`]) and sensors, from code, URDF or MJCF.
 //!
 //! The [`guide`] goes from a world in twenty lines to gradients of long rollouts.
 //!

@@ -32,7 +32,7 @@ impl<S: Scalar> Body<S> {
 
     /// Sets the dimension called `name` of the shape that the body is made of \[m\], and with it mass, center of mass, inertia, samples
     /// and field: to differentiate by it, put in a variable. States stay those of the center of mass; where the model's pose
-    /// is given instead, they follow from [`RigidBody::at_rest`].
+    /// is given instead, they follow from [`RigidBody::at_rest`](crate::RigidBody::at_rest).
     ///
     /// # Errors
     /// If the body is not made of a shape, that has no such dimension, or there is no such shape.
