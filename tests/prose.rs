@@ -72,12 +72,12 @@ fn paragraphs(page: &str) -> Vec<String> {
 fn sentences(paragraph: &str) -> Vec<Vec<&str>> {
     let mut all: Vec<Vec<&str>> = vec![Vec::new()];
     let mut formula = false;
-    let mut words = paragraph.split_whitespace().filter(move |word| {
+    let outside = |word: &&str| {
         let within = formula;
         formula ^= word.matches('$').count() % 2 == 1;
         !within
-    });
-    let mut words = words.by_ref().peekable();
+    };
+    let mut words = paragraph.split_whitespace().filter(outside).peekable();
     while let Some(word) = words.next() {
         if let Some(last) = all.last_mut() {
             last.push(word);

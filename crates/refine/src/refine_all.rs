@@ -25,7 +25,7 @@ pub struct RefineJob<'a> {
     pub rivals: Option<Vec<Isometry3<f64>>>,
     /// Renderer; `None` is the processor.
     pub backend: Option<Arc<dyn Backend>>,
-    /// Whether the fused estimator also refines without each sensor: [`Fused::diagnose`](crate::strategy::Fused::diagnose).
+    /// True if the fused estimator also refines without each sensor: [`Fused::diagnose`](crate::strategy::Fused::diagnose).
     pub diagnose: bool,
 }
 

@@ -45,7 +45,7 @@ const FAR: f64 = 4.0;
 /// More ends would take longer to look at than the number itself.
 const MOST_ENDS: usize = 1000;
 
-/// How far from one half the number has to be for its error not to matter.
+/// Distance of the winding number from one half beyond which its error does not matter.
 const CERTAIN: f64 = 0.1;
 
 impl Winding {

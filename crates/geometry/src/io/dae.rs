@@ -49,7 +49,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         MeshError::malformed(self.path, element, reason)
     }
 
-    /// What an instance or an input refers to.
+    /// Element that an instance or an input refers to.
     fn target(&self, node: Node<'a, 'i>) -> Result<Node<'a, 'i>, MeshError> {
         let name = node.attribute("url").or(node.attribute("source")).unwrap_or_default();
         let found = name.strip_prefix('#').and_then(|id| self.ids.get(id)).copied();

@@ -68,7 +68,7 @@ pub enum Dynamics {
     Muscle([f64; 3]),
 }
 
-/// How a muscle pulls: by its fiber's length, that of the actuator from `origin` over `unit`, and the rate of it.
+/// Force law of a muscle: by its fiber's length, that of the actuator from `origin` over `unit`, and the rate of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Muscle {
     /// Active force at a fiber's length of one, at rest; without it `scale` times the inertia: one over the size of the acceleration that a unit of
@@ -114,7 +114,7 @@ pub struct Actuator {
     pub activation_range: Option<(f64, f64)>,
     /// How far ahead the input is by which it drives \[s\]: by the model's time step where it is to act early.
     pub ahead: f64,
-    /// How it pulls, where it is a muscle: gain and bias are zero then.
+    /// Force law, where it is a muscle: gain and bias are zero then.
     pub muscle: Option<Muscle>,
     /// Share of critical damping that gives the rate's bias of a servo: −2 times it times √(gain · inertia at the length), with all joints at their
     /// references and everything else free to move.

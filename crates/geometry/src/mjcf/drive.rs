@@ -69,7 +69,7 @@ pub(super) struct Drive {
     bias: [f64; 3],
     activation: Activation,
     time_constant: f64,
-    /// Of a muscle: two time constants and the width between, and the parameters of its gain.
+    /// Parameters of a muscle: two time constants and the width between, and the parameters of its gain.
     muscle: ([f64; 3], [f64; 9]),
     /// The control's range in half ranges of what the actuator pulls at; zero does not set it.
     pub(super) inherit_range: f64,
@@ -123,7 +123,7 @@ impl Drive {
         })
     }
 
-    /// Whether its gain, bias or dynamics are a muscle's, and whether all are.
+    /// True if its gain, bias or dynamics are a muscle's, and whether all are.
     pub(super) fn is_muscle(&self) -> [bool; 2] {
         let parts = [
             self.gain_form == Form::Muscle,

@@ -71,7 +71,7 @@ impl StabilityJacobian {
         Self { value, gradient: Vector6::zeros(), normal: Matrix6::zeros() }
     }
 
-    /// Whether the loss and its derivatives are numbers: residuals may be too large to be squared.
+    /// True if the loss and its derivatives are numbers: residuals may be too large to be squared.
     pub(super) fn is_finite(&self) -> bool {
         let derivatives = self.gradient.iter().chain(&self.normal);
         self.value.is_finite() && { derivatives }.all(|x| x.is_finite())

@@ -305,7 +305,7 @@ impl FrameParts {
         self.layout.mass_kg.map(|mass| mass.0)
     }
 
-    /// Whether the images were taken through a lens.
+    /// True if the images were taken through a lens.
     pub(crate) fn has_lens(&self) -> bool {
         self.layout.lens.is_some()
     }

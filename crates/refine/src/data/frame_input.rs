@@ -18,7 +18,7 @@ use crate::tracker::{Tracker, TrackerSettings};
 /// Observation of an object, in a hand if that is known.
 #[derive(Clone)]
 pub struct FrameInput {
-    /// What was sensed.
+    /// Sensor data.
     pub observation: Observation,
     /// The object.
     pub object: Arc<Object>,
@@ -105,8 +105,7 @@ impl FrameInput {
         Ok(frame)
     }
 
-    /// What looks wrong with the object's model, then with the frame and the object's pose in it, `t_cam_object`: units, frames,
-    /// sensors, and what was assumed.
+    /// Warnings about the object's model, then about the frame and the object's pose in it, `t_cam_object` \[m\]: units, frames, sensors, assumptions.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
         let mut of_frame = check_frame(observation, object, hand.as_deref(), t_cam_object);
@@ -114,7 +113,7 @@ impl FrameInput {
         [check_object(object, hand.is_some()), of_frame]
     }
 
-    /// What becomes of the frame, its object about at `t_cam_object`, by corrections of common mistakes.
+    /// Trial of corrections of common mistakes on the frame, its object about at `t_cam_object` \[m\].
     ///
     /// # Errors
     /// Those of [`CorrectionTrial::new`].

@@ -4,15 +4,15 @@
 //! is whole: what a killed process left of its last line is cut off when the journal is opened again.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use prehend_geometry::{open_plain, plain_target};
+use prehend_geometry::open_plain;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::data::bop::{DatasetError, lock, write_atomically};
+use crate::data::bop::{DatasetError, open_locked};
 use crate::data::identity::Identity;
 
 /// A journal that is open for writing, by this process alone.
@@ -20,7 +20,6 @@ use crate::data::identity::Identity;
 pub struct Journal {
     path: PathBuf,
     file: File,
-    identity: Identity,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -42,18 +41,11 @@ impl Journal {
         restart: bool,
     ) -> Result<(Self, BTreeMap<usize, E>), DatasetError> {
         let fault = |error: io::Error| DatasetError::unusable(path, error);
-        let mut options = OpenOptions::new();
-        options.read(true).write(true).create(true).truncate(false);
-        let mut file = plain_target(path).and_then(|path| options.open(path)).map_err(fault)?;
-        lock(path, &file)?;
-        let mut bytes = Vec::new();
-        if !restart {
-            file.read_to_end(&mut bytes).map_err(fault)?;
-        }
+        let (mut file, bytes) = open_locked(path, restart)?;
         let own = header(path, identity)?;
         let advice = " (--restart discards the whole journal)";
         let Parsed { header, entries, length } = parse(path, &bytes, &own, advice)?;
-        let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity, &[]));
+        let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity));
         if !differences.is_empty() {
             let problem = format!(
                 "is of another run, which is not finished (there | here):\n  {}\n(--restart discards it)",
@@ -63,7 +55,7 @@ impl Journal {
         }
         file.set_len(length as u64).map_err(fault)?;
         file.seek(SeekFrom::End(0)).map_err(fault)?;
-        let mut journal = Self { path: path.into(), file, identity: identity.clone() };
+        let mut journal = Self { path: path.into(), file };
         if header.is_none() {
             journal.write_line(&own)?;
         }
@@ -101,32 +93,6 @@ impl Journal {
             serde_json::from_str(&text).map_err(|e| unrecorded(&self.path, index, e))?;
         self.write_line(&text)?;
         Ok(back.entry)
-    }
-
-    /// Replaces the journal by one with these entries in the order of their frames: the same bytes whatever
-    /// the order in which they were finished.
-    ///
-    /// # Errors
-    /// If it cannot be written; the journal is then as it was.
-    pub fn compact<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), DatasetError> {
-        Self::write(&self.path, &self.identity, entries)
-    }
-
-    /// Writes a whole journal to `path`, in place of what was there.
-    ///
-    /// # Errors
-    /// If it cannot be written; what was there is then as it was.
-    pub fn write<E: Serialize>(
-        path: &Path,
-        identity: &Identity,
-        entries: &BTreeMap<usize, E>,
-    ) -> Result<(), DatasetError> {
-        let mut text = header(path, identity)? + "\n";
-        for (&index, entry) in entries {
-            text += &line(path, index, entry)?;
-            text.push('\n');
-        }
-        write_atomically(path, text.as_bytes())
     }
 
     /// Removes the journal of a run whose output is complete.

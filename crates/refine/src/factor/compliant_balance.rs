@@ -23,7 +23,7 @@ pub(super) struct Support {
 pub(super) struct CompliantBalance {
     /// Force on the body at each support \[N\].
     pub(super) forces: Vec<Vector3<f64>>,
-    /// What load and forces add up to: force \[N\], torque about the center over the length \[N\]. Also the derivative of the value by
+    /// Sum of load and contact forces: force \[N\], torque about the center over the length \[N\]. Also the derivative of the value by
     /// the load, given in the same way.
     pub(super) residual: Vector6<f64>,
     /// The least \[N²\].
@@ -120,7 +120,7 @@ impl Dual<'_> {
         -(force + torque.cross(&arm))
     }
 
-    /// Of `force` at `support`.
+    /// Projection of `force` at `support`.
     fn wrench(&self, support: &Support, force: &Vector3<f64>) -> Vector6<f64> {
         let torque = (support.position - self.center).cross(force) / self.length;
         Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)

@@ -56,7 +56,7 @@ struct Point {
 }
 
 impl HandDepthFactor {
-    /// Of at most so many `points` of the depth of `frame` where the hand is, spread evenly over it. There may be none: the cost is then zero.
+    /// Factor of at most `points` points of the depth of `frame` where the hand is, spread evenly over it. There may be none: the cost is then zero.
     ///
     /// # Errors
     /// If the hand is unknown.

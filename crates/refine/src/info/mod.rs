@@ -32,7 +32,7 @@ pub struct DescribeOptions {
     pub density: Option<f64>,
     /// Split of a dataset; `test` or the only one without.
     pub split: Option<String>,
-    /// How a robot is read.
+    /// Options of the reader of robots.
     pub robot: ReadOptions,
 }
 

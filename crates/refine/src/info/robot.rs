@@ -57,7 +57,7 @@ pub(super) fn of_urdf(
     }))
 }
 
-/// The same of bodies, geoms and joints of MJCF, with its actuators and keyframes.
+/// Bodies, geoms and joints of MJCF under the same names, with its actuators and keyframes.
 pub(super) fn of_mjcf(
     path: &Path,
     options: &ReadOptions,

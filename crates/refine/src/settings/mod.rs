@@ -20,7 +20,7 @@ use crate::tracker::TrackerSettings;
 
 /// Settings of estimator, search, tracker and calibration: what the command's `--settings FILE` and `--set PATH=VALUE` change, and Python's `settings`.
 ///
-/// What a file leaves out is as it was: each table of it is merged into that of the defaults; an array replaces the whole array.
+/// Settings that a file leaves out keep their values: each table of it is merged into that of the defaults; an array replaces the whole array.
 ///
 /// ```
 /// use prehend_refine::Settings;
@@ -53,7 +53,7 @@ pub enum SettingsError {
     File {
         /// The file.
         file: PathBuf,
-        /// What the system says, or what is wrong with it.
+        /// Error of the system or of the content.
         source: Box<dyn Error + Send + Sync>,
     },
     /// It is no TOML, there is no such setting, or it cannot have this value.
@@ -61,7 +61,7 @@ pub enum SettingsError {
     Value {
         /// Path of the setting, such as `estimator.patches.sigma`; line of a file that is no TOML.
         place: String,
-        /// What is wrong.
+        /// Problem.
         problem: String,
     },
 }

@@ -110,7 +110,7 @@ impl TrackState {
         self.lost = self.lost.saturating_add(u32::from(seen));
     }
 
-    /// Whether colors are to be learnt from this frame, one in a `period` ([`TrackerSettings::period`]): they change slowly.
+    /// True if colors are to be learnt from this frame, one in a `period` ([`TrackerSettings::period`]): they change slowly.
     pub(super) fn is_time_to_learn(&self, period: u32) -> bool {
         self.followed.is_multiple_of(period)
     }

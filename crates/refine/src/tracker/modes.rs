@@ -46,7 +46,7 @@ impl Modes {
         }
     }
 
-    /// Whether an object turned by `rotation`, by more than an `angle` \[rad\], shows more of which it is.
+    /// True if an object turned by `rotation`, by more than an `angle` \[rad\], shows more of which it is.
     pub(super) fn is_new_view(&self, rotation: &UnitQuaternion<f64>, angle: f64) -> bool {
         self.seen.angle_to(rotation) > angle
     }

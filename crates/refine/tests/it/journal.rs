@@ -43,12 +43,10 @@ fn resumes_whatever_was_cut_off() {
         drop(journal);
         assert_eq!(fs::read(&cut).unwrap(), whole, "cut at {length}");
     }
-    // Compacted, it is in order, and still a journal.
-    let (journal, all): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
-    journal.compact(&all).unwrap();
+    // For reading alone it is the same.
+    let (_, all): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
     let (said, again): (_, Entries) = Journal::read(&path).unwrap();
     assert_eq!((said, again), (identity(1), all));
-    assert!(fs::read_to_string(&path).unwrap().contains("}\n{\"index\":0,"));
 }
 
 /// Why the journal at `path` cannot be opened for the run of this seed.
@@ -88,8 +86,11 @@ fn refuses_other_runs_other_files_and_other_processes() {
 fn a_damaged_line_is_named_and_nothing_is_lost() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.journal");
-    let entries: Entries = (0..3).map(|i| (i, entry(i))).collect();
-    Journal::write(&path, &identity(1), &entries).unwrap();
+    let (mut journal, _): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
+    for index in 0..3 {
+        journal.append(index, &entry(index)).unwrap();
+    }
+    drop(journal);
     let text = fs::read_to_string(&path).unwrap().replace("\"index\":1", "\"index\":x");
     fs::write(&path, &text).unwrap();
     let error = refused(&path, 1);

@@ -54,7 +54,7 @@ impl<I: Integrator> StepCheckpointed<I> {
         Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
-    /// Of a world of `template`.
+    /// Steps of a world of `template`.
     pub(crate) fn of(template: &Arc<WorldTemplate<I>>) -> Self {
         Self { template: Arc::clone(template) }
     }

@@ -73,7 +73,7 @@ impl JointLaw for Muscle {
 }
 
 law_part! {
-    /// What changes the activation of a muscle, which is the velocity of a joint that moves 1 kg m² and nothing else: it follows the control, faster
+    /// Rate of the activation of a muscle, which is the velocity of a joint that moves 1 kg m² and nothing else: it follows the control, faster
     /// the more it is active and slower the more it is not.
     pub struct MuscleActivation: "activation of a muscle" {
         control ["1"] Finite "control";

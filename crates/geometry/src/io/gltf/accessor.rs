@@ -110,7 +110,7 @@ impl Buffers<'_> {
     }
 }
 
-/// How the numbers of an element are stored.
+/// Storage of the numbers of an element.
 #[derive(Clone, Copy)]
 struct Layout {
     number: DataType,

@@ -43,7 +43,7 @@ pub struct DatasetScene {
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
 }
 
-/// What all scenes of a dataset have in common, and keep where it is read again.
+/// State that all scenes of a dataset share, kept where it is read again.
 #[derive(Debug, Default)]
 pub(super) struct SceneCaches {
     pub(super) remaps: RemapCache,

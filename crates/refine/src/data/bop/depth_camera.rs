@@ -18,7 +18,7 @@ pub(crate) struct DepthCamera {
 }
 
 impl DepthCamera {
-    /// Of intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
+    /// Depth camera of intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
     ///
     /// # Errors
     /// The name of what is missing beside what is there.

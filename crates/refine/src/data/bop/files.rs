@@ -1,11 +1,11 @@
 //! Files that are read whole, and appear whole or not at all.
 
-use std::fs::{self, File, TryLockError};
-use std::io::ErrorKind;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use prehend_geometry::limits::MAX_TEXT_BYTES;
-use prehend_geometry::{AtomicFile, read_plain};
+use prehend_geometry::{AtomicFile, plain_target, read_plain};
 
 use super::error::DatasetError;
 
@@ -56,6 +56,24 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
 /// [`DatasetError::Write`] naming `folder`.
 pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
     fs::create_dir_all(folder).map_err(|e| DatasetError::writing(folder, e))
+}
+
+/// Opens the file at `path` for reading and writing, made if absent, for this process alone; also returns what it holds, nothing with `anew`. Links are
+/// followed, what is no plain file is refused.
+///
+/// # Errors
+/// If another process has it, or it cannot be opened or read.
+pub(crate) fn open_locked(path: &Path, anew: bool) -> Result<(File, Vec<u8>), DatasetError> {
+    let fault = |error: io::Error| DatasetError::unusable(path, error);
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    let mut file = plain_target(path).and_then(|path| options.open(path)).map_err(fault)?;
+    lock(path, &file)?;
+    let mut bytes = Vec::new();
+    if !anew {
+        file.read_to_end(&mut bytes).map_err(fault)?;
+    }
+    Ok((file, bytes))
 }
 
 /// Keeps other processes from a file or folder, which errors call `path`, until it is closed.

@@ -66,7 +66,7 @@ impl JsonFile {
         Self { path, root: OnceLock::new(), is_told: AtomicBool::new(false) }
     }
 
-    /// The same with `entries` in place of what is in the file.
+    /// File with `entries` in place of its content.
     pub(super) fn with_entries(path: PathBuf, entries: RawEntries) -> Self {
         Self { root: Ok(entries).into(), ..Self::new(path) }
     }
@@ -169,7 +169,7 @@ pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetEr
     from_text(file, &read_bytes(file)?)
 }
 
-/// The same of its `text`.
+/// Content of a file of that `text`.
 pub(super) fn from_text<T: DeserializeOwned>(file: &Path, text: &[u8]) -> Result<T, DatasetError> {
     let broken =
         |e: serde_json::Error| DatasetError::unusable(file, format!("not valid JSON: {e}"));

@@ -40,7 +40,7 @@ pub(crate) use depth_values::drop_saturated;
 pub use detections::Detections;
 pub use error::DatasetError;
 pub use files::{check_writable, create_folder, write_atomically};
-pub(crate) use files::{lock, read_bytes, read_text};
+pub(crate) use files::{lock, open_locked, read_bytes, read_text};
 pub use frame::DatasetImage;
 pub(crate) use frame::Intrinsics;
 pub(crate) use frame_pose::{FramePose, LengthUnit};

@@ -67,7 +67,7 @@ impl<const LEAST: usize> TryFrom<f64> for Bounded<LEAST> {
 #[serde(try_from = "Numbers<9>")]
 pub(crate) struct Rotation(
     pub(crate) UnitQuaternion<f64>,
-    /// How far the matrix was from orthonormal, where that was more than rounding.
+    /// Deviation of the matrix from orthonormality, where that was more than rounding.
     pub(crate) Option<f64>,
 );
 

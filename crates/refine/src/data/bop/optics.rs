@@ -11,7 +11,7 @@ use super::depth_values::drop_saturated;
 use super::error::DatasetError;
 use crate::scene::{Observation, RemapCache};
 
-/// How the images of a camera were taken.
+/// Optics of a camera: intrinsics, lens, depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Optics<'a> {
     /// Intrinsics; of unknown size.

@@ -86,7 +86,7 @@ pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f
 /// The pose \[m\] of a 4×4 matrix in row-major order. A rotation that is up to 0.02 from orthonormal is replaced by the nearest one.
 ///
 /// # Errors
-/// What is wrong with a matrix that is no pose.
+/// Reason why a matrix is no pose.
 pub fn pose_from_matrix(m: &[f64; 16]) -> Result<Isometry3<f64>, String> {
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {
         return Err("the matrix's last row must be 0 0 0 1".into());

@@ -1,4 +1,4 @@
-//! What a study compares.
+//! Methods, steps and faults that a study compares.
 
 use std::path::Path;
 

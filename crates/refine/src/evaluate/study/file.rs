@@ -1,14 +1,12 @@
 //! The table of a study as a CSV file that grows by the rows of a frame at a time.
 
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use prehend_geometry::plain_target;
-
 use super::record::{COLUMNS, Key, Record};
-use crate::data::bop::{DatasetError, lock, write_atomically};
+use crate::data::bop::{DatasetError, open_locked, write_atomically};
 
 /// The table of a study, open for writing by this process alone. Rows count once they are whole.
 pub struct StudyFile {
@@ -24,14 +22,7 @@ impl StudyFile {
     /// If it is no such table, damaged, being written by another process, or cannot be read or written.
     pub fn open(path: &Path, restart: bool) -> Result<Self, DatasetError> {
         let fault = |error: io::Error| DatasetError::unusable(path, error);
-        let mut options = OpenOptions::new();
-        options.read(true).write(true).create(true).truncate(false);
-        let mut file = plain_target(path).and_then(|path| options.open(path)).map_err(fault)?;
-        lock(path, &file)?;
-        let mut bytes = Vec::new();
-        if !restart {
-            file.read_to_end(&mut bytes).map_err(fault)?;
-        }
+        let (mut file, bytes) = open_locked(path, restart)?;
         let header = format!("{COLUMNS}\n").into_bytes();
         // What a killed process left of its last line does not count.
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);

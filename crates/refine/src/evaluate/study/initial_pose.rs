@@ -59,7 +59,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Whether initial pose `k` belongs to it.
+    /// True if initial pose `k` belongs to it.
     pub fn holds(self, k: usize) -> bool {
         k % self.count == self.index
     }

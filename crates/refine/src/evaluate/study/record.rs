@@ -23,7 +23,7 @@ pub const COLUMNS: &str = "study,dataset,level,frame,method,steps,sweep,amount,f
     p_1mm,p_2mm,p_5mm,p_1deg,p_2deg,p_5deg,p_5mm_5deg,probability,cost,hypotheses,weight,unobservable,inconsistent,termination,\
     program,inputs,settings,seed";
 
-/// What a row is of. No two rows of a table have the same.
+/// Key of a row, unique in a table.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Key {
     /// The study.
@@ -60,14 +60,14 @@ impl Key {
     }
 }
 
-/// What determines a result, beside the frame and the method's name: fingerprints of the program, of the inputs (annotations, initial
+/// Provenance of a result, beside the frame and the method's name: fingerprints of the program, of the inputs (annotations, initial
 /// poses, rig) and of the method's settings, and the seed of the points on objects' surfaces.
 pub(super) type Provenance = [String; 4];
 
 /// One pose of one frame, with its scores: a row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// What it is of.
+    /// Key.
     pub key: Key,
     /// Initial poses of the level that were asked for, unreadable ones included.
     pub(super) frames: usize,
@@ -85,7 +85,7 @@ pub struct Record {
     pub(super) metrics: [Option<f64>; METRICS.len()],
     /// The posterior that the method states, beside the error.
     pub(super) prediction: Prediction,
-    /// What determines it.
+    /// Provenance.
     pub(super) provenance: Provenance,
 }
 
@@ -117,7 +117,7 @@ impl Record {
         self.status = reason.replace(['\n', '\r'], " ");
     }
 
-    /// Whether there is a pose with a score.
+    /// True if there is a pose with a score.
     pub fn is_scored(&self) -> bool {
         self.status == OK
     }

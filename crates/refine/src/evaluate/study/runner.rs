@@ -80,7 +80,7 @@ impl<'a> Runner<'a> {
         rows
     }
 
-    /// What `method` finds, or the pose that is given under that name.
+    /// Result of `method`, or the pose that is given under that name.
     fn pose_of(
         &self,
         initial: &InitialPose,

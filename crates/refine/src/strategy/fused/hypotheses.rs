@@ -80,7 +80,7 @@ pub(super) fn lowest(states: &[State], costs: &[f64], count: usize) -> Vec<State
     order.into_iter().take(count).map(|k| states[k].clone()).collect()
 }
 
-/// Whether `point` leaves no direction open by more than `width` \[m of surface motion\], and depth scatters by less than `scatter` \[m\] about the surface.
+/// True if `point` leaves no direction open by more than `width` \[m of surface motion\], and depth scatters by less than `scatter` \[m\] about the surface.
 pub(super) fn settled(
     point: &Linearization,
     noise: impl FnOnce() -> Option<NoiseEstimate>,

@@ -1,4 +1,4 @@
-//! What drives a model.
+//! Actuators of a model.
 
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@ use super::{MjcfError, MjcfRobot};
 use crate::state::State;
 use crate::world::World;
 
-/// Whether there are as many numbers as there should be.
+/// Checks the count of numbers.
 fn check(what: &'static str, numbers: &[f64], expected: usize) -> Result<(), MjcfError> {
     let given = numbers.len();
     if given == expected { Ok(()) } else { Err(MjcfError::Count { what, given, expected }) }
