@@ -120,7 +120,7 @@ impl Dual<'_> {
         -(force + torque.cross(&arm))
     }
 
-    /// Projection of `force` at `support`.
+    /// Wrench of `force` at `support`.
     fn wrench(&self, support: &Support, force: &Vector3<f64>) -> Vector6<f64> {
         let torque = (support.position - self.center).cross(force) / self.length;
         Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
