@@ -22,7 +22,7 @@ fn main() -> Result<(), RefineError> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| !w.starts_with('-')).collect();
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     println!("| what | median ms | fastest | slowest |\n|---|--:|--:|--:|");
-    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand))?;
+    let frame = Frame::new(&SCENE.observation, &SCENE.object)?;
     let (fused, combined) = (Fused::default(), Heuristic::combined());
     let exhaustive = Heuristic { exhaustive: true, ..combined.clone() };
     let whole: [(&str, usize, &dyn Strategy); 3] = [
@@ -77,8 +77,7 @@ fn time<T>(name: &str, samples: usize, mut run: impl FnMut() -> T) {
 
 /// A tracker that has found the object in the first frame.
 fn tracker() -> Result<Tracker, RefineError> {
-    let (object, robot) = (Arc::clone(&SEQUENCE.object), Arc::clone(&SEQUENCE.hand));
-    let mut tracker = Tracker::new(object, Some(robot), TrackerSettings::default())?;
+    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), TrackerSettings::default())?;
     tracker.start_from(&SEQUENCE.initial);
     tracker.track(&SEQUENCE.frames[0].observation, SEQUENCE.frames[0].time)?;
     Ok(tracker)

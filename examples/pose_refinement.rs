@@ -24,7 +24,7 @@ fn main() -> anyhow::Result<()> {
 
     let start = Instant::now();
     let observation = &scene.observation;
-    let frame = Frame::new(observation, &scene.object, Some(&scene.hand))?;
+    let frame = Frame::new(observation, &scene.object)?;
     let refined = refine(&frame, &scene.initial, &Method::default())?;
     let seconds = start.elapsed().as_secs_f64();
 

@@ -19,9 +19,9 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
     for row in &rows {
         let object = assets.object(row.obj_id).expect("the model loads");
         let frame = data.frame(row.scene_id, row.im_id).expect("the frame is listed");
-        let (observation, hand) =
+        let observation =
             assets.observation(&frame, 0, &Sensor::required_by(&method)).expect("the frame loads");
-        let frame = Frame::new(&observation, &object, hand.as_ref()).expect("the frame fits");
+        let frame = Frame::new(&observation, &object).expect("the frame fits");
         let refined = refine(&frame, &row.t_cam_model, &method).expect("the frame refines");
         let refined = ResultRow { t_cam_model: *refined.t_cam_object(), ..row.clone() };
         for (sum, row) in [(&mut before, row), (&mut after, &refined)] {

@@ -301,7 +301,7 @@ def test_estimates_can_be_sent_to_other_processes(refined):
 def test_an_object_is_followed():
     initial, frames = prehend.example_sequence(1, 4)
     first = frames[0][0]
-    tracker = prehend.Tracker(first.object, first.hand, pose=initial)
+    tracker = prehend.Tracker(first.object, pose=initial)
     followed = [tracker.push(frame, at) for frame, at, _ in frames]
     assert [tracked.status for tracked in followed] == ["found"] + ["followed"] * 3
     for tracked, (_, _, truth) in zip(followed, frames, strict=True):
@@ -311,7 +311,7 @@ def test_an_object_is_followed():
     bare = prehend.Frame(**inputs(frames[-1][0], mask=None))
     assert tracker.push(bare, 0.1).status == "followed"
     hidden = inputs(frames[-1][0], mask=None, depth=np.full((480, 640), 0.3), rgb=np.full((480, 640, 3), 128, np.uint8))
-    tracker = prehend.Tracker(first.object, first.hand, pose=initial, recovery="off")
+    tracker = prehend.Tracker(first.object, pose=initial, recovery="off")
     tracker.push(first, 0.0)
     lost = tracker.push(prehend.Frame(**hidden), 0.2)
     assert (lost.status, lost.covariance, lost.doubt) == ("lost", None, "nothing of the object is seen")
@@ -323,7 +323,7 @@ def test_an_object_is_followed():
         prehend.Tracker(first.object, budget=-1.0)
     with pytest.raises(prehend.Error, match="time"):
         tracker.push(first, float("nan"))
-    assert prehend.Tracker(first.object, first.hand, pose=initial).push(bare, 0.0).status == "found"
+    assert prehend.Tracker(first.object, pose=initial).push(bare, 0.0).status == "found"
 
 
 def test_results_files(tmp_path):
@@ -449,7 +449,7 @@ def test_an_object_is_followed_as_by_the_command(dataset, command, tmp_path):
     command("track", "--out", out)
     told = [line.split(",") for line in out.read_text().splitlines()[1:]]
     start = next(row for row in read_results(DATA / "init_low.csv") if row.scene == SCENE)
-    tracker = prehend.Tracker(dataset.object(OBJECT), dataset.frame(*start.ids).hand, pose=start.pose)
+    tracker = prehend.Tracker(dataset.object(OBJECT), pose=start.pose)
     assert len(told) == len(dataset.images(SCENE)) > 1
     for image, cells in zip(dataset.images(SCENE), told, strict=True):
         tracked = tracker.push(dataset.frame(SCENE, image, OBJECT), image / 30.0)

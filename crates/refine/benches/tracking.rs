@@ -72,8 +72,7 @@ fn main() -> Result<(), RefineError> {
         frame.observation.mask.pixels_mut().fill(false);
     }
     let pixels: usize = film.frames.iter().map(|f| f.observation.mask.pixels().len()).sum();
-    let hand = Some(Arc::clone(&film.hand));
-    let mut tracker = Tracker::new(Arc::clone(&film.object), hand, TrackerSettings::default())?;
+    let mut tracker = Tracker::new(Arc::clone(&film.object), TrackerSettings::default())?;
     tracker.start_from(&film.initial);
     let mut seconds = Vec::new();
     let mut followed = 0;

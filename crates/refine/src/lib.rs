@@ -8,7 +8,7 @@
 //! use prehend_refine::{Frame, Method, refine};
 //!
 //! let scene = default_scene(1)?;
-//! let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand))?;
+//! let frame = Frame::new(&scene.observation, &scene.object)?;
 //! let estimate = refine(&frame, &scene.initial, &Method::default())?;
 //! let posterior = estimate.posterior.as_ref().ok_or("only other methods have none")?;
 //! println!("{} with probability {:.2}", estimate.t_cam_object(), posterior.probability());

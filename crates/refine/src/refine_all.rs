@@ -124,8 +124,8 @@ mod tests {
 
     #[test]
     fn what_becomes_of_a_frame_depends_on_no_other() {
-        let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
-        let input = FrameInput::new(observation, object, Some(hand), None);
+        let Scene { observation, object, initial, .. } = default_scene(1).unwrap();
+        let input = FrameInput::new(observation, object, None);
         let behind = Isometry3::translation(0.0, 0.0, -2.0) * initial;
         let job = |initial| RefineJob::new(&input, initial);
         let jobs = [initial, behind, initial].map(job);
@@ -158,12 +158,11 @@ mod tests {
 
     #[test]
     fn a_panic_costs_one_frame() {
-        let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
+        let Scene { observation, object, initial, .. } = default_scene(1).unwrap();
         let input = |has_hand: bool| {
             let mut observation = observation.clone();
             observation.hand = observation.hand.filter(|_| has_hand);
-            let hand = has_hand.then(|| Arc::clone(&hand));
-            FrameInput::new(observation, Arc::clone(&object), hand, None)
+            FrameInput::new(observation, Arc::clone(&object), None)
         };
         let inputs = [input(true), input(false), input(true)];
         let job = |input| RefineJob::new(input, initial);

@@ -24,8 +24,7 @@ pub(crate) fn example_frame<'py>(
 ) -> PyResult<(Frame, Array<'py>, Array<'py>)> {
     let scene = py.detach(|| default_scene(seed)).raise()?;
     let (initial, truth) = (matrix(py, &scene.initial)?, matrix(py, &scene.truth)?);
-    let (observation, object, hand) = (scene.observation, scene.object, Some(scene.hand));
-    let input = FrameInput::new(observation, object, hand, None);
+    let input = FrameInput::new(scene.observation, scene.object, None);
     Ok((Frame { input, target: None }, initial, truth))
 }
 
@@ -41,8 +40,7 @@ pub(crate) fn example_sequence<'py>(
     let sequence = py.detach(|| default_sequence(seed, count)).raise()?;
     let initial = matrix(py, &sequence.initial)?;
     let frame = |SequenceFrame { time, observation, truth }| {
-        let (object, hand) = (Arc::clone(&sequence.object), Arc::clone(&sequence.hand));
-        let input = FrameInput::new(observation, object, Some(hand), None);
+        let input = FrameInput::new(observation, Arc::clone(&sequence.object), None);
         Ok((Frame { input, target: None }, time.as_secs_f64(), matrix(py, &truth)?))
     };
     let frames = sequence.frames.into_iter().map(frame).collect::<PyResult<_>>()?;

@@ -96,10 +96,9 @@ impl Frame {
         let object = prepared(&object)?;
         let seen = Observation::new(camera, color, depth, mask);
         let mut observation = Observation { gravity, hand: measured, ..seen };
-        let hand = hand.map(|hand| Arc::clone(&hand.hand));
         let check = |observation: &Observation| {
             // Only what looks at the object needs a mask.
-            match prehend_refine::Frame::new(observation, &object, hand.as_ref()) {
+            match prehend_refine::Frame::new(observation, &object) {
                 Ok(_) | Err(RefineError::EmptyMask) => Ok(()),
                 Err(error) => Err(error).raise(),
             }
@@ -116,7 +115,7 @@ impl Frame {
         if let Some(rig) = &rig {
             observation = rig.corrected(&observation).raise()?;
         }
-        Ok(Self { input: FrameInput::new(observation, object, hand, rig), target: None })
+        Ok(Self { input: FrameInput::new(observation, object, rig), target: None })
     }
 
     /// Refines a pose of the object (4 × 4, camera ← object [m]): an `Estimate`. Python's other threads run on meanwhile.

@@ -57,7 +57,8 @@ impl Frame {
     /// The hand, where it is known.
     #[getter]
     fn hand(&self) -> Option<Hand> {
-        self.input.hand.as_ref().map(|hand| Hand { hand: Arc::clone(hand) })
+        let measured = self.input.observation.hand.as_ref();
+        measured.map(|measured| Hand { hand: Arc::clone(&measured.hand) })
     }
 
     /// 4 × 4, camera ← base of the hand [m], where it is known.
@@ -70,11 +71,9 @@ impl Frame {
     /// Positions of the hand's joints by name [rad or m], where they are known.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (Some(hand), Some(measured)) = (&self.input.hand, &self.input.observation.hand) else {
-            return Ok(None);
-        };
+        let Some(measured) = &self.input.observation.hand else { return Ok(None) };
         let joints = PyDict::new(py);
-        for (name, position) in hand.tree.joint_names().iter().zip(&measured.joints) {
+        for (name, position) in measured.hand.tree.joint_names().iter().zip(&measured.joints) {
             joints.set_item(name, position)?;
         }
         Ok(Some(joints))

@@ -21,7 +21,7 @@ pub(super) enum Joints<'py> {
 
 /// The state of `hand`, checked.
 pub(super) fn measured(
-    hand: &prehend_refine::Hand,
+    hand: &Arc<prehend_refine::Hand>,
     hand_pose: &Numbers<'_>,
     joints: Joints<'_>,
     touch: Option<&Numbers<'_>>,
@@ -48,5 +48,5 @@ pub(super) fn measured(
         return Err(RefineError::TaxelCount { forces: given, taxels }).raise();
     }
     let joints = hand.tree.joint_vector(&named).raise()?;
-    Ok(HandMeasurement::new(pose(hand_pose, "hand_pose")?, joints).with_forces(forces))
+    Ok(hand.measured(pose(hand_pose, "hand_pose")?, joints).with_forces(forces))
 }

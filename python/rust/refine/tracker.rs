@@ -35,10 +35,9 @@ fn seconds(seconds: f64, what: &str) -> PyResult<Duration> {
 impl Tracker {
     #[new]
     #[allow(clippy::too_many_arguments)] // as Python has it
-    #[pyo3(signature = (object, hand=None, *, pose=None, rig=None, budget=None, recovery=None, settings=None))]
+    #[pyo3(signature = (object, *, pose=None, rig=None, budget=None, recovery=None, settings=None))]
     fn new(
         object: Bound<'_, PyAny>,
-        hand: Option<&Hand>,
         pose: Option<Numbers<'_>>,
         rig: Option<&Rig>,
         budget: Option<f64>,
@@ -50,9 +49,8 @@ impl Tracker {
         let mut settings = self::settings(settings.as_ref())?.tracker();
         settings.budget = budget.or(settings.budget);
         settings.recovery = recovery.unwrap_or(settings.recovery);
-        let hand = hand.map(|hand| Arc::clone(&hand.hand));
         let object = prepared(&object)?;
-        let mut tracker = prehend_refine::tracker::Tracker::new(object, hand, settings).raise()?;
+        let mut tracker = prehend_refine::tracker::Tracker::new(object, settings).raise()?;
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(&rig.rig));
         }

@@ -71,7 +71,7 @@ fn main() -> anyhow::Result<()> {
             let (observation, object) = (&mut input.observation, &mut input.object);
             fault::apply(kind, observation, object, &objects, other, &mut random)?;
         }
-        let frame = Frame::new(&input.observation, &input.object, input.hand.as_ref())?;
+        let frame = Frame::new(&input.observation, &input.object)?;
         let found = refine(&frame, &rows[index].t_cam_model, &Fused::default())?;
         let (pose, truth) = (found.t_cam_object(), &truths[index]);
         let off = (pose * input.object.center - truth * center).norm();

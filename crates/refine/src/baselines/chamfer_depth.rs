@@ -200,7 +200,7 @@ mod tests {
         let scene = scene();
         let mut observation = scene.observation.clone();
         observation.depth.pixels_mut().fill(0.0);
-        let frame = Frame::new(&observation, &scene.object, None).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let factor = ChamferDepthFactor::new(&frame, &ChamferDepthSettings::default());
         assert!(matches!(factor, Err(RefineError::NoDepth)));
     }

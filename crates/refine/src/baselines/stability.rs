@@ -88,7 +88,8 @@ impl StabilityFactor {
         let gravity = frame.observation().gravity.ok_or(missing)?;
         check_gravity(&gravity)
             .map_err(|problem| RefineError::Gravity { factor: "stability", problem })?;
-        let (robot, hand) = frame.require_hand("stability")?;
+        let hand = frame.require_hand("stability")?;
+        let robot = &hand.hand;
         let object = frame.object();
         let fail = |reason: String| RefineError::Object { object: object.name.clone(), reason };
         let inertial = &object.inertial;
@@ -224,7 +225,7 @@ mod tests {
     #[test]
     fn steps_are_fine_enough_where_the_object_penetrates() {
         let (frame, state) = fixture(0);
-        let toward_palm = frame.hand().unwrap().1.t_cam_hand * -Vector3::x();
+        let toward_palm = frame.hand().unwrap().t_cam_hand * -Vector3::x();
         let held = State { t_cam_object: scene().truth, ..state };
         for depth in [0.0, 2e-3, 5e-3] {
             let twist = Vector6::new(toward_palm.x, toward_palm.y, toward_palm.z, 0.0, 0.0, 0.0);
@@ -250,7 +251,7 @@ mod tests {
         let settings = StabilitySettings::default();
         let held = State { t_cam_object: scene().truth, ..state };
         let term = StabilityFactor::new(&frame, &held, settings).unwrap();
-        let toward_palm = frame.hand().unwrap().1.t_cam_hand * Vector3::x() * -1.0;
+        let toward_palm = frame.hand().unwrap().t_cam_hand * Vector3::x() * -1.0;
         let moved = |by: f64| {
             let twist =
                 Vector6::new(toward_palm.x, toward_palm.y, toward_palm.z, 0.0, 0.0, 0.0) * by;

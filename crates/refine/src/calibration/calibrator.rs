@@ -14,7 +14,7 @@ use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
 use crate::rig::{Play, Rig};
-use crate::scene::{Frame, Hand, Object, Observation, SurfaceDeviation, View, median};
+use crate::scene::{Frame, Object, Observation, SurfaceDeviation, View, median};
 use crate::strategy::{Fused, Modality};
 
 /// A frame of a rig, and where its object is thought to be.
@@ -25,8 +25,6 @@ pub struct CalibrationFrame {
     pub observation: Observation,
     /// The object's number.
     pub obj_id: u32,
-    /// The hand, where there is one.
-    pub hand: Option<Arc<Hand>>,
     /// Object → camera \[m\].
     pub initial: Isometry3<f64>,
     /// Whether that is where a visit has found the object, with a rig that has hardly changed since: the next visit then refines it
@@ -124,7 +122,7 @@ impl Calibrator {
     /// # Errors
     /// If the frame cannot be refined, does not fit the rig, or is of another object than there are.
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
-        let CalibrationFrame { obj_id, hand, initial, is_refined, .. } = frame;
+        let CalibrationFrame { obj_id, initial, is_refined, .. } = frame;
         let has_mask = frame.observation.mask.count() > 0;
         let (observation, mut fused) = self.corrected(frame)?;
         if *is_refined {
@@ -133,7 +131,7 @@ impl Calibrator {
             fused.settings.hypotheses.restart_angle = 0.0;
         }
         fused.rig = Some(Arc::new(self.rig.clone()));
-        let frame = Frame::new(&observation, self.object(*obj_id)?, hand.as_ref())?;
+        let frame = Frame::new(&observation, self.object(*obj_id)?)?;
         let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
         let information = self.information(&frame, &fused, *obj_id, &found.state)?;
@@ -156,18 +154,17 @@ impl Calibrator {
         let has_mask = frame.observation.mask.count() > 0;
         let (observation, fused) = self.corrected(frame)?;
         let object = self.object(frame.obj_id)?;
-        let corrected = Frame::new(&observation, object, frame.hand.as_ref())?;
+        let corrected = Frame::new(&observation, object)?;
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings, has_mask)
     }
 
     /// What a frame shows when the rig is corrected, and how it is refined.
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
-        let CalibrationFrame { observation, obj_id, hand, initial, .. } = frame;
+        let CalibrationFrame { observation, obj_id, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
         let mut observation = self.rig.corrected(observation)?;
         if observation.mask.count() == 0 {
-            observation.mask =
-                View::of_observation(&observation, object, hand.as_deref(), initial)?.likely_mask();
+            observation.mask = View::of_observation(&observation, object, initial)?.likely_mask();
             fused.settings.modalities.retain(|modality| *modality != Modality::Silhouette);
         }
         Ok((observation, fused))

@@ -44,7 +44,7 @@ impl FrameResiduals {
     ) -> Result<Self, RefineError> {
         let state = State::new(frame, t_cam_object)?;
         let pixels = Pixels::new(frame, &state, settings.hand_depth.margin);
-        let feels = frame.hand().is_some_and(|(_, hand)| !hand.forces.is_empty());
+        let feels = frame.hand().is_some_and(|hand| !hand.forces.is_empty());
         let touch = feels.then(|| TactileFactor::new(frame, &settings.tactile)).transpose()?;
         Ok(Self {
             depth: [pixels.on_object(FEWEST), pixels.on_hand()],

@@ -6,14 +6,14 @@ use prehend_render::{Camera, DepthImage};
 
 use super::limits::{BASE_DISTANCE, JOINT_EXCESS, JOINT_RATIO};
 use super::warning::{Subject, Warning};
-use crate::scene::{Hand, HandMeasurement, hand_depth};
+use crate::scene::{HandMeasurement, hand_depth};
 
-/// Warnings of pose and joints of `hand`, and its depth image \[m\] if it makes sense to compare anything with that.
+/// Warnings of the pose and joints of a hand, and its depth image \[m\] if it makes sense to compare anything with that.
 pub(super) fn check(
-    hand: &Hand,
     measured: &HandMeasurement,
     camera: &Camera,
 ) -> (Vec<Warning>, Option<DepthImage>) {
+    let hand = &measured.hand;
     let broken = |count: usize, finding: String| {
         (vec![Warning::new(Subject::Hand, (count as f64, ""), finding, "")], None)
     };
@@ -27,7 +27,7 @@ pub(super) fn check(
         count => return broken(count, "the hand's pose or a joint is no number".into()),
     }
     let joints = joints(&hand.tree, &measured.joints);
-    let drawn = hand_depth(camera, Some((hand, measured)));
+    let drawn = hand_depth(camera, Some(measured));
     let base = base(&measured.t_cam_hand, drawn.pixels().iter().any(|z| *z > 0.0));
     let other_unit = joints.as_ref().is_some_and(|(_, other_unit)| *other_unit);
     let plausible = base.is_none() && !other_unit;

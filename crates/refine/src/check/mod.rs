@@ -23,7 +23,7 @@ pub use self::correction::{
 };
 pub(crate) use self::model::likely_unit;
 pub use self::warning::{Subject, Warning};
-use crate::scene::{Hand, HandMeasurement, Object, Observation, View};
+use crate::scene::{HandMeasurement, Object, Observation, View};
 
 use self::correction::settled_pose;
 
@@ -37,7 +37,6 @@ pub(crate) fn check_object(object: &Object, held: bool) -> Vec<Warning> {
 pub(crate) fn check_frame(
     observation: &Observation,
     object: &Object,
-    hand: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<Warning> {
     if let Err((image, problem)) = observation.check_sizes() {
@@ -45,13 +44,12 @@ pub(crate) fn check_frame(
         return vec![Warning::new(subject, (0.0, ""), format!("the {image} has {problem}"), "")];
     }
     let mut warnings = Vec::new();
-    let held = hand.zip(observation.hand.as_ref());
     let (mut drawn, mut touch) = (None, None);
-    if let Some((hand, measured)) = held {
-        let (of_hand, image) = hand::check(hand, measured, &observation.camera);
-        let (of_forces, readable) = touch::check(hand, measured);
+    if let Some(measured) = &observation.hand {
+        let (of_hand, image) = hand::check(measured, &observation.camera);
+        let (of_forces, readable) = touch::check(measured);
         warnings.extend(of_hand.into_iter().chain(of_forces));
-        (drawn, touch) = (image, readable.then_some((hand, measured)));
+        (drawn, touch) = (image, readable.then_some(measured));
     }
     let z = (t_cam_object * object.center).z;
     if z.is_nan() || z <= 0.0 {
@@ -63,13 +61,14 @@ pub(crate) fn check_frame(
     if !model::is_plausible(object) {
         return warnings;
     }
-    let images = Comparison { observation, object, has_hand: held.is_some(), drawn, touch };
+    let images = Comparison { observation, object, drawn, touch };
     let found = images.check(t_cam_object, false);
     let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
     // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
-    let settled = found.iter().any(of_pose).then(|| {
-        settled_pose(observation, object, hand, t_cam_object, &CorrectionSettings::default())
-    });
+    let settled = found
+        .iter()
+        .any(of_pose)
+        .then(|| settled_pose(observation, object, t_cam_object, &CorrectionSettings::default()));
     warnings.extend(settled.flatten().map_or(found, |pose| images.check(&pose, true)));
     warnings
 }
@@ -78,23 +77,22 @@ pub(crate) fn check_frame(
 struct Comparison<'a> {
     observation: &'a Observation,
     object: &'a Object,
-    has_hand: bool,
     /// Depth of the hand \[m\], unless that is at fault.
     drawn: Option<DepthImage>,
     /// The hand whose forces have places.
-    touch: Option<(&'a Hand, &'a HandMeasurement)>,
+    touch: Option<&'a HandMeasurement>,
 }
 
 impl Comparison<'_> {
     /// Warnings with the object at a pose; one that `is_settled` where mask and depth have it fits.
     fn check(&self, t_cam_object: &Isometry3<f64>, is_settled: bool) -> Vec<Warning> {
-        let &Self { observation, object, has_hand, ref drawn, touch } = self;
+        let &Self { observation, object, ref drawn, touch } = self;
         let z = (t_cam_object * object.center).z;
         let view = View::new(observation, &observation.camera, object, drawn.clone(), t_cam_object);
         let mut warnings = depth::check(&view, object);
         let blamed = |subject| warnings.iter().any(|warning| warning.subject == subject);
         let hand_fits = drawn.is_some() && warnings.is_empty();
-        let hand_wrong = has_hand && drawn.is_none() || blamed(Subject::Hand);
+        let hand_wrong = observation.hand.is_some() && drawn.is_none() || blamed(Subject::Hand);
         let (off_object, mask_fits) = match blamed(Subject::Depth) {
             true => (None, false),
             false => mask::off_object(&view, object, hand_fits),
@@ -103,9 +101,9 @@ impl Comparison<'_> {
             if is_settled { None } else { mask::at_pose(&view, z, mask_fits, hand_wrong) };
         let pose_fits = at_pose.is_none();
         warnings.extend(at_pose.into_iter().chain(off_object));
-        if let Some((hand, measured)) = touch.filter(|_| hand_fits && pose_fits) {
+        if let Some(measured) = touch.filter(|_| hand_fits && pose_fits) {
             let seen = Translation3::from(view.toward_seen(z).unwrap_or_default()) * t_cam_object;
-            warnings.extend(touch::check_places(hand, measured, object, &seen));
+            warnings.extend(touch::check_places(measured, object, &seen));
         }
         warnings
     }

@@ -10,8 +10,8 @@ use super::warning::{Subject, Warning};
 use crate::scene::{Hand, HandMeasurement, Object, median};
 
 /// Warnings of the forces by themselves, and whether their places tell anything.
-pub(super) fn check(hand: &Hand, measured: &HandMeasurement) -> (Vec<Warning>, bool) {
-    let forces = &measured.forces;
+pub(super) fn check(measured: &HandMeasurement) -> (Vec<Warning>, bool) {
+    let HandMeasurement { hand, forces, .. } = measured;
     if forces.is_empty() {
         return (Vec::new(), false);
     }
@@ -66,11 +66,11 @@ fn far_from_link(hand: &Hand) -> Option<Warning> {
 
 /// Warning of where forces are felt, with the object where mask and depth have it (object → camera). There must be one force for each taxel.
 pub(super) fn check_places(
-    hand: &Hand,
     measured: &HandMeasurement,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
 ) -> Option<Warning> {
+    let hand = &measured.hand;
     let links = hand.tree.forward_kinematics(&measured.joints);
     let t_object_hand = t_cam_object.inverse() * measured.t_cam_hand;
     // Distances of touched taxels from the object, each with its force.

@@ -17,7 +17,7 @@ use crate::data::robots::Robots;
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{Hand, Inertial, Object, Observation, StatedSize, Target, check_gravity};
+use crate::scene::{Inertial, Object, Observation, StatedSize, Target, check_gravity};
 
 /// Standard deviations of the poses of neighbors, in each direction and about each axis \[m, rad\].
 const NEIGHBOR_SIGMAS: [f64; 2] = [2e-3, 0.02];
@@ -231,11 +231,11 @@ impl<'a> Assets<'a> {
         let dataset = self.dataset.clone();
         let frame = dataset.frame(target.scene_id, target.im_id)?;
         let sought = Sought { target, object: &object, t_cam_object };
-        let (observation, hand) = self.sensed(&frame, MaskOf::Object(&sought), required)?;
-        Ok(FrameInput::new(observation, object, hand, self.rig.clone()))
+        let observation = self.sensed(&frame, MaskOf::Object(&sought), required)?;
+        Ok(FrameInput::new(observation, object, self.rig.clone()))
     }
 
-    /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or
+    /// The frame with every sensor that it brings. A sensor whose file or
     /// entry is absent is left out, unless it is in `required`.
     ///
     /// # Errors
@@ -245,7 +245,7 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         instance: usize,
         required: &[Sensor],
-    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
+    ) -> Result<Observation, AssetError> {
         self.sensed(frame, MaskOf::Number(instance), required)
     }
 
@@ -255,10 +255,10 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
-    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        let (observation, hand) = self.stated(frame, mask, required)?;
+    ) -> Result<Observation, AssetError> {
+        let observation = self.stated(frame, mask, required)?;
         let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
-        Ok((corrected.unwrap_or(observation), hand))
+        Ok(corrected.unwrap_or(observation))
     }
 
     /// The frame as its files state it.
@@ -267,7 +267,7 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
-    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
+    ) -> Result<Observation, AssetError> {
         let mut observation = frame.unsegmented()?;
         let (number, segmented) = match mask {
             MaskOf::Object(sought) => {
@@ -298,7 +298,7 @@ impl<'a> Assets<'a> {
             sought.take_from(&mut bodies);
         }
         if bodies.is_empty() && gravity.is_none() {
-            return Ok((observation, None));
+            return Ok(observation);
         }
         let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
         gravity.iter().try_for_each(check_gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
@@ -312,16 +312,12 @@ impl<'a> Assets<'a> {
             }
         }
         let tactile = tactile.unwrap_or_default();
-        let robot = self.robots.of(frame, &bodies, &tactile, &self.objects)?;
-        let Some((hand, measured)) = robot else {
-            return match required.is_empty() {
-                true => Ok((observation, None)),
-                false => Err(frame.bodies_fault("bodies", "expected one hand, found 0").into()),
-            };
-        };
-        observation.hand = Some(measured);
+        observation.hand = self.robots.of(frame, &bodies, &tactile, &self.objects)?;
+        if observation.hand.is_none() && !required.is_empty() {
+            return Err(frame.bodies_fault("bodies", "expected one hand, found 0").into());
+        }
         observation.place_views();
-        Ok((observation, Some(hand)))
+        Ok(observation)
     }
 }
 

@@ -9,7 +9,9 @@ use prehend_geometry::robot::{KinematicTree, RobotError};
 use prehend_geometry::shapes::{RoundedBox, rounded_box};
 
 use crate::data::bop::{Tactile, TactileReading};
-use crate::scene::{BinaryContact, ContactPatch, HandMeasurement, ProximityReading, TouchReading};
+use crate::scene::{
+    BinaryContact, ContactPatch, Hand, HandMeasurement, ProximityReading, TouchReading,
+};
 
 /// A body of a frame.
 pub(crate) struct PlacedBody {
@@ -73,10 +75,10 @@ impl Bodies {
         self.0[1..].iter().try_fold(first, |all, body| all.with_floating(&body.name, &body.tree))
     }
 
-    /// Where they are.
-    pub(crate) fn measured(&self) -> HandMeasurement {
+    /// Where they are; `hand` is all of them.
+    pub(crate) fn measured(&self, hand: Arc<Hand>) -> HandMeasurement {
         let first = &self.0[0];
-        let mut measured = HandMeasurement::new(first.t_cam_body, first.joints.clone());
+        let mut measured = HandMeasurement::new(hand, first.t_cam_body, first.joints.clone());
         measured.pose_sigmas = first.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
         if self.0.len() == 1 {
             return measured;
@@ -202,7 +204,9 @@ mod tests {
         ];
         let bodies = Bodies::new(bodies).unwrap();
         assert_eq!(bodies.names(), "\"left\", \"right\", \"table\"");
-        let (tree, measured) = (bodies.tree().unwrap(), bodies.measured());
+        let tree = bodies.tree().unwrap();
+        let hand = Arc::new(Hand::new(tree.clone(), Vec::new()).unwrap());
+        let measured = bodies.measured(hand);
         let poses = tree.forward_kinematics(&measured.joints);
         let of = |link: &str| measured.t_cam_hand * poses[tree.link_index(link).unwrap()];
         let near = |a: Isometry3<f64>, b: Isometry3<f64>| {

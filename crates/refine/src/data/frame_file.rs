@@ -21,7 +21,7 @@ use crate::data::bop::{
 use crate::data::frame_input::FrameInput;
 use crate::data::robots::Robots;
 use crate::rig::Rig;
-use crate::scene::{Hand, HandMeasurement, Object, Observation, RemapCache, check_gravity};
+use crate::scene::{HandMeasurement, Object, Observation, RemapCache, check_gravity};
 
 /// Name of the robot of a frame file beside other bodies.
 const ROBOT: &str = "robot";
@@ -209,13 +209,12 @@ pub fn load_frame_file(
             None => log::info!("the rig does not know object {id}"),
         }
     }
-    let (hand, measured) = robot.unzip();
-    observation.hand = measured;
+    observation.hand = robot;
     observation.place_views();
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
-    Ok((FrameInput::new(observation, Arc::new(object), hand, rig), layout.pose.0))
+    Ok((FrameInput::new(observation, Arc::new(object), rig), layout.pose.0))
 }
 
 /// Content of a frame file as it is there: nothing is derived from it yet.
@@ -268,7 +267,7 @@ impl FrameParts {
         &self,
         file: &Path,
         cache: Option<&GridCache>,
-    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, DatasetError> {
+    ) -> Result<Option<HandMeasurement>, DatasetError> {
         let Self { bodies, tactile, .. } = self;
         let has_robot = usize::from(bodies.first().is_some_and(|body| body.name == ROBOT));
         let is_force = |sensor: &Tactile| matches!(sensor.reading, TactileReading::Force { .. });

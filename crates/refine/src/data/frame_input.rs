@@ -11,19 +11,17 @@ use crate::check::{
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{Frame, Hand, Object, Observation, RegionEvidence};
+use crate::scene::{Frame, Object, Observation, RegionEvidence};
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
 
-/// Observation of an object, in a hand if that is known.
+/// Observation of an object.
 #[derive(Clone)]
 pub struct FrameInput {
     /// Sensor data.
     pub observation: Observation,
     /// The object.
     pub object: Arc<Object>,
-    /// The hand, where it is known.
-    pub hand: Option<Arc<Hand>>,
     /// The rig, by which all this is corrected, where it is known.
     pub rig: Option<Arc<Rig>>,
     /// Size of the object by that of its model, if the model was scaled by that.
@@ -35,15 +33,10 @@ pub struct FrameInput {
 }
 
 impl FrameInput {
-    /// Frame of an object, in a hand if that is known, corrected by `rig` already.
-    pub fn new(
-        observation: Observation,
-        object: Arc<Object>,
-        hand: Option<Arc<Hand>>,
-        rig: Option<Arc<Rig>>,
-    ) -> Self {
+    /// Frame of an object, corrected by `rig` already.
+    pub fn new(observation: Observation, object: Arc<Object>, rig: Option<Arc<Rig>>) -> Self {
         let (model_scale, is_segmented, regions) = (None, false, None);
-        Self { observation, object, hand, rig, model_scale, is_segmented, regions }
+        Self { observation, object, rig, model_scale, is_segmented, regions }
     }
 
     /// The frame as `method` needs it, where it is not so yet, of an object about at `t_cam_object` \[m\]: if its mask is empty or a box, with the pixels that show
@@ -83,9 +76,9 @@ impl FrameInput {
         t_cam_object: &Isometry3<f64>,
         fused: FusedSettings,
     ) -> Result<Self, RefineError> {
-        let Self { object, hand, rig, .. } = self;
+        let Self { object, rig, .. } = self;
         let settings = TrackerSettings { fused, ..TrackerSettings::default() };
-        let mut tracker = Tracker::new(Arc::clone(object), hand.clone(), settings)?;
+        let mut tracker = Tracker::new(Arc::clone(object), settings)?;
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(rig));
         }
@@ -98,7 +91,7 @@ impl FrameInput {
     /// # Errors
     /// Those of [`Frame::new`].
     pub fn frame(&self) -> Result<Frame<'_>, RefineError> {
-        let mut frame = Frame::new(&self.observation, &self.object, self.hand.as_ref())?;
+        let mut frame = Frame::new(&self.observation, &self.object)?;
         if let Some(regions) = &self.regions {
             frame = frame.with_regions(regions);
         }
@@ -107,10 +100,10 @@ impl FrameInput {
 
     /// Warnings about the object's model, then about the frame and the object's pose in it, `t_cam_object` \[m\]: units, frames, sensors, assumptions.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
-        let Self { observation, object, hand, .. } = self;
-        let mut of_frame = check_frame(observation, object, hand.as_deref(), t_cam_object);
+        let Self { observation, object, .. } = self;
+        let mut of_frame = check_frame(observation, object, t_cam_object);
         of_frame.retain(|warning| !self.is_segmented || warning.subject != Subject::Mask);
-        [check_object(object, hand.is_some()), of_frame]
+        [check_object(object, observation.hand.is_some()), of_frame]
     }
 
     /// Trial of corrections of common mistakes on the frame, its object about at `t_cam_object` \[m\].
@@ -122,8 +115,8 @@ impl FrameInput {
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<CorrectionTrial, RefineError> {
-        let Self { observation, object, hand, .. } = self;
-        CorrectionTrial::new(observation, object, hand.as_deref(), t_cam_object, settings)
+        let Self { observation, object, .. } = self;
+        CorrectionTrial::new(observation, object, t_cam_object, settings)
     }
 
     /// `method` without the gradients of the heuristic for which the frame brings no evidence.
@@ -138,7 +131,9 @@ impl FrameInput {
     fn offers(&self, gradient: GradientKind) -> bool {
         match gradient {
             GradientKind::Rendering | GradientKind::Depth => true,
-            GradientKind::Physics => self.hand.is_some() && self.observation.gravity.is_some(),
+            GradientKind::Physics => {
+                self.observation.hand.is_some() && self.observation.gravity.is_some()
+            }
             GradientKind::Tactile => {
                 self.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
             }

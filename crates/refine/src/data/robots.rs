@@ -54,7 +54,7 @@ impl Robots {
         bodies: &[Body],
         tactile: &[Tactile],
         objects: &HashMap<u32, Arc<Object>>,
-    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, AssetError> {
+    ) -> Result<Option<HandMeasurement>, AssetError> {
         let stated = frame.stated(bodies.len(), tactile.len());
         self.combined(&stated, bodies, tactile, objects)
     }
@@ -69,7 +69,7 @@ impl Robots {
         bodies: &[Body],
         tactile: &[Tactile],
         objects: &HashMap<u32, Arc<Object>>,
-    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, AssetError> {
+    ) -> Result<Option<HandMeasurement>, AssetError> {
         let mut placed = Vec::with_capacity(bodies.len());
         for (k, body) in bodies.iter().enumerate() {
             placed.push(self.placed(stated, k, body, objects)?);
@@ -127,14 +127,13 @@ impl Robots {
         all: &Bodies,
         shapes: Vec<(String, BodyShape)>,
         tactile: &[Tactile],
-    ) -> Result<(Arc<Hand>, HandMeasurement), AssetError> {
+    ) -> Result<HandMeasurement, AssetError> {
         for (k, Tactile { body, .. }) in tactile.iter().enumerate() {
             if !all.has(body) {
                 let problem = format!("names {body:?}, the bodies are {}", all.names());
                 return Err(stated.sensor(k, "body", problem).into());
             }
         }
-        let mut measured = all.measured();
         let force = tactile.iter().enumerate().find_map(|(k, sensor)| match &sensor.reading {
             TactileReading::Force { taxels, force } => Some((k, &sensor.body, taxels, force)),
             _ => None,
@@ -156,7 +155,6 @@ impl Robots {
                     format!("expected {expected} forces, one a taxel of {file}, found {found}");
                 return Err(stated.sensor(k, stated.force, problem).into());
             }
-            measured.forces.clone_from(force);
         }
         let hand = match known {
             Some(hand) => hand,
@@ -167,6 +165,10 @@ impl Robots {
                 hand
             }
         };
+        let mut measured = all.measured(Arc::clone(&hand));
+        if let Some((.., force)) = force {
+            measured.forces.clone_from(force);
+        }
         for (k, sensor) in tactile.iter().enumerate() {
             if let TactileReading::Force { .. } = sensor.reading {
                 continue;
@@ -175,7 +177,7 @@ impl Robots {
             let reading = all.reading(&hand.tree, sensor, layout.as_deref().unwrap_or_default());
             measured.touch.extend(reading.map_err(|e| stated.sensor(k, "", e))?);
         }
-        Ok((hand, measured))
+        Ok(measured)
     }
 
     /// A layout of taxels.

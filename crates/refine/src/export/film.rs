@@ -60,11 +60,11 @@ impl SceneFilm {
         &mut self,
         im_id: u32,
         observation: &Observation,
-        hand: Option<&Arc<Hand>>,
         t_base_cam: &Isometry3<f64>,
     ) -> Result<(), RefineError> {
         let mut links = Vec::new();
-        if let Some((hand, measured)) = hand.zip(observation.hand.as_ref()) {
+        if let Some(measured) = &observation.hand {
+            let hand = &measured.hand;
             let posed = hand.posed(&measured.t_cam_hand, &measured.joints)?;
             let (known, bodies) =
                 self.hand.get_or_insert_with(|| (Arc::clone(hand), bodies_of(hand)));

@@ -151,8 +151,9 @@ mod tests {
             // Towards the camera, where there is something to say; the truth's own depth varies from pixel to pixel.
             let state = state.retract(&[Block::ObjectPose], &[0.0, 0.0, -6e-3, 0.0, 0.0, 0.0]);
             let mut observation = frame.observation().clone();
+            observation.hand = None;
             observation.depth.pixels_mut().fill(state.center().z as f32 - 0.02);
-            let frame = Frame::new(&observation, frame.object(), None).unwrap();
+            let frame = Frame::new(&observation, frame.object()).unwrap();
             let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             assert!(factor.cost(&state) > 0.0);
             for block in [Block::ObjectPose, Block::Camera] {
@@ -188,9 +189,10 @@ mod tests {
     fn pixels_without_depth_say_nothing() {
         let (frame, state) = fixture(0);
         let mut observation = frame.observation().clone();
+        observation.hand = None;
         for nothing in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             observation.depth.pixels_mut().fill(nothing);
-            let frame = Frame::new(&observation, frame.object(), None).unwrap();
+            let frame = Frame::new(&observation, frame.object()).unwrap();
             let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             assert_eq!(factor.cost(&state), 0.0, "{nothing}");
         }

@@ -65,7 +65,8 @@ impl HandDepthFactor {
         points: usize,
         settings: &HandDepthSettings,
     ) -> Result<Self, RefineError> {
-        let (robot, measured) = frame.require_hand("hand-depth")?;
+        let measured = frame.require_hand("hand-depth")?;
+        let robot = &measured.hand;
         let (observation, hand) = (frame.observation(), frame.hand_depth());
         let (depth, camera) = (&observation.depth, &observation.camera);
         let mask = observation.mask.pixels();

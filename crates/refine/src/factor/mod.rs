@@ -53,7 +53,7 @@ pub(crate) mod gradient_check {
     /// Its frame.
     pub(crate) fn frame() -> Frame<'static> {
         let scene = scene();
-        Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap()
+        Frame::new(&scene.observation, &scene.object).unwrap()
     }
 
     /// The frame, and a state a little off its truth.

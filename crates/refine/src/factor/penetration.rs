@@ -43,7 +43,7 @@ impl PenetrationFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(frame: &Frame<'_>, settings: &PenetrationSettings) -> Result<Self, RefineError> {
-        let (hand, _) = frame.require_hand("penetration")?;
+        let hand = &frame.require_hand("penetration")?.hand;
         let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
         let area = object.area / object.samples.len().max(1) as f64;
         let patch = NoiseModel::gaussian(settings.sigma).weighting(1);

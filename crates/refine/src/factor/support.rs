@@ -111,8 +111,8 @@ impl SupportFactor {
         settings.check()?;
         let missing = RefineError::Missing { what: "gravity", factor: "support" };
         let gravity = frame.observation().gravity.ok_or(missing)?;
-        let (robot, hand) = frame.require_hand("support")?;
-        let (object, robot) = (Arc::clone(frame.object()), Arc::clone(robot));
+        let hand = frame.require_hand("support")?;
+        let (object, robot) = (Arc::clone(frame.object()), Arc::clone(&hand.hand));
         let settings = settings.clone();
         if !hand.forces.is_empty() {
             robot.check_forces(&hand.forces)?;
@@ -311,7 +311,7 @@ mod tests {
     /// Of the built-in scene, with another observation.
     fn seen(observation: &Observation) -> SupportFactor {
         let scene = scene();
-        factor(&Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap())
+        factor(&Frame::new(observation, &scene.object).unwrap())
     }
 
     #[test]
@@ -375,7 +375,7 @@ mod tests {
         observation.gravity = Some(Vector3::zeros());
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::repeat(f64::NAN));
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let settings = SupportSettings::default();
         let factor = SupportFactor::new(&frame, &settings).unwrap();
         let mut equations = NormalEquations::new(&[Block::ObjectPose]);
@@ -397,7 +397,7 @@ mod tests {
         let refused = |change: fn(&mut Observation)| {
             let mut observation = scene.observation.clone();
             change(&mut observation);
-            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let frame = Frame::new(&observation, &scene.object).unwrap();
             let factor = SupportFactor::new(&frame, &SupportSettings::default());
             factor.err().unwrap().to_string()
         };

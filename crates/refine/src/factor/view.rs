@@ -181,9 +181,9 @@ mod tests {
         let scene = scene();
         let seen = Observation { hand: None, ..scene.observation.clone() };
         let both = scene.observation.clone().with_view(seen, turned().inverse());
-        let frame = Frame::new(&both, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&both, &scene.object).unwrap();
         let [view] = frame.views() else { panic!("not one view") };
-        let (hand, expected) = (view.frame.hand().unwrap().1, frame.hand().unwrap().1);
+        let (hand, expected) = (view.frame.hand().unwrap(), frame.hand().unwrap());
         let off = hand.t_cam_hand.inverse() * (view.t_view_cam * expected.t_cam_hand);
         assert!(off.translation.vector.norm() < 1e-12 && off.rotation.angle() < 1e-7);
         assert!(hand.forces.is_empty() && hand.joints == expected.joints);

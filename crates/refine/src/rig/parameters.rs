@@ -282,7 +282,7 @@ mod tests {
         assert!((rig.values() - DVector::from_vec(change)).amax() < 1e-12);
         let said = |rig: &Rig| {
             let observation = rig.corrected(&scene.observation).unwrap();
-            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let frame = Frame::new(&observation, &scene.object).unwrap();
             State::new(&frame, &scene.truth).unwrap()
         };
         let (at, step) = (said(&rig), 1e-6);

@@ -91,12 +91,13 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     // The hand's −z hangs down: fingers up, as if presenting the bottle.
     let gravity = Some(t_cam_hand.rotation * Vector3::new(0.0, 0.0, -9.81));
     let mut noise = SplitMix64::new(seed);
-    let measured = HandMeasurement::new(t_cam_hand, joints);
-    let observation = observe(camera, gravity, &object, &truth, (&hand, measured), &mut noise);
+    let hand = Arc::new(hand);
+    let measured = hand.measured(t_cam_hand, joints);
+    let observation = observe(camera, gravity, &object, &truth, measured, &mut noise);
     let scale = |k: usize| if k < 3 { INITIAL_TRANSLATION } else { INITIAL_ROTATION } / 3f64.sqrt();
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
     let initial = perturb_about(&truth, &(truth * object.center).coords, &error);
-    let (object, hand, obj_id) = (Arc::new(object), Arc::new(hand), grasp.object.bop_id());
+    let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
     Ok(Scene { observation, object, obj_id, hand, urdf, truth, initial })
 }
 
@@ -127,8 +128,8 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError
         let t_cam_hand = perturb_about(&start, &center, &sway);
         let slide = Vector3::new(0.0, 0.0, SLIDE * (1.7 * phase).sin());
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
-        let measured = HandMeasurement::new(t_cam_hand, joints.clone());
-        let observation = observe(camera, gravity, &object, &truth, (&hand, measured), &mut noise);
+        let measured = hand.measured(t_cam_hand, joints.clone());
+        let observation = observe(camera, gravity, &object, &truth, measured, &mut noise);
         SequenceFrame { time, observation, truth }
     };
     let frames = (0..count).map(frame).collect();
@@ -142,11 +143,11 @@ fn observe(
     gravity: Option<Vector3<f64>>,
     object: &Object,
     truth: &Isometry3<f64>,
-    (hand, measured): (&Hand, HandMeasurement),
+    measured: HandMeasurement,
     noise: &mut SplitMix64,
 ) -> Observation {
     let mut bodies = vec![(&*object.model, *truth)];
-    bodies.extend(hand.render_bodies(&measured.t_cam_hand, &measured.joints));
+    bodies.extend(measured.hand.render_bodies(&measured.t_cam_hand, &measured.joints));
     let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
     let directional = [0.62, 0.58, 0.52].map(|s| toward * s);
     let light = Light { ambient: [0.42, 0.43, 0.46], directional, offset: [0.0; 3] };
@@ -162,7 +163,7 @@ fn observe(
     for (m, body) in mask.pixels_mut().iter_mut().zip(&image.object) {
         *m = *body == Some(0);
     }
-    let forces = taxel_forces(object, truth, hand, &measured);
+    let forces = taxel_forces(object, truth, &measured);
     let seen = Observation::new(camera, image.color, image.depth, mask);
     Observation { gravity, hand: Some(measured.with_forces(forces)), ..seen }
 }
@@ -171,9 +172,9 @@ fn observe(
 fn taxel_forces(
     object: &Object,
     truth: &Isometry3<f64>,
-    hand: &Hand,
     measured: &HandMeasurement,
 ) -> Vec<Vector3<f64>> {
+    let hand = &measured.hand;
     let t_object_hand = truth.inverse() * measured.t_cam_hand;
     let links = hand.tree.forward_kinematics(&measured.joints);
     let force = |taxel: &Taxel| {

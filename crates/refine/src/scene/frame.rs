@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 use serde::{Deserialize, Serialize};
 
-use super::{ForegroundSettings, Hand, HandMeasurement, Object, Observation, RegionEvidence};
+use super::{ForegroundSettings, HandMeasurement, Object, Observation, RegionEvidence};
 use crate::error::RefineError;
 
 /// An observation of an object in a hand, checked, with what factors derive from it: each thing is made when it is first asked
@@ -17,7 +17,6 @@ use crate::error::RefineError;
 pub struct Frame<'a> {
     observation: &'a Observation,
     object: &'a Arc<Object>,
-    hand: Option<(&'a Arc<Hand>, &'a HandMeasurement)>,
     hand_depth: OnceLock<Arc<DepthImage>>,
     depth: OnceLock<Arc<DepthImage>>,
     /// Segmented images by what may hide the object and by how many times smaller they are.
@@ -75,36 +74,28 @@ pub(crate) const MASK_MARGIN: usize = 4;
 const IN_FRONT: f32 = 10e-3;
 
 impl<'a> Frame<'a> {
-    /// `object` in `hand` as `observation` shows them; without a hand, or without its state in the observation, nothing is known to
-    /// hide the object.
+    /// `object` as `observation` shows it; without a hand there, nothing is known to hide the object.
     ///
     /// # Errors
     /// If an image has not the camera's size, the mask is empty, or there is not one joint position a joint.
-    pub fn new(
-        observation: &'a Observation,
-        object: &'a Arc<Object>,
-        hand: Option<&'a Arc<Hand>>,
-    ) -> Result<Self, RefineError> {
+    pub fn new(observation: &'a Observation, object: &'a Arc<Object>) -> Result<Self, RefineError> {
         observation.require_sizes()?;
         if observation.mask.count() == 0 {
             return Err(RefineError::EmptyMask);
         }
-        let hand = hand.zip(observation.hand.as_ref());
-        if let Some((hand, measured)) = hand {
-            hand.check_joints(&measured.joints)?;
+        if let Some(measured) = &observation.hand {
+            measured.hand.check_joints(&measured.joints)?;
         }
         let seeing = observation.views.iter().enumerate();
         let seeing = seeing.filter(|(_, view)| view.observation().mask.count() > 0);
         let views = seeing.map(|(index, view)| {
-            let hand = hand.map(|(hand, _)| hand);
-            let frame = Self::new(view.observation(), object, hand)?;
+            let frame = Self::new(view.observation(), object)?;
             Ok(CameraView { index, t_view_cam: view.t_view_cam(), frame })
         });
         Ok(Self {
             views: views.collect::<Result<_, RefineError>>()?,
             observation,
             object,
-            hand,
             hand_depth: OnceLock::new(),
             depth: OnceLock::new(),
             segmented: Mutex::default(),
@@ -125,7 +116,7 @@ impl<'a> Frame<'a> {
         &'b self,
         object: &'b Arc<Object>,
     ) -> Result<Frame<'b>, RefineError> {
-        let mut frame = Frame::new(self.observation, object, self.hand.map(|(hand, _)| hand))?;
+        let mut frame = Frame::new(self.observation, object)?;
         frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
         frame.given_regions.clone_from(&self.given_regions);
         frame.backend.clone_from(&self.backend);
@@ -197,21 +188,17 @@ impl<'a> Frame<'a> {
         self.object
     }
 
-    /// The hand and its state, if both are known.
-    pub fn hand(&self) -> Option<(&'a Arc<Hand>, &'a HandMeasurement)> {
-        self.hand
+    /// The hand, its pose and touch, where known.
+    pub fn hand(&self) -> Option<&'a HandMeasurement> {
+        self.observation.hand.as_ref()
     }
 
-    /// The hand and its state, which `factor` needs.
+    /// The hand, which `factor` needs.
     ///
     /// # Errors
     /// [`RefineError::Missing`].
-    pub fn require_hand(
-        &self,
-        factor: &'static str,
-    ) -> Result<(&'a Arc<Hand>, &'a HandMeasurement), RefineError> {
-        let what = if self.observation.hand.is_some() { "hand" } else { "hand state" };
-        self.hand.ok_or(RefineError::Missing { what, factor })
+    pub fn require_hand(&self, factor: &'static str) -> Result<&'a HandMeasurement, RefineError> {
+        self.hand().ok_or(RefineError::Missing { what: "hand", factor })
     }
 
     /// Depth as measured \[m\], 0 where missing.
@@ -221,10 +208,7 @@ impl<'a> Frame<'a> {
 
     /// Depth image of the hand alone \[m\], 0 where it is not.
     pub fn hand_depth(&self) -> &Arc<DepthImage> {
-        self.hand_depth.get_or_init(|| {
-            let hand = self.hand.map(|(hand, measured)| (&**hand, measured));
-            Arc::new(hand_depth(&self.observation.camera, hand))
-        })
+        self.hand_depth.get_or_init(|| Arc::new(hand_depth(&self.observation.camera, self.hand())))
     }
 
     /// Log-likelihood ratio of object and others at each pixel \[nat\]: those given, or else by the mask, and by colors if these `count`.
@@ -377,7 +361,7 @@ fn brightness(observation: &Observation) -> f64 {
 }
 
 /// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
-pub(crate) fn hand_depth(camera: &Camera, hand: Option<(&Hand, &HandMeasurement)>) -> DepthImage {
+pub(crate) fn hand_depth(camera: &Camera, hand: Option<&HandMeasurement>) -> DepthImage {
     let mut depth = DepthImage::default();
     draw_hand_depth(&mut depth, camera, hand);
     depth
@@ -387,11 +371,11 @@ pub(crate) fn hand_depth(camera: &Camera, hand: Option<(&Hand, &HandMeasurement)
 pub(crate) fn draw_hand_depth(
     depth: &mut DepthImage,
     camera: &Camera,
-    hand: Option<(&Hand, &HandMeasurement)>,
+    hand: Option<&HandMeasurement>,
 ) {
     match hand {
-        Some((hand, measured)) => {
-            draw_depth(depth, camera, &hand.render_bodies(&measured.t_cam_hand, &measured.joints));
+        Some(HandMeasurement { hand, t_cam_hand, joints, .. }) => {
+            draw_depth(depth, camera, &hand.render_bodies(t_cam_hand, joints));
         }
         None => depth.refill(camera.width, camera.height, 0.0),
     }
@@ -410,7 +394,7 @@ mod tests {
         let refused = |change: &dyn Fn(&mut Observation)| {
             let mut observation = scene.observation.clone();
             change(&mut observation);
-            Frame::new(&observation, &scene.object, None).map(|_| ()).unwrap_err().to_string()
+            Frame::new(&observation, &scene.object).map(|_| ()).unwrap_err().to_string()
         };
         let color = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
         assert!(color.contains("the color image has 640x479 pixels, the camera has 640x480"));

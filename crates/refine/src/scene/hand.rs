@@ -1,5 +1,6 @@
 //! The robot hand, prepared once and shared by all frames.
 
+use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
@@ -10,6 +11,7 @@ use prehend_geometry::robot::{
 };
 use prehend_render::RenderModel;
 
+use super::HandMeasurement;
 use crate::error::RefineError;
 
 /// A robot hand: kinematics, shape and skin.
@@ -59,6 +61,15 @@ impl Hand {
             })
             .collect::<Result<_, RobotError>>()?;
         Ok(Self { tree, shape, taxels, bodies })
+    }
+
+    /// Measurement of this hand without touch, its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
+    pub fn measured(
+        self: &Arc<Self>,
+        t_cam_hand: Isometry3<f64>,
+        joints: Vec<f64>,
+    ) -> HandMeasurement {
+        HandMeasurement::new(Arc::clone(self), t_cam_hand, joints)
     }
 
     /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\].
@@ -136,6 +147,13 @@ impl Hand {
     }
 }
 
+impl fmt::Debug for Hand {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (links, taxels) = (self.tree.links().len(), self.taxels.len());
+        formatter.debug_struct("Hand").field("links", &links).field("taxels", &taxels).finish()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,13 +165,12 @@ mod tests {
         let scene = default_scene(1).unwrap();
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().joints.pop();
-        let hand = Some(&scene.hand);
-        let refused = Frame::new(&observation, &scene.object, hand).map(|_| ()).unwrap_err();
+        let refused = Frame::new(&observation, &scene.object).map(|_| ()).unwrap_err();
         let expected = RobotError::JointCount { given: 15, expected: 16 }.to_string();
         assert_eq!(refused.to_string(), expected);
         let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
-        let warnings = check_frame(&observation, &scene.object, Some(&scene.hand), &scene.initial);
+        let warnings = check_frame(&observation, &scene.object, &scene.initial);
         assert!(warnings.iter().any(|w| w.finding.contains("15 joint positions")), "{warnings:?}");
     }
 

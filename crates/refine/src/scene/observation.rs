@@ -1,14 +1,18 @@
 //! What was sensed in one frame.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
-use super::TouchReading;
+use super::{Hand, TouchReading};
 use crate::error::RefineError;
 
-/// Where the hand is said to be, and what it feels. Other bodies of a frame, tables, objects and further hands, are parts of it.
+/// A hand, its measured pose and joint positions, and its touch. Other bodies of a frame, tables, objects and further hands, are parts of it.
 #[derive(Clone, Debug)]
 pub struct HandMeasurement {
+    /// Kinematics, shape and skin.
+    pub hand: Arc<Hand>,
     /// Hand base coordinates → camera coordinates \[m\].
     pub t_cam_hand: Isometry3<f64>,
     /// Joint positions in the order of the robot's joints \[rad\].
@@ -25,10 +29,10 @@ pub struct HandMeasurement {
 }
 
 impl HandMeasurement {
-    /// A hand that feels nothing, with its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
-    pub fn new(t_cam_hand: Isometry3<f64>, joints: Vec<f64>) -> Self {
+    /// Hand without touch, its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
+    pub fn new(hand: Arc<Hand>, t_cam_hand: Isometry3<f64>, joints: Vec<f64>) -> Self {
         let (forces, touch, joint_sigmas) = (Vec::new(), Vec::new(), Vec::new());
-        Self { t_cam_hand, joints, forces, touch, pose_sigmas: [None; 2], joint_sigmas }
+        Self { hand, t_cam_hand, joints, forces, touch, pose_sigmas: [None; 2], joint_sigmas }
     }
 
     /// The same with the force of the object on each taxel, in its link's frame \[N\].
@@ -95,7 +99,7 @@ impl AdditionalView {
         self.observation.hand = hand.map(|hand| HandMeasurement {
             pose_sigmas: hand.pose_sigmas,
             joint_sigmas: hand.joint_sigmas.clone(),
-            ..HandMeasurement::new(t_view_cam * hand.t_cam_hand, hand.joints.clone())
+            ..hand.hand.measured(t_view_cam * hand.t_cam_hand, hand.joints.clone())
         });
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, Mask, depth_map};
 
 use super::frame::hand_depth;
-use super::{Hand, Object, Observation};
+use super::{Object, Observation};
 use crate::error::RefineError;
 
 /// What should be seen, and what is.
@@ -56,14 +56,13 @@ impl<'a> View<'a> {
     pub(crate) fn of_observation(
         observation: &'a Observation,
         object: &Object,
-        hand: Option<&Hand>,
         t_cam_object: &Isometry3<f64>,
     ) -> Result<Self, RefineError> {
         observation.require_sizes()?;
         let camera = &observation.camera;
-        let hand = hand.zip(observation.hand.as_ref()).map(|(hand, measured)| {
-            hand.check_joints(&measured.joints)?;
-            Ok::<_, RefineError>(hand_depth(camera, Some((hand, measured))))
+        let hand = observation.hand.as_ref().map(|measured| {
+            measured.hand.check_joints(&measured.joints)?;
+            Ok::<_, RefineError>(hand_depth(camera, Some(measured)))
         });
         Ok(Self::new(observation, camera, object, hand.transpose()?, t_cam_object))
     }

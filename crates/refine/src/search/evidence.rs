@@ -33,7 +33,8 @@ impl Evidence {
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
         let normals = estimate_normals(&tree, settings.normal_neighbors, &Point3::origin());
         let (mut touched, mut outside) = (Vec::new(), Vec::new());
-        if let Some((robot, reading)) = frame.hand() {
+        if let Some(reading) = frame.hand() {
+            let robot = &reading.hand;
             if !reading.forces.is_empty() {
                 robot.check_forces(&reading.forces)?;
             }
@@ -178,7 +179,7 @@ mod tests {
     #[test]
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
-        let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object).unwrap();
         let evidence = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
@@ -202,7 +203,7 @@ mod tests {
         // A taxel of whose force nothing is known is in neither list.
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let unfelt = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
 use prehend_geometry::limits::MAX_FILE_BYTES;
@@ -19,7 +20,7 @@ pub(super) const TAXELS: &str = "hand/taxels.csv";
 /// A hand, and what is needed to describe it in a dataset.
 pub struct HandFiles {
     /// The hand.
-    pub robot: Hand,
+    pub robot: Arc<Hand>,
     /// Its URDF.
     urdf: String,
     /// Mesh files that the URDF names: relative to its folder, and their content.
@@ -33,7 +34,7 @@ impl HandFiles {
     /// If it cannot be prepared.
     pub fn built_in() -> Result<Self, AssetError> {
         let urdf = allegro_xela_urdf();
-        let robot = Hand::new(KinematicTree::from_urdf_str(&urdf, None)?, taxels())?;
+        let robot = Arc::new(Hand::new(KinematicTree::from_urdf_str(&urdf, None)?, taxels())?);
         Ok(Self { robot, urdf, meshes: Vec::new() })
     }
 
@@ -59,6 +60,7 @@ impl HandFiles {
             }
         }
         let robot = Hand::new(tree, skin).map_err(|e| DatasetError::unusable(urdf, e))?;
+        let robot = Arc::new(robot);
         let table = taxels.unwrap_or(urdf);
         robot
             .taxels

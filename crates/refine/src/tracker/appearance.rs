@@ -347,7 +347,7 @@ mod tests {
         let scene = default_scene(1).unwrap();
         let mut observation = scene.observation.clone();
         observation.depth.pixels_mut().fill(0.0);
-        let sight = || Sight::new(observation.clone(), Some(&scene.hand), Images::default());
+        let sight = || Sight::new(observation.clone(), Images::default());
         let mut appearance = Appearance::new(&TrackerSettings::default());
         assert!(appearance.find(&sight(), &scene.object, &scene.truth).is_none());
         let mut first = sight();

@@ -34,9 +34,9 @@ impl Tracker {
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         self.segment_first(sight, false)?;
-        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let object = Arc::clone(&self.object);
         let sight = &*sight;
-        let mut frame = self.frame(sight, &object, hand.as_ref())?;
+        let mut frame = self.frame(sight, &object)?;
         let initial = match self.initial {
             Some(pose) => pose,
             None => {
@@ -96,7 +96,7 @@ impl Tracker {
     ) -> Result<(Observation, Option<Arc<RegionEvidence>>), RefineError> {
         observation.require_sizes()?;
         self.start_from(t_cam_object);
-        let mut sight = Sight::new(observation, self.hand.as_ref(), Images::default());
+        let mut sight = Sight::new(observation, Images::default());
         self.segment_first(&mut sight, true)?;
         Ok((sight.observation, sight.regions))
     }
@@ -108,7 +108,7 @@ impl Tracker {
         initial: &Isometry3<f64>,
         is_single: bool,
     ) -> Result<(), RefineError> {
-        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let object = Arc::clone(&self.object);
         let about = is_single.then_some(initial);
         let mut pose = *initial;
         for _ in 0..self.settings.appearance.rounds {
@@ -120,7 +120,7 @@ impl Tracker {
             self.appearance.look(sight, &object, &pose, about);
             // The pose may be far off.
             sight.focus = None;
-            let frame = self.frame(sight, &object, hand.as_ref())?;
+            let frame = self.frame(sight, &object)?;
             let start = State::new(&frame, initial)?;
             pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
         }
@@ -199,8 +199,8 @@ impl Tracker {
             if !(if known { seen } else { self.segment(sight, &t_cam_object) }) {
                 continue;
             }
-            let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
-            let mut frame = self.frame(sight, &object, hand.as_ref())?;
+            let object = Arc::clone(&self.object);
+            let mut frame = self.frame(sight, &object)?;
             if let Some(rivals) = rivals {
                 frame = frame.with_rivals(rivals);
             }
@@ -237,8 +237,8 @@ impl Tracker {
             return Ok(None);
         };
         (sight.observation.mask, sight.focus) = (mask, None);
-        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
-        let frame = self.frame(sight, &object, hand.as_ref())?;
+        let object = Arc::clone(&self.object);
+        let frame = self.frame(sight, &object)?;
         match self.search(&frame) {
             Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),

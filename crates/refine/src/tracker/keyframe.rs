@@ -329,7 +329,7 @@ mod tests {
     fn sights(sequence: &Sequence) -> [Sight; 2] {
         [0, 2].map(|k| {
             let observation = sequence.frames[k].observation.clone();
-            let mut sight = Sight::new(observation, Some(&sequence.hand), Images::default());
+            let mut sight = Sight::new(observation, Images::default());
             sight.observation.mask.copy_from(&sight.given);
             sight
         })
@@ -358,7 +358,7 @@ mod tests {
         let mut other = second.observation.clone();
         let stripes = other.color.pixels_mut().iter_mut().enumerate();
         stripes.for_each(|(k, pixel)| *pixel = [(k % 7) as f32 / 7.0; 3]);
-        let other = Sight::new(other, Some(&sequence.hand), Images::default());
+        let other = Sight::new(other, Images::default());
         assert!(keyframe.align(&other, object, &expected, &covariance).is_none());
     }
 

@@ -11,6 +11,21 @@ mod segmentation;
 mod settings;
 mod sight;
 mod sums;
+
+/// Refuses a frame with other bodies than the first one: joints would be those of something else.
+fn require_same(first: &Arc<Hand>, now: &Arc<Hand>) -> Result<(), RefineError> {
+    let (expected, found) = (first.tree.joint_names(), now.tree.joint_names());
+    if Arc::ptr_eq(first, now) || expected == found {
+        return Ok(());
+    }
+    let differs = |names: &[String], others: &[String]| {
+        names.iter().find(|name| !others.contains(name)).cloned()
+    };
+    let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
+    let problem = format!("are others than in the first frame: joint {which:?} is in one only");
+    Err(RefineError::Setting { name: "bodies", problem })
+}
+
 #[cfg(test)]
 mod tests;
 mod tracked;
@@ -41,7 +56,7 @@ use crate::error::{RefineError, guard};
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
-use crate::scene::{Frame, Hand, Object, Observation};
+use crate::scene::{Frame, Hand, HandMeasurement, Object, Observation};
 use crate::search::PoseSearch;
 use crate::strategy::{
     Fit, FusedSettings, Inconsistency, Posterior, chi_square_z, problem_of, surface_patches,
@@ -69,8 +84,7 @@ use crate::strategy::{
 /// use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 ///
 /// let sequence = default_sequence(1, 2)?;
-/// let robot = Some(Arc::clone(&sequence.hand));
-/// let mut tracker = Tracker::new(Arc::clone(&sequence.object), robot, TrackerSettings::default())?;
+/// let mut tracker = Tracker::new(Arc::clone(&sequence.object), TrackerSettings::default())?;
 /// tracker.start_from(&sequence.initial);
 /// for frame in &sequence.frames {
 ///     let tracked = tracker.track(&frame.observation, frame.time)?;
@@ -80,6 +94,7 @@ use crate::strategy::{
 /// ```
 pub struct Tracker {
     object: Arc<Object>,
+    /// The hand, and what else there is, of the first frame.
     hand: Option<Arc<Hand>>,
     settings: TrackerSettings,
     /// Factors of all frames besides.
@@ -119,15 +134,11 @@ impl Tracker {
     ///
     /// # Errors
     /// [`RefineError::Setting`] for a setting out of range.
-    pub fn new(
-        object: Arc<Object>,
-        hand: Option<Arc<Hand>>,
-        settings: TrackerSettings,
-    ) -> Result<Self, RefineError> {
+    pub fn new(object: Arc<Object>, settings: TrackerSettings) -> Result<Self, RefineError> {
         settings.check()?;
         Ok(Self {
             object,
-            hand,
+            hand: None,
             factors: Vec::new(),
             backend: None,
             rig: None,
@@ -202,11 +213,14 @@ impl Tracker {
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
         observation.require_sizes()?;
-        let hand = self.hand.as_deref().zip(observation.hand.as_ref());
-        if let Some((hand, measured)) = hand {
-            hand.check_joints(&measured.joints)?;
+        if let Some(HandMeasurement { hand, joints, .. }) = &observation.hand {
+            hand.check_joints(joints)?;
+            match &self.hand {
+                Some(first) if self.track.is_some() => require_same(first, hand)?,
+                _ => self.hand = Some(Arc::clone(hand)),
+            }
         }
-        let in_hand = hand.is_some();
+        let in_hand = observation.hand.is_some();
         let Some(track) = self.track.clone() else {
             return self
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
@@ -229,7 +243,7 @@ impl Tracker {
         what: impl FnOnce(&mut Self, &mut Sight) -> T,
     ) -> T {
         let images = mem::take(&mut self.images);
-        let mut sight = Sight::new(observation, self.hand.as_ref(), images);
+        let mut sight = Sight::new(observation, images);
         let done = what(self, &mut sight);
         self.images = sight.into_images();
         done
@@ -251,7 +265,7 @@ impl Tracker {
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
-        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
+        let in_hand = sight.observation.hand.is_some();
         let seen = self.segment(sight, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
@@ -300,8 +314,8 @@ impl Tracker {
         clock: &mut Clock,
         timing: &mut Timing,
     ) -> Result<Result<Tracked, Rejection>, RefineError> {
-        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
-        let frame = self.frame(sight, &object, hand.as_ref())?;
+        let object = Arc::clone(&self.object);
+        let frame = self.frame(sight, &object)?;
         let in_hand = frame.hand().is_some();
         let predicted = &prediction.state;
         let (problem, prior) = self.prepare(&frame, prediction)?;
@@ -361,10 +375,8 @@ impl Tracker {
         &self,
         sight: &'a Sight,
         object: &'a Arc<Object>,
-        hand: Option<&'a Arc<Hand>>,
     ) -> Result<Frame<'a>, RefineError> {
-        let mut frame =
-            Frame::new(&sight.observation, object, hand)?.with_hand_depth(&sight.hand_depth);
+        let mut frame = Frame::new(&sight.observation, object)?.with_hand_depth(&sight.hand_depth);
         frame = frame.with_depth(&sight.depth);
         if let Some(focus) = &sight.focus {
             frame = frame.with_focus(focus.clone());

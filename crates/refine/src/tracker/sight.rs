@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 use prehend_render::{DepthImage, Mask};
 
-use crate::scene::{Hand, Observation, RegionEvidence, draw_hand_depth};
+use crate::scene::{Observation, RegionEvidence, draw_hand_depth};
 
 /// A frame with its hand, and what shows the object in it as far as that is known.
 pub(super) struct Sight {
@@ -39,13 +39,9 @@ pub(super) struct Images {
 
 impl Sight {
     /// Of a hand whose joints were checked.
-    pub(super) fn new(
-        mut observation: Observation,
-        hand: Option<&Arc<Hand>>,
-        images: Images,
-    ) -> Self {
+    pub(super) fn new(mut observation: Observation, images: Images) -> Self {
         let Images { mask, mut hand_depth, mut depth } = images;
-        let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
+        let hand = observation.hand.as_ref();
         draw_hand_depth(own(&mut hand_depth), &observation.camera, hand);
         own(&mut depth).copy_from(&observation.depth);
         let tells = observation.is_segmented();

@@ -10,8 +10,7 @@ use crate::scene::{Sequence, SequenceFrame, default_sequence};
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
 
 fn tracker(settings: TrackerSettings) -> Tracker {
-    let robot = Some(Arc::clone(&SEQUENCE.hand));
-    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), robot, settings).unwrap();
+    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), settings).unwrap();
     tracker.start_from(&SEQUENCE.initial);
     tracker
 }
@@ -201,14 +200,14 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let turn_sigma = 1e-4;
     let mut tracker = tracker(TrackerSettings { turn_sigma, ..Default::default() });
     (0..2).for_each(|index| drop(track(&mut tracker, index)));
-    let (index, object, hand) = (2, Arc::clone(&SEQUENCE.object), Arc::clone(&SEQUENCE.hand));
+    let (index, object) = (2, Arc::clone(&SEQUENCE.object));
     let SequenceFrame { observation, time, truth } = &SEQUENCE.frames[index];
     let remembered = tracker.track.clone().unwrap();
     let nominal = State::measured(observation, &object, truth).unwrap();
     let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
-    let mut sight = Sight::new(observation.clone(), Some(&hand), Images::default());
+    let mut sight = Sight::new(observation.clone(), Images::default());
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
-    let frame = tracker.frame(&sight, &object, Some(&hand)).unwrap();
+    let frame = tracker.frame(&sight, &object).unwrap();
     let (problem, _) = tracker.prepare(&frame, &prediction).unwrap();
     let level = remembered.allowance(GatingSettings::default().growth);
     let followed =

@@ -10,7 +10,7 @@ use prehend_refine::Frame;
 use prehend_refine::baselines::{GradientKind, Heuristic};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
-use prehend_refine::scene::{Hand, HandMeasurement, Object, Observation};
+use prehend_refine::scene::{Hand, Object, Observation};
 use prehend_render::{Camera, Light, Mask, RenderModel, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">
@@ -77,7 +77,7 @@ impl Setting {
         }
         Observation {
             gravity: Some(self.t_cam_robot.rotation * Vector3::new(0.0, 0.0, -9.81)),
-            hand: Some(HandMeasurement::new(self.t_cam_robot, self.joints.clone())),
+            hand: Some(self.robot.measured(self.t_cam_robot, self.joints.clone())),
             ..Observation::new(CAMERA, seen.color, seen.depth, mask)
         }
     }
@@ -90,7 +90,7 @@ impl Setting {
         let gradients = [GradientKind::Physics, GradientKind::Rendering, GradientKind::Depth];
         let method = Heuristic { checkpoint: true, ..Heuristic::of(&gradients) };
         let observation = self.observation();
-        let frame = Frame::new(&observation, &self.object, Some(&self.robot)).unwrap();
+        let frame = Frame::new(&observation, &self.object).unwrap();
         let pose = *refine(&frame, &initial, &method).unwrap().t_cam_object();
         (pe_cm(&pose, &truth), oe_deg(&pose, &truth), self.t_cam_robot.inverse() * pose)
     }

@@ -24,9 +24,9 @@ fn half_of_the_inhand_objects_are_found_without_a_hand() {
     for target in &targets {
         let object = assets.object(target.obj_id).unwrap();
         let frame = dataset.frame(target.scene_id, target.im_id).unwrap();
-        let (observation, hand) = assets.observation(&frame, target.instance, &[]).unwrap();
+        let observation = assets.observation(&frame, target.instance, &[]).unwrap();
         let start = Instant::now();
-        let seen = Frame::new(&observation, &object, hand.as_ref()).unwrap();
+        let seen = Frame::new(&observation, &object).unwrap();
         let search = PoseSearch::new(Arc::clone(&object), SearchSettings::default()).unwrap();
         let pose = search.run(&seen).unwrap()[0].t_cam_object;
         let seconds = start.elapsed().as_secs_f64();

@@ -22,7 +22,7 @@ fn load() -> (Vec<Observation>, Arc<Object>, Isometry3<f64>) {
     let rows = read_results(&root.join("init.csv")).unwrap().rows;
     let object = assets.object(rows[0].obj_id).unwrap();
     let mut frames: Vec<Observation> = (0..10)
-        .map(|k| assets.observation(&dataset.frame(1, k).unwrap(), 0, &[]).unwrap().0)
+        .map(|k| assets.observation(&dataset.frame(1, k).unwrap(), 0, &[]).unwrap())
         .collect();
     let mask = frames[0].mask.clone();
     frames.iter_mut().for_each(|frame| frame.mask = mask.clone());
@@ -58,12 +58,11 @@ fn what_stands_still_is_refined_and_tracked_to_one_pose() {
         let start = off(&found, by, turn);
         let mut refined = Vec::new();
         for observation in &frames {
-            let frame = Frame::new(observation, &object, None).unwrap();
+            let frame = Frame::new(observation, &object).unwrap();
             let estimate = refine(&frame, &start, &Fused::default()).unwrap();
             refined.push((*estimate.t_cam_object(), estimate.posterior.unwrap().probability()));
         }
-        let mut tracker =
-            Tracker::new(Arc::clone(&object), None, TrackerSettings::default()).unwrap();
+        let mut tracker = Tracker::new(Arc::clone(&object), TrackerSettings::default()).unwrap();
         tracker.start_from(&start);
         let time = |k: usize| Duration::from_millis(33 * k as u64);
         let track = |(k, frame)| tracker.track(frame, time(k)).unwrap();
@@ -93,8 +92,7 @@ fn what_stands_still_is_tracked_on_color_alone_without_a_mask() {
         frame.mask.pixels_mut().fill(false);
     }
     for (by, turn) in [([0.0; 3], [0.0; 3]), ([5e-3, -4e-3, 6e-3], [0.05, -0.05, 0.06])] {
-        let mut tracker =
-            Tracker::new(Arc::clone(&object), None, TrackerSettings::default()).unwrap();
+        let mut tracker = Tracker::new(Arc::clone(&object), TrackerSettings::default()).unwrap();
         tracker.start_from(&off(&found, by, turn));
         let track = |(k, frame): (usize, &Observation)| {
             tracker.track(frame, Duration::from_millis(33 * k as u64)).unwrap()

@@ -22,7 +22,7 @@ use prehend_refine::{Factor, Frame, RefineError, State};
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn frame() -> Frame<'static> {
-    Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap()
+    Frame::new(&SCENE.observation, &SCENE.object).unwrap()
 }
 
 /// Twists about the object's center in which a radian counts as much as a tenth of a meter.

@@ -212,7 +212,7 @@ fn of_factor(factor: &dyn Factor, state: &State) -> Vec<f64> {
 fn factors_of_anything_seen_anywhere() {
     for (index, fault) in FAULTS.into_iter().enumerate() {
         let observation = observation(fault);
-        let frame = Frame::new(&observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+        let frame = Frame::new(&observation, &SCENE.object).unwrap();
         // Every place with what is as it is, and one more with each fault.
         let places = places();
         let some = places.iter().enumerate().filter(|(k, _)| index == 0 || k % 7 == index % 7);
@@ -237,14 +237,14 @@ fn methods_of_anything_seen() {
         for mut method in [Method::default(), other] {
             method.set_iterations(1);
             assert_finite(fault.0, || {
-                let frame = Frame::new(&observation, &SCENE.object, Some(&SCENE.hand))?;
+                let frame = Frame::new(&observation, &SCENE.object)?;
                 let frame = frame.with_rivals(vec![SCENE.initial; 2]);
                 refine(&frame, &SCENE.initial, &method).map(of_estimate)
             });
         }
     }
     let weightless = observation(FAULTS[12]);
-    let frame = Frame::new(&weightless, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let frame = Frame::new(&weightless, &SCENE.object).unwrap();
     let refused = refine(&frame, &SCENE.initial, &Method::combined());
     assert!(matches!(refused, Err(RefineError::Gravity { .. })));
 }
@@ -263,7 +263,7 @@ fn searches_of_one_hypothesis() {
     for fault in &FAULTS[..QUICK] {
         let observation = observation(*fault);
         assert_finite(fault.0, || {
-            let frame = Frame::new(&observation, &SCENE.object, Some(&SCENE.hand))?;
+            let frame = Frame::new(&observation, &SCENE.object)?;
             let found = search.run(&frame)?;
             let of = |f: &PoseCandidate| [of_pose(&f.t_cam_object), vec![f.cost, f.weight]];
             Ok(found.iter().flat_map(of).flatten().collect())
@@ -274,8 +274,7 @@ fn searches_of_one_hypothesis() {
 #[test]
 fn a_tracker_of_anything_at_any_time() {
     let settings = TrackerSettings { recovery: Recovery::Off, ..TrackerSettings::default() };
-    let hand = Some(Arc::clone(&SCENE.hand));
-    let mut tracker = Tracker::new(Arc::clone(&SCENE.object), hand, settings).unwrap();
+    let mut tracker = Tracker::new(Arc::clone(&SCENE.object), settings).unwrap();
     tracker.start_from(&SCENE.initial);
     let times = [1.0, 1.0, 0.5, 0.5 + 1e-9, 1e9];
     let mut faults: Vec<Fault> = FAULTS.to_vec();

@@ -1,6 +1,6 @@
 //! The fused estimator on the built-in scene.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
@@ -9,23 +9,23 @@ use prehend_refine::factor::ErrorGroup;
 use prehend_refine::problem::{Block, NoiseModel, Rows};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::strategy::{Fused, FusedSettings, Modality, Nuisance, Posterior};
-use prehend_refine::{Factor, Frame, Hand, Observation, State, refine};
+use prehend_refine::{Factor, Frame, Observation, State, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn turned(twist: &[f64; 6]) -> Isometry3<f64> {
-    let frame = Frame::new(&SCENE.observation, &SCENE.object, None).unwrap();
+    let bare = Observation { hand: None, ..SCENE.observation.clone() };
+    let frame = Frame::new(&bare, &SCENE.object).unwrap();
     let state = State::new(&frame, &SCENE.truth).unwrap();
     state.retract(&[Block::ObjectPose], twist).t_cam_object
 }
 
 fn run(
     observation: &Observation,
-    hand: Option<&Arc<Hand>>,
     start: &Isometry3<f64>,
     settings: FusedSettings,
 ) -> (Isometry3<f64>, Posterior) {
-    let frame = Frame::new(observation, &SCENE.object, hand).unwrap();
+    let frame = Frame::new(observation, &SCENE.object).unwrap();
     let found = refine(&frame, start, &Fused::new(settings)).unwrap();
     let posterior = found.posterior.unwrap();
     assert_eq!(found.state.t_cam_object, posterior.hypotheses[0].t_cam_object);
@@ -50,7 +50,7 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 fn from_the_back(rivals: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
     let axis = SCENE.truth.rotation * Vector3::z() * std::f64::consts::PI;
     let back = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
-    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let frame = Frame::new(&SCENE.observation, &SCENE.object).unwrap();
     let frame = match rivals {
         Some(rivals) => frame.with_rivals(rivals),
         None => frame,
@@ -76,8 +76,7 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
     let rotation = start.rotation.inverse();
     let center = start * SCENE.object.center - rotation * SCENE.object.center;
     let transposed = Isometry3::from_parts(center.into(), rotation);
-    let (pose, posterior) =
-        run(&SCENE.observation, Some(&SCENE.hand), &transposed, FusedSettings::default());
+    let (pose, posterior) = run(&SCENE.observation, &transposed, FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5 && posterior.probability() > 0.9, "{pe} cm, {oe}°");
 }
@@ -86,7 +85,7 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
 fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
     let mut observation = SCENE.observation.clone();
     observation.hand = None;
-    let frame = Frame::new(&observation, &SCENE.object, None).unwrap().with_rivals(vec![]);
+    let frame = Frame::new(&observation, &SCENE.object).unwrap().with_rivals(vec![]);
     let found = refine(&frame, &turned(&OFF), &Fused::new(without(Modality::Color))).unwrap();
     let posterior = found.posterior.unwrap();
     let best = posterior.hypotheses[0].t_cam_object;
@@ -104,8 +103,7 @@ fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
 
 #[test]
 fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
-    let (pose, posterior) =
-        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
+    let (pose, posterior) = run(&SCENE.observation, &turned(&OFF), FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
     let covariance = posterior.covariance();
@@ -128,12 +126,12 @@ fn calibrations_that_are_off_are_estimated() {
         hand.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.01 * (i as f64).cos());
     }
     let start = turned(&OFF);
-    let (pose, posterior) = run(&observation, Some(&SCENE.hand), &start, FusedSettings::default());
+    let (pose, posterior) = run(&observation, &start, FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.15 && oe < 1.5, "{pe} cm, {oe}°");
     for nuisances in [vec![], vec![Nuisance::Camera, Nuisance::Model]] {
         let believed = FusedSettings { nuisances: nuisances.clone(), ..FusedSettings::default() };
-        let (naive, _) = run(&observation, Some(&SCENE.hand), &start, believed);
+        let (naive, _) = run(&observation, &start, believed);
         assert!(pe < errors(&naive).0, "{pe} cm, with {nuisances:?} {} cm", errors(&naive).0);
     }
     let deviation = posterior.covariance().fixed_view::<3, 3>(0, 0).trace().sqrt();
@@ -146,7 +144,7 @@ fn every_sense_may_be_absent() {
     let changed = |change: &dyn Fn(&mut Observation)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
-        run(&observation, Some(&SCENE.hand), &start, FusedSettings::default()).0
+        run(&observation, &start, FusedSettings::default()).0
     };
     let poses = [
         ("touch", changed(&|o| o.hand.as_mut().unwrap().forces.clear())),
@@ -159,14 +157,14 @@ fn every_sense_may_be_absent() {
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.5 && oe < 4.0, "without {sense}: {pe} cm, {oe}°");
     }
-    let (pose, _) = run(&SCENE.observation, Some(&SCENE.hand), &start, without(Modality::Color));
+    let (pose, _) = run(&SCENE.observation, &start, without(Modality::Color));
     assert!(errors(&pose).0 < 0.3);
 }
 
 #[test]
 fn scales_are_learnt_from_what_a_frame_tells() {
-    let scale = |observation: &Observation, hand, group| {
-        let (_, posterior) = run(observation, hand, &turned(&OFF), FusedSettings::default());
+    let scale = |observation: &Observation, group| {
+        let (_, posterior) = run(observation, &turned(&OFF), FusedSettings::default());
         posterior.scales.get(group)
     };
     let mut displaced = SCENE.observation.clone();
@@ -174,13 +172,13 @@ fn scales_are_learnt_from_what_a_frame_tells() {
         hand.t_cam_hand = Translation3::new(8e-3, -6e-3, 0.0) * hand.t_cam_hand;
         hand.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.05 * (2.0 * i as f64).sin());
     }
-    let hand = Some(&SCENE.hand);
     for group in [ErrorGroup::Hand, ErrorGroup::Joints] {
-        let (exact, off) = (scale(&SCENE.observation, hand, group), scale(&displaced, hand, group));
+        let (exact, off) = (scale(&SCENE.observation, group), scale(&displaced, group));
         assert!(exact < 0.5 && off > 1.2, "{group:?}: {exact} {off}");
     }
     // Without a hand, little tells of the camera's errors.
-    let alone = scale(&SCENE.observation, None, ErrorGroup::Camera);
+    let bare = Observation { hand: None, ..SCENE.observation.clone() };
+    let alone = scale(&bare, ErrorGroup::Camera);
     assert!((0.1..1.5).contains(&alone), "{alone}");
 }
 
@@ -190,8 +188,7 @@ fn a_pose_that_senses_disagree_about_is_not_sure() {
     if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = Translation3::new(0.0, 0.0, 0.05) * hand.t_cam_hand;
     }
-    let (pose, posterior) =
-        run(&observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
+    let (pose, posterior) = run(&observation, &turned(&OFF), FusedSettings::default());
     println!("{:?} {:?} {}", errors(&pose), posterior.inconsistencies, posterior.probability());
     println!("{:?}", posterior.scales);
     let (pe, oe) = errors(&pose);
@@ -204,7 +201,7 @@ fn a_solve_that_is_cut_short_is_not_sure() {
     let of = |iterations| {
         let mut settings = FusedSettings::default();
         settings.stages.iter_mut().for_each(|stage| stage.solver.iterations = iterations);
-        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), settings).1
+        run(&SCENE.observation, &turned(&OFF), settings).1
     };
     let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
@@ -217,9 +214,7 @@ fn a_solve_that_is_cut_short_is_not_sure() {
 fn threads_make_no_difference() {
     let of = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default())
-        })
+        pool.install(|| run(&SCENE.observation, &turned(&OFF), FusedSettings::default()))
     };
     assert_eq!(of(1), of(3));
 }
@@ -228,11 +223,11 @@ fn threads_make_no_difference() {
 fn what_nothing_is_seen_of_is_said_to_be_unobserved() {
     let settings =
         FusedSettings { modalities: vec![Modality::Silhouette], ..FusedSettings::default() };
-    let (_, posterior) = run(&SCENE.observation, None, &turned(&[0.0; 6]), settings);
+    let bare = Observation { hand: None, ..SCENE.observation.clone() };
+    let (_, posterior) = run(&bare, &turned(&[0.0; 6]), settings);
     // The outline of a bottle says little of how it is turned about its axis, and of its distance.
     assert!(!posterior.unobservable.is_empty());
-    let (_, all) =
-        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
+    let (_, all) = run(&SCENE.observation, &turned(&OFF), FusedSettings::default());
     assert!(all.unobservable.is_empty(), "{:?}", all.unobservable);
 }
 
@@ -260,7 +255,7 @@ impl Factor for Pull {
 
 #[test]
 fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
-    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let frame = Frame::new(&SCENE.observation, &SCENE.object).unwrap();
     let pull = |offset: f64, sigma: f64| {
         let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * offset;
         let fused = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(sigma) });

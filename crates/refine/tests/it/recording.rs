@@ -25,9 +25,8 @@ fn sequence(count: usize) -> Sequence {
 }
 
 fn tracker(sequence: &Sequence) -> Tracker {
-    let robot = Some(Arc::clone(&sequence.hand));
     let settings = TrackerSettings::default();
-    let mut tracker = Tracker::new(Arc::clone(&sequence.object), robot, settings).unwrap();
+    let mut tracker = Tracker::new(Arc::clone(&sequence.object), settings).unwrap();
     tracker.start_from(&sequence.initial);
     tracker
 }
@@ -44,7 +43,7 @@ fn record(sequence: &Sequence, file: &Path) -> Vec<Tracked> {
     writer.object(STEP, &sequence.object.mesh).unwrap();
     for (k, frame) in sequence.frames.iter().enumerate() {
         let at = STEP * (k as i64 + 1);
-        writer.sensed(at, &frame.observation, Some(&sequence.hand)).unwrap();
+        writer.sensed(at, &frame.observation).unwrap();
         let tracked = track(&mut tracker, &frame.observation, at);
         writer.tracked(at, &tracked, &frame.observation.color).unwrap();
         found.push(tracked);
@@ -114,7 +113,9 @@ fn what_is_missing_is_named() {
     let file = folder.path().join("log.mcap");
     let sequence = sequence(1);
     let mut writer = RecordingWriter::create(&file).unwrap();
-    writer.sensed(STEP, &sequence.frames[0].observation, None).unwrap();
+    writer
+        .sensed(STEP, &Observation { hand: None, ..sequence.frames[0].observation.clone() })
+        .unwrap();
     writer.finish().unwrap();
     let topics = ImageTopics { color: Some("/left".to_owned()), ..ImageTopics::default() };
     let error = Recording::open(&file, &topics, "world").err().unwrap().to_string();
@@ -145,7 +146,7 @@ fn an_image_that_is_broken_fails_its_frame_alone() {
             observation.depth = observation.depth.downsampled(2);
             observation.mask = observation.mask.downsampled(2);
         }
-        writer.sensed(STEP * (k as i64 + 1), &observation, None).unwrap();
+        writer.sensed(STEP * (k as i64 + 1), &Observation { hand: None, ..observation }).unwrap();
     }
     writer.finish().unwrap();
     let recording = Recording::open(&file, &ImageTopics::default(), "world").unwrap();

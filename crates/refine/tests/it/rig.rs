@@ -39,7 +39,6 @@ fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
         observation: said(&frame.observation),
         // As if two objects were held.
         obj_id: 7 + index as u32 % 2,
-        hand: Some(Arc::clone(&sequence.hand)),
         initial: frame.truth,
         is_refined: false,
     };
@@ -119,7 +118,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let new = &sequence.frames[39];
     let told = said(&new.observation);
     let error = |observation: &Observation, object, rig: Option<&Rig>| {
-        let frame = Frame::new(observation, object, Some(&sequence.hand)).unwrap();
+        let frame = Frame::new(observation, object).unwrap();
         let fused = Fused { rig: rig.map(|rig| Arc::new(rig.clone())), ..Fused::default() };
         let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
         let center = sequence.object.center;
@@ -139,7 +138,8 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     };
     // Without a hand, what is known of the camera still counts.
     let corrected = rig.corrected(&told).unwrap();
-    let frame = Frame::new(&corrected, &object, None).unwrap();
+    let bare = Observation { hand: None, ..corrected };
+    let frame = Frame::new(&bare, &object).unwrap();
     let fused = Fused::default().with_rig(Arc::new(rig.clone()));
     let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
     assert!(found.posterior.is_some());
@@ -148,8 +148,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     assert!(after < 0.4 * before, "{after} of {before}");
     // A tracker is surer, too, and as sure as it may be.
     let track = |object: &Arc<_>, rig: Option<&Arc<Rig>>| {
-        let (object, hand) = (Arc::clone(object), Some(Arc::clone(&sequence.hand)));
-        let mut tracker = Tracker::new(object, hand, TrackerSettings::default()).unwrap();
+        let mut tracker = Tracker::new(Arc::clone(object), TrackerSettings::default()).unwrap();
         tracker.start_from(&sequence.initial);
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(rig));
@@ -266,7 +265,7 @@ fn a_camera_is_calibrated_without_a_hand() {
     let sequence = default_sequence(1, 61).unwrap();
     let mut frames = frames(&sequence);
     for frame in &mut frames {
-        (frame.hand, frame.observation.hand) = (None, None);
+        frame.observation.hand = None;
     }
     let objects = [7, 8].map(|id| (id, Arc::clone(&sequence.object)));
     let mut calibrator =
@@ -298,7 +297,7 @@ fn a_camera_is_calibrated_without_a_hand() {
     let mut observation = said(observation);
     observation.hand = None;
     let corrected = rig.corrected(&observation).unwrap();
-    let frame = Frame::new(&corrected, &sequence.object, None).unwrap();
+    let frame = Frame::new(&corrected, &sequence.object).unwrap();
     let fused = Fused::default().with_rig(Arc::new(rig));
     let found = refine(&frame, truth, &fused).unwrap();
     assert!(found.posterior.unwrap().probability() > 0.5);

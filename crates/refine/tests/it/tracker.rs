@@ -16,8 +16,7 @@ use prehend_render::Mask;
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
 
 fn tracker(settings: TrackerSettings) -> Tracker {
-    let robot = Some(Arc::clone(&SEQUENCE.hand));
-    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), robot, settings).unwrap();
+    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), settings).unwrap();
     tracker.start_from(&SEQUENCE.initial);
     tracker
 }
@@ -51,7 +50,7 @@ fn a_moving_hand_is_followed() {
 #[test]
 fn without_a_hand_the_camera_is_enough() {
     let settings = TrackerSettings { recovery: Recovery::Off, ..Default::default() };
-    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), None, settings).unwrap();
+    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), settings).unwrap();
     tracker.start_from(&SEQUENCE.initial);
     for index in 0..12 {
         let frame = &SEQUENCE.frames[index];
@@ -125,9 +124,8 @@ fn what_is_hidden_is_lost_and_followed_again() {
 
 #[test]
 fn an_object_in_a_hand_is_found_without_mask_and_pose() {
-    let robot = Some(Arc::clone(&SEQUENCE.hand));
     let mut tracker =
-        Tracker::new(Arc::clone(&SEQUENCE.object), robot, TrackerSettings::default()).unwrap();
+        Tracker::new(Arc::clone(&SEQUENCE.object), TrackerSettings::default()).unwrap();
     let without = |index: usize| {
         let mut observation = SEQUENCE.frames[index].observation.clone();
         observation.mask.pixels_mut().fill(false);

@@ -22,7 +22,7 @@ fn what_is_written_reads_back() {
     let dataset = Dataset::open(dir.path()).unwrap();
     let mut assets = Assets::new(&dataset, 0);
     let frame = dataset.frame(1, 0).unwrap();
-    let (seen, robot) = assets.observation(&frame, 0, &[Sensor::Hand, Sensor::Touch]).unwrap();
+    let seen = assets.observation(&frame, 0, &[Sensor::Hand, Sensor::Touch]).unwrap();
     let given = &scene.observation;
     assert_eq!((seen.camera, &seen.mask), (given.camera, &given.mask));
     assert!(seen.gravity.unwrap().metric_distance(&given.gravity.unwrap()) < 1e-12);
@@ -42,7 +42,7 @@ fn what_is_written_reads_back() {
         let clipped = b.map(|v| v.clamp(-10.0, 10.0));
         a.metric_distance(&clipped) < 1e-12
     }));
-    assert_eq!(robot.unwrap().taxels.len(), scene.hand.taxels.len());
+    assert_eq!(told.hand.taxels.len(), scene.hand.taxels.len());
 
     let object = assets.object(scene.obj_id).unwrap();
     assert!(!object.inertial_assumed);

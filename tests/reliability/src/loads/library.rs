@@ -70,8 +70,7 @@ const FILM: usize = 90;
 pub(super) fn tracker(context: &LoadContext<'_>) -> Result<Outcome> {
     let count = context.scaled(30 * 3600);
     let film = default_sequence(1, FILM)?;
-    let hand = Some(Arc::clone(&film.hand));
-    let mut tracker = Tracker::new(Arc::clone(&film.object), hand, TrackerSettings::default())?;
+    let mut tracker = Tracker::new(Arc::clone(&film.object), TrackerSettings::default())?;
     tracker.start_from(&film.initial);
     let mut errors = Vec::with_capacity(count);
     let work = || {

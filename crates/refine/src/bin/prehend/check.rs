@@ -147,7 +147,7 @@ fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)
 /// Says what a plain BOP dataset does not have, and which methods need it.
 fn without(dataset: &Dataset, input: &FrameInput, target: &Target) {
     let touches = input.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
-    let (name, terms) = match &input.hand {
+    let (name, terms) = match &input.observation.hand {
         None => ("scene_bodies.json", "rendering,depth"),
         Some(_) if !touches => ("scene_tactile.json", "physics,rendering,depth"),
         Some(_) => return,
@@ -209,7 +209,7 @@ fn names_of_frame(file: &Path) -> FieldNames {
 
 /// The object at a pose, and the hand, over their image; and what looks wrong.
 fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, Vec<Warning>) {
-    let FrameInput { observation, object, hand, .. } = input;
+    let FrameInput { observation, object, .. } = input;
     let warnings = input.warnings(t_cam_object).concat();
-    (outline_picture(observation, object, hand.as_deref(), t_cam_object), warnings)
+    (outline_picture(observation, object, t_cam_object), warnings)
 }

@@ -63,11 +63,10 @@ impl Export {
                     .iter()
                     .map(|job| assets.object(job.row.obj_id))
                     .collect::<Result<_, _>>()?;
-                let (observation, hand) =
-                    assets.observation(&dataset.frame(scene_id, im_id)?, 0, &[])?;
+                let observation = assets.observation(&dataset.frame(scene_id, im_id)?, 0, &[])?;
                 let t_base_cam = world.as_ref().map(|known| known[&im_id].inverse());
                 let t_base_cam = t_base_cam.unwrap_or_else(Isometry3::identity);
-                film.add_image(im_id, &observation, hand.as_ref(), &t_base_cam)?;
+                film.add_image(im_id, &observation, &t_base_cam)?;
                 for (Job { target, row, .. }, object) in jobs.iter().zip(&models) {
                     film.add_object(target, object, &row.t_cam_model);
                     done += 1;

@@ -6,7 +6,7 @@ use prehend_render::{DepthImage, Mask, depth_map};
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::{Hand, HandMeasurement, Object, Observation, hand_depth, median};
+use crate::scene::{HandMeasurement, Object, Observation, hand_depth, median};
 
 /// Extents that render without trouble, in units of length.
 const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
@@ -18,7 +18,7 @@ pub(super) struct FrameImages<'a> {
     scaled: Option<Box<Object>>,
     /// The inputs as they are.
     pub(super) given: Inputs,
-    pub(super) hand: Option<(&'a Hand, &'a HandMeasurement)>,
+    pub(super) hand: Option<&'a HandMeasurement>,
     pub(super) mask: Mask,
     /// As measured \[m\], 0 where it is not.
     pub(super) depth: DepthImage,
@@ -33,7 +33,6 @@ impl<'a> FrameImages<'a> {
     pub(super) fn new(
         observation: &'a Observation,
         object: &'a Object,
-        hand: Option<&'a Hand>,
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
@@ -58,10 +57,9 @@ impl<'a> FrameImages<'a> {
             given.depth_scale *= factor;
             given.meters /= factor;
         }
-        let hand = hand.zip(observation.hand.as_ref());
-        let hand = hand.filter(|(hand, measured)| {
+        let hand = observation.hand.as_ref().filter(|measured| {
             let pose = measured.t_cam_hand.to_homogeneous();
-            hand.check_joints(&measured.joints).is_ok()
+            measured.hand.check_joints(&measured.joints).is_ok()
                 && measured.joints.iter().chain(pose.iter()).all(|number| number.is_finite())
         });
         let points = [true, false].map(|masked| points(&mask, &depth, masked, settings.points));

@@ -27,12 +27,12 @@ fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     let settings = CorrectionSettings::default();
     let trial = |(k, mut scene): (usize, Scene)| {
         change(&mut scene);
-        let Scene { mut observation, object, hand, initial, .. } = scene;
+        let Scene { mut observation, object, initial, .. } = scene;
         if bare {
             observation.depth.pixels_mut().fill(0.0);
         }
-        let hand = (!bare).then_some(&*hand);
-        let trial = CorrectionTrial::new(&observation, &object, hand, &initial, &settings);
+        observation.hand = observation.hand.filter(|_| !bare);
+        let trial = CorrectionTrial::new(&observation, &object, &initial, &settings);
         (Target { scene_id: 1, im_id: k as u32, obj_id: 5, instance: 0 }, trial.unwrap())
     };
     let trials: Vec<_> = scenes().enumerate().map(trial).collect();

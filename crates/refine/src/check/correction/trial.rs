@@ -12,7 +12,7 @@ use super::inputs::Inputs;
 use super::kind::{Correction, candidates};
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::{Hand, Object, Observation};
+use crate::scene::{Object, Observation};
 
 /// A frame with each correction tried.
 #[derive(Clone, Debug)]
@@ -55,11 +55,10 @@ impl CorrectionTrial {
     pub fn new(
         observation: &Observation,
         object: &Object,
-        hand: Option<&Hand>,
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
-        let evidence = FrameImages::new(observation, object, hand, t_cam_object, settings)?;
+        let evidence = FrameImages::new(observation, object, t_cam_object, settings)?;
         let given = evidence.given;
         let hand_drawn = evidence.hand_drawn(&given);
         let fit = |inputs: &Inputs, sized: bool| {
@@ -107,11 +106,10 @@ impl CorrectionTrial {
 pub(in crate::check) fn settled_pose(
     observation: &Observation,
     object: &Object,
-    hand: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
     settings: &CorrectionSettings,
 ) -> Option<Isometry3<f64>> {
-    let evidence = FrameImages::new(observation, object, hand, t_cam_object, settings).ok()?;
+    let evidence = FrameImages::new(observation, object, t_cam_object, settings).ok()?;
     let hand = evidence.hand_drawn(&evidence.given);
     let (agreement, aligned) = fit(&evidence, hand.as_ref(), &evidence.given, false, settings)?;
     let Inputs { meters, t_cam_object, .. } = aligned.inputs;

@@ -1,6 +1,7 @@
 //! The frames of a recording.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
@@ -29,7 +30,7 @@ pub struct RecordedFrame {
 /// The frames of a [`Recording`], one after the other. A few images are in memory at a time.
 pub struct Frames<'a> {
     recording: &'a Recording,
-    hand: Option<&'a Hand>,
+    hand: Option<&'a Arc<Hand>>,
     messages: MessageReader<'a>,
     first: Stream,
     depth: Option<Stream>,
@@ -68,7 +69,7 @@ impl Stream {
 impl<'a> Frames<'a> {
     pub(super) fn new(
         recording: &'a Recording,
-        hand: Option<&'a Hand>,
+        hand: Option<&'a Arc<Hand>>,
     ) -> Result<Self, DatasetError> {
         let topics = &recording.topics;
         Ok(Self {

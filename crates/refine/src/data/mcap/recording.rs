@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
@@ -142,7 +143,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the file cannot be opened any more.
-    pub fn frames<'a>(&'a self, hand: Option<&'a Hand>) -> Result<Frames<'a>, DatasetError> {
+    pub fn frames<'a>(&'a self, hand: Option<&'a Arc<Hand>>) -> Result<Frames<'a>, DatasetError> {
         Frames::new(self, hand)
     }
 
@@ -183,7 +184,7 @@ impl Recording {
     ///
     /// # Errors
     /// What is not known.
-    pub(super) fn hand(&self, hand: &Hand, at: i64) -> Result<HandMeasurement, String> {
+    pub(super) fn hand(&self, hand: &Arc<Hand>, at: i64) -> Result<HandMeasurement, String> {
         let root = &hand.tree.links()[0].name;
         let t_cam_hand = self.in_camera(root, at)?;
         let position = |name: &String| {
@@ -193,7 +194,7 @@ impl Recording {
         };
         let known = hand.tree.joint_names().iter().filter_map(position);
         let joints = hand.tree.joint_vector(&known.collect()).map_err(|e| e.to_string())?;
-        Ok(HandMeasurement::new(t_cam_hand, joints).with_forces(self.felt(&hand.taxels, at)))
+        Ok(hand.measured(t_cam_hand, joints).with_forces(self.felt(&hand.taxels, at)))
     }
 
     /// The force on each taxel \[N\], none if nothing is known of any.

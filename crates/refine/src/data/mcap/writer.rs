@@ -18,7 +18,7 @@ use super::messages::{
 use super::recording::taxel_frame;
 use super::schemas::schema;
 use crate::data::bop::DatasetError;
-use crate::scene::{Hand, HandMeasurement, Observation};
+use crate::scene::{HandMeasurement, Observation};
 use crate::strategy::Posterior;
 use crate::tracker::{TrackStatus, Tracked};
 
@@ -62,17 +62,12 @@ impl RecordingWriter {
         written.and_then(AtomicFile::commit).map_err(|e| DatasetError::writing(&self.file, e))
     }
 
-    /// What was sensed at the moment `at` \[ns\]; of which `hand`, if there is one.
+    /// Measurements of the moment `at` \[ns\].
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn sensed(
-        &mut self,
-        at: i64,
-        observation: &Observation,
-        hand: Option<&Hand>,
-    ) -> Result<(), DatasetError> {
-        let Observation { camera, color, depth, mask, gravity, .. } = observation;
+    pub fn sensed(&mut self, at: i64, observation: &Observation) -> Result<(), DatasetError> {
+        let Observation { camera, color, depth, mask, gravity, hand, .. } = observation;
         let size = [camera.width, camera.height];
         let mut placed = Vec::new();
         if let Some(gravity) = gravity {
@@ -83,10 +78,10 @@ impl RecordingWriter {
             let (header, vector) = (header(at, CAMERA), (*gravity).into());
             self.write("/gravity", at, &Vector3Stamped { header, vector })?;
         }
-        if let (Some(measured), Some(hand)) = (&observation.hand, hand) {
-            let root = &hand.tree.links()[0].name;
+        if let Some(measured) = hand {
+            let root = &measured.hand.tree.links()[0].name;
             placed.push(transform(at, CAMERA, root, &measured.t_cam_hand));
-            self.felt(at, measured, hand)?;
+            self.felt(at, measured)?;
         }
         if !placed.is_empty() {
             self.write("/tf", at, &TransformMessage { transforms: placed })?;
@@ -104,12 +99,8 @@ impl RecordingWriter {
     }
 
     /// Joints and forces.
-    fn felt(
-        &mut self,
-        at: i64,
-        measured: &HandMeasurement,
-        hand: &Hand,
-    ) -> Result<(), DatasetError> {
+    fn felt(&mut self, at: i64, measured: &HandMeasurement) -> Result<(), DatasetError> {
+        let hand = &measured.hand;
         let joints = JointState {
             header: header(at, ""),
             name: hand.tree.joint_names().to_vec(),

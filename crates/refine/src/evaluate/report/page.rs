@@ -133,7 +133,7 @@ impl Report {
                 labeled(["image", "outline"], &image_and_outline(observation, object, t_cam_object))
             }
         };
-        let hand = input.hand.as_ref().map(|hand| self.hand(hand));
+        let hand = observation.hand.as_ref().map(|measured| self.hand(&measured.hand));
         let index = self.object(object);
         let (_, mesh, number) = &self.objects[index];
         Ok(DrawnFrame {

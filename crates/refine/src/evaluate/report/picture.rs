@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector2};
 use prehend_render::{Camera, RgbImage, draw_outline};
 
 use crate::calibration::Residuals;
-use crate::scene::{Hand, Object, Observation};
+use crate::scene::{Object, Observation};
 
 /// Outline of the initial pose.
 const BEFORE: [f32; 3] = [1.0, 0.25, 0.2];
@@ -35,7 +35,7 @@ pub(super) fn compared(
 ) -> [RgbImage; 2] {
     let (image, window) = (brightened(observation), window(observation, object, after));
     [(before, BEFORE), (after, AFTER)].map(|(pose, color)| {
-        cut(&outlined(image.clone(), observation, object, None, pose, color), window)
+        cut(&outlined(image.clone(), observation, object, pose, color), window)
     })
 }
 
@@ -47,7 +47,7 @@ pub(super) fn image_and_outline(
     t_cam_object: &Isometry3<f64>,
 ) -> [RgbImage; 2] {
     let (image, window) = (brightened(observation), window(observation, object, t_cam_object));
-    let outlined = outlined(image.clone(), observation, object, None, t_cam_object, AFTER);
+    let outlined = outlined(image.clone(), observation, object, t_cam_object, AFTER);
     [cut(&image, window), cut(&outlined, window)]
 }
 
@@ -56,13 +56,12 @@ pub(super) fn image_and_outline(
 pub fn rig_picture(
     before: (&Observation, &Object, &Isometry3<f64>),
     after: (&Observation, &Object, &Isometry3<f64>),
-    hand: Option<&Hand>,
 ) -> [RgbImage; 2] {
     let window = window(before.0, before.1, before.2);
     [(before, BEFORE), (after, AFTER)].map(|((observation, object, pose), color)| {
         // Undistorted images are others than those before.
-        let image = brightened(observation);
-        cut(&outlined(image, observation, object, hand, pose, color), window)
+        let image = with_hand(brightened(observation), observation);
+        cut(&outlined(image, observation, object, pose, color), window)
     })
 }
 
@@ -104,26 +103,30 @@ fn side_by_side(images: &[RgbImage; 2]) -> RgbImage {
 pub fn outline_picture(
     observation: &Observation,
     object: &Object,
-    robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> RgbImage {
-    outlined(brightened(observation), observation, object, robot, t_cam_object, BEFORE)
+    let image = with_hand(brightened(observation), observation);
+    outlined(image, observation, object, t_cam_object, BEFORE)
 }
 
-/// `image` with these outlines, the object's in this color.
+/// `image` with the outline of the hand, where that is known.
+fn with_hand(mut image: RgbImage, observation: &Observation) -> RgbImage {
+    if let Some(hand) = &observation.hand {
+        for (model, pose) in hand.hand.render_bodies(&hand.t_cam_hand, &hand.joints) {
+            draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
+        }
+    }
+    image
+}
+
+/// `image` with the outline of the object in this color.
 fn outlined(
     mut image: RgbImage,
     observation: &Observation,
     object: &Object,
-    robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
     color: [f32; 3],
 ) -> RgbImage {
-    if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
-        for (model, pose) in robot.render_bodies(&hand.t_cam_hand, &hand.joints) {
-            draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
-        }
-    }
     draw_outline(&mut image, &observation.camera, &object.model, t_cam_object, color, 1.5);
     image
 }

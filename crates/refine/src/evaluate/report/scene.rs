@@ -132,8 +132,8 @@ pub(super) fn encoded_scene(
     hand: Option<usize>,
 ) -> Result<EncodedScene, RobotError> {
     let FrameDrawing { input, initial, t_cam_object, covariance, .. } = drawing;
-    let known = input.hand.as_ref().zip(input.observation.hand.as_ref());
-    let posed = known.map(|(hand, at)| hand.posed(&at.t_cam_hand, &at.joints)).transpose()?;
+    let known = input.observation.hand.as_ref();
+    let posed = known.map(|at| at.hand.posed(&at.t_cam_hand, &at.joints)).transpose()?;
     let distances = posed.as_ref().map(|posed| {
         let distance = |v: &Point3<f64>| {
             let farthest = f64::from(i8::MAX) * DISTANCE_UNIT;
@@ -142,7 +142,7 @@ pub(super) fn encoded_scene(
         };
         STANDARD.encode(mesh.vertices.iter().map(distance).collect::<Vec<_>>())
     });
-    let forces = known.map_or_else(Vec::new, |(_, hand)| {
+    let forces = known.map_or_else(Vec::new, |hand| {
         let force = |f: &Vector3<f64>| (!HandMeasurement::is_unknown(f)).then(|| f.cast().into());
         hand.forces.iter().map(force).collect()
     });

@@ -143,8 +143,7 @@ mod tests {
     #[test]
     fn predictions_of_a_made_up_scene_are_those_of_its_posterior() {
         let scene = default_scene(1).unwrap();
-        let hand = Some(&scene.hand);
-        let frame = Frame::new(&scene.observation, &scene.object, hand).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object).unwrap();
         let refined = refine(&frame, &scene.initial, &Method::default()).unwrap();
         let pose = *refined.t_cam_object();
         let posterior = refined.posterior.unwrap();

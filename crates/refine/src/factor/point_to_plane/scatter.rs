@@ -93,7 +93,7 @@ mod tests {
             let [x, y] = place(pixel);
             *depth += (independent * random.normal() + tiles[100 * y + x]) as f32;
         }
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         // A kernel would limit the errors.
         let noise = NoiseModel::gaussian(2e-3);
         let settings = PointToPlaneSettings { noise, gp_sigma: 0.0, ..Default::default() };

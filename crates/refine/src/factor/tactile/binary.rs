@@ -50,7 +50,8 @@ impl BinaryTouchFactor {
         settings: &BinaryTouchSettings,
         [touched, untouched]: [bool; 2],
     ) -> Result<Self, RefineError> {
-        let (hand, measured) = frame.require_hand("binary-touch")?;
+        let measured = frame.require_hand("binary-touch")?;
+        let hand = &measured.hand;
         let readings = measured.touch.iter().filter_map(|reading| match reading {
             TouchReading::Binary(contacts) => Some(contacts),
             _ => None,

@@ -85,7 +85,8 @@ impl TactileFactor {
     /// # Errors
     /// If the hand is unknown, or its forces are not one a taxel.
     pub fn new(frame: &Frame<'_>, settings: &TactileSettings) -> Result<Self, RefineError> {
-        let (hand, measured) = frame.require_hand("tactile")?;
+        let measured = frame.require_hand("tactile")?;
+        let hand = &measured.hand;
         hand.check_forces(&measured.forces)?;
         let links = hand.taxels.iter().map(|taxel| hand.link_of(taxel));
         let links = links.collect::<Result<Vec<usize>, _>>()?;
@@ -180,7 +181,7 @@ mod tests {
         let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
         let taxels = TactileSettings { touch, ..contacts.clone() };
         let probes = |observation: &Observation, settings: &TactileSettings| {
-            let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
+            let frame = Frame::new(observation, &scene.object).unwrap();
             TactileFactor::new(&frame, settings).unwrap().0.probes.len()
         };
         let all = probes(&observation, &taxels);
@@ -215,7 +216,7 @@ mod tests {
             TouchReading::Proximity(distances),
             TouchReading::Patch(patch),
         ];
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let (binary, proximity, patch) = (
             BinaryTouchFactor::new(&frame, &BinaryTouchSettings::default(), [true; 2]).unwrap(),
             ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap(),
@@ -254,7 +255,7 @@ mod tests {
             let mut observation = scene.observation.clone();
             let readings = scene.hand.taxels.iter().map(reading).collect();
             observation.hand.as_mut().unwrap().touch = vec![TouchReading::Proximity(readings)];
-            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let frame = Frame::new(&observation, &scene.object).unwrap();
             ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap().cost(&truth)
         };
         assert!(cost(0.0) < 1e-9 && cost(2e-3) > 0.1, "{} {}", cost(0.0), cost(2e-3));
@@ -276,7 +277,7 @@ mod tests {
                 points: vec![touched.position],
                 normals: vec![touched.normal * sign],
             })];
-            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let frame = Frame::new(&observation, &scene.object).unwrap();
             let settings = ContactPatchSettings::default();
             ContactPatchFactor::new(&frame, &settings).unwrap().cost(&truth)
         };
@@ -291,11 +292,11 @@ mod tests {
         if let Some(hand) = &mut observation.hand {
             hand.forces.pop();
         }
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let error = TactileFactor::new(&frame, &settings).err().unwrap().to_string();
         assert_eq!(error, "367 taxel forces were given for 368 taxels");
         observation.hand = None;
-        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let frame = Frame::new(&observation, &scene.object).unwrap();
         let refused = TactileFactor::new(&frame, &settings);
         assert!(matches!(refused, Err(RefineError::Missing { .. })));
     }

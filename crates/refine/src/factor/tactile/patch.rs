@@ -66,7 +66,8 @@ impl ContactPatchFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(frame: &Frame<'_>, settings: &ContactPatchSettings) -> Result<Self, RefineError> {
-        let (hand, measured) = frame.require_hand("contact-patch")?;
+        let measured = frame.require_hand("contact-patch")?;
+        let hand = &measured.hand;
         let (mut probes, mut normals) = (Vec::new(), Vec::new());
         for reading in &measured.touch {
             let TouchReading::Patch(patch) = reading else { continue };

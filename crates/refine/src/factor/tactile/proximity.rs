@@ -43,7 +43,8 @@ impl ProximityFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(frame: &Frame<'_>, settings: &ProximitySettings) -> Result<Self, RefineError> {
-        let (hand, measured) = frame.require_hand("proximity")?;
+        let measured = frame.require_hand("proximity")?;
+        let hand = &measured.hand;
         let readings = measured.touch.iter().filter_map(|reading| match reading {
             TouchReading::Proximity(readings) => Some(readings),
             _ => None,

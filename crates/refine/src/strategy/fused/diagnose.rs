@@ -99,7 +99,7 @@ impl Sensor {
             Self::Color => used && frame.observation().has_colors(),
             Self::Depth => used && frame.masked_depths(1000).is_ok(),
             Self::Touch => {
-                let hand = frame.hand().map(|(_, hand)| hand);
+                let hand = frame.hand();
                 used && hand.is_some_and(|h| !h.forces.is_empty() || !h.touch.is_empty())
             }
             Self::Views => settings.views && !frame.views().is_empty(),

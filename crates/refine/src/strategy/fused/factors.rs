@@ -187,7 +187,7 @@ fn other_factors(
     if wanted(Modality::FreeSpace) {
         factors.push(Arc::new(FreeSpaceFactor::new(frame, &settings.free_space)));
     }
-    let Some((_, hand)) = frame.hand() else { return Ok(factors) };
+    let Some(hand) = frame.hand() else { return Ok(factors) };
     if wanted(Modality::HandDepth) {
         let points = stage.points / 3;
         factors.push(Arc::new(HandDepthFactor::new(frame, points, &settings.hand_depth)?));

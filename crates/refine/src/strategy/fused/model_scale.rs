@@ -133,14 +133,15 @@ fn vertex(known: &[(f64, f64)], step: f64) -> Option<ModelScale> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::default_scene;
+    use crate::scene::{Observation, default_scene};
 
     #[test]
     fn the_size_of_a_model_is_found_with_depth() {
         let scene = default_scene(1).unwrap();
         for size in [0.94, 1.0, 1.07] {
             let object = Arc::new(scene.object.scaled(size).unwrap());
-            let frame = Frame::new(&scene.observation, &object, None).unwrap();
+            let bare = Observation { hand: None, ..scene.observation.clone() };
+            let frame = Frame::new(&bare, &object).unwrap();
             let mut fused = Fused::default();
             fused.settings.model_scale.sigma = 0.05;
             let found = fused.model_scale(&frame, &scene.initial).unwrap();

@@ -17,8 +17,8 @@ impl<'a> Pixels<'a> {
     pub(crate) fn new(frame: &Frame<'a>, state: &State, margin: usize) -> Self {
         let observation = frame.observation();
         let camera = state.camera.corrected(&observation.camera);
-        let hand = frame.hand().map(|(hand, _)| {
-            depth_map(&camera, &hand.render_bodies(&state.t_cam_hand, &state.joints))
+        let hand = frame.hand().map(|measured| {
+            depth_map(&camera, &measured.hand.render_bodies(&state.t_cam_hand, &state.joints))
         });
         let (object, pose) = (frame.object(), &state.t_cam_object);
         let view = View::new(observation, &camera, object, hand, pose);

@@ -1,5 +1,7 @@
 //! Camera and tactile sensors with the faults that last through one grasp, and the frames they capture.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{Drive, Motion};
@@ -16,7 +18,7 @@ use super::lens::SimulatedLens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::data::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
+use crate::scene::{Hand, Object, Observation};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
@@ -25,7 +27,7 @@ use crate::synth::grasp::GraspSnapshot;
 pub(in crate::synth) struct SensorRig<'a> {
     settings: &'a SensorSettings,
     object: &'a Object,
-    robot: &'a Hand,
+    robot: &'a Arc<Hand>,
     camera: Camera,
     lens: Option<&'a SimulatedLens>,
     errors: Miscalibration,
@@ -57,7 +59,7 @@ impl<'a> SensorRig<'a> {
     pub(in crate::synth) fn new(
         settings: &'a SensorSettings,
         object: &'a Object,
-        robot: &'a Hand,
+        robot: &'a Arc<Hand>,
         (width, height): (usize, usize),
         lens: Option<&'a SimulatedLens>,
         noise: &mut SplitMix64,
@@ -181,7 +183,7 @@ impl<'a> SensorRig<'a> {
             depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),
             mask: self.settings.mask.segment(&seen.visible, &seen.hand, noise),
             gravity: Some(gravity),
-            hand: Some(HandMeasurement::new(t_cam_hand_told, joints).with_forces(forces)),
+            hand: Some(self.robot.measured(t_cam_hand_told, joints).with_forces(forces)),
             views: Vec::new(),
         };
         let truth = t_cam_hand * moment.t_hand_object;

@@ -243,7 +243,7 @@ mod tests {
         let sight = |fill: Option<bool>| {
             let mut observation = scene.observation.clone();
             fill.iter().for_each(|fill| observation.mask.pixels_mut().fill(*fill));
-            Sight::new(observation, Some(&scene.hand), Images::default())
+            Sight::new(observation, Images::default())
         };
         let mut segmenter = Segmenter::new(&TrackerSettings::default());
         segmenter.learn(&sight(None), &scene.object, &scene.truth);
@@ -269,7 +269,7 @@ mod tests {
         let [left, top, ..] = disguised.mask.bounds().unwrap();
         let around = disguised.color.pixels()[(top - 3) * disguised.camera.width + left - 3];
         disguised.color.pixels_mut().fill(around);
-        let disguised = Sight::new(disguised, Some(&scene.hand), Images::default());
+        let disguised = Sight::new(disguised, Images::default());
         let share = segmenter.shown(&disguised, &scene.object, &scene.truth);
         assert!(share < 0.1, "{share}");
     }

@@ -78,7 +78,7 @@ fn images_of_a_rig_are_views_of_one_moment() {
         let dataset = fixture.open();
         let frame = dataset.frame(4, 0).unwrap();
         let read = Assets::new(&dataset, 0).observation(&frame, 0, &[]);
-        read.map(|(observation, _)| observation).map_err(|error| error.to_string())
+        read.map_err(|error| error.to_string())
     };
     let seen = both(&place("7", 500.0), &place("7", 450.0)).unwrap();
     let [view] = &seen.views[..] else { panic!("not one view") };

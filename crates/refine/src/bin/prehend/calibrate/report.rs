@@ -143,5 +143,5 @@ fn draw(
     let [object, corrected] =
         [nominal.object(frame.obj_id)?, done.calibrator.object(frame.obj_id)?];
     let before = (&frame.observation, &**object, alone);
-    Ok(rig_picture(before, (&after, corrected, &frame.initial), frame.hand.as_deref()))
+    Ok(rig_picture(before, (&after, corrected, &frame.initial)))
 }

@@ -93,7 +93,7 @@ impl Log {
 
     /// Its frames as a film that begins with `start`, corrected by `rig`.
     pub(super) fn film(&self, start: Target, rig: Option<Arc<Rig>>) -> anyhow::Result<LogFilm<'_>> {
-        let frames = self.recording.frames(self.hand.as_deref())?;
+        let frames = self.recording.frames(self.hand.as_ref())?;
         Ok(LogFilm { log: self, frames, next: start, first: None, rig })
     }
 }
@@ -120,8 +120,8 @@ impl Film for LogFilm<'_> {
             if let Some(rig) = &self.rig {
                 observation = rig.corrected(&observation)?;
             }
-            let (object, hand) = (Arc::clone(&self.log.object), self.log.hand.clone());
-            Ok(FrameInput::new(observation, object, hand, self.rig.clone()))
+            let object = Arc::clone(&self.log.object);
+            Ok(FrameInput::new(observation, object, self.rig.clone()))
         };
         let stamp = Some(frame.nanoseconds);
         let input = input();
@@ -145,7 +145,7 @@ impl LogWriter {
     pub(super) fn add(
         &mut self,
         (time, stamp): (Duration, Option<i64>),
-        (object, hand): (&Object, Option<&Hand>),
+        object: &Object,
         observation: &Observation,
         tracked: &Tracked,
     ) -> anyhow::Result<()> {
@@ -153,7 +153,7 @@ impl LogWriter {
             Some(stamp) => stamp,
             None => i64::try_from((START + time).as_nanos())?,
         };
-        self.writer.sensed(at, observation, hand)?;
+        self.writer.sensed(at, observation)?;
         let model = match &self.model {
             Some(model) => model,
             None => {

@@ -29,7 +29,7 @@ use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::rig::Rig;
-use prehend_refine::scene::{Hand, Object};
+use prehend_refine::scene::Object;
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use prehend_render::Backend;
@@ -155,9 +155,9 @@ struct Following {
 }
 
 impl Following {
-    /// A tracker of an object with a hand.
-    fn begin(&self, object: Arc<Object>, hand: Option<Arc<Hand>>) -> Result<Tracker, RefineError> {
-        let tracker = Tracker::new(object, hand, self.settings.clone())?;
+    /// A tracker of an object.
+    fn begin(&self, object: Arc<Object>) -> Result<Tracker, RefineError> {
+        let tracker = Tracker::new(object, self.settings.clone())?;
         let tracker = tracker.with_backend(Arc::clone(&self.backend));
         Ok(match &self.rig {
             Some(rig) => tracker.with_rig(Arc::clone(rig)),
@@ -391,8 +391,7 @@ impl Track {
         following: &Following,
         outcome: &mut Outcome,
     ) -> anyhow::Result<()> {
-        // With the hand, and what else there is, of the first image.
-        let mut tracker: Option<(Tracker, Option<Arc<Hand>>)> = None;
+        let mut tracker: Option<Tracker> = None;
         let stopped = || following.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         if let Some(report) = &mut outcome.report {
             report.begin(bar.length());
@@ -404,25 +403,21 @@ impl Track {
             // What was sensed is given back where it is asked for once more.
             let frame = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
                 let input = input?;
-                let FrameInput { observation, hand, .. } = &input;
+                let FrameInput { observation, .. } = &input;
                 let tracker = match &mut tracker {
-                    Some((tracker, first)) => {
-                        require_same(first.as_ref(), hand.as_ref())?;
-                        tracker
-                    }
+                    Some(tracker) => tracker,
                     none => {
-                        let mut new = following.begin(Arc::clone(object), hand.clone())?;
+                        let mut new = following.begin(Arc::clone(object))?;
                         initial.iter().for_each(|pose| new.start_from(pose));
-                        &mut none.insert((new, hand.clone())).0
+                        none.insert(new)
                     }
                 };
                 if log.is_none() && report.is_none() {
                     return Ok((tracker.push(input.observation, time)?, None));
                 }
                 let tracked = tracker.track(observation, time)?;
-                let seen = (&**object, hand.as_deref());
                 let written =
-                    log.as_mut().map(|w| w.add((time, stamp), seen, observation, &tracked));
+                    log.as_mut().map(|w| w.add((time, stamp), object, observation, &tracked));
                 if let Some(Err(error)) = written {
                     // Of a log with a gap nobody would know.
                     failures.push(format!("--mcap-out: {error:#}; it was given up"));
@@ -470,19 +465,4 @@ impl Track {
         }
         Ok(())
     }
-}
-
-/// Refuses an image with other bodies than the first one: joints would be those of something else.
-fn require_same(first: Option<&Arc<Hand>>, now: Option<&Arc<Hand>>) -> Result<(), RefineError> {
-    let (Some(first), Some(now)) = (first, now) else { return Ok(()) };
-    let (expected, found) = (first.tree.joint_names(), now.tree.joint_names());
-    if Arc::ptr_eq(first, now) || expected == found {
-        return Ok(());
-    }
-    let differs = |names: &[String], others: &[String]| {
-        names.iter().find(|name| !others.contains(name)).cloned()
-    };
-    let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
-    let problem = format!("are others than in the first image: joint {which:?} is in one only");
-    Err(RefineError::Setting { name: "bodies", problem })
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::bail;
 use prehend_refine::data::Target;
 use prehend_refine::rig::Rig;
-use prehend_refine::scene::{Hand, Object, Observation};
+use prehend_refine::scene::{Object, Observation};
 use prehend_refine::tracker::Tracked;
 
 use super::film::{Film, Moment};
@@ -59,7 +59,7 @@ impl LogWriter {
     pub(super) fn add(
         &mut self,
         _: (Duration, Option<i64>),
-        _: (&Object, Option<&Hand>),
+        _: &Object,
         _: &Observation,
         _: &Tracked,
     ) -> anyhow::Result<()> {

@@ -100,8 +100,11 @@ impl Sweep {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::scene::HandMeasurement;
+    use std::sync::Arc;
+
+    use crate::scene::Hand;
     use nalgebra::{Isometry3, Vector3};
+    use prehend_geometry::robot::KinematicTree;
     use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
     /// A square object half a meter away in the middle of a small picture, before a wall.
@@ -110,6 +113,7 @@ pub(super) mod tests {
         let inside = |k: usize| (30..50).contains(&(k % width)) && (20..40).contains(&(k / width));
         let count = width * height;
         let depth = (0..count).map(|k| if inside(k) { 0.5 } else { 1.0 }).collect();
+        let hand = Arc::new(Hand::new(KinematicTree::rigid("palm", vec![]), vec![]).unwrap());
         Observation {
             camera: Camera { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, width, height },
             color: RgbImage::filled(width, height, [0.6, 0.3, 0.2]),
@@ -117,7 +121,7 @@ pub(super) mod tests {
             mask: Mask::new(width, height, (0..count).map(inside).collect()).unwrap(),
             gravity: None,
             hand: Some(
-                HandMeasurement::new(Isometry3::translation(0.0, 0.1, 0.5), vec![0.2; 16])
+                hand.measured(Isometry3::translation(0.0, 0.1, 0.5), vec![0.2; 16])
                     .with_forces((0..100).map(|k| Vector3::z() * f64::from(k % 2)).collect()),
             ),
             views: Vec::new(),
