@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 
 use crate::error::wrong;
 
+/// An array of NumPy.
+pub(crate) type Array<'py, T = f64> = Bound<'py, PyArray<T, IxDyn>>;
+
 /// An array of numbers, or a list of them.
 pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 
@@ -28,7 +31,7 @@ pub(crate) fn array<'py>(
     py: Python<'py>,
     values: Vec<f64>,
     shape: &[usize],
-) -> PyResult<Bound<'py, PyArray<f64, IxDyn>>> {
+) -> PyResult<Array<'py>> {
     PyArray::from_vec(py, values).reshape(IxDyn(shape))
 }
 
@@ -121,10 +124,12 @@ pub(crate) fn pose(array: Option<&Numbers<'_>>, what: &str) -> PyResult<Isometry
     Ok(Isometry3::from_parts(Translation3::new(rows[3], rows[7], rows[11]), rotation))
 }
 
+/// A pose as the sixteen numbers of a matrix, row by row.
+pub(crate) fn rows(pose: &Isometry3<f64>) -> [f64; 16] {
+    pose.to_homogeneous().transpose().into()
+}
+
 /// A pose as a matrix of 4 × 4.
-pub(crate) fn matrix<'py>(
-    py: Python<'py>,
-    pose: &Isometry3<f64>,
-) -> PyResult<Bound<'py, PyArray<f64, IxDyn>>> {
-    array(py, pose.to_homogeneous().transpose().iter().copied().collect(), &[4, 4])
+pub(crate) fn matrix<'py>(py: Python<'py>, pose: &Isometry3<f64>) -> PyResult<Array<'py>> {
+    array(py, rows(pose).to_vec(), &[4, 4])
 }

@@ -6,13 +6,11 @@ use prehend_sim::{RolloutFunction, RolloutGradient, RolloutInputs, SimulationErr
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::arrays::{Numbers, array, in_order};
+use crate::arrays::{Array, Numbers, array, in_order};
 use crate::error::wrong;
 use crate::integrator::AnyIntegrator;
 use crate::python_law::LawFailure;
 use crate::threads;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// Numbers of a state.
 pub(crate) const STATE: usize = 13;

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import prehend
-from prehend.datasets import Bop, Result, read_results, read_rivals, write_results
+from prehend.datasets import Bop, Result, read_results, read_hypotheses, write_results
 
 DATA = Path(os.environ.get("PREHEND_DATA", "")) / "mujoco"
 needs_data = pytest.mark.skipif(
@@ -49,14 +49,12 @@ def error(pose, truth, center):
 
 def test_a_made_up_frame_is_searched(example):
     frame, _, truth = example
-    found = frame.search()
-    shares = [share for _, share in found]
-    assert shares == sorted(shares, reverse=True) and sum(shares) == pytest.approx(1.0)
-    first, rivals = found[0][0], [pose for pose, _ in found[1:]]
-    estimate = frame.refine(first, rivals=np.reshape(rivals, (-1, 4, 4)))
+    poses, weights = frame.search()
+    assert (np.diff(weights) <= 0.0).all() and weights.sum() == pytest.approx(1.0)
+    estimate = frame.refine(poses)
     assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 1e-3
-    searched = prehend.search(frame.rgb, frame.depth, frame.K, frame.object, mask=frame.mask)
-    assert searched[0][0].shape == (4, 4)
+    searched, _ = prehend.search(frame.rgb, frame.depth, frame.K, frame.object, mask=frame.mask)
+    assert searched.shape[1:] == (4, 4)
 
 
 def test_color_or_depth_alone(example):
@@ -265,7 +263,7 @@ def test_settings_are_a_dict_or_a_file(example, refined, tmp_path):
     assert all((estimate.pose == given[0].pose).all() for estimate in given)
     assert not (given[0].pose == refined.pose).all()
     few = {"search": {"rotations": 300, "placed": 40, "turned": 8, "seen": 4, "last": 1}}
-    assert len(frame.search(settings=few)) == 1
+    assert len(frame.search(settings=few)[0]) == 1
     with pytest.raises(prehend.Error, match="settings: estimator.prior.joint: unknown field"):
         frame.refine(initial, settings={"estimator": {"prior": {"joint": 0.02}}})
     with pytest.raises(prehend.Error, match="settings: are of the fused methods, not of 'icp'"):
@@ -344,20 +342,20 @@ def test_results_files(tmp_path):
         Bop(tmp_path / "no-dataset")
 
 
-def test_rivals_files(tmp_path):
-    file = tmp_path / "poses.csv.rivals.csv"
+def test_files_of_hypotheses(tmp_path):
+    file = tmp_path / "poses.csv.hypotheses.csv"
     poses = [np.eye(4) for _ in range(4)]
     for k, pose in enumerate(poses):
         pose[2, 3] = 0.5 + 0.1 * k
     rows = [Result(1, 0, 7, poses[0]), Result(1, 1, 7, poses[0]), Result(1, 2, 7, poses[1])]
     searched = [rows[2], rows[2]._replace(pose=poses[2]), rows[2]._replace(pose=poses[3]), rows[0]]
     write_results(file, searched)
-    first, second, third = read_rivals(file, rows)
-    assert first.shape == (0, 4, 4) and second is None
-    assert (third == poses[2:]).all()
+    first, second, third = read_hypotheses(file, rows)
+    assert first.shape == (1, 4, 4) and second.shape == (4, 4)
+    assert (third == poses[1:]).all()
     write_results(file, [rows[0], rows[1]._replace(pose=poses[1])])
     with pytest.raises(prehend.Error, match="scene 1 image 1 object 7: neither"):
-        read_rivals(file, rows)
+        read_hypotheses(file, rows)
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,8 @@ pub struct RefineJob<'a> {
     pub input: &'a FrameInput,
     /// Initial pose, object → camera \[m\].
     pub initial: Isometry3<f64>,
-    /// Other poses that a search ended with, if `initial` comes from one: [`Frame::with_rivals`](crate::Frame::with_rivals).
-    pub rivals: Option<Vec<Isometry3<f64>>>,
+    /// Alternative initial poses, if `initial` comes from a search: [`Fused::alternatives`](crate::strategy::Fused::alternatives).
+    pub alternatives: Option<Vec<Isometry3<f64>>>,
     /// Renderer; `None` is the processor.
     pub backend: Option<Arc<dyn Backend>>,
     /// True if the fused estimator also refines without each sensor: [`Fused::diagnose`](crate::strategy::Fused::diagnose).
@@ -46,7 +46,7 @@ pub struct Refined {
 impl<'a> RefineJob<'a> {
     /// Refinement of `input` from `initial` (object → camera \[m\]) on the processor.
     pub fn new(input: &'a FrameInput, initial: Isometry3<f64>) -> Self {
-        Self { input, initial, rivals: None, backend: None, diagnose: false }
+        Self { input, initial, alternatives: None, backend: None, diagnose: false }
     }
 
     /// Refines the frame; `observe` hears of every iteration.
@@ -61,10 +61,10 @@ impl<'a> RefineJob<'a> {
         if let Some(backend) = &self.backend {
             frame = frame.with_backend(Arc::clone(backend));
         }
-        if let Some(rivals) = &self.rivals {
-            frame = frame.with_rivals(rivals.clone());
+        let mut method = method.with_rig(input.rig.as_ref());
+        if let Method::Fused(fused) = &mut method {
+            fused.alternatives.clone_from(&self.alternatives);
         }
-        let method = method.with_rig(input.rig.as_ref());
         let initial = State::new(&frame, &self.initial)?;
         let mut estimate = method.run(&frame, &initial, observe)?;
         if let Some(posterior) = &mut estimate.posterior {

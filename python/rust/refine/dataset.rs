@@ -12,10 +12,8 @@ use pyo3::prelude::*;
 use super::frame::Frame;
 use super::object::Object;
 use super::rig::Rig;
-use crate::arrays::matrix;
+use crate::arrays::{Array, matrix};
 use crate::error::Raise;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// A split of a BOP dataset: `prehend.datasets.Bop` is made of it.
 #[pyclass(frozen, subclass, module = "prehend")]

@@ -9,10 +9,8 @@ use pyo3::prelude::*;
 
 use super::dataset::Dataset;
 use super::poses::poses;
-use crate::arrays::{Numbers, array};
+use crate::arrays::{Array, Numbers, array};
 use crate::error::wrong;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// Names of the metrics; of each pose its metrics, n × metrics, NaN where there are none; means and medians of the metrics; what is wrong with poses that
 /// could not be scored, by their places.

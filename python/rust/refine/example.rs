@@ -9,10 +9,8 @@ use prehend_refine::scene::{SequenceFrame, default_scene, default_sequence};
 use pyo3::prelude::*;
 
 use super::frame::Frame;
-use crate::arrays::matrix;
+use crate::arrays::{Array, matrix};
 use crate::error::Raise;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// A made-up frame of the built-in hand holding the built-in bottle, a pose to start from (2 cm and 15° off), and the true one; 4 × 4, camera ←
 /// object [m]. `seed` decides noise and initial pose.

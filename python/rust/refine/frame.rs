@@ -14,12 +14,12 @@ use pyo3::prelude::*;
 use super::hand::Hand;
 use super::measured::{Joints, measured};
 use super::object::prepared;
-use super::poses::{pose, poses};
+use super::poses::{hypotheses, pose};
 use super::rig::Rig;
 use super::run::{self, Noise};
 use super::settings::settings;
 use super::{estimate, images};
-use crate::arrays::{Numbers, in_order, matrix, vector};
+use crate::arrays::{Array, Numbers, array, in_order, rows, vector};
 use crate::error::{Raise, wrong};
 
 /// One segmented RGB-D frame of an object, with the hand that holds it where that is known: what `refine` starts from, prepared once.
@@ -118,12 +118,13 @@ impl Frame {
         Ok(Self { input: FrameInput::new(observation, object, rig), target: None })
     }
 
-    /// Refines a pose of the object (4 × 4, camera ← object [m]): an `Estimate`. Python's other threads run on meanwhile.
+    /// Refines a pose of the object (4 × 4, camera ← object [m]), or the hypotheses of a search (n × 4 × 4, the best first): an `Estimate`. Python's other
+    /// threads run on meanwhile.
     ///
-    /// `rivals` (n × 4 × 4) are the other poses that a search ended with, where the pose comes from one. `iterations` limits those of each stage. `noise` has sizes of errors by name, as
+    /// `iterations` limits those of each stage. `noise` has sizes of errors by name, as
     /// `prehend refine --noise` does: `{"model.scale": "5%"}` estimates the size of the model. `settings` of the estimator are a dict such as
     /// `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
-    #[pyo3(signature = (pose, *, method="fused", iterations=None, rivals=None, noise=None, settings=None))]
+    #[pyo3(signature = (pose, *, method="fused", iterations=None, noise=None, settings=None))]
     #[allow(clippy::too_many_arguments)] // as Python has it
     fn refine<'py>(
         &self,
@@ -131,36 +132,35 @@ impl Frame {
         pose: Numbers<'py>,
         method: &str,
         iterations: Option<usize>,
-        rivals: Option<Numbers<'py>>,
         noise: Option<Noise>,
         settings: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let method = run::method(method, iterations, noise.as_ref(), settings.as_ref())?;
-        let initial = self::pose(&pose, "pose")?;
-        let rivals = rivals.map(|rivals| poses(&rivals, "rivals")).transpose()?;
-        let job = RefineJob { rivals, ..RefineJob::new(&self.input, initial) };
+        let (initial, alternatives) = hypotheses(&pose)?;
+        let job = RefineJob { alternatives, ..RefineJob::new(&self.input, initial) };
         let method = self.input.supported(&method);
         let run = || job.run(&method, &mut |_| ControlFlow::Continue(()));
         let refined = py.detach(run).raise()?;
         estimate::estimate(py, &refined)
     }
 
-    /// Searches the object in the masked depth, without any pose to begin with: up to four poses (4 × 4, camera ← object [m]), each with its share, the best
-    /// first. `refine` takes the first, and the others as `rivals`; `settings` are as it has them. Python's other threads run on meanwhile.
+    /// Searches the object in the masked depth, without any initial pose: up to four poses (n × 4 × 4, camera ← object [m]), the best first, and their
+    /// weights (n), which sum to 1. `refine` takes them all; `settings` are as it has them. Python's other threads run on meanwhile.
     #[pyo3(signature = (*, settings=None))]
     fn search<'py>(
         &self,
         py: Python<'py>,
         settings: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<Vec<(Bound<'py, PyAny>, f64)>> {
+    ) -> PyResult<(Array<'py>, Array<'py>)> {
         let settings = self::settings(settings.as_ref())?.search();
         let search = || -> Result<Vec<PoseCandidate>, RefineError> {
             let object = Arc::clone(&self.input.object);
             PoseSearch::new(object, settings)?.run(&self.input.frame()?)
         };
         let found = py.detach(search).raise()?;
-        let pose = |c: &PoseCandidate| Ok((matrix(py, &c.t_cam_object)?.into_any(), c.weight));
-        found.iter().map(pose).collect()
+        let poses = found.iter().flat_map(|c| rows(&c.t_cam_object)).collect();
+        let weights = found.iter().map(|c| c.weight).collect();
+        Ok((array(py, poses, &[found.len(), 4, 4])?, array(py, weights, &[found.len()])?))
     }
 
     /// What looks wrong with object, frame and a pose in it, in words.

@@ -12,9 +12,7 @@ use super::frame::Frame;
 use super::hand::Hand;
 use super::images;
 use super::object::Object;
-use crate::arrays::{array, matrix};
-
-type Array<'py, T> = Bound<'py, PyArray<T, IxDyn>>;
+use crate::arrays::{Array, array, matrix};
 
 #[pymethods]
 impl Frame {

@@ -21,6 +21,18 @@ fn pose_of(numbers: &[f64], what: &str) -> PyResult<Isometry3<f64>> {
     prehend_refine::data::pose_from_matrix(rows).map_err(|e| wrong(format!("{what}: {e}")))
 }
 
+/// A pose, 4 × 4, without alternatives; or the first of poses of n × 4 × 4, and the others.
+pub(super) fn hypotheses(
+    array: &Numbers<'_>,
+) -> PyResult<(Isometry3<f64>, Option<Vec<Isometry3<f64>>>)> {
+    if array.shape().len() != 3 {
+        return Ok((pose(array, "pose")?, None));
+    }
+    let mut poses = poses(array, "pose")?.into_iter();
+    let first = poses.next().ok_or_else(|| wrong("pose: there is none"))?;
+    Ok((first, Some(poses.collect())))
+}
+
 /// Poses in an array of n × 4 × 4.
 pub(super) fn poses(array: &Numbers<'_>, what: &str) -> PyResult<Vec<Isometry3<f64>>> {
     match array.shape() {

@@ -20,10 +20,8 @@ use super::mode::mode;
 use super::named;
 use super::pose::{by_matrix, pose};
 use super::pullback::shape;
-use crate::arrays::{Numbers, array};
+use crate::arrays::{Array, Numbers, array};
 use crate::error::{Raise, wrong};
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// How well a mesh at a pose explains a segmented image: a number with its gradient and its Gauss–Newton matrix.
 ///

@@ -9,10 +9,8 @@ use pyo3::prelude::*;
 
 use super::named;
 use super::pose::by_matrix;
-use crate::arrays::{Numbers, array, in_order};
+use crate::arrays::{Array, Numbers, array, in_order};
 use crate::error::wrong;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 /// Carries derivatives of a number by pictures back to what made them. Made by `Renderer.vjp`; call it as often as wanted.
 #[pyclass(frozen, module = "prehend")]

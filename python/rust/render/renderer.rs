@@ -13,9 +13,7 @@ use super::light::to_array;
 use super::mesh::{Look, model};
 use super::mode::mode;
 use super::pullback::{RenderPullback, picture};
-use crate::arrays::{Numbers, array, vector_or};
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
+use crate::arrays::{Array, Numbers, array, vector_or};
 
 /// Pictures of a mesh, with derivatives by its pose and by all that makes them.
 ///

@@ -7,11 +7,9 @@ use pyo3::prelude::*;
 
 use super::states::states;
 use super::{BodyKey, World};
-use crate::arrays::{Numbers, array, vector};
+use crate::arrays::{Array, Numbers, array, vector};
 use crate::error::{Raise, wrong};
 use crate::integrator::AnyIntegrator;
-
-type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
 #[pymethods]
 impl World {

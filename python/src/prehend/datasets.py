@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ._prehend import Dataset, Error, Frame
 
-__all__ = ["Bop", "Result", "read_results", "read_rivals", "write_results"]
+__all__ = ["Bop", "Result", "read_results", "read_hypotheses", "write_results"]
 
 
 class Bop(Dataset):
@@ -114,11 +114,11 @@ def read_results(path: str | os.PathLike[str]) -> list[Result]:
     return results
 
 
-def read_rivals(path: str | os.PathLike[str], poses: Sequence[Result]) -> list[NDArray[np.float64] | None]:
-    """The rivals of each pose, n × 4 × 4, camera ← object [m], as `prehend initial --search` writes them: the other poses that a search ended with, or None for
-    a pose that comes from none.
+def read_hypotheses(path: str | os.PathLike[str], poses: Sequence[Result]) -> list[NDArray[np.float64]]:
+    """Hypotheses of each pose, camera ← object [m], as `prehend initial --search` writes them: n × 4 × 4, the pose itself first, or 4 × 4 for a pose that
+    comes from no search. `Frame.refine` takes either.
 
-    A rivals file is a results file in which the rows of a pose follow each other: first the pose itself. A row that is neither a pose nor after one of the same object
+    A file of hypotheses is a results file in which the rows of a pose follow each other: first the pose itself. A row that is neither a pose nor after one of the same object
     and image is an error.
     """
 
@@ -133,13 +133,13 @@ def read_rivals(path: str | os.PathLike[str], poses: Sequence[Result]) -> list[N
     for row in read_results(path):
         if free := places.get(key(row)):
             current = free.pop(0)
-            found[current] = []
+            found[current] = [row.pose]
         elif current is not None and poses[current].ids[:3] == row.ids[:3]:
             found[current].append(row.pose)
         else:
             target = f"scene {row.scene} image {row.image} object {row.object}"
             raise Error(f"{os.fspath(path)}: {target}: neither a pose to be refined nor after such a one")
-    return [np.reshape(found[k], (-1, 4, 4)) if k in found else None for k in range(len(poses))]
+    return [np.stack(found[k]) if k in found else pose.pose for k, pose in enumerate(poses)]
 
 
 def write_results(path: str | os.PathLike[str], results: Iterable[Result]) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 from . import _prehend
 from ._prehend import Error, refine_batch
 from ._version import __version__
-from .datasets import Result, read_results, read_rivals, write_results
+from .datasets import Result, read_results, read_hypotheses, write_results
 from .journal import Journal
 from .progress import Progress
 from .ray_blocks import Job, Source, blocks_of, open_dataset, outcomes
@@ -54,7 +54,7 @@ def refine_dataset(
     *,
     split: str | None = None,
     rig: File | None = None,
-    rivals: File | None = None,
+    hypotheses: File | None = None,
     method: str = "fused",
     iterations: int | None = None,
     seed: int = 0,
@@ -79,7 +79,7 @@ def refine_dataset(
         out: The results file to write.
         split: As of `Bop`.
         rig: The file of a rig, which corrects frames and objects.
-        rivals: The file of the other poses that a search ended with; what is beside `poses`, with .rivals.csv added to its name, if it is there.
+        hypotheses: The file of all poses that a search ended with; what is beside `poses`, with .hypotheses.csv added to its name, if it is there.
         method: One of `methods()`.
         iterations: At most so many in each stage.
         seed: Of the points sampled on surfaces of objects.
@@ -113,15 +113,15 @@ def refine_dataset(
     rows = read_results(poses)
     if not rows:
         raise Error(f"{os.fspath(poses)}: no poses")
-    beside = Path(f"{os.fspath(poses)}.rivals.csv")
-    if rivals is None and beside.exists():
-        rivals = beside
-    others = [None] * len(rows) if rivals is None else read_rivals(rivals, rows)
-    facts = _facts(source, poses, rivals)
+    beside = Path(f"{os.fspath(poses)}.hypotheses.csv")
+    if hypotheses is None and beside.exists():
+        hypotheses = beside
+    starts = [row.pose for row in rows] if hypotheses is None else read_hypotheses(hypotheses, rows)
+    facts = _facts(source, poses, hypotheses)
     with Journal(f"{os.fspath(out)}.journal", facts, restart=restart) as journal:
         # Failures are tried again.
         entries = {k: entry for k, entry in journal.entries.items() if "error" not in entry}
-        jobs = [Job(k, row.ids, row.pose, others[k]) for k, row in enumerate(rows) if k not in entries]
+        jobs = [Job(k, row.ids, starts[k]) for k, row in enumerate(rows) if k not in entries]
         shown = Progress(len(rows), len(entries)) if progress else None
         failed = 0
         # Closed, that is, blocks that are under way are called off, whatever ends the loop.
@@ -156,7 +156,7 @@ def _refined(row: Result, entry: dict[str, Any]) -> Result:
     return row._replace(pose=pose, score=score, time=-1.0)
 
 
-def _facts(source: Source, poses: File, rivals: File | None) -> dict[str, Any]:
+def _facts(source: Source, poses: File, hypotheses: File | None) -> dict[str, Any]:
     """What decides the results. Threads do not, and the dataset is known by its path alone: to read all of it would take too long."""
 
     def digest(path: File | None) -> str | None:
@@ -168,4 +168,4 @@ def _facts(source: Source, poses: File, rivals: File | None) -> dict[str, Any]:
     facts = source._asdict()
     del facts["threads"], facts["run"]
     program = f"prehend.ray {__version__} {digest(_prehend.__file__)}"
-    return facts | {"program": program, "poses": digest(poses), "rivals": digest(rivals), "rig": digest(source.rig)}
+    return facts | {"program": program, "poses": digest(poses), "hypotheses": digest(hypotheses), "rig": digest(source.rig)}

@@ -53,7 +53,7 @@ class Job(NamedTuple):
     """Its place in the results file."""
     ids: tuple[int, int, int, int]
     pose: NDArray[np.float64]
-    rivals: NDArray[np.float64] | None
+    """4 × 4, or hypotheses of n × 4 × 4."""
 
 
 class Block(NamedTuple):
@@ -145,7 +145,7 @@ def _refine_block(source: Source, jobs: list[Job]) -> list[dict[str, Any]]:
 def _refine(source: Source, dataset: Bop, job: Job) -> dict[str, Any]:
     try:
         frame = dataset.frame(*job.ids)
-        estimate = frame.refine(job.pose, method=source.method, iterations=source.iterations, rivals=job.rivals)
+        estimate = frame.refine(job.pose, method=source.method, iterations=source.iterations)
     except (KeyboardInterrupt, SystemExit):
         raise
     # A panic of the extension is no Exception.

@@ -98,7 +98,6 @@ def refine(
     rig: Rig | None = None,
     method: str = "fused",
     iterations: int | None = None,
-    rivals: ArrayLike | None = None,
     noise: Mapping[str, str] | None = None,
     settings: Mapping[str, Any] | str | PathLike[str] | None = None,
 ) -> Estimate:
@@ -112,7 +111,7 @@ def refine(
         depth: H × W, registered to rgb; in meters, or whole numbers in units of `depth_scale` meters; 0 or not finite where missing. None for color alone.
         K: 3 × 3 [px].
         mesh: The object. A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
-        pose: Where to begin: 4 × 4, camera ← object [m].
+        pose: Initial pose, 4 × 4, camera ← object [m]; or the hypotheses of a search, n × 4 × 4, the best first.
         mask: H × W, not zero on the visible part of the object. Without it, pose, depth and colors tell the object.
         hand: The hand that holds the object; it needs `hand_pose` and `joints`.
         hand_pose: 4 × 4, camera ← base of the hand [m].
@@ -123,7 +122,6 @@ def refine(
         rig: What corrects the frame. The object is corrected by `rig.corrected`.
         method: One of `methods()`.
         iterations: At most so many in each stage.
-        rivals: n × 4 × 4, the other poses that a search ended with, if `pose` comes from one.
         noise: Sizes of errors by name, as `prehend refine --noise` has them, such as `{"hand.translation": "5mm", "model.scale": "5%"}`.
         settings: Settings of the estimator: a dict such as `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
 
@@ -154,7 +152,7 @@ def refine(
         rig=rig,
     )
     estimate: Estimate = frame.refine(
-        pose, method=method, iterations=iterations, rivals=rivals, noise=noise, settings=settings
+        pose, method=method, iterations=iterations, noise=noise, settings=settings
     )
     for text in estimate.warnings:
         warnings.warn(text, stacklevel=2)
@@ -176,11 +174,11 @@ def search(
     depth_scale: float | None = None,
     lens: tuple[str, Sequence[float]] | None = None,
     rig: Rig | None = None,
-) -> list[tuple[NDArray[np.float64], float]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Searches an object without any pose to begin with: the same as `Frame(rgb, depth, K, mesh, …).search()`, with arguments as of `refine`.
 
     Returns:
-        Up to four poses (4 × 4, camera ← object [m]), each with its share, the best first. `refine` takes the first, and the others as `rivals`.
+        Up to four poses, n × 4 × 4, camera ← object [m], the best first, and their weights, n, which sum to 1. `refine` takes them all.
 
     Raises:
         Error: What is wrong with the input, or why nothing was found.
@@ -200,5 +198,5 @@ def search(
         lens=lens,
         rig=rig,
     )
-    found: list[tuple[NDArray[np.float64], float]] = frame.search()
+    found: tuple[NDArray[np.float64], NDArray[np.float64]] = frame.search()
     return found

@@ -29,7 +29,6 @@ pub struct Frame<'a> {
     given_regions: Option<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
-    rivals: Option<Vec<Isometry3<f64>>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     focus: Option<[Range<usize>; 2]>,
     /// What other cameras saw of the object.
@@ -103,7 +102,6 @@ impl<'a> Frame<'a> {
             regions: OnceLock::new(),
             given_regions: None,
             backend: None,
-            rivals: None,
             focus: None,
         })
     }
@@ -121,17 +119,6 @@ impl<'a> Frame<'a> {
         frame.given_regions.clone_from(&self.given_regions);
         frame.backend.clone_from(&self.backend);
         Ok(frame)
-    }
-
-    /// The same where initial poses come from a search, which ended at `rivals` (object → camera \[m\]), too, or at that pose alone. The fused
-    /// estimator then trusts no rotation: it tries all of them, and what looks alike by shape. Others do not ask.
-    pub fn with_rivals(self, rivals: Vec<Isometry3<f64>>) -> Self {
-        Self { rivals: Some(rivals), ..self }
-    }
-
-    /// The rivals of initial poses, where these come from a search.
-    pub(crate) fn rivals(&self) -> Option<&[Isometry3<f64>]> {
-        self.rivals.as_deref()
     }
 
     /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures

@@ -22,7 +22,7 @@ use crate::scene::{Frame, Observation, RegionEvidence};
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
 
-/// Where to begin, and the other poses that a search ended with, if it comes from one.
+/// Initial pose, and its alternatives, if it comes from a search.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
 impl Tracker {
@@ -36,23 +36,18 @@ impl Tracker {
         self.segment_first(sight, false)?;
         let object = Arc::clone(&self.object);
         let sight = &*sight;
-        let mut frame = self.frame(sight, &object)?;
-        let initial = match self.initial {
-            Some(pose) => pose,
-            None => {
-                let (best, rivals) = self.search(&frame)?;
-                frame = frame.with_rivals(rivals);
-                best
-            }
+        let frame = &self.frame(sight, &object)?;
+        let (initial, alternatives) = match self.initial {
+            Some(pose) => (pose, None),
+            None => self.search(frame).map(|(best, others)| (best, Some(others)))?,
         };
-        let frame = &frame;
         let nominal = State::new(frame, &initial)?;
         let stated = self.settings.fused.prior.of_hand(frame.observation().hand.as_ref());
         self.prior = match &self.rig {
             Some(rig) => rig.marginal_prior(&nominal, &frame.observation().camera, &stated)?,
             None => stated,
         };
-        let (solved, posterior) = self.estimate(frame, &nominal)?;
+        let (solved, posterior) = self.estimate(frame, &nominal, alternatives)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
         let mut track = self.remember(time, &solved, &nominal, in_hand, level);
         self.begin_anew(&mut track, sight, &posterior);
@@ -122,7 +117,7 @@ impl Tracker {
             sight.focus = None;
             let frame = self.frame(sight, &object)?;
             let start = State::new(&frame, initial)?;
-            pose = self.estimate(&frame, &start)?.0.solution.at.state.t_cam_object;
+            pose = self.estimate(&frame, &start, None)?.0.solution.at.state.t_cam_object;
         }
         self.appearance.look(sight, &object, &pose, about);
         sight.focus = None;
@@ -135,10 +130,12 @@ impl Tracker {
         &self,
         frame: &Frame<'_>,
         initial: &State,
+        alternatives: Option<Vec<Isometry3<f64>>>,
     ) -> Result<(Solved, Posterior), RefineError> {
         let fused = Fused::new(self.settings.fused.clone());
         let mut fused = self.factors.iter().cloned().fold(fused, Fused::with);
         fused.rig.clone_from(&self.rig);
+        fused.alternatives = alternatives;
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
@@ -189,7 +186,7 @@ impl Tracker {
                 Recovery::Anywhere => self.search_anywhere(sight, &predicted.t_cam_object)?,
                 _ => Some((predicted.t_cam_object, None)),
             };
-            let Some((t_cam_object, rivals)) = found else { continue };
+            let Some((t_cam_object, alternatives)) = found else { continue };
             let start = State { t_cam_object, ..predicted.clone() };
             if start.center().z <= 0.0 {
                 continue;
@@ -200,11 +197,8 @@ impl Tracker {
                 continue;
             }
             let object = Arc::clone(&self.object);
-            let mut frame = self.frame(sight, &object)?;
-            if let Some(rivals) = rivals {
-                frame = frame.with_rivals(rivals);
-            }
-            let (solved, posterior) = self.estimate(&frame, &start)?;
+            let frame = self.frame(sight, &object)?;
+            let (solved, posterior) = self.estimate(&frame, &start, alternatives)?;
             let state = &solved.solution.at.state;
             let shown = self.shown(sight, &state.t_cam_object);
             let moved = object.surface_motion(&predicted.t_cam_object, &state.t_cam_object);
@@ -240,7 +234,7 @@ impl Tracker {
         let object = Arc::clone(&self.object);
         let frame = self.frame(sight, &object)?;
         match self.search(&frame) {
-            Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
+            Ok((best, others)) => Ok(Some((best, Some(others)))),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
             Err(error) => Err(error),
         }

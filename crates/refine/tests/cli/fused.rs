@@ -45,7 +45,7 @@ fn files_of_absent_senses_may_be_absent() {
     assert_right(&place, 0.5, 4.0);
 }
 
-/// A bottle that a search has found turned by half about its long axis, in both images, and true rivals of it.
+/// A bottle that a search has found turned by half about its long axis, in both images, and true hypotheses of it.
 #[test]
 fn a_hypothesis_that_fits_better_is_returned() {
     let place = Workplace::new();
@@ -59,14 +59,14 @@ fn a_hypothesis_that_fits_better_is_returned() {
     let both = turned.iter().zip(&rows).flat_map(|(turned, row)| {
         [(turned, 0.9), (row, 0.1)].map(|(row, score)| ResultRow { score, ..row.clone() })
     });
-    write_results(&place.path("rivals.csv"), &both.collect::<Vec<_>>()).unwrap();
+    write_results(&place.path("hypotheses.csv"), &both.collect::<Vec<_>>()).unwrap();
     let refine = "refine --dataset ds --poses poses.csv --out f.csv";
-    place.succeed(&format!("{refine} --rivals rivals.csv"));
+    place.succeed(&format!("{refine} --hypotheses hypotheses.csv"));
     assert_right(&place, 0.1, 1.0);
     // Half turns are tried without them, too.
     place.succeed(refine);
     assert_right(&place, 0.1, 1.0);
-    place.copy("rivals.csv", "poses.csv.rivals.csv");
+    place.copy("hypotheses.csv", "poses.csv.hypotheses.csv");
     place.succeed(refine);
     assert_right(&place, 0.1, 1.0);
 }

@@ -48,19 +48,19 @@ fn the_search_needs_no_truth() {
     let found = &rows[0].t_cam_model;
     let (pe, oe) = (pe_cm(found, &truth), oe_deg(found, &truth));
     assert!(pe < 0.5 && oe < 4.0 && rows[0].time == -1.0, "{pe} cm, {oe}°");
-    let rivals = place.poses("found.csv.rivals.csv");
-    assert_eq!(rivals[0].t_cam_model, *found);
-    assert!(rivals.windows(2).all(|r| r[0].score >= r[1].score), "{rivals:?}");
-    assert!((rivals.iter().map(|r| r.score).sum::<f64>() - 1.0).abs() < 1e-9, "{rivals:?}");
-    assert!(rivals.iter().all(|r| (r.scene_id, r.im_id, r.obj_id) == (1, 0, 5)));
+    let hypotheses = place.poses("found.csv.hypotheses.csv");
+    assert_eq!(hypotheses[0].t_cam_model, *found);
+    assert!(hypotheses.windows(2).all(|r| r[0].score >= r[1].score), "{hypotheses:?}");
+    assert!((hypotheses.iter().map(|r| r.score).sum::<f64>() - 1.0).abs() < 1e-9, "{hypotheses:?}");
+    assert!(hypotheses.iter().all(|r| (r.scene_id, r.im_id, r.obj_id) == (1, 0, 5)));
 }
 
 #[test]
-fn rivals_of_a_search_are_those_of_no_other_poses() {
+fn hypotheses_of_a_search_are_those_of_no_other_poses() {
     let place = Workplace::new();
-    place.write("init.csv.rivals.csv", "of a search before");
+    place.write("init.csv.hypotheses.csv", "of a search before");
     place.succeed("initial --dataset ds --noise low --out init.csv");
-    assert!(!place.path("init.csv.rivals.csv").exists());
+    assert!(!place.path("init.csv.hypotheses.csv").exists());
 }
 
 #[test]

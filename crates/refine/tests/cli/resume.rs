@@ -173,7 +173,7 @@ fn a_killed_search_resumes() {
     assert!(said.code == 1 && said.err.contains("another run"), "{}", said.err);
     assert_eq!(place.read("part.csv.journal"), journal);
     place.succeed(&search("part.csv"));
-    for file in ["", ".rivals.csv"] {
+    for file in ["", ".hypotheses.csv"] {
         assert_eq!(place.read(&format!("part.csv{file}")), place.read(&format!("whole.csv{file}")));
     }
     assert!(!place.path("part.csv.journal").exists());

@@ -238,7 +238,9 @@ fn methods_of_anything_seen() {
             method.set_iterations(1);
             assert_finite(fault.0, || {
                 let frame = Frame::new(&observation, &SCENE.object)?;
-                let frame = frame.with_rivals(vec![SCENE.initial; 2]);
+                if let Method::Fused(fused) = &mut method {
+                    fused.alternatives = Some(vec![SCENE.initial; 2]);
+                }
                 refine(&frame, &SCENE.initial, &method).map(of_estimate)
             });
         }

@@ -47,23 +47,20 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 }
 
 /// The pose and the posterior of a refinement that begins turned by half about the bottle's long axis, which looks much the same by shape.
-fn from_the_back(rivals: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
+fn from_the_back(alternatives: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
     let axis = SCENE.truth.rotation * Vector3::z() * std::f64::consts::PI;
     let back = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
     let frame = Frame::new(&SCENE.observation, &SCENE.object).unwrap();
-    let frame = match rivals {
-        Some(rivals) => frame.with_rivals(rivals),
-        None => frame,
-    };
-    let found = refine(&frame, &back, &Fused::default()).unwrap();
+    let fused = Fused { alternatives, ..Fused::default() };
+    let found = refine(&frame, &back, &fused).unwrap();
     (found.state.t_cam_object, found.posterior.unwrap())
 }
 
 #[test]
 fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
     // The bottle looks much the same by shape where it is turned about its long axis: colors tell.
-    for rivals in [None, Some(vec![turned(&OFF)]), Some(vec![])] {
-        let (pose, posterior) = from_the_back(rivals);
+    for alternatives in [None, Some(vec![turned(&OFF)]), Some(vec![])] {
+        let (pose, posterior) = from_the_back(alternatives);
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
         assert_eq!(pose, posterior.hypotheses[0].t_cam_object);
@@ -85,8 +82,9 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
 fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
     let mut observation = SCENE.observation.clone();
     observation.hand = None;
-    let frame = Frame::new(&observation, &SCENE.object).unwrap().with_rivals(vec![]);
-    let found = refine(&frame, &turned(&OFF), &Fused::new(without(Modality::Color))).unwrap();
+    let frame = Frame::new(&observation, &SCENE.object).unwrap();
+    let fused = Fused::new(without(Modality::Color)).with_alternatives(vec![]);
+    let found = refine(&frame, &turned(&OFF), &fused).unwrap();
     let posterior = found.posterior.unwrap();
     let best = posterior.hypotheses[0].t_cam_object;
     let share: f64 = posterior

@@ -41,9 +41,9 @@ pub const COMMANDS: &[LongCommand] = &[
         name: "initial",
         words: "initial --dataset ds --search --out i.csv",
         inputs: &["ds"],
-        outputs: &["i.csv", "i.csv.rivals.csv"],
-        blockable: &["i.csv", "i.csv.rivals.csv"],
-        tables: &["i.csv", "i.csv.rivals.csv"],
+        outputs: &["i.csv", "i.csv.hypotheses.csv"],
+        blockable: &["i.csv", "i.csv.hypotheses.csv"],
+        tables: &["i.csv", "i.csv.hypotheses.csv"],
         growing: &["i.csv.journal"],
     },
     LongCommand {

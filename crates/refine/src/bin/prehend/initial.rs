@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::options::{
-    Masks, RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses,
+    HYPOTHESES, Masks, Rendering, Selection, beside, limit_threads, row, write_poses,
 };
 use crate::settings::SettingsOptions;
 use crate::terminal::{cache, exit_code, progress, say};
@@ -55,7 +55,7 @@ pub(crate) struct Initial {
     seed: u64,
     /// Find the objects from depth, mask, color and touch alone; where a scene says nothing of its hand, without touch
     ///
-    /// All poses that the search of an object ends with, the best one first and with their shares as scores, are written to FILE.rivals.csv beside
+    /// All poses that the search of an object ends with, the best one first and with their shares as scores, are written to FILE.hypotheses.csv beside
     /// the best ones, where `prehend refine` finds them.
     #[arg(long)]
     search: bool,
@@ -85,7 +85,7 @@ pub(crate) struct Initial {
 struct PoseRows {
     rows: Vec<ResultRow>,
     /// All poses that searches ended with.
-    rivals: Vec<ResultRow>,
+    hypotheses: Vec<ResultRow>,
     failures: Vec<String>,
 }
 
@@ -107,7 +107,7 @@ impl From<&PoseCandidate> for FoundPose {
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
-        let beside = beside(&self.out, RIVALS);
+        let beside = beside(&self.out, HYPOTHESES);
         if self.search {
             check_writable(&beside)?;
         }
@@ -118,16 +118,16 @@ impl Initial {
             Some(level) => (self.perturbed(&dataset, level)?, None),
             None => self.found(&dataset).map(|(found, journal)| (found, Some(journal)))?,
         };
-        let PoseRows { rows, rivals, mut failures } = found;
+        let PoseRows { rows, hypotheses, mut failures } = found;
         if rows.is_empty() && failures.is_empty() {
             journal.map(Journal::discard).transpose()?;
             bail!("nothing is of the scenes, images and objects asked for");
         }
         let count = rows.len();
-        if !rivals.is_empty() {
-            write_results(&beside, &rivals)?;
+        if !hypotheses.is_empty() {
+            write_results(&beside, &hypotheses)?;
         } else if count > 0 && beside.exists() {
-            // Those of a search before would pass for rivals of these.
+            // Those of a search before would pass for alternatives of these.
             fs::remove_file(&beside).with_context(|| beside.display().to_string())?;
         }
         write_poses(&self.out, rows, &mut failures)?;
@@ -196,7 +196,7 @@ impl Initial {
             let pose = |c: &FoundPose, score| row(target, (&c.pose).into(), score);
             // Of a results file's scores the higher is the better.
             all.rows.extend(found.first().map(|c| pose(c, -c.cost)));
-            all.rivals.extend(found.iter().map(|c| pose(c, c.weight)));
+            all.hypotheses.extend(found.iter().map(|c| pose(c, c.weight)));
         }
         Ok((all, journal))
     }

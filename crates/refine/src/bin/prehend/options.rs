@@ -10,8 +10,8 @@ use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::Method;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_results,
-    read_rivals, share_image_times, write_results,
+    Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
+    read_results, share_image_times, write_results,
 };
 use prehend_refine::data::details::DetailsFormat;
 use prehend_refine::data::identity::file_fingerprint;
@@ -162,7 +162,7 @@ pub(crate) struct Job {
     pub(crate) target: Target,
     pub(crate) row: ResultRow,
     /// The other poses that a search ended with, if the row's comes from one.
-    pub(crate) rivals: Option<Vec<Isometry3<f64>>>,
+    pub(crate) alternatives: Option<Vec<Isometry3<f64>>>,
 }
 
 impl Selection {
@@ -219,14 +219,14 @@ impl Selection {
 
     /// The rows of the results file `poses` that are meant, and what is wrong with the others.
     pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        self.jobs_with_rivals(poses, None)
+        self.jobs_with_hypotheses(poses, None)
     }
 
-    /// As [`jobs`](Self::jobs), with the rivals that the file `rivals` has.
-    pub(crate) fn jobs_with_rivals(
+    /// As [`jobs`](Self::jobs), with the alternatives of poses that the file `hypotheses` has.
+    pub(crate) fn jobs_with_hypotheses(
         &self,
         poses: &Path,
-        rivals: Option<&Path>,
+        hypotheses: Option<&Path>,
     ) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
         let ReadResults { rows, instances, errors, .. } = read_results(poses)?;
         let file = poses.display();
@@ -234,12 +234,12 @@ impl Selection {
             bail!("{file}: no poses: there is nothing but a header");
         }
         let mut found = vec![None; rows.len()];
-        if let Some(rivals) = rivals {
-            found = read_rivals(rivals, &rows)?;
+        if let Some(hypotheses) = hypotheses {
+            found = read_hypotheses(hypotheses, &rows)?;
         }
-        let job = |((row, instance), rivals): ((ResultRow, usize), _)| {
+        let job = |((row, instance), alternatives): ((ResultRow, usize), _)| {
             let ResultRow { scene_id, im_id, obj_id, .. } = row;
-            Job { target: Target { scene_id, im_id, obj_id, instance }, row, rivals }
+            Job { target: Target { scene_id, im_id, obj_id, instance }, row, alternatives }
         };
         let mut jobs: Vec<Job> = rows.into_iter().zip(instances).zip(found).map(job).collect();
         jobs.retain(|Job { row, .. }| self.admits(row.scene_id, row.im_id, row.obj_id));
@@ -303,8 +303,8 @@ pub(crate) fn named(name: &str) -> Result<String, String> {
     }
 }
 
-/// The extension of the file of rivals beside a results file.
-pub(crate) const RIVALS: &str = "rivals.csv";
+/// Extension of the file of hypotheses beside a results file.
+pub(crate) const HYPOTHESES: &str = "hypotheses.csv";
 
 /// The file `extension` that accompanies the output `out`: out.csv.journal beside out.csv.
 pub(crate) fn beside(out: &Path, extension: &str) -> PathBuf {

@@ -15,7 +15,7 @@ mod summary;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Isometry3};
 use prehend_autodiff::optimize::LeastSquares;
 
 pub use self::diagnose::{Diagnosis, DiagnosisSummary};
@@ -66,6 +66,9 @@ pub struct Fused {
     pub factors: Vec<Arc<dyn Factor>>,
     /// Rig by which frames and the object are corrected, where it is known.
     pub rig: Option<Arc<Rig>>,
+    /// Alternative initial poses, object → camera \[m\], if the initial pose comes from a search: the rotation is then unknown, and all rotations
+    /// and what looks alike by shape are hypotheses.
+    pub alternatives: Option<Vec<Isometry3<f64>>>,
 }
 
 impl Fused {
@@ -82,7 +85,7 @@ impl Fused {
         scales: &Scales,
     ) -> Result<GaussianPrior, RefineError> {
         let mut settings = self.settings.prior.of_hand(frame.observation().hand.as_ref());
-        let unknown = self.is_rotation_unknown(frame);
+        let unknown = self.is_rotation_unknown();
         if unknown {
             // Half a turn costs half a nat.
             settings.object_rotation = PI;
@@ -121,14 +124,19 @@ impl Fused {
         Self { rig: Some(rig), ..self }
     }
 
+    /// With alternatives of an initial pose that comes from a search.
+    pub fn with_alternatives(self, poses: Vec<Isometry3<f64>>) -> Self {
+        Self { alternatives: Some(poses), ..self }
+    }
+
     /// Settings with the accuracy of the rig, and of the model of `frame`.
     fn settings_for(&self, frame: &Frame<'_>) -> FusedSettings {
         self.settings.for_frame(frame, self.rig.is_some())
     }
 
     /// Whether nothing is known of the object's rotation.
-    fn is_rotation_unknown(&self, frame: &Frame<'_>) -> bool {
-        self.settings.rotation_unknown || frame.rivals().is_some()
+    fn is_rotation_unknown(&self) -> bool {
+        self.settings.rotation_unknown || self.alternatives.is_some()
     }
 
     /// With a factor of one's own; its noise model is believed as it is stated.

@@ -45,7 +45,7 @@ impl<'a> Run<'a> {
         let scales = Scales::default();
         Ok(Self {
             prior: Arc::new(fused.prior(frame, initial, &scales)?),
-            is_rotation_unknown: fused.is_rotation_unknown(frame),
+            is_rotation_unknown: fused.is_rotation_unknown(),
             settings: fused.settings_for(frame),
             fused,
             frame,
@@ -60,7 +60,8 @@ impl<'a> Run<'a> {
         let count = self.stages().len();
         let names = std::iter::once("posterior");
         let mut recorder = Recorder::new(names, self.initial, count, None, observe);
-        let mut states = hypotheses(self.initial, self.frame.rivals().unwrap_or_default());
+        let mut states =
+            hypotheses(self.initial, self.fused.alternatives.as_deref().unwrap_or_default());
         if !self.is_rotation_unknown && states.len() == 1 {
             states = restarts(self.initial, self.hypotheses().restart_angle);
         }

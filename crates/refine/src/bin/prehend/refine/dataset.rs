@@ -32,7 +32,7 @@ pub(super) struct DatasetInputs<'a> {
     pub(super) selection: &'a Selection,
     pub(super) poses: &'a Path,
     /// Rivals of the poses, where these come from a search.
-    pub(super) rivals: Option<&'a Path>,
+    pub(super) hypotheses: Option<&'a Path>,
     pub(super) masks: &'a Masks,
     /// Poses of other objects of the images.
     pub(super) neighbors: Option<&'a Path>,
@@ -73,9 +73,9 @@ impl DatasetRun<'_> {
     pub(super) fn run(&self) -> anyhow::Result<ExitCode> {
         let name = self.options.method();
         let json = self.output.json;
-        let DatasetInputs { selection, poses, rivals, masks, neighbors, rig } = &self.inputs;
+        let DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig } = &self.inputs;
         let dataset = selection.open()?;
-        let (jobs, mut failures) = selection.jobs_with_rivals(poses, *rivals)?;
+        let (jobs, mut failures) = selection.jobs_with_hypotheses(poses, *hypotheses)?;
         let assets = Assets::new(&dataset, self.options.seed).with_cache(cache());
         let mut assets = assets.with_rig(open_rig(*rig)?).with_masks(masks.source()?);
         if let Some(file) = neighbors {
@@ -178,13 +178,13 @@ impl DatasetRun<'_> {
     }
 
     fn identity(&self, dataset: &Dataset) -> anyhow::Result<Identity> {
-        let DatasetInputs { selection, poses, rivals, masks, neighbors, rig } = &self.inputs;
+        let DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig } = &self.inputs;
         Ok(Identity::of(&json!({
             "command": "refine",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "poses": file_fingerprint(poses)?,
-            "rivals": rivals.map(file_fingerprint).transpose()?,
+            "hypotheses": hypotheses.map(file_fingerprint).transpose()?,
             "masks": masks.identity()?,
             "neighbors": neighbors.map(file_fingerprint).transpose()?,
             "rig": rig.map(file_fingerprint).transpose()?,
@@ -205,7 +205,7 @@ impl DatasetRun<'_> {
             assets.load_at(&job.target, &job.row.t_cam_model, &Sensor::required_by(&self.method))?
         };
         let refine = RefineJob {
-            rivals: job.rivals.clone(),
+            alternatives: job.alternatives.clone(),
             backend: Some(Arc::clone(&self.backend)),
             diagnose: self.output.diagnose,
             ..RefineJob::new(&input, job.row.t_cam_model)

@@ -14,7 +14,9 @@ use prehend_refine::data::bop::check_writable;
 use self::dataset::{DatasetInputs, DatasetRun};
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{Masks, RIVALS, Rendering, Selection, beside, check_details, limit_threads};
+use crate::options::{
+    HYPOTHESES, Masks, Rendering, Selection, beside, check_details, limit_threads,
+};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -29,10 +31,10 @@ pub(crate) struct Refine {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     poses: Option<PathBuf>,
-    /// The other poses that a search ended with, as `prehend initial --search` writes them beside the best ones: the fused method then trusts no
-    /// rotation, and starts from all of them and from what looks alike by shape [default: the poses' file with .rivals.csv added, if there is one]
+    /// Alternative poses, as `prehend initial --search` writes them beside the best ones: the fused method then trusts no
+    /// rotation, and starts from all of them and from what looks alike by shape [default: the poses' file with .hypotheses.csv added, if there is one]
     #[arg(long, value_name = "FILE", requires = "poses")]
-    rivals: Option<PathBuf>,
+    hypotheses: Option<PathBuf>,
     #[command(flatten)]
     masks: Masks,
     /// Poses of objects that are there besides, as a BOP results file: such as the refined poses of all objects of the images. They hide the object that is
@@ -40,7 +42,7 @@ pub(crate) struct Refine {
     #[arg(long, value_name = "FILE", requires = "poses")]
     neighbors: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "Masks", "poses", "rivals", "report"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "Masks", "poses", "hypotheses", "report"])]
     frame: Option<PathBuf>,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
     #[arg(long, value_name = "FILE")]
@@ -55,7 +57,7 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, rivals, masks, neighbors, .. } = &self;
+        let Self { selection, poses, hypotheses, masks, neighbors, .. } = &self;
         let Self { frame, rig, output, method, rendering, .. } = &self;
         let named = |out: &PathBuf| match selection {
             Some(selection) => selection.results_file(out, method.method()),
@@ -75,10 +77,10 @@ impl Refine {
                 let configured = method.configured()?;
                 let options = method;
                 let (method, rig) = (configured, rig.as_deref());
-                let beside = Some(beside(poses, RIVALS)).filter(|file| file.exists());
-                let rivals = rivals.clone().or(beside);
-                let (rivals, neighbors) = (rivals.as_deref(), neighbors.as_deref());
-                let inputs = DatasetInputs { selection, poses, rivals, masks, neighbors, rig };
+                let beside = Some(beside(poses, HYPOTHESES)).filter(|file| file.exists());
+                let hypotheses = hypotheses.clone().or(beside);
+                let (hypotheses, neighbors) = (hypotheses.as_deref(), neighbors.as_deref());
+                let inputs = DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig };
                 DatasetRun { inputs, out, output, options, method, backend }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),

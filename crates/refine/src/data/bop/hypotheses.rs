@@ -1,4 +1,4 @@
-//! Rivals files: all poses that a search ended with, beside the results file of the best ones.
+//! Files of hypotheses: all poses that a search ended with, beside the results file of the best ones.
 
 use std::path::Path;
 
@@ -7,15 +7,14 @@ use nalgebra::Isometry3;
 use super::error::DatasetError;
 use super::results::{ReadResults, ResultRow, read_results};
 
-/// Reads the rivals of `poses`, the rows of a results file: for each its rivals, object → camera \[m\], or `None` if it has none and so does not
-/// come from a search.
+/// Alternatives of `poses`, the rows of a results file, object → camera \[m\]; `None` of a pose that does not come from a search.
 ///
-/// A rivals file is a results file with any number of rows a target, and shares among them as scores. Rows of a target follow each other: first that
-/// with the pose in the results file, which is no rival of itself.
+/// A file of hypotheses is a results file with any number of rows a target, and shares among them as scores. Rows of a target follow each other: first that
+/// with the pose in the results file, then its alternatives.
 ///
 /// # Errors
-/// When the file cannot be read, a row is malformed, or what it is a rival of is not among `poses`.
-pub fn read_rivals(
+/// When the file cannot be read, a row is malformed, or the pose that it belongs to is not among `poses`.
+pub fn read_hypotheses(
     file: &Path,
     poses: &[ResultRow],
 ) -> Result<Vec<Option<Vec<Isometry3<f64>>>>, DatasetError> {
@@ -23,7 +22,7 @@ pub fn read_rivals(
     if let Some(error) = errors.first() {
         return Err(DatasetError::unusable(file, error));
     }
-    let mut rivals = vec![None; poses.len()];
+    let mut alternatives = vec![None; poses.len()];
     let mut current: Option<usize> = None;
     for (row, line) in rows.iter().zip(lines) {
         let field = |column: &str| format!("line {line}: {column}");
@@ -33,25 +32,27 @@ pub fn read_rivals(
         }
         let ids = |row: &ResultRow| (row.scene_id, row.im_id, row.obj_id);
         let first = poses.iter().enumerate().position(|(at, pose)| {
-            ids(pose) == ids(row) && pose.t_cam_model == row.t_cam_model && rivals[at].is_none()
+            ids(pose) == ids(row)
+                && pose.t_cam_model == row.t_cam_model
+                && alternatives[at].is_none()
         });
         if let Some(at) = first {
-            rivals[at] = Some(Vec::new());
+            alternatives[at] = Some(Vec::new());
             current = Some(at);
             continue;
         }
         let of_current = current.filter(|at| ids(&poses[*at]) == ids(row));
-        let Some(others) = of_current.and_then(|at| rivals[at].as_mut()) else {
+        let Some(others) = of_current.and_then(|at| alternatives[at].as_mut()) else {
             let (scene, image, object) = ids(row);
             let problem = format!(
-                "scene {scene} image {image} object {object}: neither that of a pose to be refined nor after such a one; rivals of other \
-                 poses have to be removed, or others named with --rivals"
+                "scene {scene} image {image} object {object}: neither that of a pose to be refined nor after such a one; the file of \
+                 another search has to be removed, or the right one named with --hypotheses"
             );
             return Err(DatasetError::field(file, &field("pose"), problem));
         };
         others.push(row.t_cam_model);
     }
-    Ok(rivals)
+    Ok(alternatives)
 }
 
 #[cfg(test)]
@@ -69,9 +70,9 @@ mod tests {
     }
 
     #[test]
-    fn rivals_follow_the_pose_that_they_are_rivals_of() {
+    fn alternatives_follow_their_pose() {
         let dir = tempfile::tempdir().unwrap();
-        let (poses_file, file) = (dir.path().join("poses.csv"), dir.path().join("rivals.csv"));
+        let (poses_file, file) = (dir.path().join("poses.csv"), dir.path().join("hypotheses.csv"));
         // Two instances in one image, one in another, and a pose that is not of a search.
         let poses = [row(0, 0.1, -3.0), row(0, 0.2, -4.0), row(1, 0.3, -5.0), row(2, 0.4, 1.0)];
         write_results(&poses_file, &poses).unwrap();
@@ -85,23 +86,23 @@ mod tests {
         ];
         write_results(&file, &all).unwrap();
         let poses = read_results(&poses_file).unwrap().rows;
-        let found = read_rivals(&file, &poses).unwrap();
+        let found = read_hypotheses(&file, &poses).unwrap();
         let counts: Vec<_> = found.iter().map(|r| r.as_ref().map(Vec::len)).collect();
         assert_eq!(counts, [Some(1), Some(0), Some(2), None]);
         assert_eq!(found[2].as_ref().unwrap()[1], read_results(&file).unwrap().rows[5].t_cam_model);
 
         let refused = |rows: &[ResultRow]| {
             write_results(&file, rows).unwrap();
-            read_rivals(&file, &poses).unwrap_err().to_string()
+            read_hypotheses(&file, &poses).unwrap_err().to_string()
         };
         let unknown = refused(&[row(0, 0.1, 0.9), row(7, 0.1, 0.1)]);
         let expected = "line 3: pose: scene 1 image 7 object 5: neither";
-        assert!(unknown.contains("rivals.csv") && unknown.contains(expected), "{unknown}");
+        assert!(unknown.contains("hypotheses.csv") && unknown.contains(expected), "{unknown}");
         assert!(refused(&[row(0, 0.7, 0.5)]).contains("line 2: pose"));
         let share = refused(&[row(0, 0.1, 1.5)]);
         assert!(share.contains("line 2: score: 1.5 is no share"), "{share}");
         fs::write(&file, "1,0,5,1,1 0 0,0 0 500,-1\n").unwrap();
-        let broken = read_rivals(&file, &poses).unwrap_err().to_string();
-        assert!(broken.contains("rivals.csv: line 1: R: "), "{broken}");
+        let broken = read_hypotheses(&file, &poses).unwrap_err().to_string();
+        assert!(broken.contains("hypotheses.csv: line 1: R: "), "{broken}");
     }
 }
