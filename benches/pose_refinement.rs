@@ -10,7 +10,7 @@ use prehend::refine::problem::{Block, NormalEquations, State};
 use prehend::refine::scene::{Scene, Sequence, default_scene, default_sequence};
 use prehend::refine::strategy::Fused;
 use prehend::refine::tracker::{Timing, TrackStatus, Tracked, Tracker, TrackerSettings};
-use prehend::refine::{Frame, RefineError, Strategy, refine};
+use prehend::refine::{PreparedFrame, RefineError, Strategy, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
@@ -22,7 +22,7 @@ fn main() -> Result<(), RefineError> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| !w.starts_with('-')).collect();
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     println!("| what | median ms | fastest | slowest |\n|---|--:|--:|--:|");
-    let frame = Frame::new(&SCENE.observation, &SCENE.object)?;
+    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object)?;
     let (fused, combined) = (Fused::default(), Heuristic::combined());
     let exhaustive = Heuristic { exhaustive: true, ..combined.clone() };
     let whole: [(&str, usize, &dyn Strategy); 3] = [

@@ -11,7 +11,7 @@ use prehend::refine::factor::{PointToPlaneFactor, PointToPlaneSettings};
 use prehend::refine::problem::{Block, Factor, State};
 use prehend::refine::scene::default_scene;
 use prehend::refine::strategy::Observer;
-use prehend::refine::{Estimate, Frame, RefineError, Strategy, refine};
+use prehend::refine::{Estimate, PreparedFrame, RefineError, Strategy, refine};
 
 /// Random restarts, then ICP.
 struct RandomRestarts {
@@ -25,7 +25,7 @@ struct RandomRestarts {
 impl Strategy for RandomRestarts {
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
@@ -51,7 +51,7 @@ impl Strategy for RandomRestarts {
 
 fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
-    let frame = Frame::new(&scene.observation, &scene.object)?;
+    let frame = PreparedFrame::new(&scene.observation, &scene.object)?;
     let strategy = RandomRestarts { count: 300, spread: (0.01, 0.15), icp: RobustIcp::default() };
     let errors = |pose| (pe_cm(pose, &scene.truth), oe_deg(pose, &scene.truth));
     let (pe, oe) = errors(&scene.initial);

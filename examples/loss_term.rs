@@ -7,7 +7,7 @@ use prehend::refine::evaluate::metrics::oe_deg;
 use prehend::refine::problem::{Factor, NoiseModel, Rows, State};
 use prehend::refine::scene::default_scene;
 use prehend::refine::strategy::{Fused, Modality, Posterior};
-use prehend::refine::{Frame, Observation, refine};
+use prehend::refine::{Frame, PreparedFrame, refine};
 
 /// A point of the object is believed to be at a place \[m\].
 struct Landmark {
@@ -34,8 +34,8 @@ impl Factor for Landmark {
 fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
     // Without the hand and without colors, a bottle's outline and depth say little of how it is turned.
-    let bare = Observation { hand: None, ..scene.observation.clone() };
-    let frame = Frame::new(&bare, &scene.object)?;
+    let bare = Frame { hand: None, ..scene.observation.clone() };
+    let frame = PreparedFrame::new(&bare, &scene.object)?;
     let mut plain = Fused::default();
     plain.settings.modalities = vec![Modality::Silhouette, Modality::Depth];
     let cap = Point3::new(0.0, 0.0, 0.09);

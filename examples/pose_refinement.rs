@@ -12,7 +12,7 @@ use prehend::refine::evaluate::metrics::{ContactModel, Table, oe_deg, pe_cm};
 use prehend::refine::evaluate::report::before_and_after;
 use prehend::refine::scene::HandMeasurement;
 use prehend::refine::scene::default_scene;
-use prehend::refine::{Frame, Method, refine};
+use prehend::refine::{Method, PreparedFrame, refine};
 
 fn main() -> anyhow::Result<()> {
     let seed = std::env::args()
@@ -24,7 +24,7 @@ fn main() -> anyhow::Result<()> {
 
     let start = Instant::now();
     let observation = &scene.observation;
-    let frame = Frame::new(observation, &scene.object)?;
+    let frame = PreparedFrame::new(observation, &scene.object)?;
     let refined = refine(&frame, &scene.initial, &Method::default())?;
     let seconds = start.elapsed().as_secs_f64();
 

@@ -6,7 +6,7 @@ use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
 use prehend::refine::data::{Assets, Sensor};
 use prehend::refine::evaluate::Scorer;
 use prehend::refine::evaluate::metrics::PoseScore;
-use prehend::refine::{Frame, Method, refine};
+use prehend::refine::{Method, PreparedFrame, refine};
 
 /// Means of PE, OE and |ΔIV| before and after refining every pose of `poses`, and how many there are.
 fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) {
@@ -21,7 +21,7 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
         let frame = data.frame(row.scene_id, row.im_id).expect("the frame is listed");
         let observation =
             assets.observation(&frame, 0, &Sensor::required_by(&method)).expect("the frame loads");
-        let frame = Frame::new(&observation, &object).expect("the frame fits");
+        let frame = PreparedFrame::new(&observation, &object).expect("the frame fits");
         let refined = refine(&frame, &row.t_cam_model, &method).expect("the frame refines");
         let refined = ResultRow { t_cam_model: *refined.t_cam_object(), ..row.clone() };
         for (sum, row) in [(&mut before, row), (&mut after, &refined)] {

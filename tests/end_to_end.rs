@@ -8,12 +8,12 @@ use prehend::refine::baselines::{GradientKind, Heuristic};
 use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend::refine::scene::{Scene, default_scene};
 use prehend::refine::strategy::Fused;
-use prehend::refine::{Estimate, Frame, RefineError, Strategy, refine};
+use prehend::refine::{Estimate, PreparedFrame, RefineError, Strategy, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
-fn frame() -> Frame<'static> {
-    Frame::new(&SCENE.observation, &SCENE.object).expect("the frame fits")
+fn frame() -> PreparedFrame<'static> {
+    PreparedFrame::new(&SCENE.observation, &SCENE.object).expect("the frame fits")
 }
 
 fn run(strategy: &dyn Strategy) -> Result<Estimate, RefineError> {
@@ -71,7 +71,7 @@ fn poses_are_the_same_for_any_number_of_threads() {
 fn without_a_hand_vision_alone_still_works() {
     let mut observation = SCENE.observation.clone();
     (observation.hand, observation.gravity) = (None, None);
-    let frame = Frame::new(&observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
     let vision = Heuristic::of(&[GradientKind::Rendering, GradientKind::Depth]);
     let strategies: [&dyn Strategy; 2] = [&vision, &Fused::default()];
     for strategy in strategies {

@@ -16,7 +16,7 @@ use prehend_refine::data::bop::{Dataset, GroundTruth, ResultRow, read_results};
 use prehend_refine::data::{Assets, Target};
 use prehend_refine::scene::Object;
 use prehend_refine::strategy::Fused;
-use prehend_refine::{Frame, refine};
+use prehend_refine::{PreparedFrame, refine};
 use rayon::prelude::*;
 
 const TURNS: [&str; 5] = ["none", "x", "y", "z", "transposed"];
@@ -72,7 +72,7 @@ fn main() -> anyhow::Result<()> {
             &row.t_cam_model,
             &[],
         )?;
-        let frame = Frame::new(&input.observation, &input.object)?;
+        let frame = PreparedFrame::new(&input.observation, &input.object)?;
         let initial = turned(&row.t_cam_model, &input.object, turn);
         let found = refine(&frame, &initial, &Fused::default())?;
         // A symmetric object has several true poses: the nearest one counts.

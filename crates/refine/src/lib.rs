@@ -1,14 +1,14 @@
 //! Refines the 6-DoF pose of an object held in a robot hand, from RGB-D, touch and physics.
 //!
-//! [`refine`] takes a [`Frame`] (an [`Observation`] of an [`Object`] in a [`Hand`]), an initial pose and a [`Strategy`] such as a
+//! [`refine`] takes a [`PreparedFrame`] (a [`Frame`] of an [`Object`] in a [`Hand`]), an initial pose and a [`Strategy`] such as a
 //! [`Method`], and returns an [`Estimate`]: pose, posterior and trace.
 //!
 //! ```
 //! use prehend_refine::scene::default_scene;
-//! use prehend_refine::{Frame, Method, refine};
+//! use prehend_refine::{PreparedFrame, Method, refine};
 //!
 //! let scene = default_scene(1)?;
-//! let frame = Frame::new(&scene.observation, &scene.object)?;
+//! let frame = PreparedFrame::new(&scene.observation, &scene.object)?;
 //! let estimate = refine(&frame, &scene.initial, &Method::default())?;
 //! let posterior = estimate.posterior.as_ref().ok_or("only other methods have none")?;
 //! println!("{} with probability {:.2}", estimate.t_cam_object(), posterior.probability());
@@ -64,6 +64,6 @@ pub use method::Method;
 pub use problem::{Factor, State};
 pub use refine::refine;
 pub use refine_all::{RefineJob, Refined, refine_all};
-pub use scene::{Frame, Hand, Object, Observation};
+pub use scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
 pub use settings::{Settings, SettingsError};
 pub use strategy::{Estimate, Strategy};

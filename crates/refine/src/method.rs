@@ -6,7 +6,7 @@ use crate::baselines::{GradientKind, Heuristic, Icp, RobustIcp};
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::rig::Rig;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Fused, FusedSettings, Modality, Nuisance, Observer, Strategy};
 
 /// A strategy with all of its settings.
@@ -81,7 +81,7 @@ impl Method {
 impl Strategy for Method {
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {

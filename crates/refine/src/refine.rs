@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Strategy};
 
 /// Refines `initial` (object → camera \[m\]) by `strategy`, such as a [`Method`](crate::Method).
@@ -14,7 +14,7 @@ use crate::strategy::{Estimate, Strategy};
 /// # Errors
 /// If the initial pose cannot be seen, or the frame lacks what the strategy needs.
 pub fn refine(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     initial: &Isometry3<f64>,
     strategy: &dyn Strategy,
 ) -> Result<Estimate, RefineError> {

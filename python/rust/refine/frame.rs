@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target};
-use prehend_refine::scene::check_gravity;
+use prehend_refine::scene::{PreparedFrame, check_gravity};
 use prehend_refine::search::{PoseCandidate, PoseSearch};
-use prehend_refine::{Observation, RefineError, RefineJob};
+use prehend_refine::{RefineError, RefineJob};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
@@ -94,11 +94,11 @@ impl Frame {
             _ => return Err(wrong("hand, hand_pose and joints: each needs the others")),
         };
         let object = prepared(&object)?;
-        let seen = Observation::new(camera, color, depth, mask);
-        let mut observation = Observation { gravity, hand: measured, ..seen };
-        let check = |observation: &Observation| {
+        let seen = prehend_refine::Frame::new(camera).color(color).depth(depth).mask(mask);
+        let mut observation = prehend_refine::Frame { gravity, hand: measured, ..seen };
+        let check = |observation: &prehend_refine::Frame| {
             // Only what looks at the object needs a mask.
-            match prehend_refine::Frame::new(observation, &object) {
+            match PreparedFrame::new(observation, &object) {
                 Ok(_) | Err(RefineError::EmptyMask) => Ok(()),
                 Err(error) => Err(error).raise(),
             }
@@ -171,7 +171,7 @@ impl Frame {
     }
 
     fn __repr__(&self) -> String {
-        let Observation { camera, hand, .. } = &self.input.observation;
+        let prehend_refine::Frame { camera, hand, .. } = &self.input.observation;
         let target = self.target.map(|target| format!("{target}, ")).unwrap_or_default();
         let held = if hand.is_some() { "in a hand" } else { "without a hand" };
         format!("Frame({target}{} × {}, {held})", camera.width, camera.height)

@@ -16,7 +16,7 @@ use prehend_refine::baselines::Heuristic;
 use prehend_refine::calibration::{CalibrationFrame, Calibrator, CalibratorSettings, Pass};
 use prehend_refine::scene::{default_scene, default_sequence};
 use prehend_refine::strategy::Fused;
-use prehend_refine::{Frame, Strategy, refine};
+use prehend_refine::{PreparedFrame, Strategy, refine};
 use prehend_reliability::scene::body_over_floor;
 use prehend_render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
 use prehend_sim::State;
@@ -119,7 +119,7 @@ fn a_picture() {
 #[test]
 fn a_refinement() {
     let scene = default_scene(1).unwrap();
-    let frame = Frame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
     let (fused, short) = (Fused::default(), Heuristic { iterations: 10, ..Heuristic::combined() });
     let strategies: [(&str, &dyn Strategy); 2] = [("fused", &fused), ("combined", &short)];
     for (name, strategy) in strategies {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_refine::scene::{Object, Observation};
+use prehend_refine::scene::{Frame, Object};
 use prehend_render::Mask;
 
 /// The kinds of faults: those of the model, of the mask, of depth, of the hand, of color and of the camera.
@@ -29,10 +29,10 @@ pub(crate) const KINDS: [&str; 14] = [
 /// Gives a frame a fault of `kind`; `other` is another frame of the dataset, `objects` are all of its models.
 pub(crate) fn apply(
     kind: &str,
-    observation: &mut Observation,
+    observation: &mut Frame,
     object: &mut Arc<Object>,
     objects: &BTreeMap<u32, Arc<Object>>,
-    other: Observation,
+    other: Frame,
     random: &mut SplitMix64,
 ) -> anyhow::Result<()> {
     let mut normal = || Vector3::from_fn(|_, _| random.normal());

@@ -18,7 +18,7 @@ use prehend_refine::data::bop::{Dataset, GroundTruth, ResultRow, read_results};
 use prehend_refine::data::{Assets, Target};
 use prehend_refine::scene::Object;
 use prehend_refine::strategy::{Consistency, Fit, Fused};
-use prehend_refine::{Frame, refine};
+use prehend_refine::{PreparedFrame, refine};
 use rayon::prelude::*;
 
 /// What became of a frame.
@@ -71,7 +71,7 @@ fn main() -> anyhow::Result<()> {
             let (observation, object) = (&mut input.observation, &mut input.object);
             fault::apply(kind, observation, object, &objects, other, &mut random)?;
         }
-        let frame = Frame::new(&input.observation, &input.object)?;
+        let frame = PreparedFrame::new(&input.observation, &input.object)?;
         let found = refine(&frame, &rows[index].t_cam_model, &Fused::default())?;
         let (pose, truth) = (found.t_cam_object(), &truths[index]);
         let off = (pose * input.object.center - truth * center).norm();

@@ -6,7 +6,7 @@ use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::{KinematicTree, PosedRobot};
 use prehend_geometry::shapes::{RoundedBox, cuboid, rounded_box};
 use prehend_geometry::{ClosestPoints, SplitMix64, TriMesh};
-use prehend_refine::scene::{Hand, Observation};
+use prehend_refine::scene::{Frame, Hand};
 use prehend_render::{Camera, Light, Mask, RenderModel, look_at, render_scene};
 
 pub(crate) const CAMERA: Camera =
@@ -119,7 +119,7 @@ impl World {
         camera: &Camera,
         t_world_cam: &Isometry3<f64>,
         noise: &mut SplitMix64,
-    ) -> anyhow::Result<Observation> {
+    ) -> anyhow::Result<Frame> {
         let t_cam_world = t_world_cam.inverse();
         let model = RenderModel::new(&self.object)?;
         let table = RenderModel::new(&table())?;
@@ -154,7 +154,7 @@ impl World {
         for (set, body) in mask.pixels_mut().iter_mut().zip(&image.object) {
             *set = *body == Some(0);
         }
-        Ok(Observation::new(*camera, image.color, image.depth, mask))
+        Ok(Frame::new(*camera).color(image.color).depth(image.depth).mask(mask))
     }
 }
 

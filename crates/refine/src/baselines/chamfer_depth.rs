@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::wide;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Frame, Object};
+use crate::scene::{Object, PreparedFrame};
 
 /// Settings of [`ChamferDepthFactor`].
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +57,10 @@ impl ChamferDepthFactor {
     ///
     /// # Errors
     /// If no pixel of the mask has a depth.
-    pub fn new(frame: &Frame<'_>, settings: &ChamferDepthSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &ChamferDepthSettings,
+    ) -> Result<Self, RefineError> {
         let object = Arc::clone(frame.object());
         let points = frame.masked_points(settings.points)?;
         let tree = KdTree::new(&points).map_err(|_| RefineError::NoDepth)?;
@@ -151,7 +154,7 @@ mod tests {
     use crate::factor::gradient_check::{assert_gradient, fixture, scene};
     use crate::problem::Block;
 
-    fn factor(frame: &Frame<'_>) -> ChamferDepthFactor {
+    fn factor(frame: &PreparedFrame<'_>) -> ChamferDepthFactor {
         ChamferDepthFactor::new(frame, &ChamferDepthSettings::default()).unwrap()
     }
 
@@ -200,7 +203,7 @@ mod tests {
         let scene = scene();
         let mut observation = scene.observation.clone();
         observation.depth.pixels_mut().fill(0.0);
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let factor = ChamferDepthFactor::new(&frame, &ChamferDepthSettings::default());
         assert!(matches!(factor, Err(RefineError::NoDepth)));
     }

@@ -14,7 +14,7 @@ use super::{rendering_settings, tactile_settings};
 use crate::error::RefineError;
 use crate::factor::{RenderingFactor, RenderingSettings, TactileFactor, TactileSettings};
 use crate::problem::{Block, Factor, NormalEquations, State};
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Fused, Iteration, Observer, Recorder, Strategy};
 
 /// Damping of candidate steps, as a part of the mean curvature.
@@ -124,7 +124,7 @@ impl Heuristic {
     /// If the frame lacks what one of them needs.
     pub fn factors(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
     ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
         let factor = |kind: &GradientKind| -> Result<Arc<dyn Factor>, RefineError> {
@@ -194,7 +194,7 @@ impl Heuristic {
 impl Strategy for Heuristic {
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {

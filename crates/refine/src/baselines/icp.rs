@@ -9,7 +9,7 @@ use super::rendering_settings;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
 
 /// Point-to-point ICP (Besl and McKay, 1992) between the masked depth points P and the whole surface of the model.
@@ -42,7 +42,7 @@ impl Strategy for Icp {
     /// The trace's value is Eq. 2 over the samples \[m²\].
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {

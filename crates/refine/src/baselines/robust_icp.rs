@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::{Frame, Object};
+use crate::scene::{Object, PreparedFrame};
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
 
 /// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
@@ -42,7 +42,7 @@ impl Strategy for RobustIcp {
     /// The trace's value is the root mean square distance of the matches \[m\].
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {

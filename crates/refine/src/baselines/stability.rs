@@ -12,7 +12,7 @@ use prehend_sim::{
 use super::stability_loss::{StabilityJacobian, StabilityLoss, StabilityWeights};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
-use crate::scene::{Frame, check_gravity};
+use crate::scene::{PreparedFrame, check_gravity};
 
 /// Settings of the stability factor.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +80,7 @@ impl StabilityFactor {
     /// # Errors
     /// If gravity or the hand is unknown, gravity is none ([`check_gravity`]), or the object cannot be simulated.
     pub fn new(
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         settings: StabilitySettings,
     ) -> Result<Self, RefineError> {

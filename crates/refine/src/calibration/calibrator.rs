@@ -14,7 +14,7 @@ use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
 use crate::rig::{Play, Rig};
-use crate::scene::{Frame, Object, Observation, SurfaceDeviation, View, median};
+use crate::scene::{Frame, Object, PreparedFrame, SurfaceDeviation, View, median};
 use crate::strategy::{Fused, Modality};
 
 /// A frame of a rig, and where its object is thought to be.
@@ -22,7 +22,7 @@ use crate::strategy::{Fused, Modality};
 pub struct CalibrationFrame {
     /// What was observed, as it was. Without a mask, the object is looked for where it should be, which needs a good pose: its outline then
     /// says nothing.
-    pub observation: Observation,
+    pub observation: Frame,
     /// The object's number.
     pub obj_id: u32,
     /// Object → camera \[m\].
@@ -131,7 +131,7 @@ impl Calibrator {
             fused.settings.hypotheses.restart_angle = 0.0;
         }
         fused.rig = Some(Arc::new(self.rig.clone()));
-        let frame = Frame::new(&observation, self.object(*obj_id)?)?;
+        let frame = PreparedFrame::new(&observation, self.object(*obj_id)?)?;
         let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
         let information = self.information(&frame, &fused, *obj_id, &found.state)?;
@@ -154,12 +154,12 @@ impl Calibrator {
         let has_mask = frame.observation.mask.count() > 0;
         let (observation, fused) = self.corrected(frame)?;
         let object = self.object(frame.obj_id)?;
-        let corrected = Frame::new(&observation, object)?;
+        let corrected = PreparedFrame::new(&observation, object)?;
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings, has_mask)
     }
 
     /// What a frame shows when the rig is corrected, and how it is refined.
-    fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
+    fn corrected(&self, frame: &CalibrationFrame) -> Result<(Frame, Fused), RefineError> {
         let CalibrationFrame { observation, obj_id, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
         let mut observation = self.rig.corrected(observation)?;
@@ -191,7 +191,7 @@ impl Calibrator {
     /// What `frame`, corrected, says of the rig if its state is `state`.
     fn information(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         fused: &Fused,
         obj_id: u32,
         state: &State,

@@ -218,7 +218,7 @@ mod tests {
         PointToPlaneSettings,
     };
     use crate::problem::{DepthField, Factor, ImageWarp, NormalEquations, RADIAL};
-    use crate::scene::{Frame, Observation, default_scene};
+    use crate::scene::{Frame, PreparedFrame, default_scene};
 
     /// Depth that is off by a smooth field is what a rig corrects, so its derivatives are those of a factor's cost by that correction.
     #[test]
@@ -227,8 +227,8 @@ mod tests {
         let settings = CalibratorSettings::default();
         let calibrator = Calibrator::new(16, (640, 480), BTreeMap::new(), settings).unwrap();
         let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
-        let factors_of = |observation: &Observation| {
-            let frame = Frame::new(observation, &scene.object).unwrap();
+        let factors_of = |observation: &Frame| {
+            let frame = PreparedFrame::new(observation, &scene.object).unwrap();
             let mut state = State::new(&frame, &scene.truth).unwrap();
             // Off, so that costs have slopes.
             state.t_cam_object.translation.z += 1e-3;
@@ -277,7 +277,7 @@ mod tests {
         let aside = 0.3 * scene.truth.translation.z;
         observation.hand.as_mut().unwrap().t_cam_hand.translation.x += aside;
         let mut state = {
-            let frame = Frame::new(&observation, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             State::new(&frame, &scene.truth).unwrap()
         };
         state.t_cam_object.translation.x += aside;
@@ -301,7 +301,7 @@ mod tests {
                     *z = 0.0;
                 }
             }
-            let frame = Frame::new(&window, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&window, &scene.object).unwrap();
             let factor: Box<dyn Factor> = if on_object {
                 Box::new(PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap())
             } else {

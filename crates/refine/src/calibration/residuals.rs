@@ -8,7 +8,7 @@ use crate::MM_PER_M;
 use crate::error::RefineError;
 use crate::factor::TactileFactor;
 use crate::problem::State;
-use crate::scene::{Frame, median};
+use crate::scene::{PreparedFrame, median};
 use crate::strategy::{FusedSettings, Pixels};
 
 /// What is off in one frame where calibrations are believed.
@@ -30,14 +30,17 @@ impl FrameResiduals {
     ///
     /// # Errors
     /// If the pose is not finite, or forces do not fit the taxels.
-    pub fn of(frame: &Frame<'_>, t_cam_object: &Isometry3<f64>) -> Result<Self, RefineError> {
+    pub fn of(
+        frame: &PreparedFrame<'_>,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Result<Self, RefineError> {
         let has_mask = frame.observation().mask.count() > 0;
         Self::new(frame, t_cam_object, &FusedSettings::default(), has_mask)
     }
 
     /// As [`Self::of`] has it, with these settings; the mask counts only if there is one.
     pub(super) fn new(
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         t_cam_object: &Isometry3<f64>,
         settings: &FusedSettings,
         has_mask: bool,

@@ -23,7 +23,7 @@ pub use self::correction::{
 };
 pub(crate) use self::model::likely_unit;
 pub use self::warning::{Subject, Warning};
-use crate::scene::{HandMeasurement, Object, Observation, View};
+use crate::scene::{Frame, HandMeasurement, Object, View};
 
 use self::correction::settled_pose;
 
@@ -35,7 +35,7 @@ pub(crate) fn check_object(object: &Object, held: bool) -> Vec<Warning> {
 /// Warnings of an observation, and of the object at a pose (object → camera) in it; none if all looks well. Those of the object alone are
 /// [`check_object`]'s.
 pub(crate) fn check_frame(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<Warning> {
@@ -75,7 +75,7 @@ pub(crate) fn check_frame(
 
 /// Images of a frame, and what they are compared with.
 struct Comparison<'a> {
-    observation: &'a Observation,
+    observation: &'a Frame,
     object: &'a Object,
     /// Depth of the hand \[m\], unless that is at fault.
     drawn: Option<DepthImage>,

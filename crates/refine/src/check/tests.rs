@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use prehend_render::Mask;
 
 use super::*;
-use crate::scene::{Hand, HandMeasurement, Observation, Scene, StatedSize, default_scene};
+use crate::scene::{Frame, Hand, HandMeasurement, Scene, StatedSize, default_scene};
 
 fn found(scene: &Scene, t_cam_object: &Isometry3<f64>) -> Vec<Warning> {
     let mut all = check_object(&scene.object, true);
@@ -57,7 +57,7 @@ fn a_right_scene_is_silent_at_the_truth_and_at_poses_to_start_from() {
         assert_eq!(found(&scene, &scene.truth), []);
         assert_eq!(found(&scene, &scene.initial), []);
         let Scene { observation, object, initial, .. } = scene;
-        let bare = Observation { hand: None, ..observation };
+        let bare = Frame { hand: None, ..observation };
         assert_eq!(check_frame(&bare, &object, &initial), []);
     }
 }
@@ -104,7 +104,7 @@ fn a_hand_that_is_not_where_it_is_said_to_be() {
 fn a_hand_out_of_sight_is_judged_by_touch() {
     // Depth of the hand is missing, as of a black one.
     let unseen = |scene: &mut Scene| {
-        let Observation { depth, mask, .. } = &mut scene.observation;
+        let Frame { depth, mask, .. } = &mut scene.observation;
         let pixels = depth.pixels_mut().iter_mut().zip(mask.pixels());
         pixels.filter(|(_, masked)| !**masked).for_each(|(z, _)| *z = 0.0);
     };

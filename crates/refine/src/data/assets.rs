@@ -17,7 +17,7 @@ use crate::data::robots::Robots;
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{Inertial, Object, Observation, StatedSize, Target, check_gravity};
+use crate::scene::{Frame, Inertial, Object, StatedSize, Target, check_gravity};
 
 /// Standard deviations of the poses of neighbors, in each direction and about each axis \[m, rad\].
 const NEIGHBOR_SIGMAS: [f64; 2] = [2e-3, 0.02];
@@ -245,7 +245,7 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         instance: usize,
         required: &[Sensor],
-    ) -> Result<Observation, AssetError> {
+    ) -> Result<Frame, AssetError> {
         self.sensed(frame, MaskOf::Number(instance), required)
     }
 
@@ -255,7 +255,7 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
-    ) -> Result<Observation, AssetError> {
+    ) -> Result<Frame, AssetError> {
         let observation = self.stated(frame, mask, required)?;
         let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
         Ok(corrected.unwrap_or(observation))
@@ -267,7 +267,7 @@ impl<'a> Assets<'a> {
         frame: &DatasetImage<'_>,
         mask: MaskOf<'_>,
         required: &[Sensor],
-    ) -> Result<Observation, AssetError> {
+    ) -> Result<Frame, AssetError> {
         let mut observation = frame.unsegmented()?;
         let (number, segmented) = match mask {
             MaskOf::Object(sought) => {

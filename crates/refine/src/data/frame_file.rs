@@ -21,7 +21,7 @@ use crate::data::bop::{
 use crate::data::frame_input::FrameInput;
 use crate::data::robots::Robots;
 use crate::rig::Rig;
-use crate::scene::{HandMeasurement, Object, Observation, RemapCache, check_gravity};
+use crate::scene::{Frame, HandMeasurement, Object, RemapCache, check_gravity};
 
 /// Name of the robot of a frame file beside other bodies.
 const ROBOT: &str = "robot";
@@ -131,7 +131,7 @@ impl CameraImages<'_> {
     ///
     /// # Errors
     /// If an image is missing or broken, or does not fit the others; an empty mask if it is `required` to show the object.
-    fn read(self, file: &Path, prefix: &str, required: bool) -> Result<Observation, DatasetError> {
+    fn read(self, file: &Path, prefix: &str, required: bool) -> Result<Frame, DatasetError> {
         let field = |name: &str, problem: &str| {
             DatasetError::field(file, &format!("{prefix}{name}"), problem)
         };
@@ -220,7 +220,7 @@ pub fn load_frame_file(
 /// Content of a frame file as it is there: nothing is derived from it yet.
 pub(crate) struct FrameParts {
     /// CameraImages as pinhole cameras see them, without the hand.
-    pub(crate) observation: Observation,
+    pub(crate) observation: Frame,
     /// The object's mesh \[m\].
     pub(crate) mesh: TriMesh,
     pub(crate) mesh_file: PathBuf,

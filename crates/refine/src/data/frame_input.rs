@@ -11,15 +11,15 @@ use crate::check::{
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{Frame, Object, Observation, RegionEvidence};
+use crate::scene::{Frame, Object, PreparedFrame, RegionEvidence};
 use crate::strategy::{Fused, FusedSettings, ModelScale};
 use crate::tracker::{Tracker, TrackerSettings};
 
-/// Observation of an object.
+/// Frame of an object.
 #[derive(Clone)]
 pub struct FrameInput {
     /// Sensor data.
-    pub observation: Observation,
+    pub observation: Frame,
     /// The object.
     pub object: Arc<Object>,
     /// The rig, by which all this is corrected, where it is known.
@@ -34,7 +34,7 @@ pub struct FrameInput {
 
 impl FrameInput {
     /// Frame of an object, corrected by `rig` already.
-    pub fn new(observation: Observation, object: Arc<Object>, rig: Option<Arc<Rig>>) -> Self {
+    pub fn new(observation: Frame, object: Arc<Object>, rig: Option<Arc<Rig>>) -> Self {
         let (model_scale, is_segmented, regions) = (None, false, None);
         Self { observation, object, rig, model_scale, is_segmented, regions }
     }
@@ -89,9 +89,9 @@ impl FrameInput {
     /// The frame.
     ///
     /// # Errors
-    /// Those of [`Frame::new`].
-    pub fn frame(&self) -> Result<Frame<'_>, RefineError> {
-        let mut frame = Frame::new(&self.observation, &self.object)?;
+    /// Those of [`PreparedFrame::new`].
+    pub fn frame(&self) -> Result<PreparedFrame<'_>, RefineError> {
+        let mut frame = PreparedFrame::new(&self.observation, &self.object)?;
         if let Some(regions) = &self.regions {
             frame = frame.with_regions(regions);
         }

@@ -7,7 +7,7 @@ use prehend_render::{DepthImage, Mask, depth_map};
 
 use super::bop::{Body, BodyKind, DatasetError, DatasetImage, Detections};
 use crate::scene::Target;
-use crate::scene::{Object, Observation};
+use crate::scene::{Frame, Object};
 
 /// A mask whose overlap with the object is below this share of another mask's is not the object's.
 const LEAST_SHARE: f64 = 0.5;
@@ -52,7 +52,7 @@ impl MaskSource {
     /// If there is no such mask, or it is broken or of another size than the image.
     pub(super) fn segment(
         &self,
-        observation: &mut Observation,
+        observation: &mut Frame,
         frame: &DatasetImage<'_>,
         sought: &Sought<'_>,
         number: Option<usize>,
@@ -131,13 +131,13 @@ impl Sought<'_> {
     }
 
     /// Depth of the object alone at its pose \[m\].
-    fn drawn(&self, observation: &Observation) -> Option<DepthImage> {
+    fn drawn(&self, observation: &Frame) -> Option<DepthImage> {
         let pose = self.t_cam_object?;
         Some(depth_map(&observation.camera, &[(&self.object.model, *pose)]))
     }
 
     /// Pixels that should show the object, were there nothing else.
-    fn silhouette(&self, observation: &Observation) -> Option<Mask> {
+    fn silhouette(&self, observation: &Frame) -> Option<Mask> {
         let depth = self.drawn(observation)?;
         let set = depth.pixels().iter().map(|z| *z > 0.0).collect();
         Mask::new(depth.width(), depth.height(), set).ok()
@@ -147,7 +147,7 @@ impl Sought<'_> {
     fn detected(
         &self,
         detections: &Detections,
-        observation: &Observation,
+        observation: &Frame,
     ) -> Result<(Mask, bool), DatasetError> {
         let Target { scene_id, im_id, obj_id, .. } = *self.target;
         let file = detections.file();

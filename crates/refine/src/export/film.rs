@@ -10,7 +10,7 @@ use prehend_geometry::{FilmBody, FilmCamera, FilmKey, GlbFilm, MeshError};
 use super::upright::upright;
 use crate::data::Target;
 use crate::error::RefineError;
-use crate::scene::{Hand, Object, Observation};
+use crate::scene::{Frame, Hand, Object};
 
 /// Colors of what has no own, sRGB-encoded.
 const HAND: [f32; 3] = [0.55, 0.57, 0.6];
@@ -59,7 +59,7 @@ impl SceneFilm {
     pub fn add_image(
         &mut self,
         im_id: u32,
-        observation: &Observation,
+        observation: &Frame,
         t_base_cam: &Isometry3<f64>,
     ) -> Result<(), RefineError> {
         let mut links = Vec::new();

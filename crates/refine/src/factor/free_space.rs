@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::PointToPlaneSettings;
 use super::facing::facing;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Frame, Object};
+use crate::scene::{Object, PreparedFrame};
 
 /// Settings of [`FreeSpaceFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ struct InFront {
 
 impl FreeSpaceFactor {
     /// Of the depth image of `frame`, which may be missing everywhere: the cost is then zero.
-    pub fn new(frame: &Frame<'_>, settings: &FreeSpaceSettings) -> Self {
+    pub fn new(frame: &PreparedFrame<'_>, settings: &FreeSpaceSettings) -> Self {
         Self {
             object: Arc::clone(frame.object()),
             camera: frame.observation().camera,
@@ -153,7 +153,7 @@ mod tests {
             let mut observation = frame.observation().clone();
             observation.hand = None;
             observation.depth.pixels_mut().fill(state.center().z as f32 - 0.02);
-            let frame = Frame::new(&observation, frame.object()).unwrap();
+            let frame = PreparedFrame::new(&observation, frame.object()).unwrap();
             let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             assert!(factor.cost(&state) > 0.0);
             for block in [Block::ObjectPose, Block::Camera] {
@@ -192,7 +192,7 @@ mod tests {
         observation.hand = None;
         for nothing in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             observation.depth.pixels_mut().fill(nothing);
-            let frame = Frame::new(&observation, frame.object()).unwrap();
+            let frame = PreparedFrame::new(&observation, frame.object()).unwrap();
             let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             assert_eq!(factor.cost(&state), 0.0, "{nothing}");
         }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State};
-use crate::scene::{Frame, Hand};
+use crate::scene::{Hand, PreparedFrame};
 
 /// Settings of [`HandDepthFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,7 +61,7 @@ impl HandDepthFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         points: usize,
         settings: &HandDepthSettings,
     ) -> Result<Self, RefineError> {

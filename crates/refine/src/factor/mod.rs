@@ -41,7 +41,7 @@ pub(crate) mod gradient_check {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
     use crate::problem::{Block, Factor, NormalEquations, State, SurfacePatches};
-    use crate::scene::{Frame, ModelErrorSettings, Scene, default_scene};
+    use crate::scene::{ModelErrorSettings, PreparedFrame, Scene, default_scene};
 
     static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
@@ -51,13 +51,13 @@ pub(crate) mod gradient_check {
     }
 
     /// Its frame.
-    pub(crate) fn frame() -> Frame<'static> {
+    pub(crate) fn frame() -> PreparedFrame<'static> {
         let scene = scene();
-        Frame::new(&scene.observation, &scene.object).unwrap()
+        PreparedFrame::new(&scene.observation, &scene.object).unwrap()
     }
 
     /// The frame, and a state a little off its truth.
-    pub(crate) fn fixture(seed: usize) -> (Frame<'static>, State) {
+    pub(crate) fn fixture(seed: usize) -> (PreparedFrame<'static>, State) {
         let frame = frame();
         let state = State::new(&frame, &scene().truth).unwrap();
         let turn = [0.05, -0.08, 0.06, 0.02, -0.03, 0.01];

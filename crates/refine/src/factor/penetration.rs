@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
-use crate::scene::{Frame, Hand, Object};
+use crate::scene::{Hand, Object, PreparedFrame};
 
 /// Settings of [`PenetrationFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +42,10 @@ impl PenetrationFactor {
     ///
     /// # Errors
     /// If the hand is unknown.
-    pub fn new(frame: &Frame<'_>, settings: &PenetrationSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &PenetrationSettings,
+    ) -> Result<Self, RefineError> {
         let hand = &frame.require_hand("penetration")?.hand;
         let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
         let area = object.area / object.samples.len().max(1) as f64;

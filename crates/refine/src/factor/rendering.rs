@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::patch_sums::PatchSums;
 use crate::error::RefineError;
 use crate::problem::{CAUCHY_WIDTH, Factor, NormalEquations, State, SurfacePatches};
-use crate::scene::{Frame, Object, Occluders};
+use crate::scene::{Object, Occluders, PreparedFrame};
 
 /// Settings of [`RenderingFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -88,7 +88,10 @@ impl RenderingFactor {
     ///
     /// # Errors
     /// If the images do not fit the camera or nothing of the mask is left.
-    pub fn new(frame: &Frame<'_>, settings: &RenderingSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &RenderingSettings,
+    ) -> Result<Self, RefineError> {
         let image = frame.segmented(settings.occluders, settings.downsample)?;
         let sigma = settings.sigma * image.brightness;
         let options = LossOptions {
@@ -295,7 +298,7 @@ mod tests {
     use super::*;
     use crate::problem::Block;
 
-    fn factor(frame: &Frame<'_>) -> RenderingFactor {
+    fn factor(frame: &PreparedFrame<'_>) -> RenderingFactor {
         let settings = RenderingSettings { downsample: 2, ..RenderingSettings::default() };
         RenderingFactor::new(frame, &settings).unwrap()
     }
@@ -321,7 +324,7 @@ mod tests {
         mesh.uvs.iter_mut().for_each(|uvs| uvs.push([0.0; 2]));
         let object = Arc::new(Object::with_mass("stray", mesh, Some(0.3), 0).unwrap());
         assert!((object.model.center() - object.center).norm() > 0.03);
-        let frame = Frame::new(&known.observation, &object).unwrap();
+        let frame = PreparedFrame::new(&known.observation, &object).unwrap();
         let state = State { object_center: object.center, ..fixture(1).1 };
         let factor = factor(&frame);
         assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.03);

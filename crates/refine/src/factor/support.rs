@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::compliant_balance::{CompliantBalance, Support};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
-use crate::scene::{Frame, Hand, Object};
+use crate::scene::{Hand, Object, PreparedFrame};
 
 /// Settings of [`SupportFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,7 +107,7 @@ impl SupportFactor {
     ///
     /// # Errors
     /// If gravity or the hand is unknown, the hand has a skin and its forces are not one a taxel, or a setting is out of range.
-    pub fn new(frame: &Frame<'_>, settings: &SupportSettings) -> Result<Self, RefineError> {
+    pub fn new(frame: &PreparedFrame<'_>, settings: &SupportSettings) -> Result<Self, RefineError> {
         settings.check()?;
         let missing = RefineError::Missing { what: "gravity", factor: "support" };
         let gravity = frame.observation().gravity.ok_or(missing)?;
@@ -302,16 +302,16 @@ impl SupportFactor {
 mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
-    use crate::scene::Observation;
+    use crate::scene::Frame;
 
-    fn factor(frame: &Frame<'_>) -> SupportFactor {
+    fn factor(frame: &PreparedFrame<'_>) -> SupportFactor {
         SupportFactor::new(frame, &SupportSettings::default()).unwrap()
     }
 
     /// Of the built-in scene, with another observation.
-    fn seen(observation: &Observation) -> SupportFactor {
+    fn seen(observation: &Frame) -> SupportFactor {
         let scene = scene();
-        factor(&Frame::new(observation, &scene.object).unwrap())
+        factor(&PreparedFrame::new(observation, &scene.object).unwrap())
     }
 
     #[test]
@@ -375,7 +375,7 @@ mod tests {
         observation.gravity = Some(Vector3::zeros());
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::repeat(f64::NAN));
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let settings = SupportSettings::default();
         let factor = SupportFactor::new(&frame, &settings).unwrap();
         let mut equations = NormalEquations::new(&[Block::ObjectPose]);
@@ -394,16 +394,16 @@ mod tests {
     #[test]
     fn gravity_and_the_hand_are_needed() {
         let scene = scene();
-        let refused = |change: fn(&mut Observation)| {
+        let refused = |change: fn(&mut Frame)| {
             let mut observation = scene.observation.clone();
             change(&mut observation);
-            let frame = Frame::new(&observation, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             let factor = SupportFactor::new(&frame, &SupportSettings::default());
             factor.err().unwrap().to_string()
         };
         assert!(refused(|o| o.gravity = None).contains("gravity"));
         assert!(refused(|o| o.hand = None).contains("hand state"));
-        let short = |o: &mut Observation| o.hand.as_mut().unwrap().forces.truncate(5);
+        let short = |o: &mut Frame| o.hand.as_mut().unwrap().forces.truncate(5);
         assert_eq!(refused(short), "5 taxel forces were given for 368 taxels");
     }
 }

@@ -97,7 +97,7 @@ mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
     use crate::problem::{NoiseModel, Rows};
-    use crate::scene::{CameraCalibrationError, Frame, Observation, ViewCalibrationError};
+    use crate::scene::{CameraCalibrationError, Frame, PreparedFrame, ViewCalibrationError};
 
     fn turned() -> Isometry3<f64> {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.5, 0.8));
@@ -179,9 +179,9 @@ mod tests {
     #[test]
     fn views_of_an_observation_have_the_hand_where_it_is() {
         let scene = scene();
-        let seen = Observation { hand: None, ..scene.observation.clone() };
+        let seen = Frame { hand: None, ..scene.observation.clone() };
         let both = scene.observation.clone().with_view(seen, turned().inverse());
-        let frame = Frame::new(&both, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&both, &scene.object).unwrap();
         let [view] = frame.views() else { panic!("not one view") };
         let (hand, expected) = (view.frame.hand().unwrap(), frame.hand().unwrap());
         let off = hand.t_cam_hand.inverse() * (view.t_view_cam * expected.t_cam_hand);

@@ -386,8 +386,8 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::scene::{Frame, default_scene};
-    use crate::scene::{ModelErrorSettings, Observation};
+    use crate::scene::{Frame, ModelErrorSettings};
+    use crate::scene::{PreparedFrame, default_scene};
 
     /// Measurements that are linear in the object's twist and the displacements of patches.
     struct Linear {
@@ -443,8 +443,8 @@ mod tests {
     #[test]
     fn a_solve_can_be_aborted_between_steps_that_lead_nowhere() {
         let scene = default_scene(1).unwrap();
-        let bare = Observation { hand: None, ..scene.observation.clone() };
-        let frame = Frame::new(&bare, &scene.object).unwrap();
+        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let state = State::new(&frame, &scene.truth).unwrap();
         let problem = Problem::new(vec![Arc::new(Flat)], vec![Block::ObjectPose]);
         let mut steps = Vec::new();
@@ -461,8 +461,8 @@ mod tests {
     #[test]
     fn eliminating_patches_is_integrating_them_out() {
         let scene = default_scene(1).unwrap();
-        let bare = Observation { hand: None, ..scene.observation.clone() };
-        let frame = Frame::new(&bare, &scene.object).unwrap();
+        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let state = State::new(&frame, &scene.truth).unwrap();
         let settings = ModelErrorSettings::default();
         let patches =

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Point3, Vector3};
 
-use crate::scene::{ModelErrorSettings, Observation, squared_exponential};
+use crate::scene::{Frame, ModelErrorSettings, squared_exponential};
 
 /// What is independent in patches however near they are, as a share of the variance; keeps their covariance regular.
 const OWN: f64 = 1e-3;
@@ -63,7 +63,7 @@ impl SurfacePatches {
     /// of `unit` pixels wide, to be of whole pixels in images that are smaller by that. `None` if there is nothing of it to be seen, or models are
     /// exact.
     pub(crate) fn new(
-        observation: &Observation,
+        observation: &Frame,
         distance: f64,
         settings: &ModelErrorSettings,
         unit: usize,

@@ -5,7 +5,7 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use crate::error::RefineError;
 
-use crate::scene::{CameraCalibrationError, Frame, Object, Observation, ViewCalibrationError};
+use crate::scene::{CameraCalibrationError, Frame, Object, PreparedFrame, ViewCalibrationError};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,7 +58,7 @@ impl State {
     ///
     /// # Errors
     /// If the pose is not finite, or behind the camera.
-    pub fn new(frame: &Frame<'_>, initial: &Isometry3<f64>) -> Result<Self, RefineError> {
+    pub fn new(frame: &PreparedFrame<'_>, initial: &Isometry3<f64>) -> Result<Self, RefineError> {
         Self::measured(frame.observation(), frame.object(), initial)
     }
 
@@ -67,7 +67,7 @@ impl State {
     /// # Errors
     /// See [`new`](Self::new).
     pub(crate) fn measured(
-        observation: &Observation,
+        observation: &Frame,
         object: &Object,
         initial: &Isometry3<f64>,
     ) -> Result<Self, RefineError> {

@@ -5,7 +5,7 @@ use prehend_render::{BrownConrady, Distortion};
 
 use super::parameters::{Rig, of_other_joints};
 use crate::error::RefineError;
-use crate::scene::{Object, Observation};
+use crate::scene::{Frame, Object};
 
 /// Images of a lens that moves no pixel by more are taken as they are \[px\].
 const STRAIGHT: f64 = 0.05;
@@ -15,7 +15,7 @@ impl Rig {
     ///
     /// # Errors
     /// If images are of another size, or the hand has another number of joints.
-    pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
+    pub fn corrected(&self, observation: &Frame) -> Result<Frame, RefineError> {
         let mut corrected = observation.clone();
         let (camera, error) = (&mut corrected.camera, &self.camera);
         let (size, expected) = ([camera.width, camera.height], self.warp.depth.size());
@@ -49,7 +49,7 @@ impl Rig {
     }
 
     /// Makes the images of a camera, corrected, those of a pinhole.
-    fn undistort(&self, observation: &mut Observation) -> Result<(), RefineError> {
+    fn undistort(&self, observation: &mut Frame) -> Result<(), RefineError> {
         let camera = observation.camera;
         // Coefficients of opposite signs may cancel at the corners and not inside; without signs they bound both.
         let bound = lens(self.distortion.map(f64::abs));
@@ -97,7 +97,7 @@ mod tests {
     }
 
     /// The mask of a scene with a square in a corner instead, through a lens.
-    fn through(scene: &Scene, distortion: [f64; 2]) -> (Mask, Observation) {
+    fn through(scene: &Scene, distortion: [f64; 2]) -> (Mask, Frame) {
         let mut observation = scene.observation.clone();
         let mut square = Mask::filled(640, 480, false);
         for (i, set) in square.pixels_mut().iter_mut().enumerate() {

@@ -265,7 +265,7 @@ pub(crate) fn of_other_joints(given: usize, expected: usize) -> RefineError {
 mod tests {
     use super::*;
     use crate::problem::DepthField;
-    use crate::scene::{Frame, default_scene};
+    use crate::scene::{PreparedFrame, default_scene};
 
     fn nominal() -> Rig {
         let warp = ImageWarp { depth: DepthField::new(640, 480, 4) };
@@ -282,7 +282,7 @@ mod tests {
         assert!((rig.values() - DVector::from_vec(change)).amax() < 1e-12);
         let said = |rig: &Rig| {
             let observation = rig.corrected(&scene.observation).unwrap();
-            let frame = Frame::new(&observation, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             State::new(&frame, &scene.truth).unwrap()
         };
         let (at, step) = (said(&rig), 1e-6);

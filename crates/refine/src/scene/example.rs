@@ -10,7 +10,7 @@ use prehend_geometry::hand::{JOINT_NAMES, Taxel, allegro_xela_urdf, default_gras
 use prehend_geometry::robot::KinematicTree;
 use prehend_render::{Camera, Light, Mask, look_at, render_scene};
 
-use super::{Hand, HandMeasurement, Object, Observation};
+use super::{Frame, Hand, HandMeasurement, Object};
 use crate::error::RefineError;
 
 /// Standard deviations of a color channel, and of a depth pixel \[m\].
@@ -34,7 +34,7 @@ const SLIDE: f64 = 2e-3;
 /// A frame whose truth is known.
 pub struct Scene {
     /// Measurements of the sensors.
-    pub observation: Observation,
+    pub observation: Frame,
     /// The object.
     pub object: Arc<Object>,
     /// Its number among the models of a dataset.
@@ -54,7 +54,7 @@ pub struct SequenceFrame {
     /// Time of exposure.
     pub time: Duration,
     /// Measurements of the sensors.
-    pub observation: Observation,
+    pub observation: Frame,
     /// The true pose, object → camera \[m\].
     pub truth: Isometry3<f64>,
 }
@@ -108,7 +108,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
 /// If the built-in assets cannot be prepared.
 pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError> {
     let Scene { observation, object, hand, truth, initial, .. } = default_scene(seed)?;
-    let Observation { camera, gravity, hand: measured, .. } = observation;
+    let Frame { camera, gravity, hand: measured, .. } = observation;
     let (start, joints) = measured
         .map_or_else(|| (Isometry3::identity(), Vec::new()), |hand| (hand.t_cam_hand, hand.joints));
     let center = (truth * object.center).coords;
@@ -145,7 +145,7 @@ fn observe(
     truth: &Isometry3<f64>,
     measured: HandMeasurement,
     noise: &mut SplitMix64,
-) -> Observation {
+) -> Frame {
     let mut bodies = vec![(&*object.model, *truth)];
     bodies.extend(measured.hand.render_bodies(&measured.t_cam_hand, &measured.joints));
     let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
@@ -164,8 +164,8 @@ fn observe(
         *m = *body == Some(0);
     }
     let forces = taxel_forces(object, truth, &measured);
-    let seen = Observation::new(camera, image.color, image.depth, mask);
-    Observation { gravity, hand: Some(measured.with_forces(forces)), ..seen }
+    let frame = Frame::new(camera).color(image.color).depth(image.depth).mask(mask);
+    Frame { gravity, ..frame.hand(measured.with_forces(forces)) }
 }
 
 /// Force on each taxel \[N\], in its link's frame: the nearer the object, the more.

@@ -1,404 +1,241 @@
-//! One frame, with what all factors derive from it.
+//! Measurements of the sensors at one moment.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
-use std::ops::Range;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
-use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Isometry3, Vector3};
+use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
-use super::{ForegroundSettings, HandMeasurement, Object, Observation, RegionEvidence};
+use super::{Hand, TouchReading};
 use crate::error::RefineError;
 
-/// An observation of an object in a hand, checked, with what factors derive from it: each thing is made when it is first asked
-/// for, and once.
-pub struct Frame<'a> {
-    observation: &'a Observation,
-    object: &'a Arc<Object>,
-    hand_depth: OnceLock<Arc<DepthImage>>,
-    depth: OnceLock<Arc<DepthImage>>,
-    /// Segmented images by what may hide the object and by how many times smaller they are.
-    segmented: Mutex<BTreeMap<(Occluders, usize), Arc<Target>>>,
-    /// Root mean square of the colors under the mask.
-    brightness: OnceLock<f64>,
-    /// Regions by mask and colors.
-    regions: OnceLock<(ForegroundSettings, Arc<RegionEvidence>)>,
-    /// Regions that were found otherwise.
-    given_regions: Option<Arc<RegionEvidence>>,
-    /// What renders, if not the processor at hand.
-    backend: Option<Arc<dyn Backend>>,
-    /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
-    focus: Option<[Range<usize>; 2]>,
-    /// What other cameras saw of the object.
-    views: Vec<CameraView<'a>>,
+/// A hand, its measured pose and joint positions, and its touch. Other bodies of a frame, tables, objects and further hands, are parts of it.
+#[derive(Clone, Debug)]
+pub struct HandMeasurement {
+    /// Kinematics, shape and skin.
+    pub hand: Arc<Hand>,
+    /// Hand base coordinates → camera coordinates \[m\].
+    pub t_cam_hand: Isometry3<f64>,
+    /// Joint positions in the order of the robot's joints \[rad\].
+    pub joints: Vec<f64>,
+    /// Force of the object on each taxel, in the taxel's link frame \[N\], or [`UNKNOWN_FORCE`](Self::UNKNOWN_FORCE); empty without a skin.
+    pub forces: Vec<Vector3<f64>>,
+    /// What sensors say that measure no forces.
+    pub touch: Vec<TouchReading>,
+    /// Standard deviations of `t_cam_hand` at the object's place in each direction, and about each axis \[m, rad\], where they are known.
+    pub pose_sigmas: [Option<f64>; 2],
+    /// Standard deviations of joint positions where they are known \[rad or m\], in the order of the joints; an empty list for none. The others are as
+    /// accurate as the estimator's settings state.
+    pub joint_sigmas: Vec<Option<f64>>,
 }
 
-/// What another camera saw of the object.
-pub struct CameraView<'a> {
-    /// Which of the observation's [`views`](Observation::views) it is.
-    pub index: usize,
+impl HandMeasurement {
+    /// Hand without touch, its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
+    pub fn new(hand: Arc<Hand>, t_cam_hand: Isometry3<f64>, joints: Vec<f64>) -> Self {
+        let (forces, touch, joint_sigmas) = (Vec::new(), Vec::new(), Vec::new());
+        Self { hand, t_cam_hand, joints, forces, touch, pose_sigmas: [None; 2], joint_sigmas }
+    }
+
+    /// The same with the force of the object on each taxel, in its link's frame \[N\].
+    pub fn with_forces(self, forces: Vec<Vector3<f64>>) -> Self {
+        Self { forces, ..self }
+    }
+
+    /// The same with what sensors say that measure no forces.
+    pub fn with_touch(self, touch: Vec<TouchReading>) -> Self {
+        Self { touch, ..self }
+    }
+
+    /// The force on a taxel of which nothing is known, as on a dead one: it is no evidence of anything.
+    pub const UNKNOWN_FORCE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
+
+    /// Whether nothing is known of the force on a taxel. A force that is a number in some axes only is broken.
+    pub(crate) fn is_unknown(force: &Vector3<f64>) -> bool {
+        force.iter().all(|f| f.is_nan())
+    }
+}
+
+/// Images of one moment, with the hand, its touch and gravity where they are known, all in the camera frame.
+///
+/// ```
+/// use prehend_refine::Frame;
+/// use prehend_render::{Camera, DepthImage, Mask};
+///
+/// let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
+/// let frame = Frame::new(camera).depth(DepthImage::filled(640, 480, 0.6)).mask(Mask::filled(640, 480, true));
+/// assert!(frame.hand.is_none());
+/// ```
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Intrinsics.
+    pub camera: Camera,
+    /// Color image.
+    pub color: RgbImage,
+    /// Depth image \[m\], 0 where missing.
+    pub depth: DepthImage,
+    /// Pixels on the visible part of the object.
+    pub mask: Mask,
+    /// Gravitational acceleration \[m/s²\], where known.
+    pub gravity: Option<Vector3<f64>>,
+    /// The hand, where known.
+    pub hand: Option<HandMeasurement>,
+    /// What other cameras saw at the same moment.
+    pub views: Vec<AdditionalView>,
+}
+
+/// What another camera saw.
+#[derive(Clone, Debug)]
+pub struct AdditionalView {
+    /// Its coordinates → those of the first camera \[m\].
+    t_cam_view: Isometry3<f64>,
+    /// In its own frame, with the hand there, and nothing of what that feels.
+    observation: Frame,
+}
+
+impl AdditionalView {
     /// The first camera's coordinates → its own \[m\].
-    pub t_view_cam: Isometry3<f64>,
-    /// What it saw, in its own coordinates.
-    pub frame: Frame<'a>,
-}
+    pub fn t_view_cam(&self) -> Isometry3<f64> {
+        self.t_cam_view.inverse()
+    }
 
-/// What may hide the object in the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Occluders {
-    /// The hand, where its pose and joints say that it is.
-    Hand,
-    /// The hand, and what depth shows nearer beside the mask.
-    Measured,
-    /// Anything wherever the mask is not set: nothing is compared there.
-    Unmasked,
-}
+    /// What it saw, in its own frame.
+    pub fn observation(&self) -> &Frame {
+        &self.observation
+    }
 
-/// The object in an image, with what may hide it.
-pub(crate) struct Segmented {
-    pub(crate) target: Arc<Target>,
-    /// Root mean square of the colors under the mask.
-    pub(crate) brightness: f64,
-}
-
-/// Within how many pixels of the border of a mask colors are those of object and others mixed, and masks are shrunk or grown.
-pub(crate) const MASK_MARGIN: usize = 4;
-
-/// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
-/// object itself, where the mask falls short.
-const IN_FRONT: f32 = 10e-3;
-
-impl<'a> Frame<'a> {
-    /// `object` as `observation` shows it; without a hand there, nothing is known to hide the object.
-    ///
-    /// # Errors
-    /// If an image has not the camera's size, the mask is empty, or there is not one joint position a joint.
-    pub fn new(observation: &'a Observation, object: &'a Arc<Object>) -> Result<Self, RefineError> {
-        observation.require_sizes()?;
-        if observation.mask.count() == 0 {
-            return Err(RefineError::EmptyMask);
-        }
-        if let Some(measured) = &observation.hand {
-            measured.hand.check_joints(&measured.joints)?;
-        }
-        let seeing = observation.views.iter().enumerate();
-        let seeing = seeing.filter(|(_, view)| view.observation().mask.count() > 0);
-        let views = seeing.map(|(index, view)| {
-            let frame = Self::new(view.observation(), object)?;
-            Ok(CameraView { index, t_view_cam: view.t_view_cam(), frame })
+    /// Takes over where the hand is.
+    fn place(&mut self, hand: Option<&HandMeasurement>) {
+        let t_view_cam = self.t_view_cam();
+        self.observation.hand = hand.map(|hand| HandMeasurement {
+            pose_sigmas: hand.pose_sigmas,
+            joint_sigmas: hand.joint_sigmas.clone(),
+            ..hand.hand.measured(t_view_cam * hand.t_cam_hand, hand.joints.clone())
         });
-        Ok(Self {
-            views: views.collect::<Result<_, RefineError>>()?,
-            observation,
-            object,
-            hand_depth: OnceLock::new(),
-            depth: OnceLock::new(),
-            segmented: Mutex::default(),
-            brightness: OnceLock::new(),
-            regions: OnceLock::new(),
-            given_regions: None,
-            backend: None,
-            focus: None,
-        })
-    }
-
-    /// The frame with another model of the object.
-    ///
-    /// # Errors
-    /// Those of [`Self::new`].
-    pub(crate) fn of_object<'b>(
-        &'b self,
-        object: &'b Arc<Object>,
-    ) -> Result<Frame<'b>, RefineError> {
-        let mut frame = Frame::new(self.observation, object)?;
-        frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
-        frame.given_regions.clone_from(&self.given_regions);
-        frame.backend.clone_from(&self.backend);
-        Ok(frame)
-    }
-
-    /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures
-    /// there, all hypotheses of a call at once. What it fails to answer, the processor does; a device
-    /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
-    /// must not wait for each other.
-    pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
-        let of_view = |view: CameraView<'a>| {
-            let frame = view.frame.with_backend(Arc::clone(&backend));
-            CameraView { frame, ..view }
-        };
-        let views = self.views.into_iter().map(of_view).collect();
-        // The processor needs no sessions.
-        Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), views, ..self }
-    }
-
-    /// What renders, if not the processor at hand.
-    pub(crate) fn backend(&self) -> Option<&Arc<dyn Backend>> {
-        self.backend.as_ref()
-    }
-
-    /// The same with the depth image of the hand, which is known already \[m\].
-    pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
-        Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
-    }
-
-    /// The same with a copy of the measured depth, which is there already \[m\].
-    pub(crate) fn with_depth(self, depth: &Arc<DepthImage>) -> Self {
-        Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
-    }
-
-    /// Frame whose regions are not those of its mask and its own colors.
-    pub(crate) fn with_regions(self, regions: &Arc<RegionEvidence>) -> Self {
-        Self { given_regions: Some(Arc::clone(regions)), ..self }
-    }
-
-    /// The same of an object that is nowhere but in these columns and rows.
-    pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
-        Self { focus: Some(focus), ..self }
-    }
-
-    /// What other cameras saw of the object: those with a mask of it.
-    pub fn views(&self) -> &[CameraView<'a>] {
-        &self.views
-    }
-
-    /// What was sensed.
-    pub fn observation(&self) -> &'a Observation {
-        self.observation
-    }
-
-    /// The object whose pose is sought.
-    pub fn object(&self) -> &'a Arc<Object> {
-        self.object
-    }
-
-    /// The hand, its pose and touch, where known.
-    pub fn hand(&self) -> Option<&'a HandMeasurement> {
-        self.observation.hand.as_ref()
-    }
-
-    /// The hand, which `factor` needs.
-    ///
-    /// # Errors
-    /// [`RefineError::Missing`].
-    pub fn require_hand(&self, factor: &'static str) -> Result<&'a HandMeasurement, RefineError> {
-        self.hand().ok_or(RefineError::Missing { what: "hand", factor })
-    }
-
-    /// Depth as measured \[m\], 0 where missing.
-    pub fn depth(&self) -> &Arc<DepthImage> {
-        self.depth.get_or_init(|| Arc::new(self.observation.depth.clone()))
-    }
-
-    /// Depth image of the hand alone \[m\], 0 where it is not.
-    pub fn hand_depth(&self) -> &Arc<DepthImage> {
-        self.hand_depth.get_or_init(|| Arc::new(hand_depth(&self.observation.camera, self.hand())))
-    }
-
-    /// Log-likelihood ratio of object and others at each pixel \[nat\]: those given, or else by the mask, and by colors if these `count`.
-    ///
-    /// # Errors
-    /// [`RefineError::EmptyMask`].
-    pub(crate) fn regions(
-        &self,
-        count: bool,
-        settings: &ForegroundSettings,
-    ) -> Result<Arc<RegionEvidence>, RefineError> {
-        let known = self.regions.get().filter(|(of, _)| count && of == settings);
-        if let Some(known) = self.given_regions.as_ref().or(known.map(|(_, known)| known)) {
-            return Ok(Arc::clone(known));
-        }
-        let Observation { color, mask, .. } = self.observation;
-        let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask, settings);
-        let made = Arc::new(made.ok_or(RefineError::EmptyMask)?);
-        if count {
-            self.regions.get_or_init(|| (*settings, Arc::clone(&made)));
-        }
-        Ok(made)
-    }
-
-    /// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.
-    ///
-    /// # Errors
-    /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
-    pub(crate) fn masked_depths(
-        &self,
-        limit: usize,
-    ) -> Result<Vec<(usize, usize, f64)>, RefineError> {
-        let Observation { depth, mask, .. } = self.observation;
-        let at = |x: usize, y: usize| {
-            let z = f64::from(depth.get(x, y)?);
-            (mask.get(x, y)? && z > 0.0).then_some((x, y, z))
-        };
-        let step = ((mask.count() as f64 / limit.max(1) as f64).sqrt().ceil() as usize).max(1);
-        let depths: Vec<_> = (0..depth.height())
-            .step_by(step)
-            .flat_map(|y| (0..depth.width()).step_by(step).filter_map(move |x| at(x, y)))
-            .collect();
-        if depths.is_empty() { Err(RefineError::NoDepth) } else { Ok(depths) }
-    }
-
-    /// The places of measured depths within the mask in the camera frame \[m\].
-    ///
-    /// # Errors
-    /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
-    pub fn masked_points(&self, limit: usize) -> Result<Vec<Point3<f64>>, RefineError> {
-        let camera = &self.observation.camera;
-        let depths = self.masked_depths(limit)?;
-        Ok(depths.into_iter().map(|(x, y, z)| camera.unproject(x as f64, y as f64, z)).collect())
-    }
-
-    /// The segmented image, `factor` times smaller.
-    ///
-    /// # Errors
-    /// If nothing of the mask is left.
-    pub(crate) fn segmented(
-        &self,
-        occluders: Occluders,
-        factor: usize,
-    ) -> Result<Segmented, RefineError> {
-        let fault = |error: TargetError| RefineError::Images(error.to_string());
-        let Observation { camera, color, mask, .. } = self.observation;
-        let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
-        let target = match images.entry((occluders, factor)) {
-            Entry::Occupied(known) => Arc::clone(known.get()),
-            Entry::Vacant(unknown) => {
-                let factor = factor.clamp(1, camera.width.min(camera.height));
-                let occluder = match occluders {
-                    Occluders::Hand if factor == 1 => (**self.hand_depth()).clone(),
-                    Occluders::Hand => self.hand_depth().downsampled(factor),
-                    Occluders::Measured => self.measured_occluder(factor),
-                    Occluders::Unmasked => self.unmasked_occluder(factor),
-                };
-                let target = Target::reduced(*camera, color, mask, factor);
-                let target = target.and_then(|target| target.with_occluder(occluder));
-                Arc::clone(unknown.insert(Arc::new(target.map_err(fault)?)))
-            }
-        };
-        let brightness = *self.brightness.get_or_init(|| brightness(self.observation));
-        Ok(Segmented { target, brightness })
-    }
-
-    /// Depth of the hand, and of something just before the camera where the mask is not set; `factor` times smaller.
-    fn unmasked_occluder(&self, factor: usize) -> DepthImage {
-        let mask = &self.observation.mask;
-        let (width, height) = (mask.width(), mask.height());
-        let (hand, inner) = (self.hand_depth().pixels(), eroded(width, mask.pixels(), MASK_MARGIN));
-        let nearest = |at: usize| if inner[at] { hand[at] } else { f32::MIN_POSITIVE };
-        DepthImage::downsampled_of(width, height, factor, [0..width, 0..height], nearest)
-    }
-
-    /// Depth of the hand and of what was measured beside the mask, whichever is nearer; `factor` times smaller.
-    fn measured_occluder(&self, factor: usize) -> DepthImage {
-        let Observation { depth, mask, .. } = self.observation;
-        let (width, height) = (depth.width(), depth.height());
-        let within = self.focus.clone().unwrap_or([0..width, 0..height]);
-        let (hand, depth, mask) = (self.hand_depth().pixels(), depth.pixels(), mask.pixels());
-        let nearest = |at: usize| {
-            let (hand, measured) = (hand[at], depth[at]);
-            let front = measured + IN_FRONT;
-            let nearer = hand <= 0.0 || front < hand;
-            let seen = !mask[at] && measured.is_finite() && measured > 0.0;
-            if seen && nearer { front } else { hand }
-        };
-        DepthImage::downsampled_of(width, height, factor, within, nearest)
     }
 }
 
-/// Pixels of an image of `width` columns whose neighbors up to `reach` columns and rows away are all set.
-pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
-    let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
-    let height = set.len() / width.max(1);
-    for y in 0..height {
-        let mut run = 0;
-        for x in 0..width {
-            run = if set[y * width + x] { run + 1 } else { 0 };
-            if run > 2 * reach {
-                rows[y * width + x - reach] = true;
+impl Frame {
+    /// Frame of `camera` without images: black, without depth, and with an empty mask.
+    pub fn new(camera: Camera) -> Self {
+        let (width, height) = (camera.width, camera.height);
+        Self {
+            camera,
+            color: RgbImage::filled(width, height, [0.0; 3]),
+            depth: DepthImage::filled(width, height, 0.0),
+            mask: Mask::filled(width, height, false),
+            gravity: None,
+            hand: None,
+            views: Vec::new(),
+        }
+    }
+
+    /// With a color image.
+    pub fn color(self, color: RgbImage) -> Self {
+        Self { color, ..self }
+    }
+
+    /// With a depth image \[m\], 0 where missing.
+    pub fn depth(self, depth: DepthImage) -> Self {
+        Self { depth, ..self }
+    }
+
+    /// With the visible pixels of the object.
+    pub fn mask(self, mask: Mask) -> Self {
+        Self { mask, ..self }
+    }
+
+    /// With a hand.
+    pub fn hand(self, hand: HandMeasurement) -> Self {
+        let mut frame = Self { hand: Some(hand), ..self };
+        frame.place_views();
+        frame
+    }
+
+    /// With gravitational acceleration in the camera frame \[m/s²\].
+    pub fn gravity(self, gravity: Vector3<f64>) -> Self {
+        Self { gravity: Some(gravity), ..self }
+    }
+
+    /// True of a mask that tells which pixels show the object, and not only about where it is: it is neither empty nor a box.
+    pub(crate) fn is_segmented(&self) -> bool {
+        self.mask.count() > 0 && !self.mask.is_box()
+    }
+
+    /// With what another camera saw at the same moment, whose coordinates `t_cam_view` takes to those of this one \[m\]. Hand and gravity are this one's.
+    pub fn with_view(mut self, view: Self, t_cam_view: Isometry3<f64>) -> Self {
+        let observation = Self { gravity: None, views: Vec::new(), ..view };
+        self.views.push(AdditionalView { t_cam_view, observation });
+        self.place_views();
+        self
+    }
+
+    /// Tells the other cameras where the hand is. To be called when [`hand`](Self::hand) has changed.
+    pub fn place_views(&mut self) {
+        let Self { hand, views, .. } = self;
+        views.iter_mut().for_each(|view| view.place(hand.as_ref()));
+    }
+
+    /// Makes images behind a lens those of a pinhole.
+    ///
+    /// # Errors
+    /// If one has another size than `remap` is for.
+    pub(crate) fn undistort(&mut self, remap: &Remap) -> Result<(), DistortionError> {
+        self.color = remap.rgb(&self.color)?;
+        self.depth = remap.depth(&self.depth)?;
+        self.mask = remap.mask(&self.mask)?;
+        Ok(())
+    }
+
+    /// Refuses images that have not the camera's size: the first of color, depth and mask, and what is wrong.
+    pub(crate) fn check_sizes(&self) -> Result<(), (&'static str, String)> {
+        let expected = (self.camera.width, self.camera.height);
+        let sizes = [
+            ("color image", self.color.width(), self.color.height()),
+            ("depth image", self.depth.width(), self.depth.height()),
+            ("mask", self.mask.width(), self.mask.height()),
+        ];
+        for (image, width, height) in sizes {
+            if (width, height) != expected {
+                let (w, h) = expected;
+                return Err((image, format!("{width}x{height} pixels, the camera has {w}x{h}")));
             }
         }
+        Ok(())
     }
-    let mut runs = vec![0; width];
-    for y in 0..height {
-        for (x, run) in runs.iter_mut().enumerate() {
-            *run = if rows[y * width + x] { *run + 1 } else { 0 };
-            if *run > 2 * reach {
-                all[(y - reach) * width + x] = true;
-            }
-        }
+
+    /// The same as an error of a refinement.
+    ///
+    /// # Errors
+    /// [`RefineError::Images`].
+    pub(crate) fn require_sizes(&self) -> Result<(), RefineError> {
+        self.check_sizes()
+            .map_err(|(image, problem)| RefineError::Images(format!("the {image} has {problem}")))
     }
-    all
-}
 
-/// Root mean square of the colors under the mask; never zero.
-fn brightness(observation: &Observation) -> f64 {
-    let Observation { color, mask, .. } = observation;
-    let [left, top, width, height] = mask.bounds().unwrap_or_default();
-    let line = |row: usize| row * mask.width() + left..row * mask.width() + left + width;
-    let pixels = (top..top + height)
-        .flat_map(|row| color.pixels()[line(row)].iter().zip(&mask.pixels()[line(row)]));
-    let (sum, count) = pixels
-        .filter(|(_, m)| **m)
-        .flat_map(|(c, _)| c)
-        .fold((0.0, 0.0), |(s, n), &v| (s + f64::from(v).powi(2), n + 1.0));
-    (sum / f64::max(count, 1.0)).sqrt().max(0.02)
-}
+    /// Whether the picture shows anything under the mask: one color everywhere is what a camera gives that failed.
+    pub(crate) fn has_colors(&self) -> bool {
+        let masked = self.color.pixels().iter().zip(self.mask.pixels()).filter(|(_, m)| **m);
+        let mut colors = masked.map(|(color, _)| color);
+        let first = colors.next();
+        colors.any(|color| Some(color) != first)
+    }
 
-/// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
-pub(crate) fn hand_depth(camera: &Camera, hand: Option<&HandMeasurement>) -> DepthImage {
-    let mut depth = DepthImage::default();
-    draw_hand_depth(&mut depth, camera, hand);
-    depth
-}
-
-/// The same into an image that is there already.
-pub(crate) fn draw_hand_depth(
-    depth: &mut DepthImage,
-    camera: &Camera,
-    hand: Option<&HandMeasurement>,
-) {
-    match hand {
-        Some(HandMeasurement { hand, t_cam_hand, joints, .. }) => {
-            draw_depth(depth, camera, &hand.render_bodies(t_cam_hand, joints));
-        }
-        None => depth.refill(camera.width, camera.height, 0.0),
+    /// Depth was measured at any pixel.
+    pub(crate) fn has_depth(&self) -> bool {
+        self.depth.pixels().iter().any(|z| *z > 0.0)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use prehend_render::{Mask, RgbImage};
+/// Magnitudes of gravity on solid ground, from small moons up, with room to spare \[m/s²\].
+const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
 
-    use super::*;
-    use crate::scene::default_scene;
-
-    #[test]
-    fn images_of_another_size_and_an_empty_mask_are_named() {
-        let scene = default_scene(1).unwrap();
-        let refused = |change: &dyn Fn(&mut Observation)| {
-            let mut observation = scene.observation.clone();
-            change(&mut observation);
-            Frame::new(&observation, &scene.object).map(|_| ()).unwrap_err().to_string()
-        };
-        let color = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
-        assert!(color.contains("the color image has 640x479 pixels, the camera has 640x480"));
-        let depth = refused(&|o| o.depth = DepthImage::filled(320, 480, 1.0));
-        assert!(depth.contains("the depth image has 320x480 pixels"), "{depth}");
-        let mask = refused(&|o| o.mask = Mask::filled(1, 1, true));
-        assert!(mask.contains("the mask has 1x1 pixels"), "{mask}");
-        let empty = refused(&|o| o.mask = Mask::filled(640, 480, false));
-        assert_eq!(empty, RefineError::EmptyMask.to_string());
+/// Refuses a gravity that cannot be in m/s² or that presses nothing into the hand.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
+    let norm = gravity.norm();
+    if PLAUSIBLE_GRAVITY.contains(&norm) {
+        return Ok(());
     }
-
-    #[test]
-    fn erosion_leaves_what_is_surrounded() {
-        let square = |k: usize| (2..7).contains(&(k % 10)) && (1..6).contains(&(k / 10));
-        let set: Vec<bool> = (0..80).map(square).collect();
-        let left = eroded(10, &set, 2);
-        let kept: Vec<usize> = (0..80).filter(|k| left[*k]).collect();
-        assert_eq!(kept, [34]);
-    }
+    Err(format!("{norm:.3e} m/s² is no gravity"))
 }

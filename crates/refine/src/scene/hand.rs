@@ -158,14 +158,14 @@ impl fmt::Debug for Hand {
 mod tests {
     use super::*;
     use crate::check::check_frame;
-    use crate::scene::{Frame, default_scene};
+    use crate::scene::{PreparedFrame, default_scene};
 
     #[test]
     fn a_wrong_number_of_joints_is_an_error() {
         let scene = default_scene(1).unwrap();
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().joints.pop();
-        let refused = Frame::new(&observation, &scene.object).map(|_| ()).unwrap_err();
+        let refused = PreparedFrame::new(&observation, &scene.object).map(|_| ()).unwrap_err();
         let expected = RobotError::JointCount { given: 15, expected: 16 }.to_string();
         assert_eq!(refused.to_string(), expected);
         let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);

@@ -1,4 +1,4 @@
-//! What there is: one [`Observation`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
+//! What there is: one [`Frame`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
 
 mod calibration;
 mod example;
@@ -6,7 +6,7 @@ mod frame;
 mod gaussian_process;
 mod hand;
 mod object;
-mod observation;
+mod prepared_frame;
 mod region;
 mod remap_cache;
 mod surface_deviation;
@@ -16,12 +16,12 @@ mod view;
 
 pub use calibration::{CameraCalibrationError, ViewCalibrationError};
 pub use example::{Scene, Sequence, SequenceFrame, default_scene, default_sequence};
-pub use frame::{CameraView, Frame, Occluders};
-pub(crate) use frame::{MASK_MARGIN, draw_hand_depth, eroded, hand_depth};
+pub use frame::{AdditionalView, Frame, HandMeasurement, check_gravity};
 pub(crate) use gaussian_process::{InducingPoints, farthest_points, squared_exponential};
 pub use hand::Hand;
 pub use object::{Inertial, Object, StatedSize};
-pub use observation::{AdditionalView, HandMeasurement, Observation, check_gravity};
+pub use prepared_frame::{CameraView, Occluders, PreparedFrame};
+pub(crate) use prepared_frame::{MASK_MARGIN, draw_hand_depth, eroded, hand_depth};
 pub use region::ForegroundSettings;
 pub(crate) use region::{ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index};
 pub(crate) use remap_cache::RemapCache;

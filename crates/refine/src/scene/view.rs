@@ -3,13 +3,13 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, Mask, depth_map};
 
-use super::frame::hand_depth;
-use super::{Object, Observation};
+use super::prepared_frame::hand_depth;
+use super::{Frame, Object};
 use crate::error::RefineError;
 
 /// What should be seen, and what is.
 pub(crate) struct View<'a> {
-    pub(crate) observation: &'a Observation,
+    pub(crate) observation: &'a Frame,
     /// Depth of the whole object at the pose \[m\], 0 where it is not.
     object: DepthImage,
     /// Depth of the hand \[m\], 0 where it is not or not known.
@@ -34,7 +34,7 @@ impl<'a> View<'a> {
     /// With the object at `t_cam_object` before `camera`, that of the observation or a better one of its size, and the depth image of
     /// the hand \[m\] where it is known. All images must have the camera's size.
     pub(crate) fn new(
-        observation: &'a Observation,
+        observation: &'a Frame,
         camera: &Camera,
         object: &Object,
         hand: Option<DepthImage>,
@@ -54,7 +54,7 @@ impl<'a> View<'a> {
     /// # Errors
     /// If an image has not the camera's size, or there is not one joint position a joint.
     pub(crate) fn of_observation(
-        observation: &'a Observation,
+        observation: &'a Frame,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> Result<Self, RefineError> {

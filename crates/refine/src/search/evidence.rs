@@ -8,7 +8,7 @@ use prehend_render::{Camera, DepthImage};
 
 use super::SearchSettings;
 use crate::error::RefineError;
-use crate::scene::{Frame, HandMeasurement, Observation};
+use crate::scene::{Frame, HandMeasurement, PreparedFrame};
 
 /// Everything in the camera frame \[m\].
 pub(super) struct Evidence {
@@ -27,7 +27,10 @@ impl Evidence {
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
-    pub(super) fn new(frame: &Frame<'_>, settings: &SearchSettings) -> Result<Self, RefineError> {
+    pub(super) fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &SearchSettings,
+    ) -> Result<Self, RefineError> {
         let contact_threshold = settings.estimator.tactile.contact_threshold;
         let places = frame.masked_points(settings.normal_points)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
@@ -86,7 +89,7 @@ struct Sight {
 }
 
 impl SightMap {
-    fn new(observation: &Observation, hand: &DepthImage, most_columns: usize) -> Self {
+    fn new(observation: &Frame, hand: &DepthImage, most_columns: usize) -> Self {
         let full = &observation.camera;
         let factor = full.width.div_ceil(most_columns.max(1)).max(1);
         let (width, height) = ((full.width / factor).max(1), (full.height / factor).max(1));
@@ -179,7 +182,7 @@ mod tests {
     #[test]
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
-        let frame = Frame::new(&scene.observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
         let evidence = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
@@ -203,7 +206,7 @@ mod tests {
         // A taxel of whose force nothing is known is in neither list.
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let unfelt = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();

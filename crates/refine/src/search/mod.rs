@@ -18,7 +18,7 @@ use self::evidence::Evidence;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::{Frame, Object};
+use crate::scene::{Object, PreparedFrame};
 use crate::strategy::problem_of;
 
 /// A pose that a search ends with.
@@ -78,7 +78,7 @@ impl PoseSearch {
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
-    pub fn run(&self, frame: &Frame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
+    pub fn run(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
         let Self { object, lattice, settings } = self;
         let evidence = &Evidence::new(frame, settings)?;
         let rough = CoarseScorer { object, lattice, evidence, settings };
@@ -131,7 +131,11 @@ impl PoseSearch {
     }
 
     /// Stage 3.
-    fn descend(&self, frame: &Frame<'_>, turned: &[Scored]) -> Result<Vec<Scored>, RefineError> {
+    fn descend(
+        &self,
+        frame: &PreparedFrame<'_>,
+        turned: &[Scored],
+    ) -> Result<Vec<Scored>, RefineError> {
         let mut settings = self.settings.estimator.for_frame(frame, false);
         settings.nuisances.clear();
         let states = |poses: &[Scored]| -> Vec<State> {

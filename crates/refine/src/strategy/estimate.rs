@@ -8,7 +8,7 @@ use super::{Iteration, Posterior, Trace};
 use crate::error::RefineError;
 use crate::factor::{RenderingFactor, RenderingSettings};
 use crate::problem::{Factor, State};
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 
 /// A way from an initial pose to a refined one.
 pub trait Strategy: Send + Sync {
@@ -18,7 +18,7 @@ pub trait Strategy: Send + Sync {
     /// If the frame lacks what the strategy or a factor needs, or a setting is out of range.
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError>;
@@ -92,7 +92,7 @@ impl<'a, 'b> Recorder<'a, 'b> {
     /// # Errors
     /// If the images do not fit the camera.
     pub(crate) fn judge(
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         checkpoint: bool,
         settings: &RenderingSettings,
     ) -> Result<Option<RenderingFactor>, RefineError> {

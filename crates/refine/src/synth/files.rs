@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 use super::annotation;
 use crate::data::AssetError;
 use crate::data::bop::{self, DatasetError, ResultRow, create_folder, write_atomically};
-use crate::scene::{Inertial, Observation};
+use crate::scene::{Frame, Inertial};
 
 /// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
 pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
@@ -46,7 +46,7 @@ pub(super) const FRAME_FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib
 /// One frame: what is measured, and what is true.
 pub(super) struct Shot {
     /// The observation as the estimator gets it, but for the lens.
-    pub(super) told: Observation,
+    pub(super) told: Frame,
     /// The lens that the images are seen through, if it is no pinhole.
     pub(super) lens: Option<Distortion>,
     /// Object → camera.

@@ -11,7 +11,7 @@ use super::settings::TrackerSettings;
 use super::sight::Sight;
 use super::sums::Sums;
 use crate::scene::{
-    ColorRatios, ForegroundSettings, MaskBorder, Object, Observation, RegionColors, RegionEvidence,
+    ColorRatios, ForegroundSettings, Frame, MaskBorder, Object, RegionColors, RegionEvidence,
     color_index,
 };
 
@@ -292,7 +292,7 @@ impl Appearance {
         if center.z <= object.radius || !self.ratios.are_known() {
             return None;
         }
-        let Observation { camera, color, .. } = &sight.observation;
+        let Frame { camera, color, .. } = &sight.observation;
         let stride = self.stride;
         let (columns, rows) = (camera.width / stride, camera.height / stride);
         if columns == 0 {

@@ -18,7 +18,7 @@ use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
-use crate::scene::{Frame, Observation, RegionEvidence};
+use crate::scene::{Frame, PreparedFrame, RegionEvidence};
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
 
@@ -86,9 +86,9 @@ impl Tracker {
     /// A frame with the pixels that show the object told by its pose, about `t_cam_object` \[m\], depth and colors; and its regions, where no depth is measured.
     pub(crate) fn segmented(
         mut self,
-        observation: Observation,
+        observation: Frame,
         t_cam_object: &Isometry3<f64>,
-    ) -> Result<(Observation, Option<Arc<RegionEvidence>>), RefineError> {
+    ) -> Result<(Frame, Option<Arc<RegionEvidence>>), RefineError> {
         observation.require_sizes()?;
         self.start_from(t_cam_object);
         let mut sight = Sight::new(observation, Images::default());
@@ -128,7 +128,7 @@ impl Tracker {
     /// tracked are, so that costs compare.
     fn estimate(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         alternatives: Option<Vec<Isometry3<f64>>>,
     ) -> Result<(Solved, Posterior), RefineError> {
@@ -148,7 +148,7 @@ impl Tracker {
     /// The best pose that a search finds, and the others \[m\].
     fn search(
         &mut self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
     ) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
         let search = match &mut self.search {
             Some(search) => search,

@@ -56,7 +56,7 @@ use crate::error::{RefineError, guard};
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
-use crate::scene::{Frame, Hand, HandMeasurement, Object, Observation};
+use crate::scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
 use crate::search::PoseSearch;
 use crate::strategy::{
     Fit, FusedSettings, Inconsistency, Posterior, chi_square_z, problem_of, surface_patches,
@@ -153,7 +153,7 @@ impl Tracker {
         })
     }
 
-    /// With all frames rendered on another device: [`Frame::with_backend`].
+    /// With all frames rendered on another device: [`PreparedFrame::with_backend`].
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
         Self { backend: Some(backend), ..self }
     }
@@ -181,11 +181,7 @@ impl Tracker {
     ///
     /// # Errors
     /// See there.
-    pub fn track(
-        &mut self,
-        observation: &Observation,
-        time: Duration,
-    ) -> Result<Tracked, RefineError> {
+    pub fn track(&mut self, observation: &Frame, time: Duration) -> Result<Tracked, RefineError> {
         self.push(observation.clone(), time)
     }
 
@@ -198,19 +194,11 @@ impl Tracker {
     /// # Errors
     /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with;
     /// [`RefineError::Panicked`] for a fault of the program or of a factor. The tracker is then as it was before.
-    pub fn push(
-        &mut self,
-        observation: Observation,
-        time: Duration,
-    ) -> Result<Tracked, RefineError> {
+    pub fn push(&mut self, observation: Frame, time: Duration) -> Result<Tracked, RefineError> {
         guard(|| self.advance(observation, time))
     }
 
-    fn advance(
-        &mut self,
-        observation: Observation,
-        time: Duration,
-    ) -> Result<Tracked, RefineError> {
+    fn advance(&mut self, observation: Frame, time: Duration) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
         observation.require_sizes()?;
         if let Some(HandMeasurement { hand, joints, .. }) = &observation.hand {
@@ -239,7 +227,7 @@ impl Tracker {
     /// Does something with a frame whose hand was checked.
     fn with_sight<T>(
         &mut self,
-        observation: Observation,
+        observation: Frame,
         what: impl FnOnce(&mut Self, &mut Sight) -> T,
     ) -> T {
         let images = mem::take(&mut self.images);
@@ -375,8 +363,9 @@ impl Tracker {
         &self,
         sight: &'a Sight,
         object: &'a Arc<Object>,
-    ) -> Result<Frame<'a>, RefineError> {
-        let mut frame = Frame::new(&sight.observation, object)?.with_hand_depth(&sight.hand_depth);
+    ) -> Result<PreparedFrame<'a>, RefineError> {
+        let mut frame =
+            PreparedFrame::new(&sight.observation, object)?.with_hand_depth(&sight.hand_depth);
         frame = frame.with_depth(&sight.depth);
         if let Some(focus) = &sight.focus {
             frame = frame.with_focus(focus.clone());
@@ -393,7 +382,7 @@ impl Tracker {
     /// The problem of a frame, and its prior, which is the prediction.
     fn prepare(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         prediction: &Prediction,
     ) -> Result<(Problem, Arc<GaussianPrior>), RefineError> {
         let Prediction { state, covariance, layout, .. } = prediction;
@@ -408,7 +397,7 @@ impl Tracker {
     /// The problem of the stage of tracking about `initial`.
     fn stage_problem(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         prior: Arc<GaussianPrior>,
     ) -> Result<Problem, RefineError> {

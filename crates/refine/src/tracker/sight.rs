@@ -7,12 +7,12 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 use prehend_render::{DepthImage, Mask};
 
-use crate::scene::{Observation, RegionEvidence, draw_hand_depth};
+use crate::scene::{Frame, RegionEvidence, draw_hand_depth};
 
 /// A frame with its hand, and what shows the object in it as far as that is known.
 pub(super) struct Sight {
     /// With the mask that shows the object, as far as that is known.
-    pub(super) observation: Observation,
+    pub(super) observation: Frame,
     /// The mask that came with it.
     pub(super) given: Mask,
     /// True if that tells which pixels show the object: it is neither empty nor a box.
@@ -39,7 +39,7 @@ pub(super) struct Images {
 
 impl Sight {
     /// Of a hand whose joints were checked.
-    pub(super) fn new(mut observation: Observation, images: Images) -> Self {
+    pub(super) fn new(mut observation: Frame, images: Images) -> Self {
         let Images { mask, mut hand_depth, mut depth } = images;
         let hand = observation.hand.as_ref();
         draw_hand_depth(own(&mut hand_depth), &observation.camera, hand);

@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vecto
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree;
-use prehend_refine::Frame;
+use prehend_refine::PreparedFrame;
 use prehend_refine::baselines::{GradientKind, Heuristic};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
-use prehend_refine::scene::{Hand, Object, Observation};
+use prehend_refine::scene::{Frame, Hand, Object};
 use prehend_render::{Camera, Light, Mask, RenderModel, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">
@@ -59,7 +59,7 @@ impl Setting {
     }
 
     /// What a perfect camera sees; gravity is the robot's −z.
-    fn observation(&self) -> Observation {
+    fn observation(&self) -> Frame {
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             self.robot.render_bodies(&self.t_cam_robot, &self.joints);
         let model = RenderModel::new(&self.object.mesh).unwrap();
@@ -75,10 +75,10 @@ impl Setting {
         for (set, body) in mask.pixels_mut().iter_mut().zip(&seen.object) {
             *set = *body == Some(0);
         }
-        Observation {
+        Frame {
             gravity: Some(self.t_cam_robot.rotation * Vector3::new(0.0, 0.0, -9.81)),
             hand: Some(self.robot.measured(self.t_cam_robot, self.joints.clone())),
-            ..Observation::new(CAMERA, seen.color, seen.depth, mask)
+            ..Frame::new(CAMERA).color(seen.color).depth(seen.depth).mask(mask)
         }
     }
 
@@ -90,7 +90,7 @@ impl Setting {
         let gradients = [GradientKind::Physics, GradientKind::Rendering, GradientKind::Depth];
         let method = Heuristic { checkpoint: true, ..Heuristic::of(&gradients) };
         let observation = self.observation();
-        let frame = Frame::new(&observation, &self.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &self.object).unwrap();
         let pose = *refine(&frame, &initial, &method).unwrap().t_cam_object();
         (pe_cm(&pose, &truth), oe_deg(&pose, &truth), self.t_cam_robot.inverse() * pose)
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use prehend_refine::Frame;
+use prehend_refine::PreparedFrame;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, GroundTruth};
 use prehend_refine::data::find_targets;
@@ -26,7 +26,7 @@ fn half_of_the_inhand_objects_are_found_without_a_hand() {
         let frame = dataset.frame(target.scene_id, target.im_id).unwrap();
         let observation = assets.observation(&frame, target.instance, &[]).unwrap();
         let start = Instant::now();
-        let seen = Frame::new(&observation, &object).unwrap();
+        let seen = PreparedFrame::new(&observation, &object).unwrap();
         let search = PoseSearch::new(Arc::clone(&object), SearchSettings::default()).unwrap();
         let pose = search.run(&seen).unwrap()[0].t_cam_object;
         let seconds = start.elapsed().as_secs_f64();

@@ -8,20 +8,20 @@ use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, read_results};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
-use prehend_refine::scene::{Frame, Object, Observation};
+use prehend_refine::scene::{Frame, Object, PreparedFrame};
 use prehend_refine::strategy::Fused;
 use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 
 use crate::data;
 
 /// The frames, the cube, and a pose found by a search.
-fn load() -> (Vec<Observation>, Arc<Object>, Isometry3<f64>) {
+fn load() -> (Vec<Frame>, Arc<Object>, Isometry3<f64>) {
     let root = data("real/visp_cube");
     let dataset = Dataset::open(&root).unwrap();
     let mut assets = Assets::new(&dataset, 0).with_optional_masks();
     let rows = read_results(&root.join("init.csv")).unwrap().rows;
     let object = assets.object(rows[0].obj_id).unwrap();
-    let mut frames: Vec<Observation> = (0..10)
+    let mut frames: Vec<Frame> = (0..10)
         .map(|k| assets.observation(&dataset.frame(1, k).unwrap(), 0, &[]).unwrap())
         .collect();
     let mask = frames[0].mask.clone();
@@ -58,7 +58,7 @@ fn what_stands_still_is_refined_and_tracked_to_one_pose() {
         let start = off(&found, by, turn);
         let mut refined = Vec::new();
         for observation in &frames {
-            let frame = Frame::new(observation, &object).unwrap();
+            let frame = PreparedFrame::new(observation, &object).unwrap();
             let estimate = refine(&frame, &start, &Fused::default()).unwrap();
             refined.push((*estimate.t_cam_object(), estimate.posterior.unwrap().probability()));
         }
@@ -94,7 +94,7 @@ fn what_stands_still_is_tracked_on_color_alone_without_a_mask() {
     for (by, turn) in [([0.0; 3], [0.0; 3]), ([5e-3, -4e-3, 6e-3], [0.05, -0.05, 0.06])] {
         let mut tracker = Tracker::new(Arc::clone(&object), TrackerSettings::default()).unwrap();
         tracker.start_from(&off(&found, by, turn));
-        let track = |(k, frame): (usize, &Observation)| {
+        let track = |(k, frame): (usize, &Frame)| {
             tracker.track(frame, Duration::from_millis(33 * k as u64)).unwrap()
         };
         let tracked: Vec<_> = frames.iter().enumerate().map(track).collect();

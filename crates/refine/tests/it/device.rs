@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::Isometry3;
 use prehend_refine::baselines::Heuristic;
-use prehend_refine::scene::{Frame, default_scene};
+use prehend_refine::scene::{PreparedFrame, default_scene};
 use prehend_refine::search::{PoseSearch, SearchSettings};
 use prehend_refine::{Method, refine};
 use prehend_render::{
@@ -76,7 +76,7 @@ impl Session for FragileSession {
 /// The pose of the built-in scene that `method` finds, rendered by `backend`.
 fn refined(method: &Method, backend: Option<Arc<dyn Backend>>) -> Isometry3<f64> {
     let scene = default_scene(1).unwrap();
-    let mut frame = Frame::new(&scene.observation, &scene.object).unwrap();
+    let mut frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
     if let Some(backend) = backend {
         frame = frame.with_backend(backend);
     }
@@ -109,7 +109,7 @@ fn hypotheses_go_to_the_device_together() {
     let scene = default_scene(1).unwrap();
     let device = Fragile::default();
     let found = |backend: Option<Arc<dyn Backend>>| {
-        let mut frame = Frame::new(&scene.observation, &scene.object).unwrap();
+        let mut frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
         if let Some(backend) = backend {
             frame = frame.with_backend(backend);
         }

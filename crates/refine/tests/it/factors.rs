@@ -17,18 +17,18 @@ use prehend_refine::factor::{
 };
 use prehend_refine::problem::{Block, NoiseModel, NormalEquations, Problem, Solver, Termination};
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::{Factor, Frame, RefineError, State};
+use prehend_refine::{Factor, PreparedFrame, RefineError, State};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
-fn frame() -> Frame<'static> {
-    Frame::new(&SCENE.observation, &SCENE.object).unwrap()
+fn frame() -> PreparedFrame<'static> {
+    PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap()
 }
 
 /// Twists about the object's center in which a radian counts as much as a tenth of a meter.
 const UNITS: [f64; 6] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0];
 
-fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+fn all(frame: &PreparedFrame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
     let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
     let taxels = TactileSettings { touch, ..TactileSettings::default() };
     Ok(vec![

@@ -22,14 +22,14 @@ use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::symmetry::{ContinuousSymmetry, Symmetries};
 use prehend_refine::tracker::{Recovery, Tracker, TrackerSettings};
-use prehend_refine::{Estimate, Factor, Frame, Method, Observation, RefineError, State, refine};
+use prehend_refine::{Estimate, Factor, Frame, Method, PreparedFrame, RefineError, State, refine};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use proptest::prelude::*;
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 /// Something that a camera or a hand may say.
-type Fault = (&'static str, fn(&mut Observation));
+type Fault = (&'static str, fn(&mut Frame));
 
 const FAULTS: [Fault; 18] = [
     ("as it is", |_| {}),
@@ -55,15 +55,13 @@ const FAULTS: [Fault; 18] = [
     ("no hand", |o| (o.hand, o.gravity) = (None, None)),
     ("a picture of a pixel", |o| {
         let camera = Camera { width: 1, height: 1, cx: 0.0, cy: 0.0, ..o.camera };
-        *o = Observation {
+        *o = Frame {
             gravity: o.gravity,
             hand: o.hand.clone(),
-            ..Observation::new(
-                camera,
-                RgbImage::filled(1, 1, [0.5; 3]),
-                DepthImage::filled(1, 1, 0.5),
-                Mask::filled(1, 1, true),
-            )
+            color: RgbImage::filled(1, 1, [0.5; 3]),
+            depth: DepthImage::filled(1, 1, 0.5),
+            mask: Mask::filled(1, 1, true),
+            ..Frame::new(camera)
         };
     }),
     ("depth of kilometers", |o| o.depth.pixels_mut().fill(1e6)),
@@ -73,7 +71,7 @@ const FAULTS: [Fault; 18] = [
 /// Those that do not keep the search for closest points busy for seconds.
 const QUICK: usize = FAULTS.len() - 2;
 
-fn observation(fault: Fault) -> Observation {
+fn observation(fault: Fault) -> Frame {
     let mut observation = SCENE.observation.clone();
     fault.1(&mut observation);
     observation
@@ -161,7 +159,7 @@ fn places() -> Vec<(&'static str, Isometry3<f64>)> {
 
 type Made = Result<Arc<dyn Factor>, RefineError>;
 
-fn factors(frame: &Frame<'_>, state: &State) -> Vec<Made> {
+fn factors(frame: &PreparedFrame<'_>, state: &State) -> Vec<Made> {
     fn made<F: Factor + 'static>(factor: Result<F, RefineError>) -> Made {
         factor.map(|factor| Arc::new(factor) as _)
     }
@@ -212,7 +210,7 @@ fn of_factor(factor: &dyn Factor, state: &State) -> Vec<f64> {
 fn factors_of_anything_seen_anywhere() {
     for (index, fault) in FAULTS.into_iter().enumerate() {
         let observation = observation(fault);
-        let frame = Frame::new(&observation, &SCENE.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
         // Every place with what is as it is, and one more with each fault.
         let places = places();
         let some = places.iter().enumerate().filter(|(k, _)| index == 0 || k % 7 == index % 7);
@@ -237,7 +235,7 @@ fn methods_of_anything_seen() {
         for mut method in [Method::default(), other] {
             method.set_iterations(1);
             assert_finite(fault.0, || {
-                let frame = Frame::new(&observation, &SCENE.object)?;
+                let frame = PreparedFrame::new(&observation, &SCENE.object)?;
                 if let Method::Fused(fused) = &mut method {
                     fused.alternatives = Some(vec![SCENE.initial; 2]);
                 }
@@ -246,7 +244,7 @@ fn methods_of_anything_seen() {
         }
     }
     let weightless = observation(FAULTS[12]);
-    let frame = Frame::new(&weightless, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&weightless, &SCENE.object).unwrap();
     let refused = refine(&frame, &SCENE.initial, &Method::combined());
     assert!(matches!(refused, Err(RefineError::Gravity { .. })));
 }
@@ -265,7 +263,7 @@ fn searches_of_one_hypothesis() {
     for fault in &FAULTS[..QUICK] {
         let observation = observation(*fault);
         assert_finite(fault.0, || {
-            let frame = Frame::new(&observation, &SCENE.object)?;
+            let frame = PreparedFrame::new(&observation, &SCENE.object)?;
             let found = search.run(&frame)?;
             let of = |f: &PoseCandidate| [of_pose(&f.t_cam_object), vec![f.cost, f.weight]];
             Ok(found.iter().flat_map(of).flatten().collect())

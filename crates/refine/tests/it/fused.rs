@@ -9,23 +9,23 @@ use prehend_refine::factor::ErrorGroup;
 use prehend_refine::problem::{Block, NoiseModel, Rows};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::strategy::{Fused, FusedSettings, Modality, Nuisance, Posterior};
-use prehend_refine::{Factor, Frame, Observation, State, refine};
+use prehend_refine::{Factor, Frame, PreparedFrame, State, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn turned(twist: &[f64; 6]) -> Isometry3<f64> {
-    let bare = Observation { hand: None, ..SCENE.observation.clone() };
-    let frame = Frame::new(&bare, &SCENE.object).unwrap();
+    let bare = Frame { hand: None, ..SCENE.observation.clone() };
+    let frame = PreparedFrame::new(&bare, &SCENE.object).unwrap();
     let state = State::new(&frame, &SCENE.truth).unwrap();
     state.retract(&[Block::ObjectPose], twist).t_cam_object
 }
 
 fn run(
-    observation: &Observation,
+    observation: &Frame,
     start: &Isometry3<f64>,
     settings: FusedSettings,
 ) -> (Isometry3<f64>, Posterior) {
-    let frame = Frame::new(observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(observation, &SCENE.object).unwrap();
     let found = refine(&frame, start, &Fused::new(settings)).unwrap();
     let posterior = found.posterior.unwrap();
     assert_eq!(found.state.t_cam_object, posterior.hypotheses[0].t_cam_object);
@@ -50,7 +50,7 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 fn from_the_back(alternatives: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
     let axis = SCENE.truth.rotation * Vector3::z() * std::f64::consts::PI;
     let back = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
-    let frame = Frame::new(&SCENE.observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap();
     let fused = Fused { alternatives, ..Fused::default() };
     let found = refine(&frame, &back, &fused).unwrap();
     (found.state.t_cam_object, found.posterior.unwrap())
@@ -82,7 +82,7 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
 fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
     let mut observation = SCENE.observation.clone();
     observation.hand = None;
-    let frame = Frame::new(&observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
     let fused = Fused::new(without(Modality::Color)).with_alternatives(vec![]);
     let found = refine(&frame, &turned(&OFF), &fused).unwrap();
     let posterior = found.posterior.unwrap();
@@ -139,7 +139,7 @@ fn calibrations_that_are_off_are_estimated() {
 #[test]
 fn every_sense_may_be_absent() {
     let start = turned(&OFF);
-    let changed = |change: &dyn Fn(&mut Observation)| {
+    let changed = |change: &dyn Fn(&mut Frame)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
         run(&observation, &start, FusedSettings::default()).0
@@ -161,7 +161,7 @@ fn every_sense_may_be_absent() {
 
 #[test]
 fn scales_are_learnt_from_what_a_frame_tells() {
-    let scale = |observation: &Observation, group| {
+    let scale = |observation: &Frame, group| {
         let (_, posterior) = run(observation, &turned(&OFF), FusedSettings::default());
         posterior.scales.get(group)
     };
@@ -175,7 +175,7 @@ fn scales_are_learnt_from_what_a_frame_tells() {
         assert!(exact < 0.5 && off > 1.2, "{group:?}: {exact} {off}");
     }
     // Without a hand, little tells of the camera's errors.
-    let bare = Observation { hand: None, ..SCENE.observation.clone() };
+    let bare = Frame { hand: None, ..SCENE.observation.clone() };
     let alone = scale(&bare, ErrorGroup::Camera);
     assert!((0.1..1.5).contains(&alone), "{alone}");
 }
@@ -221,7 +221,7 @@ fn threads_make_no_difference() {
 fn what_nothing_is_seen_of_is_said_to_be_unobserved() {
     let settings =
         FusedSettings { modalities: vec![Modality::Silhouette], ..FusedSettings::default() };
-    let bare = Observation { hand: None, ..SCENE.observation.clone() };
+    let bare = Frame { hand: None, ..SCENE.observation.clone() };
     let (_, posterior) = run(&bare, &turned(&[0.0; 6]), settings);
     // The outline of a bottle says little of how it is turned about its axis, and of its distance.
     assert!(!posterior.unobservable.is_empty());
@@ -253,7 +253,7 @@ impl Factor for Pull {
 
 #[test]
 fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
-    let frame = Frame::new(&SCENE.observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap();
     let pull = |offset: f64, sigma: f64| {
         let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * offset;
         let fused = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(sigma) });

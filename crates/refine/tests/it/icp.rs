@@ -7,12 +7,12 @@ use prehend_refine::baselines::{Icp, RobustIcp};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::problem::Block;
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::{Frame, RefineError, State, Strategy};
+use prehend_refine::{PreparedFrame, RefineError, State, Strategy};
 
 #[test]
 fn it_descends_and_its_own_optimum_is_not_the_truth() {
     let scene = default_scene(1).unwrap();
-    let frame = Frame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
     let start = State::new(&frame, &scene.truth).unwrap();
     let start = start.retract(&[Block::ObjectPose], &[4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04]);
     let found = Icp::default().run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();
@@ -31,7 +31,7 @@ fn no_depth_is_an_error() {
     let scene = default_scene(1).unwrap();
     let mut observation = scene.observation.clone();
     observation.depth.pixels_mut().fill(0.0);
-    let frame = Frame::new(&observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
     let start = State::new(&frame, &scene.truth).unwrap();
     let refused = Icp::default().run(&frame, &start, &mut |_| ControlFlow::Continue(()));
     assert!(matches!(refused, Err(RefineError::NoDepth)));
@@ -39,7 +39,7 @@ fn no_depth_is_an_error() {
 
 /// Where a strategy ends that begins `offset` from the truth, and in how many iterations.
 fn found(strategy: &dyn Strategy, scene: &Scene, offset: &[f64; 6]) -> (Isometry3<f64>, usize) {
-    let frame = Frame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
     let truth = State::new(&frame, &scene.truth).unwrap();
     let start = truth.retract(&[Block::ObjectPose], offset);
     let found = strategy.run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();

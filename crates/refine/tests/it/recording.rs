@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use prehend_refine::data::bop::DatasetError;
 use prehend_refine::data::mcap::{ImageTopics, Recording, RecordingWriter};
-use prehend_refine::scene::{Observation, Sequence, default_sequence};
+use prehend_refine::scene::{Frame, Sequence, default_sequence};
 use prehend_refine::tracker::{Tracked, Tracker, TrackerSettings};
 
 /// Frames so far apart \[ns\].
@@ -31,7 +31,7 @@ fn tracker(sequence: &Sequence) -> Tracker {
     tracker
 }
 
-fn track(tracker: &mut Tracker, observation: &Observation, at: i64) -> Tracked {
+fn track(tracker: &mut Tracker, observation: &Frame, at: i64) -> Tracked {
     tracker.track(observation, Duration::from_nanos(at as u64)).unwrap()
 }
 
@@ -113,9 +113,7 @@ fn what_is_missing_is_named() {
     let file = folder.path().join("log.mcap");
     let sequence = sequence(1);
     let mut writer = RecordingWriter::create(&file).unwrap();
-    writer
-        .sensed(STEP, &Observation { hand: None, ..sequence.frames[0].observation.clone() })
-        .unwrap();
+    writer.sensed(STEP, &Frame { hand: None, ..sequence.frames[0].observation.clone() }).unwrap();
     writer.finish().unwrap();
     let topics = ImageTopics { color: Some("/left".to_owned()), ..ImageTopics::default() };
     let error = Recording::open(&file, &topics, "world").err().unwrap().to_string();
@@ -146,7 +144,7 @@ fn an_image_that_is_broken_fails_its_frame_alone() {
             observation.depth = observation.depth.downsampled(2);
             observation.mask = observation.mask.downsampled(2);
         }
-        writer.sensed(STEP * (k as i64 + 1), &Observation { hand: None, ..observation }).unwrap();
+        writer.sensed(STEP * (k as i64 + 1), &Frame { hand: None, ..observation }).unwrap();
     }
     writer.finish().unwrap();
     let recording = Recording::open(&file, &ImageTopics::default(), "world").unwrap();

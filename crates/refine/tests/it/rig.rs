@@ -9,7 +9,7 @@ use prehend_refine::calibration::{
 };
 use prehend_refine::refine;
 use prehend_refine::rig::Rig;
-use prehend_refine::scene::{Frame, Observation, Sequence, SequenceFrame, default_sequence};
+use prehend_refine::scene::{Frame, PreparedFrame, Sequence, SequenceFrame, default_sequence};
 use prehend_refine::strategy::Fused;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
 use prehend_render::Mask;
@@ -20,7 +20,7 @@ const JOINT: f64 = 0.012;
 const HAND: Vector3<f64> = Vector3::new(2e-3, -1e-3, 1.5e-3);
 
 /// What a rig that is wrong says of a frame.
-fn said(truth: &Observation) -> Observation {
+fn said(truth: &Frame) -> Frame {
     let mut said = truth.clone();
     said.camera.cx -= SHIFT_PX;
     for z in said.depth.pixels_mut() {
@@ -117,8 +117,8 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let rig = Rig::load(&path).unwrap();
     let new = &sequence.frames[39];
     let told = said(&new.observation);
-    let error = |observation: &Observation, object, rig: Option<&Rig>| {
-        let frame = Frame::new(observation, object).unwrap();
+    let error = |observation: &Frame, object, rig: Option<&Rig>| {
+        let frame = PreparedFrame::new(observation, object).unwrap();
         let fused = Fused { rig: rig.map(|rig| Arc::new(rig.clone())), ..Fused::default() };
         let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
         let center = sequence.object.center;
@@ -131,15 +131,15 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     println!("{alone} ± {unsure} → {with} ± {sure}");
     // One frame, which is right to two millimeters without the rig, too.
     assert!(sure < unsure && with < 1.2 * alone, "{alone} ± {unsure} → {with} ± {sure}");
-    let wrong = |observation: &Observation| -> f64 {
-        let joints = |o: &Observation| o.hand.as_ref().unwrap().joints.clone();
+    let wrong = |observation: &Frame| -> f64 {
+        let joints = |o: &Frame| o.hand.as_ref().unwrap().joints.clone();
         let pairs = joints(observation).into_iter().zip(joints(&new.observation));
         pairs.map(|(said, is)| (said - is).abs()).sum::<f64>() / 16.0
     };
     // Without a hand, what is known of the camera still counts.
     let corrected = rig.corrected(&told).unwrap();
-    let bare = Observation { hand: None, ..corrected };
-    let frame = Frame::new(&bare, &object).unwrap();
+    let bare = Frame { hand: None, ..corrected };
+    let frame = PreparedFrame::new(&bare, &object).unwrap();
     let fused = Fused::default().with_rig(Arc::new(rig.clone()));
     let found = refine(&frame, &sequence.frames[36].truth, &fused).unwrap();
     assert!(found.posterior.is_some());
@@ -297,7 +297,7 @@ fn a_camera_is_calibrated_without_a_hand() {
     let mut observation = said(observation);
     observation.hand = None;
     let corrected = rig.corrected(&observation).unwrap();
-    let frame = Frame::new(&corrected, &sequence.object).unwrap();
+    let frame = PreparedFrame::new(&corrected, &sequence.object).unwrap();
     let fused = Fused::default().with_rig(Arc::new(rig));
     let found = refine(&frame, truth, &fused).unwrap();
     assert!(found.posterior.unwrap().probability() > 0.5);

@@ -5,12 +5,12 @@ use std::sync::{Arc, LazyLock};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
-use prehend_refine::{Frame, Observation, RefineError};
+use prehend_refine::{Frame, PreparedFrame, RefineError};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn search(settings: SearchSettings) -> Result<Vec<PoseCandidate>, RefineError> {
-    let frame = Frame::new(&SCENE.observation, &SCENE.object)?;
+    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object)?;
     PoseSearch::new(Arc::clone(&SCENE.object), settings)?.run(&frame)
 }
 
@@ -29,7 +29,7 @@ fn vision_alone_finds_it_too() {
     let mut observation = SCENE.observation.clone();
     observation.hand = None;
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
-    let frame = Frame::new(&observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
     let best = search.run(&frame).unwrap()[0].t_cam_object;
     let (pe, oe) = (pe_cm(&best, &SCENE.truth), oe_deg(&best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
@@ -56,10 +56,10 @@ fn bad_input_is_an_error() {
     assert!(search(nan).unwrap_err().to_string().contains("scale is NaN"));
 
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
-    let refused = |change: &dyn Fn(&mut Observation)| {
+    let refused = |change: &dyn Fn(&mut Frame)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
-        let frame = Frame::new(&observation, &SCENE.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
         search.run(&frame).unwrap_err()
     };
     let dark = refused(&|o| o.depth.pixels_mut().fill(0.0));

@@ -12,7 +12,7 @@ use prehend_geometry::SplitMix64;
 use prehend_refine::data::load_frame_file;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::strategy::{Estimate, Fused, Posterior};
-use prehend_refine::{Observation, refine};
+use prehend_refine::{Frame, refine};
 use serde_json::{Value, json};
 
 use self::sensing::{Extra, write_frame};
@@ -213,7 +213,7 @@ fn of_changed(change: impl Fn([usize; 2], &mut [f32; 3], &mut f32)) -> (f64, f64
     write_frame(folder.path(), &world, &[], 0).unwrap();
     let (mut input, start) =
         load_frame_file(&folder.path().join("frame.json"), 0, None, None).unwrap();
-    let Observation { color, depth, mask, .. } = &mut input.observation;
+    let Frame { color, depth, mask, .. } = &mut input.observation;
     let pixels = color.pixels_mut().iter_mut().zip(depth.pixels_mut()).zip(mask.pixels());
     for (k, ((color, depth), _)) in pixels.enumerate().filter(|(_, (_, masked))| **masked) {
         change([k % 640, k / 640], color, depth);

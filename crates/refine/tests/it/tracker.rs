@@ -6,7 +6,7 @@ use std::time::Duration;
 use nalgebra::Isometry3;
 use prehend_refine::RefineError;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
-use prehend_refine::scene::{Observation, Sequence, default_sequence};
+use prehend_refine::scene::{Frame, Sequence, default_sequence};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{
     GatingSettings, Recovery, Rejection, TrackStatus, Tracked, Tracker, TrackerSettings,
@@ -70,7 +70,7 @@ fn follow_with_masks(change: impl Fn(&Mask) -> Mask) {
     for index in 3..14 {
         let frame = &SEQUENCE.frames[index];
         let mask = change(&frame.observation.mask);
-        let observation = Observation { mask, ..frame.observation.clone() };
+        let observation = Frame { mask, ..frame.observation.clone() };
         let tracked = tracker.push(observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
         println!("{index}: {pe:.3} cm {oe:.2}° {:?} {:?}", tracked.status, tracked.rejection);

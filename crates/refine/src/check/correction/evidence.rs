@@ -6,7 +6,7 @@ use prehend_render::{DepthImage, Mask, depth_map};
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::{HandMeasurement, Object, Observation, hand_depth, median};
+use crate::scene::{Frame, HandMeasurement, Object, hand_depth, median};
 
 /// Extents that render without trouble, in units of length.
 const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
@@ -31,13 +31,13 @@ impl<'a> FrameImages<'a> {
     /// # Errors
     /// If images have not the camera's size, or a model that has to be made larger cannot be used.
     pub(super) fn new(
-        observation: &'a Observation,
+        observation: &'a Frame,
         object: &'a Object,
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
         observation.require_sizes()?;
-        let Observation { camera, mask, depth, .. } = observation;
+        let Frame { camera, mask, depth, .. } = observation;
         let factor = camera.width.div_ceil(settings.width.max(1)).max(1);
         let (mask, depth) = match factor {
             1 => (mask.clone(), depth.clone()),

@@ -12,7 +12,7 @@ use super::inputs::Inputs;
 use super::kind::{Correction, candidates};
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::{Object, Observation};
+use crate::scene::{Frame, Object};
 
 /// A frame with each correction tried.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl CorrectionTrial {
     /// # Errors
     /// If images have not the camera's size, or the object's mesh cannot be used at another scale.
     pub fn new(
-        observation: &Observation,
+        observation: &Frame,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
@@ -104,7 +104,7 @@ impl CorrectionTrial {
 
 /// The pose that mask and depth have, within what poses to start from are off, if object and `observation` agree there.
 pub(in crate::check) fn settled_pose(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
     settings: &CorrectionSettings,

@@ -17,7 +17,7 @@ use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
 use super::optics::{DepthWarning, Optics, check_size};
 use super::stated::Stated;
 use super::touch::Tactile;
-use crate::scene::Observation;
+use crate::scene::Frame;
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
 /// read when asked for and fails on its own.
@@ -216,12 +216,12 @@ impl DatasetImage<'_> {
         self.optics.mask(&self.mask_path(instance)?)
     }
 
-    /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
+    /// The image as a [`Frame`] of camera, color, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
     /// The first of those of [`DatasetImage::rgb`], [`DatasetImage::depth`] and [`DatasetImage::mask`], and
     /// images that differ in size.
-    pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
+    pub fn observation(&self, instance: usize) -> Result<Frame, DatasetError> {
         let mut observation = self.unsegmented()?;
         self.segment(&mut observation, instance)?;
         Ok(observation)
@@ -233,14 +233,14 @@ impl DatasetImage<'_> {
     /// Those of [`DatasetImage::mask`], and if it has another size.
     pub(crate) fn segment(
         &self,
-        observation: &mut Observation,
+        observation: &mut Frame,
         instance: usize,
     ) -> Result<(), DatasetError> {
         self.segment_by(observation, &self.mask_path(instance)?)
     }
 
     /// The same of the mask in `file`.
-    fn segment_by(&self, observation: &mut Observation, file: &Path) -> Result<(), DatasetError> {
+    fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
         check_size(file, &if self.has_color() { self.rgb_path()? } else { self.depth_path() })?;
         observation.mask = self.optics.mask(file)?;
         Ok(())
@@ -286,7 +286,7 @@ impl DatasetImage<'_> {
     ///
     /// # Errors
     /// Those of [`DatasetImage::rgb`] and [`DatasetImage::depth`], and if the images differ in size.
-    pub(crate) fn unsegmented(&self) -> Result<Observation, DatasetError> {
+    pub(crate) fn unsegmented(&self) -> Result<Frame, DatasetError> {
         let has_color = self.has_color() || !self.has_depth();
         if self.optics.depth_camera.is_some() && !has_color {
             let problem = "is of a camera beside the color camera, and the scene has no rgb";
@@ -307,7 +307,7 @@ impl DatasetImage<'_> {
         &self,
         dataset: &Dataset,
         instance: usize,
-    ) -> Result<Vec<(Observation, Isometry3<f64>)>, DatasetError> {
+    ) -> Result<Vec<(Frame, Isometry3<f64>)>, DatasetError> {
         let Some(together) = self.scene.taken_together(self.im_id)? else { return Ok(Vec::new()) };
         let t_cam_world = self.place()?;
         let number = self.mask_path(instance).ok().and_then(|file| number_of(&file));

@@ -9,7 +9,7 @@ use prehend_render::{
 use super::depth_camera::DepthCamera;
 use super::depth_values::drop_saturated;
 use super::error::DatasetError;
-use crate::scene::{Observation, RemapCache};
+use crate::scene::{Frame, RemapCache};
 
 /// Optics of a camera: intrinsics, lens, depth.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ impl Optics<'_> {
         color: Option<&Path>,
         depth: Option<&Path>,
         warn: &dyn Fn(&Path, DepthWarning),
-    ) -> Result<Observation, DatasetError> {
+    ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
         if let (Some(color), Some(depth), None) = (color, depth, &self.depth_camera) {
@@ -131,7 +131,7 @@ impl Optics<'_> {
         let depth = depth.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
         let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let mask = Mask::filled(width, height, false);
-        Ok(Observation::new(self.camera(width, height), color, depth, mask))
+        Ok(Frame::new(self.camera(width, height)).color(color).depth(depth).mask(mask))
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use crate::calibration::CalibrationFrame;
 use crate::data::{AssetError, Assets, FrameInput, Target};
 use crate::error::RefineError;
-use crate::scene::Observation;
+use crate::scene::Frame;
 
 /// Frames of a dataset, each with a rough pose (object → camera \[m\]); they are read when they are visited.
 pub struct CalibrationFrames<'a> {
@@ -37,7 +37,7 @@ impl<'a> CalibrationFrames<'a> {
         let mut fault = None;
         for (target, _) in held.into_iter().chain(free) {
             match assets.load(&target, &[]) {
-                Ok(FrameInput { observation: Observation { camera, hand, .. }, .. }) => {
+                Ok(FrameInput { observation: Frame { camera, hand, .. }, .. }) => {
                     let joints = hand.map(|measured| measured.hand.tree.joint_names().len());
                     return Ok((joints, (camera.width, camera.height)));
                 }

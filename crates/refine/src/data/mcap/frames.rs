@@ -10,7 +10,7 @@ use super::reader::MessageReader;
 use super::recording::{Recording, messages, moment, type_of};
 use super::topics::ImageTopic;
 use crate::data::bop::{DatasetError, DepthCamera};
-use crate::scene::{Hand, Observation};
+use crate::scene::{Frame, Hand};
 
 /// Images are of the same moment if they are not farther apart \[ns\].
 const TOGETHER: i64 = 20_000_000;
@@ -24,7 +24,7 @@ pub struct RecordedFrame {
     /// When the image was taken, by the clock of the recording \[ns\].
     pub nanoseconds: i64,
     /// What was sensed.
-    pub observation: Result<Observation, DatasetError>,
+    pub observation: Result<Frame, DatasetError>,
 }
 
 /// The frames of a [`Recording`], one after the other. A few images are in memory at a time.
@@ -112,7 +112,7 @@ impl<'a> Frames<'a> {
         first: &[u8],
         depth: Option<&[u8]>,
         mask: Option<&[u8]>,
-    ) -> Result<Observation, DatasetError> {
+    ) -> Result<Frame, DatasetError> {
         let recording = self.recording;
         let fault = |topic: &str, problem: String| {
             let field = format!("{topic} at {:.3} s", at as f64 * 1e-9);
@@ -168,7 +168,7 @@ impl<'a> Frames<'a> {
                 depth = remap.depth(&depth).map_err(lens_fault)?;
             }
         }
-        let mut observation = Observation::new(camera, color, depth, mask);
+        let mut observation = Frame::new(camera).color(color).depth(depth).mask(mask);
         let checked = observation.check_sizes();
         checked.map_err(|(image, problem)| fault(image, problem))?;
         observation.gravity = recording.gravity(at);

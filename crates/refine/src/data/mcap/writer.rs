@@ -18,7 +18,7 @@ use super::messages::{
 use super::recording::taxel_frame;
 use super::schemas::schema;
 use crate::data::bop::DatasetError;
-use crate::scene::{HandMeasurement, Observation};
+use crate::scene::{Frame, HandMeasurement};
 use crate::strategy::Posterior;
 use crate::tracker::{TrackStatus, Tracked};
 
@@ -66,8 +66,8 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn sensed(&mut self, at: i64, observation: &Observation) -> Result<(), DatasetError> {
-        let Observation { camera, color, depth, mask, gravity, hand, .. } = observation;
+    pub fn sensed(&mut self, at: i64, observation: &Frame) -> Result<(), DatasetError> {
+        let Frame { camera, color, depth, mask, gravity, hand, .. } = observation;
         let size = [camera.width, camera.height];
         let mut placed = Vec::new();
         if let Some(gravity) = gravity {

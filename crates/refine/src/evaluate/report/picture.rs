@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector2};
 use prehend_render::{Camera, RgbImage, draw_outline};
 
 use crate::calibration::Residuals;
-use crate::scene::{Object, Observation};
+use crate::scene::{Frame, Object};
 
 /// Outline of the initial pose.
 const BEFORE: [f32; 3] = [1.0, 0.25, 0.2];
@@ -18,7 +18,7 @@ const GAP: usize = 6;
 
 /// The image around the object twice, side by side: with the outline at `before`, and with that at `after`.
 pub fn before_and_after(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
@@ -28,7 +28,7 @@ pub fn before_and_after(
 
 /// The image around the object with the outline at `before`, and with that at `after`.
 pub(super) fn compared(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
@@ -42,7 +42,7 @@ pub(super) fn compared(
 /// The image around the object, and the same with the object's outline.
 #[cfg(feature = "cli")]
 pub(super) fn image_and_outline(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
 ) -> [RgbImage; 2] {
@@ -54,8 +54,8 @@ pub(super) fn image_and_outline(
 /// The image around the object twice, with outlines of object and hand: as an observation, a model and a pose (object → camera \[m\]) have
 /// them before, and after a calibration.
 pub fn rig_picture(
-    before: (&Observation, &Object, &Isometry3<f64>),
-    after: (&Observation, &Object, &Isometry3<f64>),
+    before: (&Frame, &Object, &Isometry3<f64>),
+    after: (&Frame, &Object, &Isometry3<f64>),
 ) -> [RgbImage; 2] {
     let window = window(before.0, before.1, before.2);
     [(before, BEFORE), (after, AFTER)].map(|((observation, object, pose), color)| {
@@ -101,7 +101,7 @@ fn side_by_side(images: &[RgbImage; 2]) -> RgbImage {
 
 /// The whole image with the outline at `t_cam_object`, and the hand's in blue where it is known.
 pub fn outline_picture(
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
 ) -> RgbImage {
@@ -110,7 +110,7 @@ pub fn outline_picture(
 }
 
 /// `image` with the outline of the hand, where that is known.
-fn with_hand(mut image: RgbImage, observation: &Observation) -> RgbImage {
+fn with_hand(mut image: RgbImage, observation: &Frame) -> RgbImage {
     if let Some(hand) = &observation.hand {
         for (model, pose) in hand.hand.render_bodies(&hand.t_cam_hand, &hand.joints) {
             draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
@@ -122,7 +122,7 @@ fn with_hand(mut image: RgbImage, observation: &Observation) -> RgbImage {
 /// `image` with the outline of the object in this color.
 fn outlined(
     mut image: RgbImage,
-    observation: &Observation,
+    observation: &Frame,
     object: &Object,
     t_cam_object: &Isometry3<f64>,
     color: [f32; 3],
@@ -132,7 +132,7 @@ fn outlined(
 }
 
 /// The image, brightened if it is dark, so that people see something.
-fn brightened(observation: &Observation) -> RgbImage {
+fn brightened(observation: &Frame) -> RgbImage {
     let mut image = observation.color.clone();
     let masked = image.pixels().iter().zip(observation.mask.pixels()).filter(|(_, m)| **m);
     let mut values: Vec<f32> = masked.map(|(c, _)| c.iter().copied().fold(0.0, f32::max)).collect();
@@ -144,7 +144,7 @@ fn brightened(observation: &Observation) -> RgbImage {
 }
 
 /// Left, top, width and height of the surroundings of the mask, or without one, of the object at a pose \[px\].
-fn window(observation: &Observation, object: &Object, t_cam_object: &Isometry3<f64>) -> [usize; 4] {
+fn window(observation: &Frame, object: &Object, t_cam_object: &Isometry3<f64>) -> [usize; 4] {
     let mask = &observation.mask;
     let (width, height) = (mask.width(), mask.height());
     let bounds = mask.bounds().or_else(|| projected(&observation.camera, object, t_cam_object));

@@ -18,7 +18,7 @@ use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
-use crate::scene::{Frame, ModelErrorSettings, Object};
+use crate::scene::{ModelErrorSettings, Object, PreparedFrame};
 
 /// Settings of [`PointToPlaneFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -117,7 +117,10 @@ impl PointToPlaneFactor {
     ///
     /// # Errors
     /// If no pixel of the mask, beside the hand, has a depth.
-    pub fn new(frame: &Frame<'_>, settings: &PointToPlaneSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &PointToPlaneSettings,
+    ) -> Result<Self, RefineError> {
         let (object, hand) = (Arc::clone(frame.object()), frame.hand_depth());
         let (mask, camera) = (&frame.observation().mask, &frame.observation().camera);
         let settings = settings.clone();
@@ -300,7 +303,7 @@ mod tests {
     use crate::problem::Block;
 
     /// With a smooth field of this standard deviation \[m\].
-    fn factor(frame: &Frame<'_>, gp_sigma: f64) -> PointToPlaneFactor {
+    fn factor(frame: &PreparedFrame<'_>, gp_sigma: f64) -> PointToPlaneFactor {
         let settings = PointToPlaneSettings { gp_sigma, ..Default::default() };
         PointToPlaneFactor::new(frame, &settings).unwrap()
     }

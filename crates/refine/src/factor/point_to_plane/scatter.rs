@@ -78,7 +78,7 @@ mod tests {
     use super::super::{PointToPlaneFactor, PointToPlaneSettings};
     use super::*;
     use crate::problem::NoiseModel;
-    use crate::scene::Frame;
+    use crate::scene::PreparedFrame;
 
     /// Of the built-in scene's depth, to which normal errors are added: of each point, and one of all points in tiles of some pixels.
     fn estimate(independent: f64, [shared, tile]: [f64; 2]) -> NoiseEstimate {
@@ -93,7 +93,7 @@ mod tests {
             let [x, y] = place(pixel);
             *depth += (independent * random.normal() + tiles[100 * y + x]) as f32;
         }
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         // A kernel would limit the errors.
         let noise = NoiseModel::gaussian(2e-3);
         let settings = PointToPlaneSettings { noise, gp_sigma: 0.0, ..Default::default() };

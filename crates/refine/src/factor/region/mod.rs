@@ -14,7 +14,7 @@ use super::patch_sums::PatchSums;
 use super::rendering::{reprojected, seen_by_state};
 use crate::error::RefineError;
 use crate::problem::{Factor, NormalEquations, State};
-use crate::scene::{ForegroundSettings, Frame, Object, RegionEvidence};
+use crate::scene::{ForegroundSettings, Object, PreparedFrame, RegionEvidence};
 
 /// Settings of [`RegionFactor`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,7 +98,7 @@ impl RegionFactor {
     ///
     /// # Errors
     /// [`RefineError::EmptyMask`], [`RefineError::Setting`] for a setting that is not positive.
-    pub fn new(frame: &Frame<'_>, settings: &RegionSettings) -> Result<Self, RefineError> {
+    pub fn new(frame: &PreparedFrame<'_>, settings: &RegionSettings) -> Result<Self, RefineError> {
         settings.check()?;
         let observation = frame.observation();
         let factor = settings.downsample;

@@ -8,7 +8,7 @@ use super::probes::{Distance, Probe, Probes};
 use super::{ProximitySettings, TactileSettings};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{BinaryContact, Frame, TouchReading};
+use crate::scene::{BinaryContact, PreparedFrame, TouchReading};
 
 /// Settings of [`BinaryTouchFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,7 +46,7 @@ impl BinaryTouchFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         settings: &BinaryTouchSettings,
         [touched, untouched]: [bool; 2],
     ) -> Result<Self, RefineError> {

@@ -20,7 +20,7 @@ use self::probes::{Distance, Probe, Probes};
 pub use self::proximity::{ProximityFactor, ProximitySettings};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Frame, Hand};
+use crate::scene::{Hand, PreparedFrame};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,7 +84,7 @@ impl TactileFactor {
     ///
     /// # Errors
     /// If the hand is unknown, or its forces are not one a taxel.
-    pub fn new(frame: &Frame<'_>, settings: &TactileSettings) -> Result<Self, RefineError> {
+    pub fn new(frame: &PreparedFrame<'_>, settings: &TactileSettings) -> Result<Self, RefineError> {
         let measured = frame.require_hand("tactile")?;
         let hand = &measured.hand;
         hand.check_forces(&measured.forces)?;
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::problem::Block;
     use crate::scene::{
-        BinaryContact, ContactPatch, HandMeasurement, Observation, ProximityReading, TouchReading,
+        BinaryContact, ContactPatch, Frame, HandMeasurement, ProximityReading, TouchReading,
     };
 
     #[test]
@@ -180,12 +180,12 @@ mod tests {
         let contacts = TactileSettings::default();
         let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
         let taxels = TactileSettings { touch, ..contacts.clone() };
-        let probes = |observation: &Observation, settings: &TactileSettings| {
-            let frame = Frame::new(observation, &scene.object).unwrap();
+        let probes = |observation: &Frame, settings: &TactileSettings| {
+            let frame = PreparedFrame::new(observation, &scene.object).unwrap();
             TactileFactor::new(&frame, settings).unwrap().0.probes.len()
         };
         let all = probes(&observation, &taxels);
-        fn forces(observation: &mut Observation) -> &mut [Vector3<f64>] {
+        fn forces(observation: &mut Frame) -> &mut [Vector3<f64>] {
             &mut observation.hand.as_mut().unwrap().forces
         }
         forces(&mut observation)[7] = HandMeasurement::UNKNOWN_FORCE;
@@ -216,7 +216,7 @@ mod tests {
             TouchReading::Proximity(distances),
             TouchReading::Patch(patch),
         ];
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let (binary, proximity, patch) = (
             BinaryTouchFactor::new(&frame, &BinaryTouchSettings::default(), [true; 2]).unwrap(),
             ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap(),
@@ -255,7 +255,7 @@ mod tests {
             let mut observation = scene.observation.clone();
             let readings = scene.hand.taxels.iter().map(reading).collect();
             observation.hand.as_mut().unwrap().touch = vec![TouchReading::Proximity(readings)];
-            let frame = Frame::new(&observation, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap().cost(&truth)
         };
         assert!(cost(0.0) < 1e-9 && cost(2e-3) > 0.1, "{} {}", cost(0.0), cost(2e-3));
@@ -277,7 +277,7 @@ mod tests {
                 points: vec![touched.position],
                 normals: vec![touched.normal * sign],
             })];
-            let frame = Frame::new(&observation, &scene.object).unwrap();
+            let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             let settings = ContactPatchSettings::default();
             ContactPatchFactor::new(&frame, &settings).unwrap().cost(&truth)
         };
@@ -292,11 +292,11 @@ mod tests {
         if let Some(hand) = &mut observation.hand {
             hand.forces.pop();
         }
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let error = TactileFactor::new(&frame, &settings).err().unwrap().to_string();
         assert_eq!(error, "367 taxel forces were given for 368 taxels");
         observation.hand = None;
-        let frame = Frame::new(&observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let refused = TactileFactor::new(&frame, &settings);
         assert!(matches!(refused, Err(RefineError::Missing { .. })));
     }

@@ -11,7 +11,7 @@ use super::ProximitySettings;
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
-use crate::scene::{Frame, TouchReading};
+use crate::scene::{PreparedFrame, TouchReading};
 
 /// Settings of [`ContactPatchFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,7 +65,10 @@ impl ContactPatchFactor {
     ///
     /// # Errors
     /// If the hand is unknown.
-    pub fn new(frame: &Frame<'_>, settings: &ContactPatchSettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &ContactPatchSettings,
+    ) -> Result<Self, RefineError> {
         let measured = frame.require_hand("contact-patch")?;
         let hand = &measured.hand;
         let (mut probes, mut normals) = (Vec::new(), Vec::new());

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::probes::{Distance, Probe, Probes};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Frame, ProximityReading, TouchReading};
+use crate::scene::{PreparedFrame, ProximityReading, TouchReading};
 
 /// Settings of [`ProximityFactor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +42,10 @@ impl ProximityFactor {
     ///
     /// # Errors
     /// If the hand is unknown.
-    pub fn new(frame: &Frame<'_>, settings: &ProximitySettings) -> Result<Self, RefineError> {
+    pub fn new(
+        frame: &PreparedFrame<'_>,
+        settings: &ProximitySettings,
+    ) -> Result<Self, RefineError> {
         let measured = frame.require_hand("proximity")?;
         let hand = &measured.hand;
         let readings = measured.touch.iter().filter_map(|reading| match reading {

@@ -10,7 +10,7 @@ use super::{Fused, FusedSettings, Modality};
 use crate::MM_PER_M;
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Strategy};
 
 /// A refinement with one kind of evidence excluded.
@@ -93,7 +93,7 @@ impl Sensor {
     }
 
     /// Whether `frame` brings it, and it is used.
-    fn is_in(self, frame: &Frame<'_>, settings: &FusedSettings) -> bool {
+    fn is_in(self, frame: &PreparedFrame<'_>, settings: &FusedSettings) -> bool {
         let used = self.modalities().iter().any(|kind| settings.modalities.contains(kind));
         match self {
             Self::Color => used && frame.observation().has_colors(),
@@ -115,7 +115,7 @@ impl Fused {
     /// Those of a run.
     pub fn diagnose(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
     ) -> Result<Vec<Diagnosis>, RefineError> {
         let estimate = self.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
@@ -128,7 +128,7 @@ impl Fused {
     /// Those of a run.
     pub fn diagnose_estimate(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         estimate: Estimate,
     ) -> Result<Vec<Diagnosis>, RefineError> {

@@ -13,7 +13,7 @@ use crate::factor::{
     ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
-use crate::scene::{CameraView, Frame, Occluders, TouchReading};
+use crate::scene::{CameraView, Occluders, PreparedFrame, TouchReading};
 
 /// What of a frame is seen.
 const SEEN: [Modality; 5] = [
@@ -26,7 +26,7 @@ const SEEN: [Modality; 5] = [
 
 /// Noise of depth points about the object at `state`; `None` without enough depth, or if it is not used.
 pub(super) fn depth_noise(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     state: &State,
     settings: &FusedSettings,
 ) -> Option<NoiseEstimate> {
@@ -38,7 +38,7 @@ pub(super) fn depth_noise(
 
 /// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`, and turned as at `seen`.
 pub(crate) fn surface_patches(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     initial: &State,
     seen: &State,
     stage: &Stage,
@@ -58,7 +58,7 @@ pub(crate) fn surface_patches(
 
 /// What `stage` solves but for the prior: all factors, the `own` ones among them, by the pose and all nuisances of `initial`.
 pub(crate) fn problem_of(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     initial: &State,
     stage: &Stage,
     settings: &FusedSettings,
@@ -73,7 +73,7 @@ pub(crate) fn problem_of(
 
 /// The factors of `stage` for what `frame` brings.
 fn factors_of(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,
@@ -92,7 +92,7 @@ fn factors_of(
 /// What other cameras see, one factor each. Where the object may be off from its model in patches of the first camera's image, what that does to
 /// another camera's depth is as large.
 fn view_factors(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     with_patches: bool,
@@ -114,7 +114,7 @@ fn view_factors(
 
 /// What compares pictures, if anything does; of the outline nothing where a `region` factor tells it.
 fn picture_factor(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,
@@ -144,14 +144,14 @@ fn picture_factor(
 }
 
 /// Regions tell the outline where no depth does.
-fn has_region(frame: &Frame<'_>, settings: &FusedSettings) -> bool {
+fn has_region(frame: &PreparedFrame<'_>, settings: &FusedSettings) -> bool {
     let seen = frame.observation();
     settings.modalities.contains(&Modality::Silhouette) && seen.has_colors() && !seen.has_depth()
 }
 
 /// All others, with a `region` factor or without.
 fn other_factors(
-    frame: &Frame<'_>,
+    frame: &PreparedFrame<'_>,
     stage: &Stage,
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,

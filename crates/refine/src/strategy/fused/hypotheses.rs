@@ -148,13 +148,13 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::scene::{Frame, Observation, default_scene};
+    use crate::scene::{Frame, PreparedFrame, default_scene};
 
     #[test]
     fn hypotheses_are_in_front_of_the_camera_and_the_cheapest_come_first() {
         let scene = default_scene(1).unwrap();
-        let bare = Observation { hand: None, ..scene.observation.clone() };
-        let frame = Frame::new(&bare, &scene.object).unwrap();
+        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let initial = State::new(&frame, &scene.initial).unwrap();
         let behind = Isometry3::translation(0.0, 0.0, -1.0);
         let states = hypotheses(&initial, &[scene.initial, behind, scene.truth]);

@@ -41,7 +41,7 @@ use crate::problem::{
     Termination,
 };
 use crate::rig::Rig;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
 ///
@@ -80,7 +80,7 @@ impl Fused {
     /// The prior about `initial` with errors of these sizes; calibrations have the covariance of the frame's rig, if it is known.
     fn prior(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         scales: &Scales,
     ) -> Result<GaussianPrior, RefineError> {
@@ -130,7 +130,7 @@ impl Fused {
     }
 
     /// Settings with the accuracy of the rig, and of the model of `frame`.
-    fn settings_for(&self, frame: &Frame<'_>) -> FusedSettings {
+    fn settings_for(&self, frame: &PreparedFrame<'_>) -> FusedSettings {
         self.settings.for_frame(frame, self.rig.is_some())
     }
 
@@ -169,7 +169,7 @@ impl Fused {
     /// Those of a run.
     pub(crate) fn evidence(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         state: &State,
         warp: &Arc<ImageWarp>,
     ) -> Result<Option<Evidence>, RefineError> {
@@ -187,7 +187,7 @@ impl Fused {
     /// Those of a run.
     pub(crate) fn posterior_at(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         state: &State,
     ) -> Result<Option<Posterior>, RefineError> {
@@ -201,7 +201,7 @@ impl Fused {
     /// The problem of the last stage about `state`, from where noise is measured; `None` without stages.
     fn last_problem(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         state: &State,
     ) -> Result<Option<StageProblem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
@@ -212,7 +212,7 @@ impl Fused {
     /// The problem of `stage` about `initial`, with the noise that is measured at `seen`, which `settings` take.
     fn stage_problem(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         seen: &State,
         stage: &Stage,
@@ -243,7 +243,7 @@ impl Strategy for Fused {
     /// Every stage is an iteration.
     fn run(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {

@@ -10,7 +10,7 @@ use super::{Fused, Stage, StageProblem};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, Scales};
 use crate::problem::State;
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::Strategy;
 
 /// Scale of an object's model about its center.
@@ -51,7 +51,7 @@ impl Fused {
     /// Those of a run.
     pub fn model_scale(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &Isometry3<f64>,
     ) -> Result<ModelScale, RefineError> {
         let ModelScaleSettings { sigma, reach, refinements, ratio } = self.settings.model_scale;
@@ -86,7 +86,7 @@ impl Fused {
     /// Least cost with the model scaled, of poses about `t_cam_object` \[m\], where nothing but `initial` is known beforehand \[nat\].
     fn cost_at_scale(
         &self,
-        frame: &Frame<'_>,
+        frame: &PreparedFrame<'_>,
         initial: &State,
         t_cam_object: &Isometry3<f64>,
         scale: f64,
@@ -133,15 +133,15 @@ fn vertex(known: &[(f64, f64)], step: f64) -> Option<ModelScale> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Observation, default_scene};
+    use crate::scene::{Frame, default_scene};
 
     #[test]
     fn the_size_of_a_model_is_found_with_depth() {
         let scene = default_scene(1).unwrap();
         for size in [0.94, 1.0, 1.07] {
             let object = Arc::new(scene.object.scaled(size).unwrap());
-            let bare = Observation { hand: None, ..scene.observation.clone() };
-            let frame = Frame::new(&bare, &object).unwrap();
+            let bare = Frame { hand: None, ..scene.observation.clone() };
+            let frame = PreparedFrame::new(&bare, &object).unwrap();
             let mut fused = Fused::default();
             fused.settings.model_scale.sigma = 0.05;
             let found = fused.model_scale(&frame, &scene.initial).unwrap();

@@ -3,7 +3,7 @@
 use prehend_render::depth_map;
 
 use crate::problem::State;
-use crate::scene::{CameraCalibrationError, Frame, Pixel, View, eroded};
+use crate::scene::{CameraCalibrationError, Pixel, PreparedFrame, View, eroded};
 
 /// The object and the hand of a state in the image of a frame, with what is wrong with the camera corrected.
 pub(crate) struct Pixels<'a> {
@@ -14,7 +14,7 @@ pub(crate) struct Pixels<'a> {
 }
 
 impl<'a> Pixels<'a> {
-    pub(crate) fn new(frame: &Frame<'a>, state: &State, margin: usize) -> Self {
+    pub(crate) fn new(frame: &PreparedFrame<'a>, state: &State, margin: usize) -> Self {
         let observation = frame.observation();
         let camera = state.camera.corrected(&observation.camera);
         let hand = frame.hand().map(|measured| {

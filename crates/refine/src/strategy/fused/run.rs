@@ -17,7 +17,7 @@ use super::settings::{FusedSettings, HypothesisSettings, Stage};
 use crate::error::RefineError;
 use crate::factor::{ErrorGroup, GaussianPrior, Scales};
 use crate::problem::{NoiseScales, Problem, Solution, Solver, State, Termination};
-use crate::scene::Frame;
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Iteration, Observer, Recorder};
 
 /// The factor of color and silhouette.
@@ -26,7 +26,7 @@ const IMAGE: &str = "rendering";
 /// A refinement under way.
 pub(super) struct Run<'a> {
     fused: &'a Fused,
-    frame: &'a Frame<'a>,
+    frame: &'a PreparedFrame<'a>,
     initial: &'a State,
     is_rotation_unknown: bool,
     /// With what was measured of depth's noise.
@@ -39,7 +39,7 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     pub(super) fn new(
         fused: &'a Fused,
-        frame: &'a Frame<'a>,
+        frame: &'a PreparedFrame<'a>,
         initial: &'a State,
     ) -> Result<Self, RefineError> {
         let scales = Scales::default();

@@ -12,7 +12,7 @@ use crate::factor::{
     RenderingSettings, ScaleSettings, SupportSettings, TactileSettings,
 };
 use crate::problem::{Block, Solver, State};
-use crate::scene::{Frame, ModelErrorSettings};
+use crate::scene::{ModelErrorSettings, PreparedFrame};
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
@@ -261,7 +261,7 @@ pub struct FusedSettings {
 
 impl FusedSettings {
     /// These settings with the accuracy of the model of `frame`, and of a rig if that `is_rig_known`.
-    pub(crate) fn for_frame(&self, frame: &Frame<'_>, is_rig_known: bool) -> Self {
+    pub(crate) fn for_frame(&self, frame: &PreparedFrame<'_>, is_rig_known: bool) -> Self {
         let mut settings = self.clone();
         if let Some(deviation) = &frame.object().deviation {
             settings.patches.sigma = settings.patches.sigma.min(deviation.left());

@@ -18,7 +18,7 @@ use super::lens::SimulatedLens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::data::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
-use crate::scene::{Hand, Object, Observation};
+use crate::scene::{Frame, Hand, Object};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
@@ -177,7 +177,7 @@ impl<'a> SensorRig<'a> {
             Some((film, _)) => self.settings.color.gains(&mut film.surroundings.clone()),
             None => self.settings.color.gains(noise),
         };
-        let told = Observation {
+        let told = Frame {
             camera: self.errors.camera(&self.camera),
             color: self.settings.color.expose(&seen.color, gains, noise),
             depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),

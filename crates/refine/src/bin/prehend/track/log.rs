@@ -11,7 +11,7 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_refine::data::mcap::{Frames, ImageTopics, Recording, RecordingWriter};
 use prehend_refine::data::{FrameInput, Target};
 use prehend_refine::rig::Rig;
-use prehend_refine::scene::{Hand, Object, Observation};
+use prehend_refine::scene::{Frame, Hand, Object};
 use prehend_refine::tracker::{TrackStatus, Tracked};
 use prehend_render::{RenderModel, draw_outline};
 
@@ -146,7 +146,7 @@ impl LogWriter {
         &mut self,
         (time, stamp): (Duration, Option<i64>),
         object: &Object,
-        observation: &Observation,
+        observation: &Frame,
         tracked: &Tracked,
     ) -> anyhow::Result<()> {
         let at = match stamp {

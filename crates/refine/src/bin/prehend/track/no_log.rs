@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::bail;
 use prehend_refine::data::Target;
 use prehend_refine::rig::Rig;
-use prehend_refine::scene::{Object, Observation};
+use prehend_refine::scene::{Frame, Object};
 use prehend_refine::tracker::Tracked;
 
 use super::film::{Film, Moment};
@@ -60,7 +60,7 @@ impl LogWriter {
         &mut self,
         _: (Duration, Option<i64>),
         _: &Object,
-        _: &Observation,
+        _: &Frame,
         _: &Tracked,
     ) -> anyhow::Result<()> {
         match *self {}

@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use crate::scene::{HandMeasurement, Observation};
+use crate::scene::{Frame, HandMeasurement};
 
 /// Shifts the hand by `distance` \[m\].
-pub(super) fn shift(observation: &mut Observation, distance: f64, random: &mut SplitMix64) {
+pub(super) fn shift(observation: &mut Frame, distance: f64, random: &mut SplitMix64) {
     let shift = Translation3::from(distance * direction(random));
     if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = shift * hand.t_cam_hand;
@@ -14,7 +14,7 @@ pub(super) fn shift(observation: &mut Observation, distance: f64, random: &mut S
 }
 
 /// Turns the hand by `angle` \[rad\] about its base.
-pub(super) fn turn(observation: &mut Observation, angle: f64, random: &mut SplitMix64) {
+pub(super) fn turn(observation: &mut Frame, angle: f64, random: &mut SplitMix64) {
     let turn = UnitQuaternion::new(angle * direction(random));
     if let Some(hand) = &mut observation.hand {
         let Isometry3 { rotation, translation } = hand.t_cam_hand;
@@ -23,14 +23,14 @@ pub(super) fn turn(observation: &mut Observation, angle: f64, random: &mut Split
 }
 
 /// Moves every joint by `angle` \[rad\], one way or the other.
-pub(super) fn bend(observation: &mut Observation, angle: f64, random: &mut SplitMix64) {
+pub(super) fn bend(observation: &mut Frame, angle: f64, random: &mut SplitMix64) {
     for joint in observation.hand.iter_mut().flat_map(|hand| &mut hand.joints) {
         *joint += if random.uniform() < 0.5 { angle } else { -angle };
     }
 }
 
 /// A share of the taxels feels nothing.
-pub(super) fn silence(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
+pub(super) fn silence(observation: &mut Frame, share: f64, random: &mut SplitMix64) {
     for force in observation.hand.iter_mut().flat_map(|hand| &mut hand.forces) {
         if random.uniform() < share && !HandMeasurement::is_unknown(force) {
             *force = Vector3::zeros();
@@ -39,7 +39,7 @@ pub(super) fn silence(observation: &mut Observation, share: f64, random: &mut Sp
 }
 
 /// A share of the taxels feels forces that are not there, in any direction and on average as large as those that are.
-pub(super) fn invent(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
+pub(super) fn invent(observation: &mut Frame, share: f64, random: &mut SplitMix64) {
     let Some(hand) = &mut observation.hand else { return };
     let sizes: Vec<f64> = hand.forces.iter().map(|f| f.norm()).filter(|&f| f > 0.0).collect();
     let mean = if sizes.is_empty() { 1.0 } else { sizes.iter().sum::<f64>() / sizes.len() as f64 };
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use crate::scene::HandMeasurement;
 
-    fn after(change: fn(&mut Observation, f64, &mut SplitMix64), amount: f64) -> HandMeasurement {
+    fn after(change: fn(&mut Frame, f64, &mut SplitMix64), amount: f64) -> HandMeasurement {
         let mut observation = square();
         change(&mut observation, amount, &mut SplitMix64::new(8));
         observation.hand.unwrap()

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use strum::Display;
 
 use crate::data::bop::ResultRow;
-use crate::scene::Observation;
+use crate::scene::Frame;
 
 /// A kind of fault that is swept from none to much; the documentation of the variants is the command's help.
 ///
@@ -61,7 +61,7 @@ impl Sweep {
     }
 
     /// Adds `amount` of the fault, in the unit that the variant names; `seed` seeds its random numbers.
-    pub(super) fn perturb(self, observation: &mut Observation, amount: u32, seed: u64) {
+    pub(super) fn perturb(self, observation: &mut Frame, amount: u32, seed: u64) {
         if amount == self.amounts()[0] {
             return;
         }
@@ -108,13 +108,13 @@ pub(super) mod tests {
     use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
     /// A square object half a meter away in the middle of a small picture, before a wall.
-    pub(in super::super) fn square() -> Observation {
+    pub(in super::super) fn square() -> Frame {
         let (width, height) = (80, 60);
         let inside = |k: usize| (30..50).contains(&(k % width)) && (20..40).contains(&(k / width));
         let count = width * height;
         let depth = (0..count).map(|k| if inside(k) { 0.5 } else { 1.0 }).collect();
         let hand = Arc::new(Hand::new(KinematicTree::rigid("palm", vec![]), vec![]).unwrap());
-        Observation {
+        Frame {
             camera: Camera { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, width, height },
             color: RgbImage::filled(width, height, [0.6, 0.3, 0.2]),
             depth: DepthImage::new(width, height, depth).unwrap(),
@@ -128,7 +128,7 @@ pub(super) mod tests {
         }
     }
 
-    fn same(a: &Observation, b: &Observation) -> bool {
+    fn same(a: &Frame, b: &Frame) -> bool {
         format!("{a:?}") == format!("{b:?}")
     }
 

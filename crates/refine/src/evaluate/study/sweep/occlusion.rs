@@ -2,14 +2,14 @@
 
 use prehend_geometry::SplitMix64;
 
-use crate::scene::Observation;
+use crate::scene::Frame;
 
 /// How far in front of the object the block is \[m\].
 const AHEAD: f64 = 0.03;
 
 /// A gray block with a straight edge in front of the object, from one side, that leaves `visible` of the mask's pixels to be seen:
 /// it is in the depth and the color image, and the mask knows of it.
-pub(super) fn block(observation: &mut Observation, visible: f64, random: &mut SplitMix64) {
+pub(super) fn block(observation: &mut Frame, visible: f64, random: &mut SplitMix64) {
     let width = observation.camera.width;
     let angle = std::f64::consts::TAU * random.uniform();
     let (across, down) = (angle.cos(), angle.sin());

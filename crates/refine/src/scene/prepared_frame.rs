@@ -1,0 +1,404 @@
+//! A frame and its object, with what factors derive from them.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use nalgebra::{Isometry3, Point3};
+use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
+use serde::{Deserialize, Serialize};
+
+use super::{ForegroundSettings, Frame, HandMeasurement, Object, RegionEvidence};
+use crate::error::RefineError;
+
+/// A frame and the object whose pose is sought, checked, with what factors derive from them: each image is made when it is first asked
+/// for, and once.
+pub struct PreparedFrame<'a> {
+    observation: &'a Frame,
+    object: &'a Arc<Object>,
+    hand_depth: OnceLock<Arc<DepthImage>>,
+    depth: OnceLock<Arc<DepthImage>>,
+    /// Segmented images by what may hide the object and by how many times smaller they are.
+    segmented: Mutex<BTreeMap<(Occluders, usize), Arc<Target>>>,
+    /// Root mean square of the colors under the mask.
+    brightness: OnceLock<f64>,
+    /// Regions by mask and colors.
+    regions: OnceLock<(ForegroundSettings, Arc<RegionEvidence>)>,
+    /// Regions that were found otherwise.
+    given_regions: Option<Arc<RegionEvidence>>,
+    /// What renders, if not the processor at hand.
+    backend: Option<Arc<dyn Backend>>,
+    /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
+    focus: Option<[Range<usize>; 2]>,
+    /// What other cameras saw of the object.
+    views: Vec<CameraView<'a>>,
+}
+
+/// What another camera saw of the object.
+pub struct CameraView<'a> {
+    /// Which of the observation's [`views`](Frame::views) it is.
+    pub index: usize,
+    /// The first camera's coordinates → its own \[m\].
+    pub t_view_cam: Isometry3<f64>,
+    /// What it saw, in its own coordinates.
+    pub frame: PreparedFrame<'a>,
+}
+
+/// What may hide the object in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Occluders {
+    /// The hand, where its pose and joints say that it is.
+    Hand,
+    /// The hand, and what depth shows nearer beside the mask.
+    Measured,
+    /// Anything wherever the mask is not set: nothing is compared there.
+    Unmasked,
+}
+
+/// The object in an image, with what may hide it.
+pub(crate) struct Segmented {
+    pub(crate) target: Arc<Target>,
+    /// Root mean square of the colors under the mask.
+    pub(crate) brightness: f64,
+}
+
+/// Within how many pixels of the border of a mask colors are those of object and others mixed, and masks are shrunk or grown.
+pub(crate) const MASK_MARGIN: usize = 4;
+
+/// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
+/// object itself, where the mask falls short.
+const IN_FRONT: f32 = 10e-3;
+
+impl<'a> PreparedFrame<'a> {
+    /// `object` as `observation` shows it; without a hand there, nothing is known to hide the object.
+    ///
+    /// # Errors
+    /// If an image has not the camera's size, the mask is empty, or there is not one joint position a joint.
+    pub fn new(observation: &'a Frame, object: &'a Arc<Object>) -> Result<Self, RefineError> {
+        observation.require_sizes()?;
+        if observation.mask.count() == 0 {
+            return Err(RefineError::EmptyMask);
+        }
+        if let Some(measured) = &observation.hand {
+            measured.hand.check_joints(&measured.joints)?;
+        }
+        let seeing = observation.views.iter().enumerate();
+        let seeing = seeing.filter(|(_, view)| view.observation().mask.count() > 0);
+        let views = seeing.map(|(index, view)| {
+            let frame = Self::new(view.observation(), object)?;
+            Ok(CameraView { index, t_view_cam: view.t_view_cam(), frame })
+        });
+        Ok(Self {
+            views: views.collect::<Result<_, RefineError>>()?,
+            observation,
+            object,
+            hand_depth: OnceLock::new(),
+            depth: OnceLock::new(),
+            segmented: Mutex::default(),
+            brightness: OnceLock::new(),
+            regions: OnceLock::new(),
+            given_regions: None,
+            backend: None,
+            focus: None,
+        })
+    }
+
+    /// The frame with another model of the object.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub(crate) fn of_object<'b>(
+        &'b self,
+        object: &'b Arc<Object>,
+    ) -> Result<PreparedFrame<'b>, RefineError> {
+        let mut frame = PreparedFrame::new(self.observation, object)?;
+        frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
+        frame.given_regions.clone_from(&self.given_regions);
+        frame.backend.clone_from(&self.backend);
+        Ok(frame)
+    }
+
+    /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures
+    /// there, all hypotheses of a call at once. What it fails to answer, the processor does; a device
+    /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
+    /// must not wait for each other.
+    pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
+        let of_view = |view: CameraView<'a>| {
+            let frame = view.frame.with_backend(Arc::clone(&backend));
+            CameraView { frame, ..view }
+        };
+        let views = self.views.into_iter().map(of_view).collect();
+        // The processor needs no sessions.
+        Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), views, ..self }
+    }
+
+    /// What renders, if not the processor at hand.
+    pub(crate) fn backend(&self) -> Option<&Arc<dyn Backend>> {
+        self.backend.as_ref()
+    }
+
+    /// The same with the depth image of the hand, which is known already \[m\].
+    pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
+        Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
+    }
+
+    /// The same with a copy of the measured depth, which is there already \[m\].
+    pub(crate) fn with_depth(self, depth: &Arc<DepthImage>) -> Self {
+        Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
+    }
+
+    /// Frame whose regions are not those of its mask and its own colors.
+    pub(crate) fn with_regions(self, regions: &Arc<RegionEvidence>) -> Self {
+        Self { given_regions: Some(Arc::clone(regions)), ..self }
+    }
+
+    /// The same of an object that is nowhere but in these columns and rows.
+    pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
+        Self { focus: Some(focus), ..self }
+    }
+
+    /// What other cameras saw of the object: those with a mask of it.
+    pub fn views(&self) -> &[CameraView<'a>] {
+        &self.views
+    }
+
+    /// What was sensed.
+    pub fn observation(&self) -> &'a Frame {
+        self.observation
+    }
+
+    /// The object whose pose is sought.
+    pub fn object(&self) -> &'a Arc<Object> {
+        self.object
+    }
+
+    /// The hand, its pose and touch, where known.
+    pub fn hand(&self) -> Option<&'a HandMeasurement> {
+        self.observation.hand.as_ref()
+    }
+
+    /// The hand, which `factor` needs.
+    ///
+    /// # Errors
+    /// [`RefineError::Missing`].
+    pub fn require_hand(&self, factor: &'static str) -> Result<&'a HandMeasurement, RefineError> {
+        self.hand().ok_or(RefineError::Missing { what: "hand", factor })
+    }
+
+    /// Depth as measured \[m\], 0 where missing.
+    pub fn depth(&self) -> &Arc<DepthImage> {
+        self.depth.get_or_init(|| Arc::new(self.observation.depth.clone()))
+    }
+
+    /// Depth image of the hand alone \[m\], 0 where it is not.
+    pub fn hand_depth(&self) -> &Arc<DepthImage> {
+        self.hand_depth.get_or_init(|| Arc::new(hand_depth(&self.observation.camera, self.hand())))
+    }
+
+    /// Log-likelihood ratio of object and others at each pixel \[nat\]: those given, or else by the mask, and by colors if these `count`.
+    ///
+    /// # Errors
+    /// [`RefineError::EmptyMask`].
+    pub(crate) fn regions(
+        &self,
+        count: bool,
+        settings: &ForegroundSettings,
+    ) -> Result<Arc<RegionEvidence>, RefineError> {
+        let known = self.regions.get().filter(|(of, _)| count && of == settings);
+        if let Some(known) = self.given_regions.as_ref().or(known.map(|(_, known)| known)) {
+            return Ok(Arc::clone(known));
+        }
+        let Frame { color, mask, .. } = self.observation;
+        let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask, settings);
+        let made = Arc::new(made.ok_or(RefineError::EmptyMask)?);
+        if count {
+            self.regions.get_or_init(|| (*settings, Arc::clone(&made)));
+        }
+        Ok(made)
+    }
+
+    /// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.
+    ///
+    /// # Errors
+    /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
+    pub(crate) fn masked_depths(
+        &self,
+        limit: usize,
+    ) -> Result<Vec<(usize, usize, f64)>, RefineError> {
+        let Frame { depth, mask, .. } = self.observation;
+        let at = |x: usize, y: usize| {
+            let z = f64::from(depth.get(x, y)?);
+            (mask.get(x, y)? && z > 0.0).then_some((x, y, z))
+        };
+        let step = ((mask.count() as f64 / limit.max(1) as f64).sqrt().ceil() as usize).max(1);
+        let depths: Vec<_> = (0..depth.height())
+            .step_by(step)
+            .flat_map(|y| (0..depth.width()).step_by(step).filter_map(move |x| at(x, y)))
+            .collect();
+        if depths.is_empty() { Err(RefineError::NoDepth) } else { Ok(depths) }
+    }
+
+    /// The places of measured depths within the mask in the camera frame \[m\].
+    ///
+    /// # Errors
+    /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
+    pub fn masked_points(&self, limit: usize) -> Result<Vec<Point3<f64>>, RefineError> {
+        let camera = &self.observation.camera;
+        let depths = self.masked_depths(limit)?;
+        Ok(depths.into_iter().map(|(x, y, z)| camera.unproject(x as f64, y as f64, z)).collect())
+    }
+
+    /// The segmented image, `factor` times smaller.
+    ///
+    /// # Errors
+    /// If nothing of the mask is left.
+    pub(crate) fn segmented(
+        &self,
+        occluders: Occluders,
+        factor: usize,
+    ) -> Result<Segmented, RefineError> {
+        let fault = |error: TargetError| RefineError::Images(error.to_string());
+        let Frame { camera, color, mask, .. } = self.observation;
+        let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
+        let target = match images.entry((occluders, factor)) {
+            Entry::Occupied(known) => Arc::clone(known.get()),
+            Entry::Vacant(unknown) => {
+                let factor = factor.clamp(1, camera.width.min(camera.height));
+                let occluder = match occluders {
+                    Occluders::Hand if factor == 1 => (**self.hand_depth()).clone(),
+                    Occluders::Hand => self.hand_depth().downsampled(factor),
+                    Occluders::Measured => self.measured_occluder(factor),
+                    Occluders::Unmasked => self.unmasked_occluder(factor),
+                };
+                let target = Target::reduced(*camera, color, mask, factor);
+                let target = target.and_then(|target| target.with_occluder(occluder));
+                Arc::clone(unknown.insert(Arc::new(target.map_err(fault)?)))
+            }
+        };
+        let brightness = *self.brightness.get_or_init(|| brightness(self.observation));
+        Ok(Segmented { target, brightness })
+    }
+
+    /// Depth of the hand, and of something just before the camera where the mask is not set; `factor` times smaller.
+    fn unmasked_occluder(&self, factor: usize) -> DepthImage {
+        let mask = &self.observation.mask;
+        let (width, height) = (mask.width(), mask.height());
+        let (hand, inner) = (self.hand_depth().pixels(), eroded(width, mask.pixels(), MASK_MARGIN));
+        let nearest = |at: usize| if inner[at] { hand[at] } else { f32::MIN_POSITIVE };
+        DepthImage::downsampled_of(width, height, factor, [0..width, 0..height], nearest)
+    }
+
+    /// Depth of the hand and of what was measured beside the mask, whichever is nearer; `factor` times smaller.
+    fn measured_occluder(&self, factor: usize) -> DepthImage {
+        let Frame { depth, mask, .. } = self.observation;
+        let (width, height) = (depth.width(), depth.height());
+        let within = self.focus.clone().unwrap_or([0..width, 0..height]);
+        let (hand, depth, mask) = (self.hand_depth().pixels(), depth.pixels(), mask.pixels());
+        let nearest = |at: usize| {
+            let (hand, measured) = (hand[at], depth[at]);
+            let front = measured + IN_FRONT;
+            let nearer = hand <= 0.0 || front < hand;
+            let seen = !mask[at] && measured.is_finite() && measured > 0.0;
+            if seen && nearer { front } else { hand }
+        };
+        DepthImage::downsampled_of(width, height, factor, within, nearest)
+    }
+}
+
+/// Pixels of an image of `width` columns whose neighbors up to `reach` columns and rows away are all set.
+pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
+    let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
+    let height = set.len() / width.max(1);
+    for y in 0..height {
+        let mut run = 0;
+        for x in 0..width {
+            run = if set[y * width + x] { run + 1 } else { 0 };
+            if run > 2 * reach {
+                rows[y * width + x - reach] = true;
+            }
+        }
+    }
+    let mut runs = vec![0; width];
+    for y in 0..height {
+        for (x, run) in runs.iter_mut().enumerate() {
+            *run = if rows[y * width + x] { *run + 1 } else { 0 };
+            if *run > 2 * reach {
+                all[(y - reach) * width + x] = true;
+            }
+        }
+    }
+    all
+}
+
+/// Root mean square of the colors under the mask; never zero.
+fn brightness(observation: &Frame) -> f64 {
+    let Frame { color, mask, .. } = observation;
+    let [left, top, width, height] = mask.bounds().unwrap_or_default();
+    let line = |row: usize| row * mask.width() + left..row * mask.width() + left + width;
+    let pixels = (top..top + height)
+        .flat_map(|row| color.pixels()[line(row)].iter().zip(&mask.pixels()[line(row)]));
+    let (sum, count) = pixels
+        .filter(|(_, m)| **m)
+        .flat_map(|(c, _)| c)
+        .fold((0.0, 0.0), |(s, n), &v| (s + f64::from(v).powi(2), n + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt().max(0.02)
+}
+
+/// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
+pub(crate) fn hand_depth(camera: &Camera, hand: Option<&HandMeasurement>) -> DepthImage {
+    let mut depth = DepthImage::default();
+    draw_hand_depth(&mut depth, camera, hand);
+    depth
+}
+
+/// The same into an image that is there already.
+pub(crate) fn draw_hand_depth(
+    depth: &mut DepthImage,
+    camera: &Camera,
+    hand: Option<&HandMeasurement>,
+) {
+    match hand {
+        Some(HandMeasurement { hand, t_cam_hand, joints, .. }) => {
+            draw_depth(depth, camera, &hand.render_bodies(t_cam_hand, joints));
+        }
+        None => depth.refill(camera.width, camera.height, 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_render::{Mask, RgbImage};
+
+    use super::*;
+    use crate::scene::default_scene;
+
+    #[test]
+    fn images_of_another_size_and_an_empty_mask_are_named() {
+        let scene = default_scene(1).unwrap();
+        let refused = |change: &dyn Fn(&mut Frame)| {
+            let mut observation = scene.observation.clone();
+            change(&mut observation);
+            PreparedFrame::new(&observation, &scene.object).map(|_| ()).unwrap_err().to_string()
+        };
+        let color = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
+        assert!(color.contains("the color image has 640x479 pixels, the camera has 640x480"));
+        let depth = refused(&|o| o.depth = DepthImage::filled(320, 480, 1.0));
+        assert!(depth.contains("the depth image has 320x480 pixels"), "{depth}");
+        let mask = refused(&|o| o.mask = Mask::filled(1, 1, true));
+        assert!(mask.contains("the mask has 1x1 pixels"), "{mask}");
+        let empty = refused(&|o| o.mask = Mask::filled(640, 480, false));
+        assert_eq!(empty, RefineError::EmptyMask.to_string());
+    }
+
+    #[test]
+    fn erosion_leaves_what_is_surrounded() {
+        let square = |k: usize| (2..7).contains(&(k % 10)) && (1..6).contains(&(k / 10));
+        let set: Vec<bool> = (0..80).map(square).collect();
+        let left = eroded(10, &set, 2);
+        let kept: Vec<usize> = (0..80).filter(|k| left[*k]).collect();
+        assert_eq!(kept, [34]);
+    }
+}
