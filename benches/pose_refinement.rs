@@ -22,7 +22,7 @@ fn main() -> Result<(), RefineError> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| !w.starts_with('-')).collect();
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     println!("| what | median ms | fastest | slowest |\n|---|--:|--:|--:|");
-    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object)?;
+    let frame = PreparedFrame::new(&SCENE.frame, &SCENE.object)?;
     let (fused, combined) = (Fused::default(), Heuristic::combined());
     let exhaustive = Heuristic { exhaustive: true, ..combined.clone() };
     let whole: [(&str, usize, &dyn Strategy); 3] = [
@@ -79,14 +79,14 @@ fn time<T>(name: &str, samples: usize, mut run: impl FnMut() -> T) {
 fn tracker() -> Result<Tracker, RefineError> {
     let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), TrackerSettings::default())?;
     tracker.start_from(&SEQUENCE.initial);
-    tracker.track(&SEQUENCE.frames[0].observation, SEQUENCE.frames[0].time)?;
+    tracker.track(&SEQUENCE.frames[0].frame, SEQUENCE.frames[0].time)?;
     Ok(tracker)
 }
 
 /// All frames but the first.
 fn follow(mut tracker: Tracker) -> Result<Vec<Tracked>, RefineError> {
     let frames = &SEQUENCE.frames[1..];
-    frames.iter().map(|frame| tracker.track(&frame.observation, frame.time)).collect()
+    frames.iter().map(|frame| tracker.track(&frame.frame, frame.time)).collect()
 }
 
 /// Prints what the time of tracking goes into.

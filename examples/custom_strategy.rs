@@ -51,7 +51,7 @@ impl Strategy for RandomRestarts {
 
 fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
-    let frame = PreparedFrame::new(&scene.observation, &scene.object)?;
+    let frame = PreparedFrame::new(&scene.frame, &scene.object)?;
     let strategy = RandomRestarts { count: 300, spread: (0.01, 0.15), icp: RobustIcp::default() };
     let errors = |pose| (pe_cm(pose, &scene.truth), oe_deg(pose, &scene.truth));
     let (pe, oe) = errors(&scene.initial);

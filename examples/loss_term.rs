@@ -34,7 +34,7 @@ impl Factor for Landmark {
 fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
     // Without the hand and without colors, a bottle's outline and depth say little of how it is turned.
-    let bare = Frame { hand: None, ..scene.observation.clone() };
+    let bare = Frame { hand: None, ..scene.frame.clone() };
     let frame = PreparedFrame::new(&bare, &scene.object)?;
     let mut plain = Fused::default();
     plain.settings.modalities = vec![Modality::Silhouette, Modality::Depth];

@@ -23,7 +23,7 @@ fn main() -> anyhow::Result<()> {
     let scene = default_scene(seed)?;
 
     let start = Instant::now();
-    let observation = &scene.observation;
+    let observation = &scene.frame;
     let frame = PreparedFrame::new(observation, &scene.object)?;
     let refined = refine(&frame, &scene.initial, &Method::default())?;
     let seconds = start.elapsed().as_secs_f64();

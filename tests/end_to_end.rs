@@ -13,7 +13,7 @@ use prehend::refine::{Estimate, PreparedFrame, RefineError, Strategy, refine};
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
 fn frame() -> PreparedFrame<'static> {
-    PreparedFrame::new(&SCENE.observation, &SCENE.object).expect("the frame fits")
+    PreparedFrame::new(&SCENE.frame, &SCENE.object).expect("the frame fits")
 }
 
 fn run(strategy: &dyn Strategy) -> Result<Estimate, RefineError> {
@@ -69,7 +69,7 @@ fn poses_are_the_same_for_any_number_of_threads() {
 
 #[test]
 fn without_a_hand_vision_alone_still_works() {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     (observation.hand, observation.gravity) = (None, None);
     let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
     let vision = Heuristic::of(&[GradientKind::Rendering, GradientKind::Depth]);

@@ -69,9 +69,9 @@ static ALLOCATOR: Counting = Counting;
 fn main() -> Result<(), RefineError> {
     let mut film = default_sequence(1, FRAMES)?;
     for frame in &mut film.frames[1..] {
-        frame.observation.mask.pixels_mut().fill(false);
+        frame.frame.mask.pixels_mut().fill(false);
     }
-    let pixels: usize = film.frames.iter().map(|f| f.observation.mask.pixels().len()).sum();
+    let pixels: usize = film.frames.iter().map(|f| f.frame.mask.pixels().len()).sum();
     let mut tracker = Tracker::new(Arc::clone(&film.object), TrackerSettings::default())?;
     tracker.start_from(&film.initial);
     let mut seconds = Vec::new();
@@ -79,7 +79,7 @@ fn main() -> Result<(), RefineError> {
     for (number, frame) in film.frames.into_iter().enumerate() {
         COUNTING.store(number >= FIRST, Ordering::Relaxed);
         let start = Instant::now();
-        let tracked = tracker.push(frame.observation, frame.time)?;
+        let tracked = tracker.push(frame.frame, frame.time)?;
         let time = start.elapsed().as_secs_f64();
         COUNTING.store(false, Ordering::Relaxed);
         if number >= FIRST {

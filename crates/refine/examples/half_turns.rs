@@ -72,7 +72,7 @@ fn main() -> anyhow::Result<()> {
             &row.t_cam_model,
             &[],
         )?;
-        let frame = PreparedFrame::new(&input.observation, &input.object)?;
+        let frame = PreparedFrame::new(&input.frame, &input.object)?;
         let initial = turned(&row.t_cam_model, &input.object, turn);
         let found = refine(&frame, &initial, &Fused::default())?;
         // A symmetric object has several true poses: the nearest one counts.

@@ -8,7 +8,7 @@
 //! use prehend_refine::{PreparedFrame, Method, refine};
 //!
 //! let scene = default_scene(1)?;
-//! let frame = PreparedFrame::new(&scene.observation, &scene.object)?;
+//! let frame = PreparedFrame::new(&scene.frame, &scene.object)?;
 //! let estimate = refine(&frame, &scene.initial, &Method::default())?;
 //! let posterior = estimate.posterior.as_ref().ok_or("only other methods have none")?;
 //! println!("{} with probability {:.2}", estimate.t_cam_object(), posterior.probability());
@@ -39,14 +39,13 @@ pub mod calibration;
 pub mod check;
 pub mod data;
 mod error;
+mod estimator;
 pub mod evaluate;
 pub mod export;
 pub mod factor;
 pub mod info;
 mod method;
 pub mod problem;
-mod refine;
-mod refine_all;
 pub mod rig;
 pub mod scene;
 pub mod search;
@@ -55,15 +54,16 @@ pub mod strategy;
 pub mod symmetry;
 pub mod synth;
 pub mod tracker;
+mod workers;
 
 /// Millimeters in a meter, for what is told to people and written to BOP files.
 pub(crate) const MM_PER_M: f64 = 1e3;
 
 pub use error::{Panicked, RefineError, guard};
+pub use estimator::{Estimator, EstimatorInput, Hypotheses, RefineJob, Refined, refine_all};
 pub use method::Method;
 pub use problem::{Factor, State};
-pub use refine::refine;
-pub use refine_all::{RefineJob, Refined, refine_all};
 pub use scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
 pub use settings::{Settings, SettingsError};
-pub use strategy::{Estimate, Strategy};
+pub use strategy::{Estimate, Strategy, refine};
+pub use workers::Workers;

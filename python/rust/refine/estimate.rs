@@ -1,5 +1,6 @@
 //! What was found, as Python's dataclasses.
 
+use nalgebra::Isometry3;
 use prehend_refine::Refined;
 use prehend_refine::strategy::{Posterior, PosteriorSummary};
 use prehend_refine::tracker::Tracked;
@@ -32,14 +33,18 @@ fn describe(fields: &Bound<'_, PyDict>, posterior: Option<&Posterior>) -> PyResu
     fields.set_item("hypotheses", hypotheses.collect::<PyResult<Vec<_>>>()?)
 }
 
-/// An `Estimate`.
-pub(super) fn estimate<'py>(py: Python<'py>, refined: &Refined) -> PyResult<Bound<'py, PyAny>> {
+/// An `Estimate`, of a refinement that began at `initial`.
+pub(super) fn estimate<'py>(
+    py: Python<'py>,
+    refined: &Refined<'_>,
+    initial: &Isometry3<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
     let fields = PyDict::new(py);
     let (found, posterior) = (&refined.estimate, refined.estimate.posterior.as_ref());
     fields.set_item("pose", matrix(py, found.t_cam_object())?)?;
     describe(&fields, posterior)?;
-    let warnings = refined.object_warnings.iter().chain(&refined.warnings);
-    let warnings: Vec<String> = warnings.map(ToString::to_string).collect();
+    let warnings = py.detach(|| refined.input.warnings(initial).concat());
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     fields.set_item("warnings", warnings)?;
     fields.set_item("iterations", found.trace.iterations.len().saturating_sub(1))?;
     if let Some(summary) = posterior.map(PosteriorSummary::from) {

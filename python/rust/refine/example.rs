@@ -22,7 +22,7 @@ pub(crate) fn example_frame<'py>(
 ) -> PyResult<(Frame, Array<'py>, Array<'py>)> {
     let scene = py.detach(|| default_scene(seed)).raise()?;
     let (initial, truth) = (matrix(py, &scene.initial)?, matrix(py, &scene.truth)?);
-    let input = FrameInput::new(scene.observation, scene.object, None);
+    let input = FrameInput { frame: scene.frame, object: scene.object, rig: None };
     Ok((Frame { input, target: None }, initial, truth))
 }
 
@@ -37,8 +37,8 @@ pub(crate) fn example_sequence<'py>(
 ) -> PyResult<(Array<'py>, Vec<(Frame, f64, Array<'py>)>)> {
     let sequence = py.detach(|| default_sequence(seed, count)).raise()?;
     let initial = matrix(py, &sequence.initial)?;
-    let frame = |SequenceFrame { time, observation, truth }| {
-        let input = FrameInput::new(observation, Arc::clone(&sequence.object), None);
+    let frame = |SequenceFrame { time, frame, truth }| {
+        let input = FrameInput { frame, object: Arc::clone(&sequence.object), rig: None };
         Ok((Frame { input, target: None }, time.as_secs_f64(), matrix(py, &truth)?))
     };
     let frames = sequence.frames.into_iter().map(frame).collect::<PyResult<_>>()?;

@@ -7,7 +7,7 @@ use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target};
 use prehend_refine::scene::{PreparedFrame, check_gravity};
 use prehend_refine::search::{PoseCandidate, PoseSearch};
-use prehend_refine::{RefineError, RefineJob};
+use prehend_refine::{EstimatorInput, RefineError};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
@@ -115,7 +115,7 @@ impl Frame {
         if let Some(rig) = &rig {
             observation = rig.corrected(&observation).raise()?;
         }
-        Ok(Self { input: FrameInput::new(observation, object, rig), target: None })
+        Ok(Self { input: FrameInput { frame: observation, object, rig }, target: None })
     }
 
     /// Refines a pose of the object (4 × 4, camera ← object [m]), or the hypotheses of a search (n × 4 × 4, the best first): an `Estimate`. Python's other
@@ -136,12 +136,11 @@ impl Frame {
         settings: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let method = run::method(method, iterations, noise.as_ref(), settings.as_ref())?;
-        let (initial, alternatives) = hypotheses(&pose)?;
-        let job = RefineJob { alternatives, ..RefineJob::new(&self.input, initial) };
-        let method = self.input.supported(&method);
-        let run = || job.run(&method, &mut |_| ControlFlow::Continue(()));
+        let (frame, hypotheses) = (&self.input.frame, hypotheses(&pose)?);
+        let estimator = self.input.estimator(&method).supported_by(frame);
+        let run = || estimator.run(frame, &hypotheses, &mut |_| ControlFlow::Continue(()));
         let refined = py.detach(run).raise()?;
-        estimate::estimate(py, &refined)
+        estimate::estimate(py, &refined, &hypotheses.best)
     }
 
     /// Searches the object in the masked depth, without any initial pose: up to four poses (n × 4 × 4, camera ← object [m]), the best first, and their
@@ -155,7 +154,8 @@ impl Frame {
         let settings = self::settings(settings.as_ref())?.search();
         let search = || -> Result<Vec<PoseCandidate>, RefineError> {
             let object = Arc::clone(&self.input.object);
-            PoseSearch::new(object, settings)?.run(&self.input.frame()?)
+            PoseSearch::new(object, settings)?
+                .run(&PreparedFrame::new(&self.input.frame, &self.input.object)?)
         };
         let found = py.detach(search).raise()?;
         let poses = found.iter().flat_map(|c| rows(&c.t_cam_object)).collect();
@@ -166,12 +166,14 @@ impl Frame {
     /// What looks wrong with object, frame and a pose in it, in words.
     fn warnings(&self, py: Python<'_>, pose: Numbers<'_>) -> PyResult<Vec<String>> {
         let pose = self::pose(&pose, "pose")?;
-        let warnings = py.detach(|| self.input.warnings(&pose).concat());
+        let warnings = py.detach(|| {
+            EstimatorInput::new(&self.input.frame, &self.input.object).warnings(&pose).concat()
+        });
         Ok(warnings.iter().map(ToString::to_string).collect())
     }
 
     fn __repr__(&self) -> String {
-        let prehend_refine::Frame { camera, hand, .. } = &self.input.observation;
+        let prehend_refine::Frame { camera, hand, .. } = &self.input.frame;
         let target = self.target.map(|target| format!("{target}, ")).unwrap_or_default();
         let held = if hand.is_some() { "in a hand" } else { "without a hand" };
         format!("Frame({target}{} × {}, {held})", camera.width, camera.height)

@@ -19,7 +19,7 @@ impl Frame {
     /// H × W × 3 of uint8.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, u8>> {
-        let image = &self.input.observation.color;
+        let image = &self.input.frame.color;
         let byte = |v: &f32| (255.0 * v.clamp(0.0, 1.0)).round() as u8;
         let pixels = image.pixels().iter().flatten().map(byte).collect();
         images::image(py, pixels, &[image.height(), image.width(), 3])
@@ -28,14 +28,14 @@ impl Frame {
     /// H × W [m], 0 where missing.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f32>> {
-        let image = &self.input.observation.depth;
+        let image = &self.input.frame.depth;
         images::image(py, image.pixels().to_vec(), &[image.height(), image.width()])
     }
 
     /// H × W.
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
-        let image = &self.input.observation.mask;
+        let image = &self.input.frame.mask;
         images::image(py, image.pixels().to_vec(), &[image.height(), image.width()])
     }
 
@@ -43,7 +43,7 @@ impl Frame {
     #[getter]
     #[pyo3(name = "K")]
     fn k<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        array(py, self.input.observation.camera.k().to_vec(), &[3, 3])
+        array(py, self.input.frame.camera.k().to_vec(), &[3, 3])
     }
 
     /// The object.
@@ -55,21 +55,21 @@ impl Frame {
     /// The hand, where it is known.
     #[getter]
     fn hand(&self) -> Option<Hand> {
-        let measured = self.input.observation.hand.as_ref();
+        let measured = self.input.frame.hand.as_ref();
         measured.map(|measured| Hand { hand: Arc::clone(&measured.hand) })
     }
 
     /// 4 × 4, camera ← base of the hand [m], where it is known.
     #[getter]
     fn hand_pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
-        let hand = self.input.observation.hand.as_ref();
+        let hand = self.input.frame.hand.as_ref();
         hand.map(|hand| matrix(py, &hand.t_cam_hand)).transpose()
     }
 
     /// Positions of the hand's joints by name [rad or m], where they are known.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(measured) = &self.input.observation.hand else { return Ok(None) };
+        let Some(measured) = &self.input.frame.hand else { return Ok(None) };
         let joints = PyDict::new(py);
         for (name, position) in measured.hand.tree.joint_names().iter().zip(&measured.joints) {
             joints.set_item(name, position)?;
@@ -80,7 +80,7 @@ impl Frame {
     /// taxels × 3 [N], where they are known.
     #[getter]
     fn touch<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
-        let hand = self.input.observation.hand.as_ref();
+        let hand = self.input.frame.hand.as_ref();
         let forces = hand.map(|hand| &hand.forces).filter(|forces| !forces.is_empty());
         let numbers = |forces: &Vec<Vector3<f64>>| {
             forces.iter().flat_map(|force| [force.x, force.y, force.z]).collect()
@@ -91,7 +91,7 @@ impl Frame {
     /// In the camera frame [m/s²], where it is known.
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
-        let gravity = self.input.observation.gravity;
+        let gravity = self.input.frame.gravity;
         gravity.map(|gravity| array(py, gravity.as_slice().to_vec(), &[3])).transpose()
     }
 

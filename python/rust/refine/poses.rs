@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 use numpy::PyUntypedArrayMethods;
+use prehend_refine::Hypotheses;
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, in_order};
@@ -22,15 +23,13 @@ fn pose_of(numbers: &[f64], what: &str) -> PyResult<Isometry3<f64>> {
 }
 
 /// A pose, 4 × 4, without alternatives; or the first of poses of n × 4 × 4, and the others.
-pub(super) fn hypotheses(
-    array: &Numbers<'_>,
-) -> PyResult<(Isometry3<f64>, Option<Vec<Isometry3<f64>>>)> {
+pub(super) fn hypotheses(array: &Numbers<'_>) -> PyResult<Hypotheses> {
     if array.shape().len() != 3 {
-        return Ok((pose(array, "pose")?, None));
+        return Ok(pose(array, "pose")?.into());
     }
     let mut poses = poses(array, "pose")?.into_iter();
-    let first = poses.next().ok_or_else(|| wrong("pose: there is none"))?;
-    Ok((first, Some(poses.collect())))
+    let best = poses.next().ok_or_else(|| wrong("pose: there is none"))?;
+    Ok(Hypotheses { best, alternatives: Some(poses.collect()) })
 }
 
 /// Poses in an array of n × 4 × 4.

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
+use nalgebra::Isometry3;
+use prehend_refine::data::FrameInput;
 use prehend_refine::{Method, RefineJob, refine_all};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -81,14 +83,17 @@ pub(crate) fn refine_batch<'py>(
     if given != count {
         return Err(wrong(format!("poses: {count} are expected, one a frame, not {given}")));
     }
+    let job = |(input, initial): (&'_ FrameInput, Isometry3<f64>)| {
+        let estimator = input.estimator(&method).supported_by(&input.frame);
+        RefineJob { estimator, frame: &input.frame, hypotheses: initial.into() }
+    };
     let frames = frames.iter().map(|frame| &frame.get().input);
-    let jobs: Vec<RefineJob<'_>> =
-        frames.zip(poses).map(|(input, initial)| RefineJob::new(input, initial)).collect();
-    let done = py.detach(|| refine_all(&jobs, &method, threads)).raise()?;
+    let jobs: Vec<RefineJob<'_>> = frames.zip(poses.iter().copied()).map(job).collect();
+    let done = py.detach(|| refine_all(&jobs, threads)).raise()?;
     let results = PyList::empty(py);
-    for outcome in &done {
+    for (outcome, initial) in done.iter().zip(&poses) {
         match outcome {
-            Ok(refined) => results.append(estimate::estimate(py, refined)?)?,
+            Ok(refined) => results.append(estimate::estimate(py, refined, initial)?)?,
             Err(error) => results.append(Error::new_err(error.to_string()).into_value(py))?,
         }
     }

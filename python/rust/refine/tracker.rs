@@ -69,7 +69,7 @@ impl Tracker {
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let time = seconds(time, "time")?;
-        let tracked = py.detach(|| self.tracker.track(&frame.input.observation, time)).raise()?;
+        let tracked = py.detach(|| self.tracker.track(&frame.input.frame, time)).raise()?;
         estimate::tracked(py, &tracked)
     }
 

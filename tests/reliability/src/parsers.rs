@@ -7,11 +7,13 @@ use anyhow::Result;
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
-use prehend_refine::Settings;
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::data::{Assets, Journal, Target, Times, find_targets, load_frame_file};
+use prehend_refine::data::{
+    Assets, FrameInput, Journal, Target, Times, find_targets, load_frame_file,
+};
 use prehend_refine::evaluate::study::StudyFile;
 use prehend_refine::rig::Rig;
+use prehend_refine::{EstimatorInput, Settings};
 use prehend_render::{DepthImage, RgbImage};
 use serde_json::Value;
 
@@ -224,11 +226,16 @@ fn scene(small: &SmallDataset, bytes: &[u8], name: &str) -> Result<()> {
         // Distance grids are made once.
         let cache = Some(GridCache::new(small.path("cache")));
         let input = Assets::new(dataset, 0).with_cache(cache).load(&target, &[])?;
-        // Warnings look at everything.
-        let _ = input.warnings(&Isometry3::translation(0.0, 0.0, 0.3));
-        input.frame()?;
-        Ok(())
+        look(&input, &Isometry3::translation(0.0, 0.0, 0.3))
     })
+}
+
+/// Prepares a frame, and computes its warnings, which look at everything.
+fn look(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> Result<()> {
+    let input = EstimatorInput::new(&input.frame, &input.object);
+    let _ = input.warnings(t_cam_object);
+    input.prepared(None)?;
+    Ok(())
 }
 
 fn truth(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
@@ -261,9 +268,7 @@ fn frame(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     let cache = GridCache::new(small.path("cache"));
     let (input, pose) = load_frame_file(&file, 0, Some(&cache), None)?;
     finite(&pose);
-    let _ = input.warnings(&pose);
-    input.frame()?;
-    Ok(())
+    look(&input, &pose)
 }
 
 fn rig(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
@@ -313,7 +318,7 @@ fn log(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     fs::write(&file, bytes)?;
     let recording = Recording::open(&file, &ImageTopics::default(), "world")?;
     for frame in recording.frames(None)?.take(8) {
-        frame.observation?;
+        frame.frame?;
     }
     Ok(())
 }

@@ -81,7 +81,7 @@ fn log(dataset: &SmallDataset) -> Result<Vec<u8>> {
     let file = dataset.path("log.mcap");
     let mut writer = RecordingWriter::create(&file)?;
     for at in [1_000_000_000, 1_033_000_000] {
-        writer.sensed(at, &input.observation)?;
+        writer.sensed(at, &input.frame)?;
     }
     writer.finish()?;
     Ok(fs::read(file)?)

@@ -119,7 +119,7 @@ fn a_picture() {
 #[test]
 fn a_refinement() {
     let scene = default_scene(1).unwrap();
-    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
     let (fused, short) = (Fused::default(), Heuristic { iterations: 10, ..Heuristic::combined() });
     let strategies: [(&str, &dyn Strategy); 2] = [("fused", &fused), ("combined", &short)];
     for (name, strategy) in strategies {
@@ -141,10 +141,14 @@ fn a_rig() {
     for is_refined in [false, true] {
         let mut pass = Pass::default();
         for frame in sequence.frames.iter().step_by(4) {
-            let mut observation = frame.observation.clone();
+            let mut observation = frame.frame.clone();
             observation.camera.cx -= 2.0;
-            let frame =
-                CalibrationFrame { observation, obj_id: 7, initial: frame.truth, is_refined };
+            let frame = CalibrationFrame {
+                frame: observation,
+                obj_id: 7,
+                initial: frame.truth,
+                is_refined,
+            };
             pass.add(calibrator.visit(&frame).unwrap());
         }
         calibrator.solve(&mut pass).unwrap();

@@ -67,11 +67,11 @@ fn main() -> anyhow::Result<()> {
         if let Some(kind) = kind {
             let mut random = SplitMix64::new(index as u64 + 1);
             let step = 1 + (random.uniform() * (rows.len() - 1) as f64) as usize;
-            let other = load(&rows[(index + step) % rows.len()])?.observation;
-            let (observation, object) = (&mut input.observation, &mut input.object);
+            let other = load(&rows[(index + step) % rows.len()])?.frame;
+            let (observation, object) = (&mut input.frame, &mut input.object);
             fault::apply(kind, observation, object, &objects, other, &mut random)?;
         }
-        let frame = PreparedFrame::new(&input.observation, &input.object)?;
+        let frame = PreparedFrame::new(&input.frame, &input.object)?;
         let found = refine(&frame, &rows[index].t_cam_model, &Fused::default())?;
         let (pose, truth) = (found.t_cam_object(), &truths[index]);
         let off = (pose * input.object.center - truth * center).norm();

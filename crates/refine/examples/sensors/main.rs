@@ -13,8 +13,8 @@ use std::path::PathBuf;
 
 use prehend_refine::data::load_frame_file;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
-use prehend_refine::refine;
 use prehend_refine::strategy::Fused;
+use prehend_refine::{PreparedFrame, refine};
 
 use crate::sensing::{Extra, write_frame};
 use crate::world::World;
@@ -80,7 +80,11 @@ fn main() -> anyhow::Result<()> {
                 let table = write_frame(folder.path(), &world, extras, seed)?;
                 let file = folder.path().join("frame.json");
                 let (input, start) = load_frame_file(&file, 0, None, None)?;
-                let found = refine(&input.frame()?, &start, &Fused::default())?;
+                let found = refine(
+                    &PreparedFrame::new(&input.frame, &input.object)?,
+                    &start,
+                    &Fused::default(),
+                )?;
                 let (pose, truth) = (found.t_cam_object(), world.t_cam_object());
                 pe.push(pe_cm(pose, &truth));
                 oe.push(oe_deg(pose, &truth));

@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn no_depth_is_an_error() {
         let scene = scene();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.depth.pixels_mut().fill(0.0);
         let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let factor = ChamferDepthFactor::new(&frame, &ChamferDepthSettings::default());

@@ -22,7 +22,7 @@ use crate::strategy::{Fused, Modality};
 pub struct CalibrationFrame {
     /// What was observed, as it was. Without a mask, the object is looked for where it should be, which needs a good pose: its outline then
     /// says nothing.
-    pub observation: Frame,
+    pub frame: Frame,
     /// The object's number.
     pub obj_id: u32,
     /// Object → camera \[m\].
@@ -123,7 +123,7 @@ impl Calibrator {
     /// If the frame cannot be refined, does not fit the rig, or is of another object than there are.
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
         let CalibrationFrame { obj_id, initial, is_refined, .. } = frame;
-        let has_mask = frame.observation.mask.count() > 0;
+        let has_mask = frame.frame.mask.count() > 0;
         let (observation, mut fused) = self.corrected(frame)?;
         if *is_refined {
             let stages = &mut fused.settings.stages;
@@ -151,7 +151,7 @@ impl Calibrator {
     /// # Errors
     /// If the frame does not fit the rig, or is of another object than there are.
     pub fn residuals(&self, frame: &CalibrationFrame) -> Result<FrameResiduals, RefineError> {
-        let has_mask = frame.observation.mask.count() > 0;
+        let has_mask = frame.frame.mask.count() > 0;
         let (observation, fused) = self.corrected(frame)?;
         let object = self.object(frame.obj_id)?;
         let corrected = PreparedFrame::new(&observation, object)?;
@@ -160,7 +160,7 @@ impl Calibrator {
 
     /// What a frame shows when the rig is corrected, and how it is refined.
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Frame, Fused), RefineError> {
-        let CalibrationFrame { observation, obj_id, initial, .. } = frame;
+        let CalibrationFrame { frame: observation, obj_id, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
         let mut observation = self.rig.corrected(observation)?;
         if observation.mask.count() == 0 {

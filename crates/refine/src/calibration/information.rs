@@ -238,7 +238,7 @@ mod tests {
             let free = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             (state, [Box::new(depth) as Box<dyn Factor>, Box::new(hand), Box::new(free)])
         };
-        let (state, factors) = factors_of(&scene.observation);
+        let (state, factors) = factors_of(&scene.frame);
         for (f, factor) in factors.iter().enumerate() {
             let blocks = [Block::ObjectPose, Block::Camera];
             let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));
@@ -250,7 +250,7 @@ mod tests {
                 let cost = |sign: f64| {
                     let mut rig = calibrator.rig().clone();
                     rig.depth_offsets[k] = sign * step;
-                    let observation = rig.corrected(&scene.observation).unwrap();
+                    let observation = rig.corrected(&scene.frame).unwrap();
                     let (state, factors) = factors_of(&observation);
                     factors[f].cost(&state)
                 };
@@ -271,7 +271,7 @@ mod tests {
     fn derivatives_by_distortion_are_those_of_a_shift_there() {
         let scene = default_scene(1).unwrap();
         let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         // Off the image's center, where distortion is something.
         observation.camera.cx -= 0.3 * observation.camera.fx;
         let aside = 0.3 * scene.truth.translation.z;

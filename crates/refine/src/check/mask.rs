@@ -33,7 +33,7 @@ pub(super) fn at_pose(
     }
     let share = overlap / (mask + model - overlap);
     let pixels = (of_mask.xy() / mask - of_model.xy() / model).norm();
-    let shift = pixels * z / view.observation.camera.fx;
+    let shift = pixels * z / view.frame.camera.fx;
     let value = if hand_wrong {
         return None;
     } else if !MASK_AREA.contains(&area) {

@@ -61,7 +61,7 @@ pub(crate) fn check_frame(
     if !model::is_plausible(object) {
         return warnings;
     }
-    let images = Comparison { observation, object, drawn, touch };
+    let images = Comparison { frame: observation, object, drawn, touch };
     let found = images.check(t_cam_object, false);
     let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
     // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
@@ -75,7 +75,7 @@ pub(crate) fn check_frame(
 
 /// Images of a frame, and what they are compared with.
 struct Comparison<'a> {
-    observation: &'a Frame,
+    frame: &'a Frame,
     object: &'a Object,
     /// Depth of the hand \[m\], unless that is at fault.
     drawn: Option<DepthImage>,
@@ -86,7 +86,7 @@ struct Comparison<'a> {
 impl Comparison<'_> {
     /// Warnings with the object at a pose; one that `is_settled` where mask and depth have it fits.
     fn check(&self, t_cam_object: &Isometry3<f64>, is_settled: bool) -> Vec<Warning> {
-        let &Self { observation, object, ref drawn, touch } = self;
+        let &Self { frame: observation, object, ref drawn, touch } = self;
         let z = (t_cam_object * object.center).z;
         let view = View::new(observation, &observation.camera, object, drawn.clone(), t_cam_object);
         let mut warnings = depth::check(&view, object);

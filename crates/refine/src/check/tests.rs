@@ -10,7 +10,7 @@ use crate::scene::{Frame, Hand, HandMeasurement, Scene, StatedSize, default_scen
 
 fn found(scene: &Scene, t_cam_object: &Isometry3<f64>) -> Vec<Warning> {
     let mut all = check_object(&scene.object, true);
-    all.extend(check_frame(&scene.observation, &scene.object, t_cam_object));
+    all.extend(check_frame(&scene.frame, &scene.object, t_cam_object));
     all
 }
 
@@ -28,7 +28,7 @@ fn named(subject: Subject, words: &str, change: impl Fn(&mut Scene)) -> Warning 
 }
 
 fn hand(scene: &mut Scene) -> &mut HandMeasurement {
-    scene.observation.hand.as_mut().unwrap()
+    scene.frame.hand.as_mut().unwrap()
 }
 
 /// Moves the hand's base, in the camera frame \[m\].
@@ -39,14 +39,14 @@ fn moved(scene: &mut Scene, by: [f64; 3]) {
 
 /// Shifts the mask \[px\].
 fn shifted(scene: &mut Scene, columns: isize, rows: isize) {
-    let mask = scene.observation.mask.clone();
+    let mask = scene.frame.mask.clone();
     let width = mask.width();
     let from = |i: usize| {
         let x = (i % width).checked_add_signed(-columns)?;
         let y = (i / width).checked_add_signed(-rows)?;
         mask.get(x, y)
     };
-    let pixels = scene.observation.mask.pixels_mut().iter_mut().enumerate();
+    let pixels = scene.frame.mask.pixels_mut().iter_mut().enumerate();
     pixels.for_each(|(i, pixel)| *pixel = from(i).unwrap_or(false));
 }
 
@@ -56,8 +56,8 @@ fn a_right_scene_is_silent_at_the_truth_and_at_poses_to_start_from() {
         let scene = default_scene(seed).unwrap();
         assert_eq!(found(&scene, &scene.truth), []);
         assert_eq!(found(&scene, &scene.initial), []);
-        let Scene { observation, object, initial, .. } = scene;
-        let bare = Frame { hand: None, ..observation };
+        let Scene { frame, object, initial, .. } = scene;
+        let bare = Frame { hand: None, ..frame };
         assert_eq!(check_frame(&bare, &object, &initial), []);
     }
 }
@@ -76,7 +76,7 @@ fn joints_in_degrees_and_beyond_their_limits() {
     assert!((warnings[0].value - 0.3).abs() < 1e-12, "{sentence}");
     assert!(sentence.contains("0.300 rad outside its limits -0.470 to 0.470"), "{sentence}");
     // Encoders are not exact.
-    hand(&mut scene).joints[4] = default_scene(1).unwrap().observation.hand.unwrap().joints[4];
+    hand(&mut scene).joints[4] = default_scene(1).unwrap().frame.hand.unwrap().joints[4];
     hand(&mut scene).joints[5] = scene.hand.tree.joint_limits()[5].0 - 0.05;
     assert!(found(&scene, &scene.truth).iter().all(|w| !w.finding.contains("limits")));
 }
@@ -104,7 +104,7 @@ fn a_hand_that_is_not_where_it_is_said_to_be() {
 fn a_hand_out_of_sight_is_judged_by_touch() {
     // Depth of the hand is missing, as of a black one.
     let unseen = |scene: &mut Scene| {
-        let Frame { depth, mask, .. } = &mut scene.observation;
+        let Frame { depth, mask, .. } = &mut scene.frame;
         let pixels = depth.pixels_mut().iter_mut().zip(mask.pixels());
         pixels.filter(|(_, masked)| !**masked).for_each(|(z, _)| *z = 0.0);
     };
@@ -122,7 +122,7 @@ fn a_hand_out_of_sight_is_judged_by_touch() {
 fn depth_in_another_unit_and_of_another_scale() {
     for factor in [1.03, 0.96, 1.2] {
         let scale = |scene: &mut Scene| {
-            let depths = scene.observation.depth.pixels_mut();
+            let depths = scene.frame.depth.pixels_mut();
             depths.iter_mut().for_each(|z| *z *= factor as f32);
         };
         let mut scene = default_scene(1).unwrap();
@@ -136,7 +136,7 @@ fn depth_in_another_unit_and_of_another_scale() {
         }
     }
     let mut scene = default_scene(1).unwrap();
-    scene.observation.depth.pixels_mut().iter_mut().for_each(|z| *z *= 1e3);
+    scene.frame.depth.pixels_mut().iter_mut().for_each(|z| *z *= 1e3);
     let warnings = found(&scene, &scene.initial);
     let of_units = |w: &Warning| w.to_string().contains("check depth_scale and units");
     assert!(warnings.len() == 1 && of_units(&warnings[0]), "{warnings:#?}");
@@ -149,12 +149,12 @@ fn masks_that_are_not_of_the_object() {
         assert!(warning.value > 0.1, "{warning}");
     }
     named(Subject::Mask, "does not touch its mask", |scene| {
-        let mask = &mut scene.observation.mask;
+        let mask = &mut scene.frame.mask;
         *mask = Mask::filled(mask.width(), mask.height(), false);
         mask.pixels_mut()[100] = true;
     });
     let mut scene = default_scene(1).unwrap();
-    scene.observation.mask.pixels_mut().iter_mut().for_each(|masked| *masked = !*masked);
+    scene.frame.mask.pixels_mut().iter_mut().for_each(|masked| *masked = !*masked);
     let warnings = found(&scene, &scene.initial);
     assert!(
         warnings.iter().any(|w| w.to_string().contains("does not touch its mask")

@@ -232,7 +232,7 @@ impl<'a> Assets<'a> {
         let frame = dataset.frame(target.scene_id, target.im_id)?;
         let sought = Sought { target, object: &object, t_cam_object };
         let observation = self.sensed(&frame, MaskOf::Object(&sought), required)?;
-        Ok(FrameInput::new(observation, object, self.rig.clone()))
+        Ok(FrameInput { frame: observation, object, rig: self.rig.clone() })
     }
 
     /// The frame with every sensor that it brings. A sensor whose file or

@@ -198,7 +198,7 @@ pub fn load_frame_file(
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
     let parts = FrameParts::read(file)?;
     let robot = parts.robot(file, cache)?;
-    let FrameParts { mut observation, mesh, mesh_file, layout, .. } = parts;
+    let FrameParts { frame: mut observation, mesh, mesh_file, layout, .. } = parts;
     let name = mesh_file.display().to_string();
     let mass = layout.mass_kg.map(|mass| mass.0);
     let mut object = Object::with_mass(&name, mesh, mass, seed).map_err(|e| fault(&e))?;
@@ -214,13 +214,13 @@ pub fn load_frame_file(
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
-    Ok((FrameInput::new(observation, Arc::new(object), rig), layout.pose.0))
+    Ok((FrameInput { frame: observation, object: Arc::new(object), rig }, layout.pose.0))
 }
 
 /// Content of a frame file as it is there: nothing is derived from it yet.
 pub(crate) struct FrameParts {
     /// CameraImages as pinhole cameras see them, without the hand.
-    pub(crate) observation: Frame,
+    pub(crate) frame: Frame,
     /// The object's mesh \[m\].
     pub(crate) mesh: TriMesh,
     pub(crate) mesh_file: PathBuf,
@@ -259,7 +259,7 @@ impl FrameParts {
             let view = camera.images().read(file, &format!("cameras[{k}]."), false)?;
             observation = observation.with_view(view, camera.pose.0);
         }
-        Ok(Self { observation, mesh, mesh_file, bodies, tactile, layout })
+        Ok(Self { frame: observation, mesh, mesh_file, bodies, tactile, layout })
     }
 
     /// All bodies as one robot, and what that measures; `None` of none.

@@ -15,7 +15,7 @@ const LEAST_SHARE: f64 = 0.5;
 const SAME_PLACE: f64 = 0.2;
 
 /// Source of the masks of a dataset's frames. Where there is no mask, or one that is a box, pixels are told by pose, depth and colors
-/// ([`FrameInput::prepared`](super::FrameInput::prepared)).
+/// ([`Estimator::input`](crate::Estimator::input)).
 #[derive(Clone, Debug, Default)]
 pub enum MaskSource {
     /// `mask_visib/`; where another mask of the image overlaps the object at its pose far better, that one, with a warning.

@@ -21,7 +21,6 @@ mod rig_file;
 mod robots;
 mod targets;
 mod times;
-mod workers;
 
 pub use assets::{AssetError, Assets, Sensor, load_mesh};
 pub use bop::pose_from_matrix;
@@ -39,6 +38,5 @@ pub use pose::PlainPose;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
 pub use times::Times;
-pub use workers::Workers;
 
 pub use crate::scene::Target;

@@ -53,7 +53,7 @@ pub(crate) mod gradient_check {
     /// Its frame.
     pub(crate) fn frame() -> PreparedFrame<'static> {
         let scene = scene();
-        PreparedFrame::new(&scene.observation, &scene.object).unwrap()
+        PreparedFrame::new(&scene.frame, &scene.object).unwrap()
     }
 
     /// The frame, and a state a little off its truth.
@@ -113,8 +113,7 @@ pub(crate) mod gradient_check {
     pub(crate) fn patches(unit: usize) -> Arc<SurfacePatches> {
         let settings = ModelErrorSettings::default();
         Arc::new(
-            SurfacePatches::new(&SCENE.observation, SCENE.truth.translation.z, &settings, unit)
-                .unwrap(),
+            SurfacePatches::new(&SCENE.frame, SCENE.truth.translation.z, &settings, unit).unwrap(),
         )
     }
 

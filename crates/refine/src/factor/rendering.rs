@@ -324,7 +324,7 @@ mod tests {
         mesh.uvs.iter_mut().for_each(|uvs| uvs.push([0.0; 2]));
         let object = Arc::new(Object::with_mass("stray", mesh, Some(0.3), 0).unwrap());
         assert!((object.model.center() - object.center).norm() > 0.03);
-        let frame = PreparedFrame::new(&known.observation, &object).unwrap();
+        let frame = PreparedFrame::new(&known.frame, &object).unwrap();
         let state = State { object_center: object.center, ..fixture(1).1 };
         let factor = factor(&frame);
         assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.03);

@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn what_a_finger_feels_pushes_the_object_away_from_it() {
         let scene = scene();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         let taxel = &scene.hand.taxels[100];
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::zeros());
@@ -371,7 +371,7 @@ mod tests {
     fn where_nothing_acts_nothing_is_said() {
         let (_, state) = fixture(0);
         let scene = scene();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.gravity = Some(Vector3::zeros());
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::repeat(f64::NAN));
@@ -395,7 +395,7 @@ mod tests {
     fn gravity_and_the_hand_are_needed() {
         let scene = scene();
         let refused = |change: fn(&mut Frame)| {
-            let mut observation = scene.observation.clone();
+            let mut observation = scene.frame.clone();
             change(&mut observation);
             let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             let factor = SupportFactor::new(&frame, &SupportSettings::default());

@@ -179,8 +179,8 @@ mod tests {
     #[test]
     fn views_of_an_observation_have_the_hand_where_it_is() {
         let scene = scene();
-        let seen = Frame { hand: None, ..scene.observation.clone() };
-        let both = scene.observation.clone().with_view(seen, turned().inverse());
+        let seen = Frame { hand: None, ..scene.frame.clone() };
+        let both = scene.frame.clone().with_view(seen, turned().inverse());
         let frame = PreparedFrame::new(&both, &scene.object).unwrap();
         let [view] = frame.views() else { panic!("not one view") };
         let (hand, expected) = (view.frame.hand().unwrap(), frame.hand().unwrap());

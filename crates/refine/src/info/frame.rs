@@ -21,7 +21,7 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Inf
     if mass_kg.is_none() {
         warnings.push("no mass_kg: 500 kg/m³ are assumed".to_owned());
     }
-    let FrameParts { observation, mesh, mesh_file, bodies, tactile, .. } = &parts;
+    let FrameParts { frame: observation, mesh, mesh_file, bodies, tactile, .. } = &parts;
     let (camera, depth) = (&observation.camera, observation.depth.pixels());
     let (mut taxels, mut touched) = (0, None);
     if let Some(TactileReading::Force { taxels: file, force }) = tactile.first().map(|t| &t.reading)

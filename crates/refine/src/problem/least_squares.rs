@@ -443,7 +443,7 @@ mod tests {
     #[test]
     fn a_solve_can_be_aborted_between_steps_that_lead_nowhere() {
         let scene = default_scene(1).unwrap();
-        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let bare = Frame { hand: None, ..scene.frame.clone() };
         let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let state = State::new(&frame, &scene.truth).unwrap();
         let problem = Problem::new(vec![Arc::new(Flat)], vec![Block::ObjectPose]);
@@ -461,12 +461,11 @@ mod tests {
     #[test]
     fn eliminating_patches_is_integrating_them_out() {
         let scene = default_scene(1).unwrap();
-        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let bare = Frame { hand: None, ..scene.frame.clone() };
         let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let state = State::new(&frame, &scene.truth).unwrap();
         let settings = ModelErrorSettings::default();
-        let patches =
-            SurfacePatches::new(&scene.observation, state.center().z, &settings, 2).unwrap();
+        let patches = SurfacePatches::new(&scene.frame, state.center().z, &settings, 2).unwrap();
         let mut random = SplitMix64::new(5);
         let (rows, size) = (40, 3 * patches.count());
         let mut matrix =

@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn every_pixel_of_the_mask_is_in_a_patch_and_neighbors_are_off_alike() {
         let scene = default_scene(1).unwrap();
-        let (observation, distance) = (&scene.observation, scene.truth.translation.z);
+        let (observation, distance) = (&scene.frame, scene.truth.translation.z);
         let settings = ModelErrorSettings::default();
         let patches = SurfacePatches::new(observation, distance, &settings, 4).unwrap();
         let width = observation.camera.width;
@@ -193,8 +193,8 @@ mod tests {
     fn an_exact_model_has_none() {
         let scene = default_scene(1).unwrap();
         let settings = ModelErrorSettings { sigma: 0.0, ..ModelErrorSettings::default() };
-        assert!(SurfacePatches::new(&scene.observation, 0.5, &settings, 1).is_none());
-        let mut unseen = scene.observation.clone();
+        assert!(SurfacePatches::new(&scene.frame, 0.5, &settings, 1).is_none());
+        let mut unseen = scene.frame.clone();
         unseen.mask = prehend_render::Mask::filled(640, 480, false);
         assert!(SurfacePatches::new(&unseen, 0.5, &ModelErrorSettings::default(), 1).is_none());
     }
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn specks_and_a_stiff_model_make_few() {
         let scene = default_scene(1).unwrap();
-        let mut specks = scene.observation.clone();
+        let mut specks = scene.frame.clone();
         let speck =
             |pixel: usize| (pixel % 640).is_multiple_of(29) && (pixel / 640).is_multiple_of(31);
         let mask = (0..640 * 480).map(speck).collect();
@@ -212,7 +212,7 @@ mod tests {
         assert!(patches.count() <= settings.max_patches && patches.side().is_multiple_of(3));
         for (length_scale, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
             let settings = ModelErrorSettings { length_scale, ..settings.clone() };
-            let patches = SurfacePatches::new(&scene.observation, distance, &settings, 4).unwrap();
+            let patches = SurfacePatches::new(&scene.frame, distance, &settings, 4).unwrap();
             assert!((1..=2).contains(&patches.count()), "{}", patches.count());
         }
     }

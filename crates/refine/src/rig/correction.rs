@@ -98,7 +98,7 @@ mod tests {
 
     /// The mask of a scene with a square in a corner instead, through a lens.
     fn through(scene: &Scene, distortion: [f64; 2]) -> (Mask, Frame) {
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         let mut square = Mask::filled(640, 480, false);
         for (i, set) in square.pixels_mut().iter_mut().enumerate() {
             *set = (20..60).contains(&(i % 640)) && (30..80).contains(&(i / 640));
@@ -129,13 +129,13 @@ mod tests {
     fn a_lens_that_moves_no_corner_is_undone_too() {
         let scene = default_scene(1).unwrap();
         let mut rig = nominal();
-        let camera = scene.observation.camera;
+        let camera = scene.frame.camera;
         let corner = camera.ray(0.0, 0.0).xy().norm_squared();
         rig.distortion = [0.1, -0.1 / corner];
-        let corrected = rig.corrected(&scene.observation).unwrap();
-        assert!(corrected.color.pixels() != scene.observation.color.pixels());
+        let corrected = rig.corrected(&scene.frame).unwrap();
+        assert!(corrected.color.pixels() != scene.frame.color.pixels());
         rig.distortion = [0.0; 2];
-        let corrected = rig.corrected(&scene.observation).unwrap();
-        assert!(corrected.color.pixels() == scene.observation.color.pixels());
+        let corrected = rig.corrected(&scene.frame).unwrap();
+        assert!(corrected.color.pixels() == scene.frame.color.pixels());
     }
 }

@@ -281,7 +281,7 @@ mod tests {
         let rig = nominal().changed(&change);
         assert!((rig.values() - DVector::from_vec(change)).amax() < 1e-12);
         let said = |rig: &Rig| {
-            let observation = rig.corrected(&scene.observation).unwrap();
+            let observation = rig.corrected(&scene.frame).unwrap();
             let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             State::new(&frame, &scene.truth).unwrap()
         };
@@ -305,7 +305,7 @@ mod tests {
         let mut rig = nominal();
         rig.camera = rig.camera.changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3, 2e-3]);
         let scene = default_scene(1).unwrap();
-        let (said, corrected) = (&scene.observation, rig.corrected(&scene.observation).unwrap());
+        let (said, corrected) = (&scene.frame, rig.corrected(&scene.frame).unwrap());
         for (x, y) in [(320, 240), (300, 260)] {
             let depth = f64::from(said.depth.get(x, y).unwrap());
             let ray = said.camera.ray(x as f64, y as f64).xy();

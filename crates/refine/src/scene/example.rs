@@ -34,7 +34,7 @@ const SLIDE: f64 = 2e-3;
 /// A frame whose truth is known.
 pub struct Scene {
     /// Measurements of the sensors.
-    pub observation: Frame,
+    pub frame: Frame,
     /// The object.
     pub object: Arc<Object>,
     /// Its number among the models of a dataset.
@@ -54,7 +54,7 @@ pub struct SequenceFrame {
     /// Time of exposure.
     pub time: Duration,
     /// Measurements of the sensors.
-    pub observation: Frame,
+    pub frame: Frame,
     /// The true pose, object → camera \[m\].
     pub truth: Isometry3<f64>,
 }
@@ -98,7 +98,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
     let initial = perturb_about(&truth, &(truth * object.center).coords, &error);
     let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
-    Ok(Scene { observation, object, obj_id, hand, urdf, truth, initial })
+    Ok(Scene { frame: observation, object, obj_id, hand, urdf, truth, initial })
 }
 
 /// `count` frames of [`default_scene`], thirty a second: the hand sways and turns, by up to 7 cm and 36° a second, and the
@@ -107,7 +107,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
 /// # Errors
 /// If the built-in assets cannot be prepared.
 pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError> {
-    let Scene { observation, object, hand, truth, initial, .. } = default_scene(seed)?;
+    let Scene { frame: observation, object, hand, truth, initial, .. } = default_scene(seed)?;
     let Frame { camera, gravity, hand: measured, .. } = observation;
     let (start, joints) = measured
         .map_or_else(|| (Isometry3::identity(), Vec::new()), |hand| (hand.t_cam_hand, hand.joints));
@@ -130,7 +130,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
         let measured = hand.measured(t_cam_hand, joints.clone());
         let observation = observe(camera, gravity, &object, &truth, measured, &mut noise);
-        SequenceFrame { time, observation, truth }
+        SequenceFrame { time, frame: observation, truth }
     };
     let frames = (0..count).map(frame).collect();
     Ok(Sequence { object, hand, initial, frames })
@@ -196,7 +196,7 @@ mod tests {
     fn the_object_stays_in_the_hand_while_both_move() {
         let sequence = default_sequence(1, 4).unwrap();
         let place = |frame: &SequenceFrame| -> (Point3<f64>, Point3<f64>) {
-            let hand = frame.observation.hand.as_ref().unwrap().t_cam_hand;
+            let hand = frame.frame.hand.as_ref().unwrap().t_cam_hand;
             let center = frame.truth * sequence.object.center;
             (center, hand.inverse() * center)
         };
@@ -205,7 +205,7 @@ mod tests {
             assert!((1e-3..4e-3).contains(&(a - b).norm()));
             assert!((in_hand - next_in_hand).norm() < 3e-4);
             assert_eq!(pair[1].time - pair[0].time, STEP);
-            assert!(pair[0].observation.mask.count() > 1000);
+            assert!(pair[0].frame.mask.count() > 1000);
         }
     }
 }

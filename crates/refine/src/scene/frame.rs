@@ -88,7 +88,7 @@ pub struct AdditionalView {
     /// Its coordinates → those of the first camera \[m\].
     t_cam_view: Isometry3<f64>,
     /// In its own frame, with the hand there, and nothing of what that feels.
-    observation: Frame,
+    frame: Frame,
 }
 
 impl AdditionalView {
@@ -99,13 +99,13 @@ impl AdditionalView {
 
     /// What it saw, in its own frame.
     pub fn observation(&self) -> &Frame {
-        &self.observation
+        &self.frame
     }
 
     /// Takes over where the hand is.
     fn place(&mut self, hand: Option<&HandMeasurement>) {
         let t_view_cam = self.t_view_cam();
-        self.observation.hand = hand.map(|hand| HandMeasurement {
+        self.frame.hand = hand.map(|hand| HandMeasurement {
             pose_sigmas: hand.pose_sigmas,
             joint_sigmas: hand.joint_sigmas.clone(),
             ..hand.hand.measured(t_view_cam * hand.t_cam_hand, hand.joints.clone())
@@ -162,8 +162,8 @@ impl Frame {
 
     /// With what another camera saw at the same moment, whose coordinates `t_cam_view` takes to those of this one \[m\]. Hand and gravity are this one's.
     pub fn with_view(mut self, view: Self, t_cam_view: Isometry3<f64>) -> Self {
-        let observation = Self { gravity: None, views: Vec::new(), ..view };
-        self.views.push(AdditionalView { t_cam_view, observation });
+        let frame = Self { gravity: None, views: Vec::new(), ..view };
+        self.views.push(AdditionalView { t_cam_view, frame });
         self.place_views();
         self
     }

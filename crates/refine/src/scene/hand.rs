@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_wrong_number_of_joints_is_an_error() {
         let scene = default_scene(1).unwrap();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.hand.as_mut().unwrap().joints.pop();
         let refused = PreparedFrame::new(&observation, &scene.object).map(|_| ()).unwrap_err();
         let expected = RobotError::JointCount { given: 15, expected: 16 }.to_string();

@@ -15,7 +15,7 @@ use crate::error::RefineError;
 /// A frame and the object whose pose is sought, checked, with what factors derive from them: each image is made when it is first asked
 /// for, and once.
 pub struct PreparedFrame<'a> {
-    observation: &'a Frame,
+    frame: &'a Frame,
     object: &'a Arc<Object>,
     hand_depth: OnceLock<Arc<DepthImage>>,
     depth: OnceLock<Arc<DepthImage>>,
@@ -93,7 +93,7 @@ impl<'a> PreparedFrame<'a> {
         });
         Ok(Self {
             views: views.collect::<Result<_, RefineError>>()?,
-            observation,
+            frame: observation,
             object,
             hand_depth: OnceLock::new(),
             depth: OnceLock::new(),
@@ -114,7 +114,7 @@ impl<'a> PreparedFrame<'a> {
         &'b self,
         object: &'b Arc<Object>,
     ) -> Result<PreparedFrame<'b>, RefineError> {
-        let mut frame = PreparedFrame::new(self.observation, object)?;
+        let mut frame = PreparedFrame::new(self.frame, object)?;
         frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
         frame.given_regions.clone_from(&self.given_regions);
         frame.backend.clone_from(&self.backend);
@@ -167,7 +167,7 @@ impl<'a> PreparedFrame<'a> {
 
     /// What was sensed.
     pub fn observation(&self) -> &'a Frame {
-        self.observation
+        self.frame
     }
 
     /// The object whose pose is sought.
@@ -177,7 +177,7 @@ impl<'a> PreparedFrame<'a> {
 
     /// The hand, its pose and touch, where known.
     pub fn hand(&self) -> Option<&'a HandMeasurement> {
-        self.observation.hand.as_ref()
+        self.frame.hand.as_ref()
     }
 
     /// The hand, which `factor` needs.
@@ -190,12 +190,12 @@ impl<'a> PreparedFrame<'a> {
 
     /// Depth as measured \[m\], 0 where missing.
     pub fn depth(&self) -> &Arc<DepthImage> {
-        self.depth.get_or_init(|| Arc::new(self.observation.depth.clone()))
+        self.depth.get_or_init(|| Arc::new(self.frame.depth.clone()))
     }
 
     /// Depth image of the hand alone \[m\], 0 where it is not.
     pub fn hand_depth(&self) -> &Arc<DepthImage> {
-        self.hand_depth.get_or_init(|| Arc::new(hand_depth(&self.observation.camera, self.hand())))
+        self.hand_depth.get_or_init(|| Arc::new(hand_depth(&self.frame.camera, self.hand())))
     }
 
     /// Log-likelihood ratio of object and others at each pixel \[nat\]: those given, or else by the mask, and by colors if these `count`.
@@ -211,7 +211,7 @@ impl<'a> PreparedFrame<'a> {
         if let Some(known) = self.given_regions.as_ref().or(known.map(|(_, known)| known)) {
             return Ok(Arc::clone(known));
         }
-        let Frame { color, mask, .. } = self.observation;
+        let Frame { color, mask, .. } = self.frame;
         let made = RegionEvidence::of_mask(Some(color).filter(|_| count), mask, settings);
         let made = Arc::new(made.ok_or(RefineError::EmptyMask)?);
         if count {
@@ -228,7 +228,7 @@ impl<'a> PreparedFrame<'a> {
         &self,
         limit: usize,
     ) -> Result<Vec<(usize, usize, f64)>, RefineError> {
-        let Frame { depth, mask, .. } = self.observation;
+        let Frame { depth, mask, .. } = self.frame;
         let at = |x: usize, y: usize| {
             let z = f64::from(depth.get(x, y)?);
             (mask.get(x, y)? && z > 0.0).then_some((x, y, z))
@@ -246,7 +246,7 @@ impl<'a> PreparedFrame<'a> {
     /// # Errors
     /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
     pub fn masked_points(&self, limit: usize) -> Result<Vec<Point3<f64>>, RefineError> {
-        let camera = &self.observation.camera;
+        let camera = &self.frame.camera;
         let depths = self.masked_depths(limit)?;
         Ok(depths.into_iter().map(|(x, y, z)| camera.unproject(x as f64, y as f64, z)).collect())
     }
@@ -261,7 +261,7 @@ impl<'a> PreparedFrame<'a> {
         factor: usize,
     ) -> Result<Segmented, RefineError> {
         let fault = |error: TargetError| RefineError::Images(error.to_string());
-        let Frame { camera, color, mask, .. } = self.observation;
+        let Frame { camera, color, mask, .. } = self.frame;
         let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
         let target = match images.entry((occluders, factor)) {
             Entry::Occupied(known) => Arc::clone(known.get()),
@@ -278,13 +278,13 @@ impl<'a> PreparedFrame<'a> {
                 Arc::clone(unknown.insert(Arc::new(target.map_err(fault)?)))
             }
         };
-        let brightness = *self.brightness.get_or_init(|| brightness(self.observation));
+        let brightness = *self.brightness.get_or_init(|| brightness(self.frame));
         Ok(Segmented { target, brightness })
     }
 
     /// Depth of the hand, and of something just before the camera where the mask is not set; `factor` times smaller.
     fn unmasked_occluder(&self, factor: usize) -> DepthImage {
-        let mask = &self.observation.mask;
+        let mask = &self.frame.mask;
         let (width, height) = (mask.width(), mask.height());
         let (hand, inner) = (self.hand_depth().pixels(), eroded(width, mask.pixels(), MASK_MARGIN));
         let nearest = |at: usize| if inner[at] { hand[at] } else { f32::MIN_POSITIVE };
@@ -293,7 +293,7 @@ impl<'a> PreparedFrame<'a> {
 
     /// Depth of the hand and of what was measured beside the mask, whichever is nearer; `factor` times smaller.
     fn measured_occluder(&self, factor: usize) -> DepthImage {
-        let Frame { depth, mask, .. } = self.observation;
+        let Frame { depth, mask, .. } = self.frame;
         let (width, height) = (depth.width(), depth.height());
         let within = self.focus.clone().unwrap_or([0..width, 0..height]);
         let (hand, depth, mask) = (self.hand_depth().pixels(), depth.pixels(), mask.pixels());
@@ -379,7 +379,7 @@ mod tests {
     fn images_of_another_size_and_an_empty_mask_are_named() {
         let scene = default_scene(1).unwrap();
         let refused = |change: &dyn Fn(&mut Frame)| {
-            let mut observation = scene.observation.clone();
+            let mut observation = scene.frame.clone();
             change(&mut observation);
             PreparedFrame::new(&observation, &scene.object).map(|_| ()).unwrap_err().to_string()
         };

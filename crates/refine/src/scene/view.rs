@@ -9,7 +9,7 @@ use crate::error::RefineError;
 
 /// What should be seen, and what is.
 pub(crate) struct View<'a> {
-    pub(crate) observation: &'a Frame,
+    pub(crate) frame: &'a Frame,
     /// Depth of the whole object at the pose \[m\], 0 where it is not.
     object: DepthImage,
     /// Depth of the hand \[m\], 0 where it is not or not known.
@@ -42,7 +42,7 @@ impl<'a> View<'a> {
     ) -> Self {
         let hand = hand.unwrap_or_else(|| hand_depth(camera, None));
         let object = depth_map(camera, &[(&object.model, *t_cam_object)]);
-        let mut view = Self { observation, object, hand, covered: Vec::new() };
+        let mut view = Self { frame: observation, object, hand, covered: Vec::new() };
         let covers = |p: Pixel| p.object > 0.0 || p.hand > 0.0 || p.masked;
         let (width, height) = view.size();
         view.covered = (0..width * height).filter(|&i| covers(view.pixel(i))).collect();
@@ -104,8 +104,8 @@ impl<'a> View<'a> {
         Pixel {
             object: self.object.pixels()[index],
             hand: self.hand.pixels()[index],
-            sensor: self.observation.depth.pixels()[index],
-            masked: self.observation.mask.pixels()[index],
+            sensor: self.frame.depth.pixels()[index],
+            masked: self.frame.mask.pixels()[index],
         }
     }
 
@@ -125,7 +125,7 @@ impl<'a> View<'a> {
     pub(crate) fn toward_seen(&self, z: f64) -> Option<Vector3<f64>> {
         let [mask, model] = self.sums();
         let forward = median(self.depths_on_object().map(|(sensor, object)| sensor - object))?;
-        let camera = &self.observation.camera;
+        let camera = &self.frame.camera;
         let place = |sum: Vector3<f64>, z| camera.unproject(sum.x / sum.z, sum.y / sum.z, z);
         Some(place(mask, z + forward) - place(model, z))
     }

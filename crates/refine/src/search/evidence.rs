@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
-        let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
         let evidence = Evidence::new(&frame, &SearchSettings::default()).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
@@ -204,7 +204,7 @@ mod tests {
         let wrong = evidence.outside.iter().filter(|p| inside(p)).count();
         assert!(wrong * 20 < evidence.outside.len(), "{wrong}");
         // A taxel of whose force nothing is known is in neither list.
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
         let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let unfelt = Evidence::new(&frame, &SearchSettings::default()).unwrap();

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6};
 
-use super::{Iteration, Posterior, Trace};
+use super::{Hypothesis, Iteration, Posterior, Trace};
 use crate::error::RefineError;
 use crate::factor::{RenderingFactor, RenderingSettings};
 use crate::problem::{Factor, State};
@@ -25,6 +25,19 @@ pub trait Strategy: Send + Sync {
 
     /// Iterations at most.
     fn iterations(&self) -> usize;
+}
+
+/// Refines `initial` (object → camera \[m\]) by `strategy`, such as a [`Method`](crate::Method).
+///
+/// # Errors
+/// If the initial pose cannot be seen, or the frame lacks what the strategy needs.
+pub fn refine(
+    frame: &PreparedFrame<'_>,
+    initial: &Isometry3<f64>,
+    strategy: &dyn Strategy,
+) -> Result<Estimate, RefineError> {
+    let state = State::new(frame, initial)?;
+    strategy.run(frame, &state, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Hears of every iteration; a break ends the refinement with what has been found.
@@ -58,6 +71,21 @@ impl Estimate {
     /// The pose: object coordinates → camera coordinates \[m\].
     pub fn t_cam_object(&self) -> &Isometry3<f64> {
         &self.state.t_cam_object
+    }
+
+    /// Probability that model, data and pose are right ([`Posterior::probability`]); of the fused estimator.
+    pub fn probability(&self) -> Option<f64> {
+        Some(self.posterior.as_ref()?.probability())
+    }
+
+    /// Covariance of the pose ([`Posterior::covariance`]); of the fused estimator.
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        Some(self.posterior.as_ref()?.covariance())
+    }
+
+    /// Modes of the posterior, the most likely one first; of the fused estimator.
+    pub fn modes(&self) -> &[Hypothesis] {
+        self.posterior.as_ref().map_or(&[], |posterior| &posterior.hypotheses)
     }
 }
 

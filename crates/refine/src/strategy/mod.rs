@@ -5,7 +5,7 @@ mod fused;
 mod trace;
 
 pub(crate) use estimate::Recorder;
-pub use estimate::{Estimate, Observer, Progress, Strategy};
+pub use estimate::{Estimate, Observer, Progress, Strategy, refine};
 pub(crate) use fused::Evidence;
 pub use fused::{
     Consistency, Diagnosis, DiagnosisSummary, Fit, FitSettings, Fused, FusedSettings, Hypothesis,

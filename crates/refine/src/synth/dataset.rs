@@ -32,7 +32,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
     let mut objects = BTreeMap::new();
     let mut rows = Vec::new();
     for (im_id, scene) in (0_u32..).zip(scenes) {
-        let seen = &scene.observation;
+        let seen = &scene.frame;
         let shot = Shot {
             told: seen.clone(),
             lens: None,
@@ -62,7 +62,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
 
 /// The object's whole silhouette.
 fn silhouette(scene: &Scene) -> Mask {
-    let rendered = depth_map(&scene.observation.camera, &[(&scene.object.model, scene.truth)]);
+    let rendered = depth_map(&scene.frame.camera, &[(&scene.object.model, scene.truth)]);
     let mut whole = Mask::filled(rendered.width(), rendered.height(), false);
     for (set, &z) in whole.pixels_mut().iter_mut().zip(rendered.pixels()) {
         *set = z > 0.0;

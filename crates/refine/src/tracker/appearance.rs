@@ -89,7 +89,7 @@ impl Silhouette {
         t_cam_object: &Isometry3<f64>,
         settings: &AppearanceSettings,
     ) -> Option<Self> {
-        let camera = &sight.observation.camera;
+        let camera = &sight.frame.camera;
         let center = t_cam_object * object.center;
         if center.z <= object.radius {
             return None;
@@ -111,7 +111,7 @@ impl Silhouette {
     /// Indices in the image of the pixels that should show the object.
     fn shown<'a>(&'a self, sight: &'a Sight) -> impl Iterator<Item = usize> + 'a {
         let [columns, rows] = self.window.clone();
-        let width = sight.observation.camera.width;
+        let width = sight.frame.camera.width;
         let index = rows.flat_map(move |y| columns.clone().map(move |x| y * width + x));
         let hand = sight.hand_depth.pixels();
         let shown = move |(at, z): (usize, f32)| {
@@ -124,7 +124,7 @@ impl Silhouette {
 
 /// Pixels that an area of 1 m² at `place` has, were it seen from the front.
 fn pixels_per_area(sight: &Sight, place: &Point3<f64>) -> f64 {
-    let camera = &sight.observation.camera;
+    let camera = &sight.frame.camera;
     camera.fx * camera.fy / (place.z * place.z)
 }
 
@@ -174,7 +174,7 @@ impl Appearance {
         about: Option<&Isometry3<f64>>,
     ) -> bool {
         let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return false };
-        let color = &sight.observation.color;
+        let color = &sight.frame.color;
         let seen: Vec<usize> = silhouette
             .shown(sight)
             .filter(|at| self.ratios.of(&color.pixels()[*at]) >= 0.0)
@@ -197,8 +197,8 @@ impl Appearance {
             self.place(&mut regions, sight, object, about);
         }
         sight.regions = Some(Arc::new(regions));
-        let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
-        let mask = &mut sight.observation.mask;
+        let (width, height) = (sight.frame.camera.width, sight.frame.camera.height);
+        let mask = &mut sight.frame.mask;
         mask.refill(width, height, false);
         seen.iter()
             .filter(|at| !agrees || given[**at])
@@ -215,7 +215,7 @@ impl Appearance {
         object: &Object,
         about: &Isometry3<f64>,
     ) {
-        let (camera, given) = (&sight.observation.camera, sight.given.pixels());
+        let (camera, given) = (&sight.frame.camera, sight.given.pixels());
         let Some(Silhouette { window, depth }) = self.silhouette(sight, object, about) else {
             return;
         };
@@ -249,7 +249,7 @@ impl Appearance {
 
     /// Share of the pixels which should show the object that rather have its colors, and intersection of their histogram and its own.
     fn shares(&self, sight: &Sight, silhouette: &Silhouette) -> [f64; 2] {
-        let color = sight.observation.color.pixels();
+        let color = sight.frame.color.pixels();
         let shown: Vec<u16> = silhouette.shown(sight).map(|at| color_index(&color[at])).collect();
         let own = shown.iter().filter(|color| self.ratios.of_index(**color) > 0.0).count();
         [own as f64 / shown.len().max(1) as f64, self.colors.object.overlap(&shown)]
@@ -259,9 +259,9 @@ impl Appearance {
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return };
         let set: Vec<bool> = silhouette.depth.pixels().iter().map(|z| *z > 0.0).collect();
-        let width = sight.observation.camera.width;
+        let width = sight.frame.camera.width;
         let border = MaskBorder::within(width, silhouette.window.clone(), &set);
-        let (mask, color) = (sight.observation.mask.pixels(), &sight.observation.color);
+        let (mask, color) = (sight.frame.mask.pixels(), &sight.frame.color);
         let mut shown = vec![false; color.pixels().len()];
         silhouette.shown(sight).for_each(|at| shown[at] = true);
         let known = self.ratios.are_known();
@@ -292,7 +292,7 @@ impl Appearance {
         if center.z <= object.radius || !self.ratios.are_known() {
             return None;
         }
-        let Frame { camera, color, .. } = &sight.observation;
+        let Frame { camera, color, .. } = &sight.frame;
         let stride = self.stride;
         let (columns, rows) = (camera.width / stride, camera.height / stride);
         if columns == 0 {
@@ -345,13 +345,13 @@ mod tests {
     #[test]
     fn colors_tell_where_the_object_is() {
         let scene = default_scene(1).unwrap();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.depth.pixels_mut().fill(0.0);
         let sight = || Sight::new(observation.clone(), Images::default());
         let mut appearance = Appearance::new(&TrackerSettings::default());
         assert!(appearance.find(&sight(), &scene.object, &scene.truth).is_none());
         let mut first = sight();
-        first.observation.mask.copy_from(&first.given.clone());
+        first.frame.mask.copy_from(&first.given.clone());
         appearance.learn(&first, &scene.object, &scene.truth);
         let shown = |pose: &Isometry3<f64>| appearance.shown(&sight(), &scene.object, pose);
         let away = Isometry3::translation(0.15, 0.0, 0.0) * scene.truth;
@@ -363,9 +363,9 @@ mod tests {
         assert!(appearance.look(&mut looked, &scene.object, &scene.truth, None));
         let regions = looked.regions.unwrap();
         let mean = |set: bool| {
-            let width = scene.observation.camera.width;
+            let width = scene.frame.camera.width;
             let [columns, rows] = looked.focus.clone().unwrap();
-            let mask = scene.observation.mask.pixels();
+            let mask = scene.frame.mask.pixels();
             let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
             let values = places.filter(|(x, y)| mask[y * width + x] == set);
             let values: Vec<f64> =

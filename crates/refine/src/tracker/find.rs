@@ -65,19 +65,18 @@ impl Tracker {
             Some(pose) => {
                 let is_seen = self.segment(sight, &pose);
                 if sight.given.count() > 0 {
-                    let (given, mask) = (sight.given.pixels(), sight.observation.mask.pixels_mut());
+                    let (given, mask) = (sight.given.pixels(), sight.frame.mask.pixels_mut());
                     mask.iter_mut().zip(given).for_each(|(set, given)| *set &= given);
                 }
-                if !is_seen || sight.observation.mask.count() == 0 {
+                if !is_seen || sight.frame.mask.count() == 0 {
                     return Err(RefineError::OutOfView);
                 }
                 // The pose may be far off.
                 sight.focus = None;
             }
-            None if sight.given.count() > 0 => sight.observation.mask.copy_from(&sight.given),
+            None if sight.given.count() > 0 => sight.frame.mask.copy_from(&sight.given),
             None => {
-                sight.observation.mask =
-                    self.segmenter.anywhere(sight).ok_or(RefineError::EmptyMask)?;
+                sight.frame.mask = self.segmenter.anywhere(sight).ok_or(RefineError::EmptyMask)?;
             }
         }
         Ok(())
@@ -93,7 +92,7 @@ impl Tracker {
         self.start_from(t_cam_object);
         let mut sight = Sight::new(observation, Images::default());
         self.segment_first(&mut sight, true)?;
-        Ok((sight.observation, sight.regions))
+        Ok((sight.frame, sight.regions))
     }
 
     /// Learns colors in a frame with neither depth nor a mask, in which the object is about `initial` \[m\]: colors and pose in turns.
@@ -230,7 +229,7 @@ impl Tracker {
             debug!("nothing like the object is seen anywhere");
             return Ok(None);
         };
-        (sight.observation.mask, sight.focus) = (mask, None);
+        (sight.frame.mask, sight.focus) = (mask, None);
         let object = Arc::clone(&self.object);
         let frame = self.frame(sight, &object)?;
         match self.search(&frame) {

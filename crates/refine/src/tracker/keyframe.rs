@@ -91,7 +91,7 @@ impl Keyframe {
         let Level { camera, pixels } = &levels[0];
         let mut drawn = DepthImage::default();
         draw_depth(&mut drawn, camera, &[(&object.model, *pose)]);
-        let full = &sight.observation.camera;
+        let full = &sight.frame.camera;
         let (left, top) = ((full.cx - camera.cx) as usize, (full.cy - camera.cy) as usize);
         let depth = drawn.pixels();
         let shows = |x: usize, y: usize| {
@@ -100,7 +100,7 @@ impl Keyframe {
             let [hand, sensed] = [&sight.hand_depth, &sight.depth].map(|image| image.pixels()[at]);
             let off = f64::from((sensed - z).abs());
             z > 0.0
-                && sight.observation.mask.pixels()[at]
+                && sight.frame.mask.pixels()[at]
                 && !(hand > 0.0 && hand < z)
                 && !(sensed > 0.0 && off > settings.off_surface)
         };
@@ -222,7 +222,7 @@ impl Tracker {
 
     /// A keyframe of an object that is in no hand: a hand that is known says better how what it holds has moved, than images that show half of it.
     pub(super) fn keyframe(&self, sight: &Sight, pose: &Isometry3<f64>) -> Option<Keyframe> {
-        let in_hand = self.hand.is_some() && sight.observation.hand.is_some();
+        let in_hand = self.hand.is_some() && sight.frame.hand.is_some();
         let settings = &self.settings.keyframe;
         (!in_hand).then(|| Keyframe::new(sight, &self.object, pose, settings)).flatten()
     }
@@ -328,9 +328,9 @@ mod tests {
     /// The first frames of a sequence, as they are without a hand.
     fn sights(sequence: &Sequence) -> [Sight; 2] {
         [0, 2].map(|k| {
-            let observation = sequence.frames[k].observation.clone();
+            let observation = sequence.frames[k].frame.clone();
             let mut sight = Sight::new(observation, Images::default());
-            sight.observation.mask.copy_from(&sight.given);
+            sight.frame.mask.copy_from(&sight.given);
             sight
         })
     }
@@ -355,7 +355,7 @@ mod tests {
             assert!(off.fixed_rows::<3>(k).norm() < 0.4 * error, "{off}");
         }
         // Another object's image is no motion.
-        let mut other = second.observation.clone();
+        let mut other = second.frame.clone();
         let stripes = other.color.pixels_mut().iter_mut().enumerate();
         stripes.for_each(|(k, pixel)| *pixel = [(k % 7) as f32 / 7.0; 3]);
         let other = Sight::new(other, Images::default());

@@ -87,7 +87,7 @@ use crate::strategy::{
 /// let mut tracker = Tracker::new(Arc::clone(&sequence.object), TrackerSettings::default())?;
 /// tracker.start_from(&sequence.initial);
 /// for frame in &sequence.frames {
-///     let tracked = tracker.track(&frame.observation, frame.time)?;
+///     let tracked = tracker.track(&frame.frame, frame.time)?;
 ///     assert_ne!(tracked.status, TrackStatus::Lost);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -253,7 +253,7 @@ impl Tracker {
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
-        let in_hand = sight.observation.hand.is_some();
+        let in_hand = sight.frame.hand.is_some();
         let seen = self.segment(sight, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
@@ -365,7 +365,7 @@ impl Tracker {
         object: &'a Arc<Object>,
     ) -> Result<PreparedFrame<'a>, RefineError> {
         let mut frame =
-            PreparedFrame::new(&sight.observation, object)?.with_hand_depth(&sight.hand_depth);
+            PreparedFrame::new(&sight.frame, object)?.with_hand_depth(&sight.hand_depth);
         frame = frame.with_depth(&sight.depth);
         if let Some(focus) = &sight.focus {
             frame = frame.with_focus(focus.clone());

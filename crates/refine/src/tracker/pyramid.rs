@@ -47,7 +47,7 @@ impl Level {
 
 /// The part of the image of `sight` that shows what is within `reach` \[m\] of `center` (camera frame), at each resolution; none if that is out of the image.
 pub(super) fn pyramid(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option<[Level; LEVELS]> {
-    let camera = &sight.observation.camera;
+    let camera = &sight.frame.camera;
     let at = camera.project(center)?;
     let extent = reach * camera.fx.max(camera.fy) / (center.z - reach).max(reach);
     // Sizes are multiples of the coarsest level's pixels.
@@ -58,7 +58,7 @@ pub(super) fn pyramid(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option
     if width < 4 * unit || height < 4 * unit {
         return None;
     }
-    let color = sight.observation.color.pixels();
+    let color = sight.frame.color.pixels();
     let line = |y: usize| &color[y * camera.width + left..][..width];
     let gray = |color: &[f32; 3]| color.iter().sum::<f32>() / color.len() as f32;
     let pixels = (top..top + height).flat_map(|y| line(y).iter().map(gray)).collect();

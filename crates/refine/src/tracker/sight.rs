@@ -12,7 +12,7 @@ use crate::scene::{Frame, RegionEvidence, draw_hand_depth};
 /// A frame with its hand, and what shows the object in it as far as that is known.
 pub(super) struct Sight {
     /// With the mask that shows the object, as far as that is known.
-    pub(super) observation: Frame,
+    pub(super) frame: Frame,
     /// The mask that came with it.
     pub(super) given: Mask,
     /// True if that tells which pixels show the object: it is neither empty nor a box.
@@ -47,7 +47,16 @@ impl Sight {
         let tells = observation.is_segmented();
         let given = mem::replace(&mut observation.mask, mask);
         let measured = observation.has_depth();
-        Self { given, tells, observation, hand_depth, depth, measured, regions: None, focus: None }
+        Self {
+            given,
+            tells,
+            frame: observation,
+            hand_depth,
+            depth,
+            measured,
+            regions: None,
+            focus: None,
+        }
     }
 
     /// Columns and rows within `extent` \[px\] of a place, in squares of `unit` pixels, as far as they are in the image.
@@ -56,13 +65,13 @@ impl Sight {
             let end = |at: f64| at.clamp(0.0, size as f64) as usize / unit;
             end(middle - extent)..end(middle + extent)
         };
-        let camera = &self.observation.camera;
+        let camera = &self.frame.camera;
         [range(place.x, camera.width), range(place.y, camera.height)]
     }
 
     /// What is left of it for the next one.
     pub(super) fn into_images(self) -> Images {
-        let Self { observation, hand_depth, depth, .. } = self;
+        let Self { frame: observation, hand_depth, depth, .. } = self;
         Images { mask: observation.mask, hand_depth, depth }
     }
 }

@@ -17,7 +17,7 @@ fn tracker(settings: TrackerSettings) -> Tracker {
 
 fn track(tracker: &mut Tracker, index: usize) -> Tracked {
     let frame = &SEQUENCE.frames[index];
-    tracker.track(&frame.observation, frame.time).unwrap()
+    tracker.track(&frame.frame, frame.time).unwrap()
 }
 
 /// Errors \[cm; deg\].
@@ -32,8 +32,8 @@ fn a_jump_is_noticed_and_recovered_from() {
         (0..3).for_each(|index| drop(track(tracker, index)));
         // The hand's reading stays behind: to the tracker, the object has left it.
         let frame = &SEQUENCE.frames[23];
-        let mut observation = frame.observation.clone();
-        observation.hand = SEQUENCE.frames[3].observation.hand.clone();
+        let mut observation = frame.frame.clone();
+        observation.hand = SEQUENCE.frames[3].frame.hand.clone();
         tracker.hand = None;
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
@@ -56,7 +56,7 @@ fn without_time_the_prediction_is_returned() {
     let mut tracker = tracker(TrackerSettings::default());
     let first = track(&mut tracker, 0);
     tracker.settings.budget = Some(Duration::ZERO);
-    let hand = |k: usize| SEQUENCE.frames[k].observation.hand.as_ref().unwrap().t_cam_hand;
+    let hand = |k: usize| SEQUENCE.frames[k].frame.hand.as_ref().unwrap().t_cam_hand;
     for index in 1..4 {
         let predicted = track(&mut tracker, index);
         assert_eq!(predicted.status, TrackStatus::Predicted);
@@ -88,12 +88,12 @@ fn calibrations_carry_over() {
     let mut tracker = tracker(TrackerSettings { time_constant: 3.0, ..Default::default() });
     let wrong = 0.03;
     let observation = |index: usize| {
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         observation.hand.as_mut().unwrap().joints.iter_mut().for_each(|q| *q += wrong);
         observation
     };
     let error = |tracked: &Tracked, index: usize| -> f64 {
-        let truth = &SEQUENCE.frames[index].observation.hand.as_ref().unwrap().joints;
+        let truth = &SEQUENCE.frames[index].frame.hand.as_ref().unwrap().joints;
         let joints = tracked.state.joints.iter().zip(truth);
         joints.map(|(q, truth)| (q - truth).abs()).sum::<f64>() / truth.len() as f64
     };
@@ -131,7 +131,7 @@ fn a_panic_costs_one_frame() {
     (0..2).for_each(|index| drop(track(&mut tracker, index)));
     fault.store(true, Ordering::Relaxed);
     let frame = &SEQUENCE.frames[2];
-    let failed = tracker.track(&frame.observation, frame.time);
+    let failed = tracker.track(&frame.frame, frame.time);
     assert!(matches!(failed, Err(RefineError::Panicked(_))));
     fault.store(false, Ordering::Relaxed);
     let next = track(&mut tracker, 3);
@@ -144,7 +144,7 @@ fn a_panic_costs_one_frame() {
 fn what_is_found_where_it_was_expected_may_be_hidden_by_more_than_half() {
     let mut tracker = tracker(TrackerSettings::default());
     let hidden = |index: usize, share: f64| {
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         let [left, top, columns, rows] = observation.mask.bounds().unwrap();
         let width = observation.camera.width;
         let covered = (share * columns as f64) as usize;
@@ -161,7 +161,7 @@ fn what_is_found_where_it_was_expected_may_be_hidden_by_more_than_half() {
     let statuses: Vec<TrackStatus> = (0..24)
         .map(|index| {
             let observation = match index {
-                0..6 => SEQUENCE.frames[index].observation.clone(),
+                0..6 => SEQUENCE.frames[index].frame.clone(),
                 6..14 => hidden(index, 1.0),
                 _ => hidden(index, 0.62),
             };
@@ -182,7 +182,7 @@ fn what_is_found_where_it_was_expected_may_be_hidden_by_more_than_half() {
 #[test]
 fn what_has_slipped_is_expected_and_what_is_held_in_another_way_is_not() {
     let frame = &SEQUENCE.frames[0];
-    let state = State::measured(&frame.observation, &SEQUENCE.object, &frame.truth).unwrap();
+    let state = State::measured(&frame.frame, &SEQUENCE.object, &frame.truth).unwrap();
     let object = &SEQUENCE.object;
     let radius = object.radius;
     let share = |twist: &[f64]| {
@@ -201,7 +201,7 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let mut tracker = tracker(TrackerSettings { turn_sigma, ..Default::default() });
     (0..2).for_each(|index| drop(track(&mut tracker, index)));
     let (index, object) = (2, Arc::clone(&SEQUENCE.object));
-    let SequenceFrame { observation, time, truth } = &SEQUENCE.frames[index];
+    let SequenceFrame { frame: observation, time, truth } = &SEQUENCE.frames[index];
     let remembered = tracker.track.clone().unwrap();
     let nominal = State::measured(observation, &object, truth).unwrap();
     let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
@@ -246,7 +246,7 @@ fn a_turned_pose_that_fits_better_is_taken() {
 #[test]
 fn color_alone_follows_an_object_without_any_mask() {
     let hidden = |index: usize| {
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         observation.depth.pixels_mut().fill(0.0);
         observation.mask.pixels_mut().fill(false);
         observation

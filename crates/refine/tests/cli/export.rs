@@ -61,7 +61,7 @@ fn nodes_of_a_film_are_where_the_poses_are() {
     let mut links = 0;
     for (image, seed) in [1, 2].into_iter().enumerate() {
         let scene = default_scene(seed).unwrap();
-        let hand = scene.observation.hand.as_ref().unwrap();
+        let hand = scene.frame.hand.as_ref().unwrap();
         let posed = scene.hand.posed(&hand.t_cam_hand, &hand.joints).unwrap();
         for (link, t_cam_link) in scene.hand.tree.links().iter().zip(posed.t_world_links()) {
             if !link.parts.is_empty() {
@@ -74,7 +74,7 @@ fn nodes_of_a_film_are_where_the_poses_are() {
     assert!(links > 20, "{links}");
     // Upright: what falls, falls along −y, and the camera looks ahead.
     let [scene, _] = keys(&film, "scene").0;
-    let gravity = default_scene(1).unwrap().observation.gravity.unwrap();
+    let gravity = default_scene(1).unwrap().frame.gravity.unwrap();
     assert!((scene.rotation * gravity.normalize() + Vector3::y()).norm() < 1e-6);
     let [camera, _] = keys(&film, "camera").0;
     let ahead = scene.rotation * (camera.rotation * -Vector3::z());
@@ -108,7 +108,7 @@ fn where_the_world_is_known_the_camera_moves() {
         assert!((cameras[k].translation.vector - Vector3::new(0.0, 0.0, -z)).norm() < 1e-6);
     }
     let [scene, _] = keys(&film, "scene").0;
-    let gravity = turn_back(default_scene(1).unwrap().observation.gravity.unwrap());
+    let gravity = turn_back(default_scene(1).unwrap().frame.gravity.unwrap());
     assert!((scene.rotation * gravity.normalize() + Vector3::y()).norm() < 1e-6);
     // Half of a place is none.
     place.edit_json("ds/test/000001/scene_camera.json", |cameras| {

@@ -76,7 +76,7 @@ impl Session for FragileSession {
 /// The pose of the built-in scene that `method` finds, rendered by `backend`.
 fn refined(method: &Method, backend: Option<Arc<dyn Backend>>) -> Isometry3<f64> {
     let scene = default_scene(1).unwrap();
-    let mut frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+    let mut frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
     if let Some(backend) = backend {
         frame = frame.with_backend(backend);
     }
@@ -109,7 +109,7 @@ fn hypotheses_go_to_the_device_together() {
     let scene = default_scene(1).unwrap();
     let device = Fragile::default();
     let found = |backend: Option<Arc<dyn Backend>>| {
-        let mut frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+        let mut frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
         if let Some(backend) = backend {
             frame = frame.with_backend(backend);
         }

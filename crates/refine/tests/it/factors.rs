@@ -22,7 +22,7 @@ use prehend_refine::{Factor, PreparedFrame, RefineError, State};
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn frame() -> PreparedFrame<'static> {
-    PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap()
+    PreparedFrame::new(&SCENE.frame, &SCENE.object).unwrap()
 }
 
 /// Twists about the object's center in which a radian counts as much as a tenth of a meter.

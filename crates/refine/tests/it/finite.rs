@@ -72,7 +72,7 @@ const FAULTS: [Fault; 18] = [
 const QUICK: usize = FAULTS.len() - 2;
 
 fn observation(fault: Fault) -> Frame {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     fault.1(&mut observation);
     observation
 }
@@ -292,7 +292,7 @@ fn a_tracker_of_anything_at_any_time() {
 
 #[test]
 fn errors_of_poses_of_nothing_and_of_a_vertex() {
-    let camera = SCENE.observation.camera;
+    let camera = SCENE.frame.camera;
     let axis = ContinuousSymmetry { axis: Vector3::z_axis(), point: Point3::origin() };
     let flip = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     let symmetric = Symmetries { discrete: vec![flip], continuous: vec![axis] };
@@ -342,7 +342,7 @@ proptest! {
         };
         let corner = Point3::new(1.0, -2.0, 0.5) * 10f64.powi(size);
         let model = ScoredModel::new(vec![corner, -corner], Symmetries::default());
-        let score = model.score(&pose(a), &pose(b), &SCENE.observation.camera);
+        let score = model.score(&pose(a), &pose(b), &SCENE.frame.camera);
         prop_assert!(score.values().into_iter().flatten().all(f64::is_finite), "{score:?}");
     }
 }

@@ -14,7 +14,7 @@ use prehend_refine::{Factor, Frame, PreparedFrame, State, refine};
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn turned(twist: &[f64; 6]) -> Isometry3<f64> {
-    let bare = Frame { hand: None, ..SCENE.observation.clone() };
+    let bare = Frame { hand: None, ..SCENE.frame.clone() };
     let frame = PreparedFrame::new(&bare, &SCENE.object).unwrap();
     let state = State::new(&frame, &SCENE.truth).unwrap();
     state.retract(&[Block::ObjectPose], twist).t_cam_object
@@ -50,7 +50,7 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 fn from_the_back(alternatives: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
     let axis = SCENE.truth.rotation * Vector3::z() * std::f64::consts::PI;
     let back = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
-    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&SCENE.frame, &SCENE.object).unwrap();
     let fused = Fused { alternatives, ..Fused::default() };
     let found = refine(&frame, &back, &fused).unwrap();
     (found.state.t_cam_object, found.posterior.unwrap())
@@ -73,14 +73,14 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
     let rotation = start.rotation.inverse();
     let center = start * SCENE.object.center - rotation * SCENE.object.center;
     let transposed = Isometry3::from_parts(center.into(), rotation);
-    let (pose, posterior) = run(&SCENE.observation, &transposed, FusedSettings::default());
+    let (pose, posterior) = run(&SCENE.frame, &transposed, FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5 && posterior.probability() > 0.9, "{pe} cm, {oe}°");
 }
 
 #[test]
 fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     observation.hand = None;
     let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
     let fused = Fused::new(without(Modality::Color)).with_alternatives(vec![]);
@@ -101,7 +101,7 @@ fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
 
 #[test]
 fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
-    let (pose, posterior) = run(&SCENE.observation, &turned(&OFF), FusedSettings::default());
+    let (pose, posterior) = run(&SCENE.frame, &turned(&OFF), FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
     let covariance = posterior.covariance();
@@ -117,7 +117,7 @@ fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
 
 #[test]
 fn calibrations_that_are_off_are_estimated() {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     let off = Vector3::new(3e-3, -2e-3, 2e-3);
     if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = Translation3::from(off) * hand.t_cam_hand;
@@ -140,7 +140,7 @@ fn calibrations_that_are_off_are_estimated() {
 fn every_sense_may_be_absent() {
     let start = turned(&OFF);
     let changed = |change: &dyn Fn(&mut Frame)| {
-        let mut observation = SCENE.observation.clone();
+        let mut observation = SCENE.frame.clone();
         change(&mut observation);
         run(&observation, &start, FusedSettings::default()).0
     };
@@ -155,7 +155,7 @@ fn every_sense_may_be_absent() {
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.5 && oe < 4.0, "without {sense}: {pe} cm, {oe}°");
     }
-    let (pose, _) = run(&SCENE.observation, &start, without(Modality::Color));
+    let (pose, _) = run(&SCENE.frame, &start, without(Modality::Color));
     assert!(errors(&pose).0 < 0.3);
 }
 
@@ -165,24 +165,24 @@ fn scales_are_learnt_from_what_a_frame_tells() {
         let (_, posterior) = run(observation, &turned(&OFF), FusedSettings::default());
         posterior.scales.get(group)
     };
-    let mut displaced = SCENE.observation.clone();
+    let mut displaced = SCENE.frame.clone();
     if let Some(hand) = &mut displaced.hand {
         hand.t_cam_hand = Translation3::new(8e-3, -6e-3, 0.0) * hand.t_cam_hand;
         hand.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.05 * (2.0 * i as f64).sin());
     }
     for group in [ErrorGroup::Hand, ErrorGroup::Joints] {
-        let (exact, off) = (scale(&SCENE.observation, group), scale(&displaced, group));
+        let (exact, off) = (scale(&SCENE.frame, group), scale(&displaced, group));
         assert!(exact < 0.5 && off > 1.2, "{group:?}: {exact} {off}");
     }
     // Without a hand, little tells of the camera's errors.
-    let bare = Frame { hand: None, ..SCENE.observation.clone() };
+    let bare = Frame { hand: None, ..SCENE.frame.clone() };
     let alone = scale(&bare, ErrorGroup::Camera);
     assert!((0.1..1.5).contains(&alone), "{alone}");
 }
 
 #[test]
 fn a_pose_that_senses_disagree_about_is_not_sure() {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = Translation3::new(0.0, 0.0, 0.05) * hand.t_cam_hand;
     }
@@ -199,7 +199,7 @@ fn a_solve_that_is_cut_short_is_not_sure() {
     let of = |iterations| {
         let mut settings = FusedSettings::default();
         settings.stages.iter_mut().for_each(|stage| stage.solver.iterations = iterations);
-        run(&SCENE.observation, &turned(&OFF), settings).1
+        run(&SCENE.frame, &turned(&OFF), settings).1
     };
     let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
@@ -212,7 +212,7 @@ fn a_solve_that_is_cut_short_is_not_sure() {
 fn threads_make_no_difference() {
     let of = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| run(&SCENE.observation, &turned(&OFF), FusedSettings::default()))
+        pool.install(|| run(&SCENE.frame, &turned(&OFF), FusedSettings::default()))
     };
     assert_eq!(of(1), of(3));
 }
@@ -221,11 +221,11 @@ fn threads_make_no_difference() {
 fn what_nothing_is_seen_of_is_said_to_be_unobserved() {
     let settings =
         FusedSettings { modalities: vec![Modality::Silhouette], ..FusedSettings::default() };
-    let bare = Frame { hand: None, ..SCENE.observation.clone() };
+    let bare = Frame { hand: None, ..SCENE.frame.clone() };
     let (_, posterior) = run(&bare, &turned(&[0.0; 6]), settings);
     // The outline of a bottle says little of how it is turned about its axis, and of its distance.
     assert!(!posterior.unobservable.is_empty());
-    let (_, all) = run(&SCENE.observation, &turned(&OFF), FusedSettings::default());
+    let (_, all) = run(&SCENE.frame, &turned(&OFF), FusedSettings::default());
     assert!(all.unobservable.is_empty(), "{:?}", all.unobservable);
 }
 
@@ -253,7 +253,7 @@ impl Factor for Pull {
 
 #[test]
 fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
-    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object).unwrap();
+    let frame = PreparedFrame::new(&SCENE.frame, &SCENE.object).unwrap();
     let pull = |offset: f64, sigma: f64| {
         let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * offset;
         let fused = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(sigma) });

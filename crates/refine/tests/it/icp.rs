@@ -12,7 +12,7 @@ use prehend_refine::{PreparedFrame, RefineError, State, Strategy};
 #[test]
 fn it_descends_and_its_own_optimum_is_not_the_truth() {
     let scene = default_scene(1).unwrap();
-    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
     let start = State::new(&frame, &scene.truth).unwrap();
     let start = start.retract(&[Block::ObjectPose], &[4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04]);
     let found = Icp::default().run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();
@@ -29,7 +29,7 @@ fn it_descends_and_its_own_optimum_is_not_the_truth() {
 #[test]
 fn no_depth_is_an_error() {
     let scene = default_scene(1).unwrap();
-    let mut observation = scene.observation.clone();
+    let mut observation = scene.frame.clone();
     observation.depth.pixels_mut().fill(0.0);
     let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
     let start = State::new(&frame, &scene.truth).unwrap();
@@ -39,7 +39,7 @@ fn no_depth_is_an_error() {
 
 /// Where a strategy ends that begins `offset` from the truth, and in how many iterations.
 fn found(strategy: &dyn Strategy, scene: &Scene, offset: &[f64; 6]) -> (Isometry3<f64>, usize) {
-    let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+    let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
     let truth = State::new(&frame, &scene.truth).unwrap();
     let start = truth.retract(&[Block::ObjectPose], offset);
     let found = strategy.run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();

@@ -147,7 +147,7 @@ fn a_frame_file_behind_a_lens_is_seen_by_a_pinhole() {
     for lens in lenses() {
         let dir = dataset(&lens_of(&lens), None, None);
         let (input, _) = load_frame_file(&frame_file(dir.path(), &lens), 1, None, None).unwrap();
-        let seen = input.observation;
+        let seen = input.frame;
         assert_pinhole(&seen.color, &seen.depth, &seen.mask);
     }
 }

@@ -17,7 +17,7 @@ const STEP: i64 = 50_000_000;
 fn sequence(count: usize) -> Sequence {
     let mut sequence = default_sequence(1, count).unwrap();
     for frame in &mut sequence.frames {
-        for pixel in frame.observation.color.pixels_mut() {
+        for pixel in frame.frame.color.pixels_mut() {
             *pixel = pixel.map(|v| (v.clamp(0.0, 1.0) * 255.0).round() / 255.0);
         }
     }
@@ -43,9 +43,9 @@ fn record(sequence: &Sequence, file: &Path) -> Vec<Tracked> {
     writer.object(STEP, &sequence.object.mesh).unwrap();
     for (k, frame) in sequence.frames.iter().enumerate() {
         let at = STEP * (k as i64 + 1);
-        writer.sensed(at, &frame.observation).unwrap();
-        let tracked = track(&mut tracker, &frame.observation, at);
-        writer.tracked(at, &tracked, &frame.observation.color).unwrap();
+        writer.sensed(at, &frame.frame).unwrap();
+        let tracked = track(&mut tracker, &frame.frame, at);
+        writer.tracked(at, &tracked, &frame.frame.color).unwrap();
         found.push(tracked);
     }
     assert!(!file.exists(), "it appears whole");
@@ -67,7 +67,7 @@ fn what_was_sensed_comes_back_from_a_log_and_gives_the_same_poses() {
     for (k, (frame, expected)) in sequence.frames.iter().zip(&expected).enumerate() {
         let read = frames.next().unwrap();
         assert_eq!(read.nanoseconds, STEP * (k as i64 + 1));
-        let (told, read) = (&frame.observation, read.observation.unwrap());
+        let (told, read) = (&frame.frame, read.frame.unwrap());
         assert_eq!(read.camera, told.camera);
         // Not printed: they are large.
         assert!(read.color == told.color && read.depth == told.depth, "{k}");
@@ -113,19 +113,18 @@ fn what_is_missing_is_named() {
     let file = folder.path().join("log.mcap");
     let sequence = sequence(1);
     let mut writer = RecordingWriter::create(&file).unwrap();
-    writer.sensed(STEP, &Frame { hand: None, ..sequence.frames[0].observation.clone() }).unwrap();
+    writer.sensed(STEP, &Frame { hand: None, ..sequence.frames[0].frame.clone() }).unwrap();
     writer.finish().unwrap();
     let topics = ImageTopics { color: Some("/left".to_owned()), ..ImageTopics::default() };
     let error = Recording::open(&file, &topics, "world").err().unwrap().to_string();
     assert!(error.contains("/left: there are no images of this name"), "{error}");
     let recording = Recording::open(&file, &ImageTopics::default(), "up").unwrap();
-    let without_hand = recording.frames(None).unwrap().next().unwrap().observation.unwrap();
+    let without_hand = recording.frames(None).unwrap().next().unwrap().frame.unwrap();
     assert!(
-        without_hand.hand.is_none()
-            && without_hand.gravity == sequence.frames[0].observation.gravity
+        without_hand.hand.is_none() && without_hand.gravity == sequence.frames[0].frame.gravity
     );
     let with_hand = recording.frames(Some(&sequence.hand)).unwrap().next().unwrap();
-    let error = with_hand.observation.err().unwrap().to_string();
+    let error = with_hand.frame.err().unwrap().to_string();
     assert!(error.contains("no transform says where") && error.contains("at 0.050 s"), "{error}");
 }
 
@@ -136,7 +135,7 @@ fn an_image_that_is_broken_fails_its_frame_alone() {
     let sequence = sequence(3);
     let mut writer = RecordingWriter::create(&file).unwrap();
     for (k, frame) in sequence.frames.iter().enumerate() {
-        let mut observation = frame.observation.clone();
+        let mut observation = frame.frame.clone();
         if k == 1 {
             // Its camera_info is that of the first.
             observation.color = observation.color.downsampled(2);
@@ -149,7 +148,7 @@ fn an_image_that_is_broken_fails_its_frame_alone() {
     writer.finish().unwrap();
     let recording = Recording::open(&file, &ImageTopics::default(), "world").unwrap();
     let read: Vec<_> = recording.frames(None).unwrap().collect();
-    assert_eq!(read.iter().map(|f| f.observation.is_ok()).collect::<Vec<_>>(), [true, false, true]);
-    let error = read[1].observation.as_ref().err().unwrap().to_string();
+    assert_eq!(read.iter().map(|f| f.frame.is_ok()).collect::<Vec<_>>(), [true, false, true]);
+    let error = read[1].frame.as_ref().err().unwrap().to_string();
     assert!(error.contains("at 0.100 s: 320x240 pixels, its camera_info is of 640x480"), "{error}");
 }

@@ -36,7 +36,7 @@ fn said(truth: &Frame) -> Frame {
 fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
     let chosen = sequence.frames.iter().step_by(6).enumerate();
     let frame = |(index, frame): (usize, &SequenceFrame)| CalibrationFrame {
-        observation: said(&frame.observation),
+        frame: said(&frame.frame),
         // As if two objects were held.
         obj_id: 7 + index as u32 % 2,
         initial: frame.truth,
@@ -73,7 +73,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let (mut frames, mut calibrator) = (frames(&sequence), calibrator(&sequence));
     // The hand was elsewhere in one frame.
     let bumped = 4;
-    let hand = frames[bumped].observation.hand.as_mut().unwrap();
+    let hand = frames[bumped].frame.hand.as_mut().unwrap();
     hand.t_cam_hand.translation.vector += Vector3::new(0.02, -0.01, 0.01);
     for number in 0..6 {
         let mut pass = Pass::default();
@@ -91,7 +91,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let rig = calibrator.rig();
     let sigmas = rig.covariance.diagonal().map(f64::sqrt);
     let names = rig.parameters();
-    let focal = sequence.frames[0].observation.camera.fx;
+    let focal = sequence.frames[0].frame.camera.fx;
     for (k, (name, found)) in names.iter().enumerate() {
         let expected = match name.as_str() {
             "depth scale" => DEPTH_SCALE - 1.0,
@@ -116,7 +116,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     rig.save(&path).unwrap();
     let rig = Rig::load(&path).unwrap();
     let new = &sequence.frames[39];
-    let told = said(&new.observation);
+    let told = said(&new.frame);
     let error = |observation: &Frame, object, rig: Option<&Rig>| {
         let frame = PreparedFrame::new(observation, object).unwrap();
         let fused = Fused { rig: rig.map(|rig| Arc::new(rig.clone())), ..Fused::default() };
@@ -133,7 +133,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     assert!(sure < unsure && with < 1.2 * alone, "{alone} ± {unsure} → {with} ± {sure}");
     let wrong = |observation: &Frame| -> f64 {
         let joints = |o: &Frame| o.hand.as_ref().unwrap().joints.clone();
-        let pairs = joints(observation).into_iter().zip(joints(&new.observation));
+        let pairs = joints(observation).into_iter().zip(joints(&new.frame));
         pairs.map(|(said, is)| (said - is).abs()).sum::<f64>() / 16.0
     };
     // Without a hand, what is known of the camera still counts.
@@ -155,7 +155,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
         }
         let (mut off, mut unsure) = (0.0, 0.0);
         for frame in &sequence.frames[..6] {
-            let told = said(&frame.observation);
+            let told = said(&frame.frame);
             let told = rig.map_or_else(|| told.clone(), |rig| rig.corrected(&told).unwrap());
             let tracked = tracker.track(&told, frame.time).unwrap();
             let posterior = tracked.posterior.unwrap();
@@ -183,7 +183,7 @@ fn what_frames_have_said_is_kept_and_masks_may_be_missing() {
     learn(&mut in_windows, &mut frames[..half], 4);
     let of_half = in_windows.rig().covariance.trace();
     for frame in &mut frames[half..] {
-        frame.observation.mask = Mask::filled(640, 480, false);
+        frame.frame.mask = Mask::filled(640, 480, false);
     }
     learn(&mut in_windows, &mut frames[half..], 4);
     let (a, b) = (at_once.rig(), in_windows.rig());
@@ -203,7 +203,7 @@ fn what_frames_have_said_is_kept_and_masks_may_be_missing() {
     // Of a window in which the hand was elsewhere, nothing is learnt, and nothing ends.
     let mut bumped = frames[0].clone();
     bumped.is_refined = false;
-    let hand = bumped.observation.hand.as_mut().unwrap();
+    let hand = bumped.frame.hand.as_mut().unwrap();
     hand.t_cam_hand.translation.vector += Vector3::new(0.02, -0.01, 0.01);
     let (mut after, mut pass) = (in_windows.clone(), Pass::default());
     let visit = after.visit(&bumped).unwrap();
@@ -265,7 +265,7 @@ fn a_camera_is_calibrated_without_a_hand() {
     let sequence = default_sequence(1, 61).unwrap();
     let mut frames = frames(&sequence);
     for frame in &mut frames {
-        frame.observation.hand = None;
+        frame.frame.hand = None;
     }
     let objects = [7, 8].map(|id| (id, Arc::clone(&sequence.object)));
     let mut calibrator =
@@ -293,7 +293,7 @@ fn a_camera_is_calibrated_without_a_hand() {
     let path = file.path().join("rig.json");
     rig.save(&path).unwrap();
     let rig = Rig::load(&path).unwrap();
-    let SequenceFrame { observation, truth, .. } = &sequence.frames[39];
+    let SequenceFrame { frame: observation, truth, .. } = &sequence.frames[39];
     let mut observation = said(observation);
     observation.hand = None;
     let corrected = rig.corrected(&observation).unwrap();

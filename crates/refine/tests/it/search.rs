@@ -10,7 +10,7 @@ use prehend_refine::{Frame, PreparedFrame, RefineError};
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn search(settings: SearchSettings) -> Result<Vec<PoseCandidate>, RefineError> {
-    let frame = PreparedFrame::new(&SCENE.observation, &SCENE.object)?;
+    let frame = PreparedFrame::new(&SCENE.frame, &SCENE.object)?;
     PoseSearch::new(Arc::clone(&SCENE.object), settings)?.run(&frame)
 }
 
@@ -26,7 +26,7 @@ fn the_bottle_is_found_from_sensors_alone() {
 
 #[test]
 fn vision_alone_finds_it_too() {
-    let mut observation = SCENE.observation.clone();
+    let mut observation = SCENE.frame.clone();
     observation.hand = None;
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
     let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
@@ -57,7 +57,7 @@ fn bad_input_is_an_error() {
 
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
     let refused = |change: &dyn Fn(&mut Frame)| {
-        let mut observation = SCENE.observation.clone();
+        let mut observation = SCENE.frame.clone();
         change(&mut observation);
         let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
         search.run(&frame).unwrap_err()

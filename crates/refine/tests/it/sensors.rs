@@ -12,7 +12,7 @@ use prehend_geometry::SplitMix64;
 use prehend_refine::data::load_frame_file;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::strategy::{Estimate, Fused, Posterior};
-use prehend_refine::{Frame, refine};
+use prehend_refine::{Frame, PreparedFrame, refine};
 use serde_json::{Value, json};
 
 use self::sensing::{Extra, write_frame};
@@ -24,7 +24,8 @@ fn found(world: &World, extras: &[Extra], seed: u64) -> Estimate {
     let folder = tempfile::tempdir().unwrap();
     write_frame(folder.path(), world, extras, seed).unwrap();
     let (input, start) = load_frame_file(&folder.path().join("frame.json"), 0, None, None).unwrap();
-    refine(&input.frame().unwrap(), &start, &Fused::default()).unwrap()
+    refine(&PreparedFrame::new(&input.frame, &input.object).unwrap(), &start, &Fused::default())
+        .unwrap()
 }
 
 /// Mean errors with one sensor more: of the pose in the camera \[cm, °\], and of its place from the hand \[cm\].
@@ -213,12 +214,17 @@ fn of_changed(change: impl Fn([usize; 2], &mut [f32; 3], &mut f32)) -> (f64, f64
     write_frame(folder.path(), &world, &[], 0).unwrap();
     let (mut input, start) =
         load_frame_file(&folder.path().join("frame.json"), 0, None, None).unwrap();
-    let Frame { color, depth, mask, .. } = &mut input.observation;
+    let Frame { color, depth, mask, .. } = &mut input.frame;
     let pixels = color.pixels_mut().iter_mut().zip(depth.pixels_mut()).zip(mask.pixels());
     for (k, ((color, depth), _)) in pixels.enumerate().filter(|(_, (_, masked))| **masked) {
         change([k % 640, k / 640], color, depth);
     }
-    let found = refine(&input.frame().unwrap(), &start, &Fused::default()).unwrap();
+    let found = refine(
+        &PreparedFrame::new(&input.frame, &input.object).unwrap(),
+        &start,
+        &Fused::default(),
+    )
+    .unwrap();
     let (pose, truth) = (*found.t_cam_object(), world.t_cam_object());
     (pe_cm(&pose, &truth), oe_deg(&pose, &truth), found.posterior.unwrap())
 }

@@ -23,7 +23,7 @@ fn tracker(settings: TrackerSettings) -> Tracker {
 
 fn track(tracker: &mut Tracker, index: usize) -> Tracked {
     let frame = &SEQUENCE.frames[index];
-    tracker.track(&frame.observation, frame.time).unwrap()
+    tracker.track(&frame.frame, frame.time).unwrap()
 }
 
 /// Errors \[cm; deg\].
@@ -54,7 +54,7 @@ fn without_a_hand_the_camera_is_enough() {
     tracker.start_from(&SEQUENCE.initial);
     for index in 0..12 {
         let frame = &SEQUENCE.frames[index];
-        let mut observation = frame.observation.clone();
+        let mut observation = frame.frame.clone();
         observation.hand = None;
         let tracked = tracker.track(&observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
@@ -69,8 +69,8 @@ fn follow_with_masks(change: impl Fn(&Mask) -> Mask) {
     (0..3).for_each(|index| drop(track(&mut tracker, index)));
     for index in 3..14 {
         let frame = &SEQUENCE.frames[index];
-        let mask = change(&frame.observation.mask);
-        let observation = Frame { mask, ..frame.observation.clone() };
+        let mask = change(&frame.frame.mask);
+        let observation = Frame { mask, ..frame.frame.clone() };
         let tracked = tracker.push(observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
         println!("{index}: {pe:.3} cm {oe:.2}° {:?} {:?}", tracked.status, tracked.rejection);
@@ -106,7 +106,7 @@ fn what_is_hidden_is_lost_and_followed_again() {
     track(&mut tracker, 0);
     for index in 1..4 {
         // A gray board in front of everything, which the mask takes for the object.
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         observation.depth.pixels_mut().fill(0.3);
         observation.color.pixels_mut().fill([0.5; 3]);
         let lost = tracker.push(observation, SEQUENCE.frames[index].time).unwrap();
@@ -116,7 +116,7 @@ fn what_is_hidden_is_lost_and_followed_again() {
     let (pe, oe) = errors(&tracked, 4);
     assert!(pe < 0.2 && oe < 2.0, "{:?}: {pe} cm, {oe}°", tracked.status);
     // Neither color nor depth.
-    let mut observation = SEQUENCE.frames[5].observation.clone();
+    let mut observation = SEQUENCE.frames[5].frame.clone();
     observation.depth.pixels_mut().fill(0.0);
     let blind = tracker.track(&observation, SEQUENCE.frames[5].time).unwrap();
     assert!(blind.t_cam_object.translation.vector.iter().all(|v| v.is_finite()));
@@ -127,7 +127,7 @@ fn an_object_in_a_hand_is_found_without_mask_and_pose() {
     let mut tracker =
         Tracker::new(Arc::clone(&SEQUENCE.object), TrackerSettings::default()).unwrap();
     let without = |index: usize| {
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         observation.mask.pixels_mut().fill(false);
         observation
     };
@@ -143,7 +143,7 @@ fn an_object_in_a_hand_is_found_without_mask_and_pose() {
 #[test]
 fn a_still_scene_does_not_wander_off() {
     let mut tracker = tracker(TrackerSettings::default());
-    let mut observation = SEQUENCE.frames[0].observation.clone();
+    let mut observation = SEQUENCE.frames[0].frame.clone();
     let warp =
         |x: usize, y: usize| 1.0 + 4e-3 * ((x as f32 / 90.0).sin() + (y as f32 / 70.0).cos());
     let width = observation.depth.width();
@@ -165,7 +165,7 @@ fn a_still_scene_does_not_wander_off() {
 fn calibrations_that_were_led_astray_still_disagree() {
     let mut tracker = tracker(TrackerSettings::default());
     for index in 0..6 {
-        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let mut observation = SEQUENCE.frames[index].frame.clone();
         let hand = observation.hand.as_mut().unwrap();
         hand.t_cam_hand.translation.z += 0.05;
         let tracked = tracker.track(&observation, SEQUENCE.frames[index].time).unwrap();
@@ -194,10 +194,10 @@ fn an_uncertain_pose_is_doubted_at_any_limit() {
 fn faults_of_a_frame_are_errors_and_change_nothing() {
     let mut tracker = tracker(TrackerSettings::default());
     track(&mut tracker, 0);
-    let mut observation = SEQUENCE.frames[1].observation.clone();
+    let mut observation = SEQUENCE.frames[1].frame.clone();
     observation.hand.as_mut().unwrap().joints.pop();
     assert!(tracker.track(&observation, SEQUENCE.frames[1].time).is_err());
-    let mut observation = SEQUENCE.frames[1].observation.clone();
+    let mut observation = SEQUENCE.frames[1].frame.clone();
     observation.hand.as_mut().unwrap().forces.pop();
     let error = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap_err();
     assert!(matches!(error, RefineError::TaxelCount { .. }));

@@ -23,7 +23,7 @@ fn what_is_written_reads_back() {
     let mut assets = Assets::new(&dataset, 0);
     let frame = dataset.frame(1, 0).unwrap();
     let seen = assets.observation(&frame, 0, &[Sensor::Hand, Sensor::Touch]).unwrap();
-    let given = &scene.observation;
+    let given = &scene.frame;
     assert_eq!((seen.camera, &seen.mask), (given.camera, &given.mask));
     assert!(seen.gravity.unwrap().metric_distance(&given.gravity.unwrap()) < 1e-12);
     // Half a unit of 8 bits and of 0.1 mm.

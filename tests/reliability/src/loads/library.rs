@@ -77,7 +77,7 @@ pub(super) fn tracker(context: &LoadContext<'_>) -> Result<Outcome> {
         for number in 0..count {
             let phase = number % (2 * FILM - 2);
             let frame = &film.frames[phase.min(2 * FILM - 2 - phase)];
-            let mut observation = frame.observation.clone();
+            let mut observation = frame.frame.clone();
             if number > 0 {
                 observation.mask.pixels_mut().fill(false);
             }

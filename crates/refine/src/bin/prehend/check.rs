@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
+use prehend_refine::EstimatorInput;
 use prehend_refine::check::{
     CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning, find_corrections,
 };
@@ -53,7 +54,7 @@ impl Check {
         let settings = CorrectionSettings::default();
         // No scene, no image, no object: one frame of a file of its own.
         let target = Target { scene_id: 0, im_id: 0, obj_id: 0, instance: 0 };
-        let trial = input.try_corrections(&t_cam_object, &settings)?;
+        let trial = CorrectionTrial::new(&input.frame, &input.object, &t_cam_object, &settings)?;
         let findings = find_corrections(&[(target, trial)], &settings);
         let names = names_of_frame(file);
         let mut warnings: Vec<String> =
@@ -135,7 +136,9 @@ fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)
     let bar = progress(jobs.len() / stride, "comparing");
     let attempt = |Job { target, row, .. }: &Job| {
         let input = assets.load_at(target, &row.t_cam_model, &[]).ok()?;
-        Some((*target, input.try_corrections(&row.t_cam_model, &settings).ok()?))
+        let FrameInput { frame, object, .. } = &input;
+        let trial = CorrectionTrial::new(frame, object, &row.t_cam_model, &settings);
+        Some((*target, trial.ok()?))
     };
     let trials: Vec<(Target, CorrectionTrial)> =
         bar.wrap_iter(jobs.iter().step_by(stride)).filter_map(attempt).collect();
@@ -146,8 +149,8 @@ fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)
 
 /// Says what a plain BOP dataset does not have, and which methods need it.
 fn without(dataset: &Dataset, input: &FrameInput, target: &Target) {
-    let touches = input.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
-    let (name, terms) = match &input.observation.hand {
+    let touches = input.frame.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
+    let (name, terms) = match &input.frame.hand {
         None => ("scene_bodies.json", "rendering,depth"),
         Some(_) if !touches => ("scene_tactile.json", "physics,rendering,depth"),
         Some(_) => return,
@@ -209,7 +212,7 @@ fn names_of_frame(file: &Path) -> FieldNames {
 
 /// The object at a pose, and the hand, over their image; and what looks wrong.
 fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, Vec<Warning>) {
-    let FrameInput { observation, object, .. } = input;
-    let warnings = input.warnings(t_cam_object).concat();
-    (outline_picture(observation, object, t_cam_object), warnings)
+    let FrameInput { frame, object, .. } = input;
+    let warnings = EstimatorInput::new(frame, object).warnings(t_cam_object).concat();
+    (outline_picture(frame, object, t_cam_object), warnings)
 }

@@ -16,9 +16,9 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint};
 use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Target};
-use prehend_refine::guard;
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_refine::synth::NoiseLevel;
+use prehend_refine::{PreparedFrame, guard};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -235,5 +235,6 @@ fn search_one(
             unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?)
         }
     };
-    Ok(search.run(&input.frame()?.with_backend(Arc::clone(backend)))?)
+    let frame = PreparedFrame::new(&input.frame, &input.object)?;
+    Ok(search.run(&frame.with_backend(Arc::clone(backend)))?)
 }

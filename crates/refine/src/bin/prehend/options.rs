@@ -8,7 +8,6 @@ use anyhow::{anyhow, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
-use prehend_refine::Method;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
     read_results, share_image_times, write_results,
@@ -17,6 +16,7 @@ use prehend_refine::data::details::DetailsFormat;
 use prehend_refine::data::identity::file_fingerprint;
 use prehend_refine::data::{MaskSource, Target, find_targets};
 use prehend_refine::rig::Rig;
+use prehend_refine::{Hypotheses, Method};
 use prehend_render::{Backend, Device};
 use strum::VariantNames;
 
@@ -163,6 +163,13 @@ pub(crate) struct Job {
     pub(crate) row: ResultRow,
     /// The other poses that a search ended with, if the row's comes from one.
     pub(crate) alternatives: Option<Vec<Isometry3<f64>>>,
+}
+
+impl Job {
+    /// Initial poses.
+    pub(crate) fn hypotheses(&self) -> Hypotheses {
+        Hypotheses { best: self.row.t_cam_model, alternatives: self.alternatives.clone() }
+    }
 }
 
 impl Selection {

@@ -8,8 +8,9 @@ use std::sync::Mutex;
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use prehend_refine::Method;
+use prehend_refine::Workers;
+use prehend_refine::data::Assets;
 use prehend_refine::data::bop::Dataset;
-use prehend_refine::data::{Assets, Workers};
 use prehend_refine::evaluate::study::{
     Design, InitialPose, Kind, Record, Runner, Shard, StudyFile, Sweep, tables, write_page,
 };

@@ -14,7 +14,7 @@ fn scenes() -> impl Iterator<Item = Scene> {
     static SCENES: OnceLock<Vec<Scene>> = OnceLock::new();
     let scenes = SCENES.get_or_init(|| (1..=4).map(|seed| default_scene(seed).unwrap()).collect());
     scenes.iter().map(|scene| Scene {
-        observation: scene.observation.clone(),
+        frame: scene.frame.clone(),
         object: Arc::clone(&scene.object),
         hand: Arc::clone(&scene.hand),
         urdf: String::new(),
@@ -27,7 +27,7 @@ fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     let settings = CorrectionSettings::default();
     let trial = |(k, mut scene): (usize, Scene)| {
         change(&mut scene);
-        let Scene { mut observation, object, initial, .. } = scene;
+        let Scene { frame: mut observation, object, initial, .. } = scene;
         if bare {
             observation.depth.pixels_mut().fill(0.0);
         }
@@ -117,7 +117,7 @@ fn quaternion(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
 #[test]
 fn corrections_undo_mistakes_of_rotation() {
     let right = scenes().next().unwrap().initial;
-    let camera = scenes().next().unwrap().observation.camera;
+    let camera = scenes().next().unwrap().frame.camera;
     type Mistake = fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>;
     let mistakes: [(Correction, Mistake); 4] = [
         (Correction::RotationTransposed, |q| q.inverse()),
@@ -142,7 +142,7 @@ fn units_of_poses_meshes_and_depth() {
         named(Correction::ModelUnit, factor, sized(factor.recip()));
         named_of(true, Correction::ModelUnit, factor, &sized(factor.recip()));
         named(Correction::DepthUnit, factor, |scene| {
-            let depths = scene.observation.depth.pixels_mut().iter_mut();
+            let depths = scene.frame.depth.pixels_mut().iter_mut();
             depths.for_each(|z| *z /= factor as f32);
         });
         named(Correction::ModelAndPoseUnit, factor, |scene| {
@@ -152,23 +152,23 @@ fn units_of_poses_meshes_and_depth() {
     }
     named(Correction::Translation, 1.0, moved(1.6));
     named(Correction::DepthScale, 0.25, |scene| {
-        scene.observation.depth.pixels_mut().iter_mut().for_each(|z| *z *= 4.0);
+        scene.frame.depth.pixels_mut().iter_mut().for_each(|z| *z *= 4.0);
     });
 }
 
 #[test]
 fn masks_and_cameras() {
     named(Correction::MaskInverted, 1.0, |scene| {
-        scene.observation.mask.pixels_mut().iter_mut().for_each(|masked| *masked = !*masked);
+        scene.frame.mask.pixels_mut().iter_mut().for_each(|masked| *masked = !*masked);
     });
     named(Correction::PrincipalPointSwapped, 1.0, |scene| {
-        let camera = &mut scene.observation.camera;
+        let camera = &mut scene.frame.camera;
         (camera.cx, camera.cy) = (camera.cy, camera.cx);
     });
     for factor in [0.5, 2.0, 1.5] {
         for bare in [false, true] {
             named_of(bare, Correction::CameraOfOtherSize, factor, &|scene| {
-                let camera = &mut scene.observation.camera;
+                let camera = &mut scene.frame.camera;
                 let (width, height) = (camera.width, camera.height);
                 *camera = prehend_render::Camera { width, height, ..camera.scaled(factor.recip()) };
             });
@@ -182,7 +182,7 @@ fn sizes_of_models_and_focal_lengths() {
         let of_model = sized(1.0 / factor);
         named(Correction::ModelScale, factor, of_model);
         named(Correction::FocalLength, factor, |scene| {
-            let camera = &mut scene.observation.camera;
+            let camera = &mut scene.frame.camera;
             (camera.fx, camera.fy) = (camera.fx / factor, camera.fy / factor);
         });
     }

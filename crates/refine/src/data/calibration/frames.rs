@@ -37,7 +37,7 @@ impl<'a> CalibrationFrames<'a> {
         let mut fault = None;
         for (target, _) in held.into_iter().chain(free) {
             match assets.load(&target, &[]) {
-                Ok(FrameInput { observation: Frame { camera, hand, .. }, .. }) => {
+                Ok(FrameInput { frame: Frame { camera, hand, .. }, .. }) => {
                     let joints = hand.map(|measured| measured.hand.tree.joint_names().len());
                     return Ok((joints, (camera.width, camera.height)));
                 }
@@ -64,8 +64,8 @@ impl<'a> CalibrationFrames<'a> {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
             assets.load(target, &[])?
         };
-        let FrameInput { observation, .. } = input;
+        let observation = input.frame;
         let obj_id = target.obj_id;
-        Ok(CalibrationFrame { observation, obj_id, initial: *pose, is_refined: false })
+        Ok(CalibrationFrame { frame: observation, obj_id, initial: *pose, is_refined: false })
     }
 }

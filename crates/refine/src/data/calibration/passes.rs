@@ -8,8 +8,9 @@ use nalgebra::Isometry3;
 
 use super::frames::CalibrationFrames;
 use crate::calibration::{Calibrator, Pass, Visit};
-use crate::data::{AssetError, Workers};
+use crate::data::AssetError;
 use crate::error::guard;
+use crate::workers::Workers;
 
 /// Parameters that change by fewer of their deviations are found.
 const SETTLED: f64 = 0.05;

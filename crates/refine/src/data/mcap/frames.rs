@@ -24,7 +24,7 @@ pub struct RecordedFrame {
     /// When the image was taken, by the clock of the recording \[ns\].
     pub nanoseconds: i64,
     /// What was sensed.
-    pub observation: Result<Frame, DatasetError>,
+    pub frame: Result<Frame, DatasetError>,
 }
 
 /// The frames of a [`Recording`], one after the other. A few images are in memory at a time.
@@ -196,7 +196,7 @@ impl Iterator for Frames<'_> {
                     let depth = self.depth.as_mut().and_then(|stream| stream.take(at));
                     let mask = self.mask.as_mut().and_then(|stream| stream.take(at));
                     let observation = self.observe(at, &first, depth.as_deref(), mask.as_deref());
-                    return Some(RecordedFrame { nanoseconds: at, observation });
+                    return Some(RecordedFrame { nanoseconds: at, frame: observation });
                 }
             } else if self.ended {
                 return None;

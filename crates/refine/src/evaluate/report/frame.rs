@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::document::{Chart, Figure, LabeledPicture, Series};
 use super::scene::EncodedScene;
 use crate::calibration::{FrameResiduals, SensorResidual};
-use crate::data::FrameInput;
 use crate::error::RefineError;
+use crate::estimator::EstimatorInput;
 use crate::strategy::{PosteriorSummary, Trace};
 
 /// A frame: a row of the table, and words.
@@ -30,7 +30,7 @@ pub struct FrameReport {
 /// What there is to draw of a frame.
 pub struct FrameDrawing<'a> {
     /// What was sensed.
-    pub input: &'a FrameInput,
+    pub input: &'a EstimatorInput<'a>,
     /// Where the object was said to be, where that is known (object → camera) \[m\].
     pub initial: Option<&'a Isometry3<f64>>,
     /// Where it was found \[m\].
@@ -83,7 +83,7 @@ impl FrameEntry {
 
 /// Residuals at both poses, by sensor.
 pub(super) fn residuals(drawing: &FrameDrawing<'_>) -> Result<Vec<ResidualEntry>, RefineError> {
-    let frame = drawing.input.frame()?;
+    let frame = drawing.input.prepared(None)?;
     let at = |pose| Ok::<_, RefineError>(FrameResiduals::of(&frame, pose)?.sensors());
     let before = drawing.initial.map_or(Ok(Vec::new()), at)?;
     let entry = |SensorResidual { sensor, unit, size, .. }| {

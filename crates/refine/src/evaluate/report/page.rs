@@ -123,7 +123,7 @@ impl Report {
     /// If the frame or one of its pictures is broken.
     pub fn draw(&mut self, drawing: &FrameDrawing<'_>) -> Result<DrawnFrame, AssetError> {
         let FrameDrawing { input, initial, t_cam_object, trace, .. } = drawing;
-        let (observation, object) = (&input.observation, &input.object);
+        let (observation, object) = (&input.frame, &input.object);
         let pictures = match initial {
             Some(initial) => labeled(
                 ["initial", "refined"],

@@ -132,7 +132,7 @@ pub(super) fn encoded_scene(
     hand: Option<usize>,
 ) -> Result<EncodedScene, RobotError> {
     let FrameDrawing { input, initial, t_cam_object, covariance, .. } = drawing;
-    let known = input.observation.hand.as_ref();
+    let known = input.frame.hand.as_ref();
     let posed = known.map(|at| at.hand.posed(&at.t_cam_hand, &at.joints)).transpose()?;
     let distances = posed.as_ref().map(|posed| {
         let distance = |v: &Point3<f64>| {
@@ -146,7 +146,7 @@ pub(super) fn encoded_scene(
         let force = |f: &Vector3<f64>| (!HandMeasurement::is_unknown(f)).then(|| f.cast().into());
         hand.forces.iter().map(force).collect()
     });
-    let up = match &input.observation.gravity {
+    let up = match &input.frame.gravity {
         Some(gravity) if gravity.norm() > 0.0 => -gravity.normalize(),
         _ => -Vector3::y(),
     };

@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn predictions_of_a_made_up_scene_are_those_of_its_posterior() {
         let scene = default_scene(1).unwrap();
-        let frame = PreparedFrame::new(&scene.observation, &scene.object).unwrap();
+        let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
         let refined = refine(&frame, &scene.initial, &Method::default()).unwrap();
         let pose = *refined.t_cam_object();
         let posterior = refined.posterior.unwrap();

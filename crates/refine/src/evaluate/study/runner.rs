@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 use nalgebra::Isometry3;
 
@@ -16,9 +15,8 @@ use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
 use crate::error::{RefineError, guard};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
-use crate::problem::State;
 use crate::scene::Object;
-use crate::strategy::{Posterior, Strategy};
+use crate::strategy::Posterior;
 
 /// Runs the methods of a study frame by frame; several runners may share the assets.
 pub struct Runner<'a> {
@@ -115,27 +113,22 @@ impl<'a> Runner<'a> {
             assets.load_at(&target, &row.t_cam_model, &Sensor::required_by(method))?
         };
         if let Some((sweep, amount)) = fault {
-            sweep.perturb(&mut input.observation, amount, sweep.seed(row));
+            sweep.perturb(&mut input.frame, amount, sweep.seed(row));
         }
         let steps = &self.design.steps;
         let mut poses = Vec::new();
-        let start = Instant::now();
-        let input = input.prepared(&row.t_cam_model, method)?.unwrap_or(input);
-        let frame = input.frame()?;
-        let initial = State::new(&frame, &row.t_cam_model)?;
-        let refined = method.with_rig(input.rig.as_ref()).run(&frame, &initial, &mut |p| {
+        let hypotheses = row.t_cam_model.into();
+        let refined = input.estimator(method).run(&input.frame, &hypotheses, &mut |p| {
             // A run of fewer iterations would have come just as far: nothing in it looks ahead.
             if steps.contains(&p.iteration) {
                 poses.push((p.iteration, p.t_cam_object));
             }
             ControlFlow::Continue(())
         })?;
-        let seconds = start.elapsed().as_secs_f64();
-        let last = (Some(refined.iteration), *refined.t_cam_object());
-        let posterior = refined.posterior;
-        drop(frame);
-        let posterior = posterior.map(|posterior| (posterior, input.object));
-        Ok(Refined { poses, last, seconds: Some(seconds), posterior })
+        let estimate = refined.estimate;
+        let last = (Some(estimate.iteration), *estimate.t_cam_object());
+        let posterior = estimate.posterior.map(|posterior| (posterior, refined.input.object));
+        Ok(Refined { poses, last, seconds: Some(refined.seconds), posterior })
     }
 
     /// Fills in a row of the frame whose initial pose is `initial`.

@@ -84,7 +84,7 @@ mod tests {
     fn estimate(independent: f64, [shared, tile]: [f64; 2]) -> NoiseEstimate {
         let scene = scene();
         let (_, state) = fixture(0);
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         let mut random = SplitMix64::new(3);
         let width = observation.depth.width();
         let place = |pixel: usize| [pixel % width, pixel / width].map(|x| x / tile as usize);

@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn contacts_of_a_grasp_lie_on_the_object() {
         let scene = scene();
-        let hand = scene.observation.hand.as_ref().unwrap();
+        let hand = scene.frame.hand.as_ref().unwrap();
         let posed = scene.hand.posed(&hand.t_cam_hand, &hand.joints).unwrap();
         let contacts = found(scene, &hand.forces);
         assert!(contacts.len() >= 3);

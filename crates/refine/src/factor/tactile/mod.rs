@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn forces_of_which_nothing_is_known_say_nothing() {
         let scene = scene();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         let contacts = TactileSettings::default();
         let touch = TouchModel::Taxels(NoiseModel::cauchy(3e-3, 8.0));
         let taxels = TactileSettings { touch, ..contacts.clone() };
@@ -210,7 +210,7 @@ mod tests {
             points: of_pad.iter().map(|taxel| taxel.position).collect(),
             normals: of_pad.iter().map(|taxel| taxel.normal).collect(),
         };
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         observation.hand.as_mut().unwrap().touch = vec![
             TouchReading::Binary(contacts),
             TouchReading::Proximity(distances),
@@ -241,7 +241,7 @@ mod tests {
     fn distances_that_are_right_cost_nothing() {
         let scene = scene();
         let (_, state) = fixture(0);
-        let measured = scene.observation.hand.as_ref().unwrap();
+        let measured = scene.frame.hand.as_ref().unwrap();
         let hand = scene.hand.articulated(&measured.t_cam_hand, &measured.joints).unwrap();
         let truth = State { t_cam_object: scene.truth, ..state };
         let cost = |off: f64| {
@@ -252,7 +252,7 @@ mod tests {
                 let distance = scene.object.surface.signed_distance(&local).0 + off;
                 ProximityReading { link, position: taxel.position, distance }
             };
-            let mut observation = scene.observation.clone();
+            let mut observation = scene.frame.clone();
             let readings = scene.hand.taxels.iter().map(reading).collect();
             observation.hand.as_mut().unwrap().touch = vec![TouchReading::Proximity(readings)];
             let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
@@ -268,10 +268,10 @@ mod tests {
         let truth = State { t_cam_object: scene.truth, ..state };
         // Where the object touches a pad, the skin's normal is against its own.
         let taxels = scene.hand.taxels.iter();
-        let touched = taxels.zip(&scene.observation.hand.as_ref().unwrap().forces);
+        let touched = taxels.zip(&scene.frame.hand.as_ref().unwrap().forces);
         let touched = touched.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm())).unwrap().0;
         let cost = |sign: f64| {
-            let mut observation = scene.observation.clone();
+            let mut observation = scene.frame.clone();
             observation.hand.as_mut().unwrap().touch = vec![TouchReading::Patch(ContactPatch {
                 link: scene.hand.link_of(touched).unwrap(),
                 points: vec![touched.position],
@@ -287,7 +287,7 @@ mod tests {
     #[test]
     fn forces_must_fit_the_skin() {
         let scene = scene();
-        let mut observation = scene.observation.clone();
+        let mut observation = scene.frame.clone();
         let settings = TactileSettings::default();
         if let Some(hand) = &mut observation.hand {
             hand.forces.pop();

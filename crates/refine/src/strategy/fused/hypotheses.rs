@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn hypotheses_are_in_front_of_the_camera_and_the_cheapest_come_first() {
         let scene = default_scene(1).unwrap();
-        let bare = Frame { hand: None, ..scene.observation.clone() };
+        let bare = Frame { hand: None, ..scene.frame.clone() };
         let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let initial = State::new(&frame, &scene.initial).unwrap();
         let behind = Isometry3::translation(0.0, 0.0, -1.0);

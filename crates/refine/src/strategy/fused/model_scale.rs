@@ -140,7 +140,7 @@ mod tests {
         let scene = default_scene(1).unwrap();
         for size in [0.94, 1.0, 1.07] {
             let object = Arc::new(scene.object.scaled(size).unwrap());
-            let bare = Frame { hand: None, ..scene.observation.clone() };
+            let bare = Frame { hand: None, ..scene.frame.clone() };
             let frame = PreparedFrame::new(&bare, &object).unwrap();
             let mut fused = Fused::default();
             fused.settings.model_scale.sigma = 0.05;

@@ -65,8 +65,8 @@ impl Segmenter {
         self.judge_masks(window);
         let [set, unset] = self.mask_evidence(sight);
         let settings = &self.settings;
-        let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
-        let mask = &mut sight.observation.mask;
+        let (width, height) = (sight.frame.camera.width, sight.frame.camera.height);
+        let mask = &mut sight.frame.mask;
         mask.refill(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
@@ -108,12 +108,12 @@ impl Segmenter {
             evidence > 0.0 || evidence == 0.0 && !self.ratios.are_known()
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
-        let columns = sight.observation.camera.width.div_ceil(settings.stride());
+        let columns = sight.frame.camera.width.div_ceil(settings.stride());
         let parts = large_parts(&may_show, columns, settings.least_share);
         let shown =
             || window.pixels().zip(&parts).filter(|(_, part)| **part).map(|(pixel, _)| pixel);
         let area: f32 = shown().map(Pixel::seen_area).sum();
-        let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
+        let (width, height) = (sight.frame.camera.width, sight.frame.camera.height);
         let mut mask = Mask::filled(width, height, false);
         shown().for_each(|pixel| fill(&mut mask, pixel.at, settings.stride()));
         let enough = shown().count() >= settings.enough
@@ -241,7 +241,7 @@ mod tests {
     fn the_object_is_told_from_the_rest_also_by_useless_masks() {
         let scene = default_scene(1).unwrap();
         let sight = |fill: Option<bool>| {
-            let mut observation = scene.observation.clone();
+            let mut observation = scene.frame.clone();
             fill.iter().for_each(|fill| observation.mask.pixels_mut().fill(*fill));
             Sight::new(observation, Images::default())
         };
@@ -252,11 +252,11 @@ mod tests {
         for fill in [None, Some(false), Some(true)] {
             let mut looked = sight(fill);
             assert!(segmenter.segment(&mut looked, &scene.object, &off));
-            let overlap = overlap(&looked.observation.mask, &scene.observation.mask);
+            let overlap = overlap(&looked.frame.mask, &scene.frame.mask);
             assert!(overlap > 0.9, "{fill:?}: {overlap}");
             // From nothing, too.
             let found = segmenter.anywhere(&sight(fill)).unwrap();
-            let anywhere = self::overlap(&found, &scene.observation.mask);
+            let anywhere = self::overlap(&found, &scene.frame.mask);
             assert!(anywhere > 0.6, "{fill:?}: {anywhere}");
         }
         let away = Isometry3::translation(0.3, 0.0, 0.0) * scene.truth;
@@ -265,7 +265,7 @@ mod tests {
         let [there, elsewhere] = [&scene.truth, &away].map(shown);
         assert!(there > LEAST_OF_TRUTH && there > elsewhere, "{there} {elsewhere}");
         // Something with the colors of what is around it, as far away as the object would be.
-        let mut disguised = scene.observation.clone();
+        let mut disguised = scene.frame.clone();
         let [left, top, ..] = disguised.mask.bounds().unwrap();
         let around = disguised.color.pixels()[(top - 3) * disguised.camera.width + left - 3];
         disguised.color.pixels_mut().fill(around);

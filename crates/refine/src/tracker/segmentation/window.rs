@@ -63,7 +63,7 @@ impl Window {
     ) -> Option<()> {
         self.settings = *settings;
         let (stride, band) = (settings.stride(), settings.band);
-        let full = &sight.observation.camera;
+        let full = &sight.frame.camera;
         let center = t_cam_object * object.center;
         if center.z <= 0.0 {
             return None;
@@ -119,7 +119,7 @@ impl Window {
 
     /// Of a whole picture, in which nothing is known of the object.
     pub(super) fn whole(sight: &Sight, settings: &SegmentationSettings) -> Self {
-        let (full, stride) = (&sight.observation.camera, settings.stride());
+        let (full, stride) = (&sight.frame.camera, settings.stride());
         let (columns, rows) = (full.width.div_ceil(stride), full.height.div_ceil(stride));
         let pixel = |k: usize| Pixel::sensed(sight, [k % columns * stride, k / columns * stride]);
         let range = [0..full.width, 0..full.height];
@@ -156,7 +156,7 @@ impl Window {
 impl Pixel {
     /// What was sensed at a column and row, of which nothing is expected.
     fn sensed(sight: &Sight, at: [usize; 2]) -> Self {
-        let Sight { observation, given, hand_depth, .. } = sight;
+        let Sight { frame: observation, given, hand_depth, .. } = sight;
         let index = at[1] * observation.camera.width + at[0];
         Self {
             at: at.map(|k| k as u32),

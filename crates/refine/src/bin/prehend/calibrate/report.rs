@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Isometry3;
+use prehend_refine::Workers;
 use prehend_refine::calibration::{
     CalibrationFrame, Calibrator, FrameResiduals, Residuals, SensorResidual,
 };
-use prehend_refine::data::Workers;
 use prehend_refine::data::{Calibrated, CalibrationFrames};
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_render::RgbImage;
@@ -139,9 +139,9 @@ fn draw(
     alone: &Isometry3<f64>,
 ) -> anyhow::Result<[RgbImage; 2]> {
     let frame = frames.load(index, &done.poses[&index])?;
-    let after = done.calibrator.rig().corrected(&frame.observation)?;
+    let after = done.calibrator.rig().corrected(&frame.frame)?;
     let [object, corrected] =
         [nominal.object(frame.obj_id)?, done.calibrator.object(frame.obj_id)?];
-    let before = (&frame.observation, &**object, alone);
+    let before = (&frame.frame, &**object, alone);
     Ok(rig_picture(before, (&after, corrected, &frame.initial)))
 }

@@ -11,13 +11,11 @@ use prehend_refine::check::Warning;
 use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::data::{
-    AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times, Workers,
-};
+use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Sensor, Times};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
 use prehend_refine::strategy::{DiagnosisSummary, PosteriorSummary, Trace};
-use prehend_refine::{Method, RefineJob, guard};
+use prehend_refine::{Method, Workers, guard};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -204,23 +202,25 @@ impl DatasetRun<'_> {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
             assets.load_at(&job.target, &job.row.t_cam_model, &Sensor::required_by(&self.method))?
         };
-        let refine = RefineJob {
-            alternatives: job.alternatives.clone(),
-            backend: Some(Arc::clone(&self.backend)),
-            diagnose: self.output.diagnose,
-            ..RefineJob::new(&input, job.row.t_cam_model)
+        let estimator = input.estimator(&self.method).backend(Arc::clone(&self.backend));
+        let hypotheses = job.hypotheses();
+        let frame = &input.frame;
+        let refined = estimator.run(frame, &hypotheses, &mut |_| ControlFlow::Continue(()))?;
+        let diagnosis = match self.output.diagnose {
+            true => DiagnosisSummary::of(&estimator.diagnose(&refined, &hypotheses)?),
+            false => Vec::new(),
         };
-        let refined = refine.run(&self.method, &mut |_| ControlFlow::Continue(()))?;
+        let [object_warnings, warnings] = refined.input.warnings(&hypotheses.best);
         let found = refined.estimate;
         let texts = |warnings: Vec<Warning>| warnings.iter().map(Warning::to_string).collect();
         let entry = RefinedFrame {
             pose: PlainPose::from(found.t_cam_object()),
             iteration: found.iteration,
             iterations: found.trace.iterations.len().saturating_sub(1),
-            warnings: texts(refined.warnings),
-            object_warnings: texts(refined.object_warnings),
+            warnings: texts(warnings),
+            object_warnings: texts(object_warnings),
             confidence: found.posterior.as_ref().map(PosteriorSummary::from),
-            diagnosis: refined.diagnosis,
+            diagnosis,
             trace: self.keeps_trace().then_some(found.trace),
         };
         Ok((entry, refined.seconds))
@@ -254,9 +254,8 @@ impl DatasetRun<'_> {
                 let initial = &job.row.t_cam_model;
                 let required = Sensor::required_by(&self.method);
                 let input = assets.load_at(&job.target, initial, &required)?;
-                let input = input.prepared(initial, &self.method)?.unwrap_or(input);
                 report.draw(&FrameDrawing {
-                    input: &input,
+                    input: &input.estimator(&self.method).input(&input.frame, initial)?,
                     initial: Some(initial),
                     t_cam_object: &t_cam_object,
                     covariance: refined.confidence.as_ref().map(|c| &c.covariance),

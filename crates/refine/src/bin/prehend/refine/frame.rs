@@ -9,7 +9,7 @@ use prehend_refine::check::Warning;
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
-use prehend_refine::{Method, RefineJob, Refined};
+use prehend_refine::{Method, Refined};
 use prehend_render::Backend;
 use serde_json::json;
 
@@ -25,27 +25,27 @@ pub(super) fn refine_frame(
     backend: Arc<dyn Backend>,
     rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
-    let mut configured = method.configured()?;
     let (rig, cache) = (open_rig(rig)?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
+    let mut estimator = input.estimator(&method.configured()?).backend(backend);
     // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
     if method.terms.is_none() {
-        configured = input.supported(&configured);
+        estimator = estimator.supported_by(&input.frame);
     }
-    let terms: Vec<&str> = match &configured {
+    let configured = estimator.configured_method();
+    let terms: Vec<&str> = match configured {
         Method::Heuristic(heuristic) => heuristic.gradients.iter().map(|g| g.name()).collect(),
         _ => Vec::new(),
     };
-    let job = RefineJob { backend: Some(backend), ..RefineJob::new(&input, t_cam_object) };
     let bar = progress(configured.iterations(), "refining");
-    let Refined { estimate: refined, object_warnings, warnings, .. } =
-        job.run(&configured, &mut |p| {
+    let Refined { estimate: refined, input, .. } =
+        estimator.run(&input.frame, &t_cam_object.into(), &mut |p| {
             bar.set_position(p.iteration as u64);
             ControlFlow::Continue(())
         })?;
     bar.finish_and_clear();
-    let warnings = object_warnings.iter().chain(&warnings);
-    let warnings: Vec<String> = warnings.map(Warning::to_string).collect();
+    let warnings = input.warnings(&t_cam_object).concat();
+    let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
     warnings.iter().for_each(|warning| log::warn!("{warning}"));
     let pose = refined.t_cam_object();
     let PlainPose { translation_m, quaternion_wxyz } = pose.into();
@@ -60,7 +60,7 @@ pub(super) fn refine_frame(
         "warnings": warnings,
         "confidence": refined.posterior.as_ref().map(PosteriorSummary::from),
         "trace": refined.trace,
-        "settings": record(&configured)?,
+        "settings": record(configured)?,
     });
     let text = format!("{document:#}");
     if let Some(out) = &output.out {

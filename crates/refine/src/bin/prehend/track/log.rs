@@ -116,12 +116,12 @@ impl Film for LogFilm<'_> {
         let first = *self.first.get_or_insert(frame.nanoseconds);
         let time = Duration::from_nanos(frame.nanoseconds.saturating_sub(first).max(0) as u64);
         let input = || {
-            let mut observation = frame.observation?;
+            let mut observation = frame.frame?;
             if let Some(rig) = &self.rig {
                 observation = rig.corrected(&observation)?;
             }
             let object = Arc::clone(&self.log.object);
-            Ok(FrameInput::new(observation, object, self.rig.clone()))
+            Ok(FrameInput { frame: observation, object, rig: self.rig.clone() })
         };
         let stamp = Some(frame.nanoseconds);
         let input = input();

@@ -403,7 +403,7 @@ impl Track {
             // What was sensed is given back where it is asked for once more.
             let frame = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
                 let input = input?;
-                let FrameInput { observation, .. } = &input;
+                let observation = &input.frame;
                 let tracker = match &mut tracker {
                     Some(tracker) => tracker,
                     none => {
@@ -413,7 +413,7 @@ impl Track {
                     }
                 };
                 if log.is_none() && report.is_none() {
-                    return Ok((tracker.push(input.observation, time)?, None));
+                    return Ok((tracker.push(input.frame, time)?, None));
                 }
                 let tracked = tracker.track(observation, time)?;
                 let written =

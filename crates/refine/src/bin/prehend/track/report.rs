@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use prehend_refine::EstimatorInput;
 use prehend_refine::data::bop::{DatasetError, ResultRow};
 use prehend_refine::data::{AssetError, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
@@ -83,7 +84,7 @@ impl FilmReport {
         self.drawn += usize::from(wanted);
         let draw = || {
             self.report.draw(&FrameDrawing {
-                input,
+                input: &EstimatorInput::new(&input.frame, &input.object),
                 initial: None,
                 t_cam_object: &tracked.t_cam_object,
                 covariance: posterior.as_ref().map(|p| &p.covariance),

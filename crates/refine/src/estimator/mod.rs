@@ -1,0 +1,224 @@
+//! The estimator of an object's pose: search, refinement and tracking by one set of settings.
+
+mod batch;
+mod hypotheses;
+mod input;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::Isometry3;
+use prehend_render::Backend;
+
+pub use self::batch::{RefineJob, refine_all};
+pub use self::hypotheses::Hypotheses;
+pub use self::input::EstimatorInput;
+use crate::baselines::GradientKind;
+use crate::error::RefineError;
+use crate::method::Method;
+use crate::problem::{Factor, State};
+use crate::rig::Rig;
+use crate::scene::{Frame, Object};
+use crate::search::PoseSearch;
+use crate::settings::Settings;
+use crate::strategy::{Diagnosis, Estimate, Fused, Observer, Strategy};
+use crate::tracker::Tracker;
+
+/// Estimator of the pose of one object in frames.
+///
+/// ```
+/// use prehend_refine::scene::default_scene;
+/// use prehend_refine::{Estimator, Hypotheses};
+///
+/// let scene = default_scene(1)?;
+/// let estimator = Estimator::new(scene.object);
+/// let estimate = estimator.refine(&scene.frame, &Hypotheses::from(scene.initial))?;
+/// println!("{} with probability {:?}", estimate.t_cam_object(), estimate.probability());
+/// # Ok::<(), prehend_refine::RefineError>(())
+/// ```
+#[derive(Clone)]
+pub struct Estimator {
+    object: Arc<Object>,
+    settings: Settings,
+    method: Method,
+    rig: Option<Arc<Rig>>,
+    backend: Option<Arc<dyn Backend>>,
+}
+
+/// Outcome of [`Estimator::run`].
+pub struct Refined<'a> {
+    /// Pose, with its posterior.
+    pub estimate: Estimate,
+    /// Frame and object as they were used.
+    pub input: EstimatorInput<'a>,
+    /// Wall time \[s\].
+    pub seconds: f64,
+}
+
+impl Estimator {
+    /// The fused estimator of default settings.
+    pub fn new(object: impl Into<Arc<Object>>) -> Self {
+        let (settings, method) = (Settings::default(), Method::default());
+        Self { object: object.into(), settings, method, rig: None, backend: None }
+    }
+
+    /// With these settings.
+    pub fn settings(mut self, settings: Settings) -> Self {
+        if let Method::Fused(fused) = &mut self.method {
+            fused.settings.clone_from(&settings.estimator);
+        }
+        Self { settings, ..self }
+    }
+
+    /// With another method than the fused estimator, or with its ablations.
+    pub fn method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// With a user-defined factor in every frame, beside those of the fused estimator.
+    pub fn factor(mut self, factor: impl Factor + 'static) -> Self {
+        if let Method::Fused(fused) = self.method {
+            self.method = fused.with(factor).into();
+        }
+        self
+    }
+
+    /// For frames and an object that are [corrected](Rig::corrected) by `rig`: calibrations are as accurate as the rig is known.
+    pub fn rig(self, rig: Option<Arc<Rig>>) -> Self {
+        Self { rig, ..self }
+    }
+
+    /// Rendering by `backend` in place of the processor.
+    pub fn backend(self, backend: Arc<dyn Backend>) -> Self {
+        Self { backend: Some(backend), ..self }
+    }
+
+    /// Poses by sensors alone, the most likely one first.
+    ///
+    /// # Errors
+    /// Those of [`PoseSearch::run`].
+    pub fn search(&self, frame: &Frame) -> Result<Hypotheses, RefineError> {
+        let search = PoseSearch::new(Arc::clone(&self.object), self.settings.search())?;
+        let input = EstimatorInput::new(frame, &self.object);
+        let mut found = search.run(&input.prepared(self.backend.as_ref())?)?.into_iter();
+        let best = found.next().ok_or(RefineError::NothingFits)?.t_cam_object;
+        Ok(Hypotheses { best, alternatives: Some(found.map(|c| c.t_cam_object).collect()) })
+    }
+
+    /// Refines `hypotheses` in `frame`.
+    ///
+    /// # Errors
+    /// If a hypothesis cannot be seen, the frame lacks what the method needs, or the pose that is found is not finite.
+    pub fn refine(&self, frame: &Frame, hypotheses: &Hypotheses) -> Result<Estimate, RefineError> {
+        let observe = &mut |_: &_| ControlFlow::Continue(());
+        Ok(self.run(frame, hypotheses, observe)?.estimate)
+    }
+
+    /// As [`refine`](Self::refine), with the frame as it was used, and the time; `observe` hears of every iteration.
+    ///
+    /// # Errors
+    /// See there.
+    pub fn run<'a>(
+        &self,
+        frame: &'a Frame,
+        hypotheses: &Hypotheses,
+        observe: &mut Observer<'_>,
+    ) -> Result<Refined<'a>, RefineError> {
+        let start = Instant::now();
+        let input = self.input(frame, &hypotheses.best)?;
+        let prepared = input.prepared(self.backend.as_ref())?;
+        let initial = State::new(&prepared, &hypotheses.best)?;
+        let mut estimate = self.method_of(hypotheses).run(&prepared, &initial, observe)?;
+        if let Some(posterior) = &mut estimate.posterior {
+            posterior.model_scale = input.model_scale;
+        }
+        let pose = estimate.t_cam_object();
+        let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
+        if !numbers.all(|v| v.is_finite()) {
+            return Err(RefineError::Diverged);
+        }
+        drop(prepared);
+        Ok(Refined { estimate, input, seconds: start.elapsed().as_secs_f64() })
+    }
+
+    /// Refinements without each sensor beside the estimate of `refined`, a [`run`](Self::run) from `hypotheses`; none of other methods than the fused
+    /// one.
+    ///
+    /// # Errors
+    /// See there.
+    pub fn diagnose(
+        &self,
+        refined: &Refined<'_>,
+        hypotheses: &Hypotheses,
+    ) -> Result<Vec<Diagnosis>, RefineError> {
+        let Method::Fused(fused) = self.method_of(hypotheses) else { return Ok(Vec::new()) };
+        let prepared = refined.input.prepared(self.backend.as_ref())?;
+        let initial = State::new(&prepared, &hypotheses.best)?;
+        fused.diagnose_estimate(&prepared, &initial, refined.estimate.clone())
+    }
+
+    /// A tracker; it searches in its first frame, unless [`start_from`](Tracker::start_from) gives a pose.
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`] for a setting out of range.
+    pub fn tracker(&self) -> Result<Tracker, RefineError> {
+        let mut tracker = Tracker::new(Arc::clone(&self.object), self.settings.tracker())?;
+        if let Some(rig) = &self.rig {
+            tracker = tracker.with_rig(Arc::clone(rig));
+        }
+        if let Method::Fused(fused) = &self.method {
+            tracker = fused.factors.iter().cloned().fold(tracker, Tracker::with);
+        }
+        Ok(match &self.backend {
+            Some(backend) => tracker.with_backend(Arc::clone(backend)),
+            None => tracker,
+        })
+    }
+
+    /// The frame as the method needs it, of an object about at `t_cam_object` \[m\].
+    ///
+    /// # Errors
+    /// If nothing of the object is seen there.
+    pub fn input<'a>(
+        &self,
+        frame: &'a Frame,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Result<EstimatorInput<'a>, RefineError> {
+        let fused = match &self.method {
+            Method::Fused(fused) => Fused::clone(fused),
+            _ => Fused::default(),
+        };
+        let fused = Fused { rig: self.rig.clone(), ..fused };
+        EstimatorInput::new(frame, &self.object).completed(&fused, t_cam_object)
+    }
+
+    /// Without the gradients of the heuristic for which `frame` has no evidence.
+    pub fn supported_by(mut self, frame: &Frame) -> Self {
+        if let Method::Heuristic(heuristic) = &mut self.method {
+            heuristic.gradients.retain(|gradient| match gradient {
+                GradientKind::Rendering | GradientKind::Depth => true,
+                GradientKind::Physics => frame.hand.is_some() && frame.gravity.is_some(),
+                GradientKind::Tactile => {
+                    frame.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
+                }
+            });
+        }
+        self
+    }
+
+    /// The method as it is set.
+    pub fn configured_method(&self) -> &Method {
+        &self.method
+    }
+
+    /// The method with the rig, and with alternatives of the initial pose.
+    fn method_of(&self, hypotheses: &Hypotheses) -> Method {
+        let mut method = self.method.clone();
+        if let Method::Fused(fused) = &mut method {
+            fused.rig.clone_from(&self.rig);
+            fused.alternatives.clone_from(&hypotheses.alternatives);
+        }
+        method
+    }
+}
