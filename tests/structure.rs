@@ -6,7 +6,7 @@ use std::{fs, io};
 
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
-    ("autodiff", 4_610),
+    ("autodiff", 4_100),
     ("geometry", 16_060),
     ("sim", 16_110),
     ("render", 10_900),

@@ -9,7 +9,7 @@ use crate::solve::Factored;
 ///
 /// The mode of choice for up to about 16 inputs: no tape, no allocation, usable in any thread. Over another
 /// scalar `T` it carries derivatives of derivatives: `Fwd<N, Fwd<N>>` has second derivatives, and
-/// `Fwd<1, Var>` those of a directional derivative (see [`hessian_vector`](crate::hessian_vector)).
+/// `Fwd<1, Var>` those of a directional derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Fwd<const N: usize, T = f64> {
     /// The value.

@@ -1,4 +1,4 @@
-//! Dense Jacobians by either mode; [`sparse`](crate::sparse) has sparse ones.
+//! Dense Jacobians by either mode.
 
 use nalgebra::DMatrix;
 

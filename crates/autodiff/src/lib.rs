@@ -23,9 +23,9 @@
 //! | wanted | use |
 //! |---|---|
 //! | gradient | [`gradient`], [`gradient_into`] (allocates nothing), [`Recording`] for control |
-//! | Jacobian | [`jacobian`], [`forward_jacobian`], [`sparse`] by coloring |
-//! | Hessian, Hessian–vector product | [`hessian`], [`hessian_vector`], or `Fwd<N, Fwd<N>>` |
-//! | gradient through thousands of steps | [`checkpoint`], [`Scalar::recompute`] for one node a step |
+//! | Jacobian | [`jacobian`], [`forward_jacobian`] |
+//! | Hessian, Hessian–vector product | `Fwd<N, Fwd<N>>`, `Fwd<1, Var>` |
+//! | gradient through thousands of steps | [`Scalar::recompute`]: one node a step |
 //! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
 //! | an operation with its own derivative | [`LocalFunction`], [`CustomVjp`]: see [below](#a-derivative-of-your-own) |
 //! | rotations and rigid motions | [`lie`], [`rigid`] |
@@ -63,7 +63,7 @@
 //! [`Operand`] is the bound of the operations that bring a derivative for both modes ([`solve`], [`implicit`]).
 //!
 //! # Further
-//! [A checkpointed rollout](checkpoint), [a differentiable solve](implicit#a-differentiable-solve).
+//! [A differentiable solve](implicit#a-differentiable-solve).
 //!
 //! A [`Var`] belongs to its [`Recording`] and thread: using it elsewhere is a panic that says so, never a wrong
 //! number. At singular points the derivative is documented (in [`Scalar`] and at each function), and a
@@ -74,10 +74,8 @@
 mod arena;
 mod arithmetic;
 pub mod check;
-pub mod checkpoint;
 mod differentiable;
 mod fwd;
-mod hessian;
 pub mod implicit;
 mod jacobian;
 mod lanes;
@@ -93,7 +91,6 @@ mod reverse;
 pub mod rigid;
 mod scalar;
 pub mod solve;
-pub mod sparse;
 mod stumpff;
 mod sweep;
 mod tape;
@@ -101,7 +98,6 @@ mod var;
 mod vjp;
 
 pub use fwd::Fwd;
-pub use hessian::{HessianScalar, hessian, hessian_vector};
 pub use jacobian::{forward_jacobian, jacobian};
 pub use operand::{CustomJvp, Operand};
 pub use quadratic::Quadratic;

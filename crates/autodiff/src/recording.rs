@@ -129,30 +129,7 @@ impl Recording {
     /// If an output or input belongs to another recording, an input is a fused result (see
     /// [`Adjoints::wrt`]), or a nested recording is open.
     pub fn jacobian(&self, outputs: &[Var], inputs: &[Var]) -> DMatrix<f64> {
-        self.weighted_rows(outputs.len(), outputs, inputs, |row| std::iter::once((row, 1.0)))
-    }
-
-    /// The products of several rows of `weights`, one weight for each of `outputs`, with the Jacobian of
-    /// `outputs` with respect to `inputs`: shape \[rows, inputs\], several rows in one sweep.
-    ///
-    /// # Panics
-    /// If `weights` does not have a column for each output, and as [`jacobian`](Self::jacobian).
-    pub fn vjps(&self, outputs: &[Var], weights: &DMatrix<f64>, inputs: &[Var]) -> DMatrix<f64> {
-        assert_eq!(weights.ncols(), outputs.len(), "a weight for each output");
-        let row = |row| weights.row(row).into_iter().copied().enumerate();
-        self.weighted_rows(weights.nrows(), outputs, inputs, row)
-    }
-
-    /// One row of products for each of `count` sets of weights, which `weights` hands out as places in
-    /// `outputs` and weights there.
-    fn weighted_rows<W: Iterator<Item = (usize, f64)>>(
-        &self,
-        count: usize,
-        outputs: &[Var],
-        inputs: &[Var],
-        weights: impl Fn(usize) -> W,
-    ) -> DMatrix<f64> {
-        let mut products = DMatrix::zeros(count, inputs.len());
+        let mut products = DMatrix::zeros(outputs.len(), inputs.len());
         let (start, mut adjoints) = with_tape(|tape| {
             let start = tape.start(self.recording);
             outputs.iter().filter(|var| var.recording != 0).for_each(|var| tape.check(*var));
@@ -160,16 +137,13 @@ impl Recording {
             (start, tape.scratch(nodes * LANES))
         });
         let lanes = adjoints.as_chunks_mut::<LANES>().0;
-        for first in (0..count).step_by(LANES) {
-            let rows = LANES.min(count - first);
+        for first in (0..outputs.len()).step_by(LANES) {
+            let rows = LANES.min(outputs.len() - first);
             sweep(self.recording, lanes, |lanes| {
                 for row in first..first + rows {
-                    for (output, weight) in weights(row) {
-                        let var = outputs[output];
-                        if var.recording != 0 {
-                            lanes[(var.node - start.node) as usize][row - first] +=
-                                chain(var.coefficient, weight);
-                        }
+                    let var = outputs[row];
+                    if var.recording != 0 {
+                        lanes[(var.node - start.node) as usize][row - first] += var.coefficient;
                     }
                 }
             });

@@ -24,20 +24,6 @@ pub fn cross<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector3<S> {
     Vector3::from(S::local(&Cross, [a.x, a.y, a.z, b.x, b.y, b.z]))
 }
 
-/// exp(`velocity` · `duration`) · `rotation`: the exponential step of a body with angular velocity `velocity` \[rad/s\],
-/// in the frame that `rotation` maps into, for `duration` \[s\].
-#[inline]
-pub fn integrate_rotation<S: Scalar>(
-    rotation: &UnitQuaternion<S>,
-    velocity: &Vector3<S>,
-    duration: f64,
-) -> UnitQuaternion<S> {
-    let [i, j, k, w] = rotation.coords.into();
-    let [x, y, z] = (*velocity).into();
-    let after = S::local(&IntegrateRotation { duration }, [i, j, k, w, x, y, z]);
-    UnitQuaternion::new_unchecked(Quaternion::from_vector(after.into()))
-}
-
 /// exp(`turn`) · `rotation` for a rotation vector `turn` \[rad\], with the quaternion's length brought back to one.
 #[inline]
 pub fn turned<S: Scalar>(rotation: &UnitQuaternion<S>, turn: &Vector3<S>) -> UnitQuaternion<S> {
@@ -57,25 +43,6 @@ pub fn conjugated<S: Scalar>(
     let [i, j, k, w] = rotation.coords.into();
     let conjugated = Conjugated { matrix: *matrix };
     Vector3::from(S::local(&conjugated, [i, j, k, w, vector.x, vector.y, vector.z]))
-}
-
-/// Angular acceleration \[rad/s²\] of a free body by Euler's equation, α = I⁻¹ (τ − ω × I ω), I = R diag(J) Rᵀ.
-///
-/// `rotation` maps the body's principal axes into the frame of `velocity` \[rad/s\], `torque` \[N·m\] and the
-/// result; `inertia` are the principal moments \[kg·m²\], all positive.
-///
-/// In reverse mode the derivative is that along turns of the body: what would change the length of the
-/// quaternion has none.
-#[inline]
-pub fn angular_acceleration<S: Scalar>(
-    rotation: &UnitQuaternion<S>,
-    velocity: &Vector3<S>,
-    torque: &Vector3<S>,
-    inertia: &Vector3<f64>,
-) -> Vector3<S> {
-    let [i, j, k, w] = rotation.coords.into();
-    let [(a, b, c), (d, e, f)] = [velocity, torque].map(|v| (v.x, v.y, v.z));
-    Vector3::from(S::local(&Euler { inertia: *inertia }, [i, j, k, w, a, b, c, d, e, f]))
 }
 
 #[inline]
@@ -122,21 +89,20 @@ impl LocalFunction<6, 3> for Cross {
     }
 }
 
-struct IntegrateRotation {
-    duration: f64,
-}
+/// exp(ω) · q, whose length is that of q.
+struct Exponential;
 
-impl LocalFunction<7, 4> for IntegrateRotation {
+impl LocalFunction<7, 4> for Exponential {
     #[inline]
     fn evaluate<S: Scalar>(&self, [i, j, k, w, x, y, z]: [S; 7]) -> [S; 4] {
-        let step = so3_exp(&Vector3::new(x, y, z).map(|rate| rate.times(self.duration)));
+        let step = so3_exp(&Vector3::new(x, y, z));
         (step.into_inner() * Quaternion::new(w, i, j, k)).coords.into()
     }
 
     // The product is linear in both factors; exp = (cos θ/2, s ω) has the derivative (−½ s ω, s 1 + s'/θ ω ωᵀ).
     #[inline]
     fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> Option<([f64; 4], [[f64; 7]; 4])> {
-        let omega = Vector3::new(x, y, z) * self.duration;
+        let omega = Vector3::new(x, y, z);
         let step = so3_exp(&omega);
         let (a, u) = (step.w, step.imag());
         let v = Vector3::new(i, j, k);
@@ -155,10 +121,9 @@ impl LocalFunction<7, 4> for IntegrateRotation {
         }
         jacobian[3][3] = a;
         for c in 0..3 {
-            let da = -0.5 * s * omega[c] * self.duration;
+            let da = -0.5 * s * omega[c];
             let mut du = omega * (ds * omega[c]);
             du[c] += s;
-            du *= self.duration;
             let column = v * da + du * w + du.cross(&v);
             (0..3).for_each(|r| jacobian[r][4 + c] = column[r]);
             jacobian[3][4 + c] = da * w - du.dot(&v);
@@ -172,7 +137,7 @@ struct Turned;
 impl LocalFunction<7, 4> for Turned {
     #[inline]
     fn evaluate<S: Scalar>(&self, x: [S; 7]) -> [S; 4] {
-        let mut after = quaternion(IntegrateRotation { duration: 1.0 }.evaluate(x));
+        let mut after = quaternion(Exponential.evaluate(x));
         after.renormalize_fast();
         after.into_inner().coords.into()
     }
@@ -180,7 +145,7 @@ impl LocalFunction<7, 4> for Turned {
     // The quaternion y becomes y (3 − y²)/2.
     #[inline]
     fn linearize(&self, x: [f64; 7]) -> Option<([f64; 4], [[f64; 7]; 4])> {
-        let (y, mut jacobian) = IntegrateRotation { duration: 1.0 }.linearize(x)?;
+        let (y, mut jacobian) = Exponential.linearize(x)?;
         let mut after = quaternion(y);
         after.renormalize_fast();
         let scale = 1.5 - 0.5 * y.iter().map(|y| y * y).sum::<f64>();
@@ -228,57 +193,6 @@ impl LocalFunction<7, 3> for Conjugated {
     }
 }
 
-struct Euler {
-    inertia: Vector3<f64>,
-}
-
-impl LocalFunction<10, 3> for Euler {
-    #[inline]
-    fn evaluate<S: Scalar>(&self, x: [S; 10]) -> [S; 3] {
-        let rotation = quaternion([x[0], x[1], x[2], x[3]]);
-        let to_body = rotation.inverse();
-        let velocity = to_body * Vector3::new(x[4], x[5], x[6]);
-        let torque = to_body * Vector3::new(x[7], x[8], x[9]);
-        let momentum = velocity.zip_map(&self.inertia, |v, j| v.times(j));
-        let net = torque - velocity.cross(&momentum);
-        (rotation * net.zip_map(&self.inertia, |n, j| n.times(j.recip()))).into()
-    }
-
-    // By a small turn θ of the body, R → (1 + [θ]×) R; then from θ to the quaternion's coordinates.
-    #[inline]
-    fn linearize(&self, x: [f64; 10]) -> Option<([f64; 3], [[f64; 10]; 3])> {
-        let q = quaternion([x[0], x[1], x[2], x[3]]);
-        let (velocity, torque) = (Vector3::new(x[4], x[5], x[6]), Vector3::new(x[7], x[8], x[9]));
-        // The value as `evaluate` computes it, to the last bit.
-        let inverse = q.inverse();
-        let body_velocity = inverse * velocity;
-        let momentum = body_velocity.component_mul(&self.inertia);
-        let net = inverse * torque - body_velocity.cross(&momentum);
-        let acceleration = q * net.zip_map(&self.inertia, |n, j| n * j.recip());
-        let rotation = q.to_rotation_matrix().into_inner();
-        let to_body = rotation.transpose();
-        let scaled = Matrix3::from_fn(|r, c| rotation[(r, c)] / self.inertia[c]);
-        let gyroscopic = {
-            let by_momentum = cross_matrix(&body_velocity);
-            let spread = Matrix3::from_fn(|r, c| by_momentum[(r, c)] * self.inertia[c]);
-            scaled * (spread - cross_matrix(&momentum)) * to_body
-        };
-        let by_torque = scaled * to_body;
-        let by_turn = by_torque * cross_matrix(&torque)
-            - gyroscopic * cross_matrix(&velocity)
-            - cross_matrix(&acceleration);
-        let by_rotation = by_turn * rotation_vector_jacobian(&q);
-        let row = |r| {
-            std::array::from_fn(|c: usize| match c {
-                0..4 => by_rotation[(r, c)],
-                4..7 => -gyroscopic[(r, c - 4)],
-                _ => by_torque[(r, c - 7)],
-            })
-        };
-        Some((acceleration.into(), std::array::from_fn(row)))
-    }
-}
-
 /// ∂θ/∂q of the left rotation vector θ \[rad\] by the coordinates (i, j, k, w) of a unit quaternion, θ = 2 vec(dq q̄): takes a
 /// Jacobian by θ to one by q.
 #[inline]
@@ -296,7 +210,6 @@ mod tests {
     use nalgebra::ComplexField;
 
     use super::*;
-    use crate::check::finite_difference_jacobian;
     use crate::fwd::Fwd;
     use crate::recording::Recording;
     use crate::var::Var;
@@ -338,38 +251,11 @@ mod tests {
             check(&Rotate, [i, j, k, w, 0.4, -1.2, 2.0]);
             for velocity in VELOCITIES {
                 let [x, y, z] = velocity;
-                check(&IntegrateRotation { duration: 0.5 }, unit([i, j, k, w, x, y, z]));
+                check(&Exponential, unit([i, j, k, w, x, y, z]));
                 check(&Turned, unit([i, j, k, w, x, y, z]));
                 let matrix = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, 0.1, 0.4, 0.5);
                 check(&Conjugated { matrix }, unit([i, j, k, w, x, y, z]));
                 check(&Cross, [x, y, z, 0.3, w, -1.0]);
-            }
-        }
-    }
-
-    #[test]
-    fn euler_matches_differences_along_turns() {
-        let euler = Euler { inertia: Vector3::new(0.002, 0.005, 0.009) };
-        let x = unit([0.3, -0.5, 0.2, 0.7, 3.0, -2.0, 5.0, 0.01, 0.03, -0.02]);
-        let start = quaternion([x[0], x[1], x[2], x[3]]);
-        let at = |s: &[f64]| {
-            let mut y = x;
-            let moved = so3_exp(&Vector3::new(s[0], s[1], s[2])) * start;
-            y[..4].copy_from_slice(moved.coords.as_slice());
-            (0..6).for_each(|i| y[4 + i] += s[3 + i]);
-            euler.evaluate(y).to_vec()
-        };
-        let differences = finite_difference_jacobian(at, &[0.0; 9], 1e-3);
-        let recording = Recording::start();
-        let s = recording.variables([0.0; 9]);
-        let moved = so3_exp(&Vector3::new(s[0], s[1], s[2])) * start.cast::<Var>();
-        let [a, b, c, d, e, f] = std::array::from_fn(|i| s[3 + i] + Var::from(x[4 + i]));
-        let (velocity, torque) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
-        let out = angular_acceleration(&moved, &velocity, &torque, &euler.inertia);
-        let ours = recording.jacobian(out.as_slice(), &s);
-        for (r, row) in differences.iter().enumerate() {
-            for (c, d) in row.iter().enumerate() {
-                assert!((ours[(r, c)] - d).abs() < 1e-7 * (1.0 + d.abs()), "{r} {c}");
             }
         }
     }
@@ -384,7 +270,7 @@ mod tests {
             let (rotated, turned) = if plain {
                 (rotation * v, so3_exp(&(v * Var::from(0.1))) * rotation)
             } else {
-                (rotate(&rotation, &v), integrate_rotation(&rotation, &v, 0.1))
+                (rotate(&rotation, &v), turned(&rotation, &(v * Var::from(0.1))))
             };
             let [sum, end] = [rotated, turned.inverse() * cross(&rotated, &v)].map(|v| v.sum());
             let out = sum * end.sin();

@@ -11,7 +11,7 @@ use prehend_autodiff::lie::{
 use prehend_autodiff::optimize::{
     Adam, GradientDescent, LevenbergMarquardt, NormalEquations, OptimizeError,
 };
-use prehend_autodiff::rigid::{angular_acceleration, conjugated, rotate, turned};
+use prehend_autodiff::rigid::{conjugated, rotate, turned};
 #[cfg(feature = "faer")]
 use prehend_autodiff::solve::SparseSolver;
 use prehend_autodiff::solve::{lu, sparse_lu};
@@ -139,7 +139,6 @@ fn motions<S: Scalar>(x: &[S]) -> Vec<S> {
     all.extend(
         conjugated(&turn, &Matrix3::new(1.0, 0.1, 0.0, 0.1, 2.0, 0.0, 0.0, 0.0, 3.0), &rho).iter(),
     );
-    all.extend(angular_acceleration(&turn, &omega, &rho, &Vector3::new(1e-6, 2e-6, 3e-6)).iter());
     all
 }
 

@@ -12,7 +12,8 @@ use super::workloads::rigid_body::{
 /// What `rigid_body::miss` computes.
 pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
     let [r0, r1, r2, x, y, z, vx, vy, vz, wx, wy, wz] = *inputs;
-    let inertia = Vector3::from(INERTIA);
+    let inertia = Matrix3::from_diagonal(&Vector3::from(INERTIA));
+    let inverse = Matrix3::from_diagonal(&Vector3::from(INERTIA.map(f64::recip)));
     let mut rotation = so3_exp(&Vector3::new(r0, r1, r2));
     let mut position = Vector3::new(x, y, z);
     let mut velocity = Vector3::new(vx, vy, vz);
@@ -29,10 +30,12 @@ pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
         };
         velocity += Vector3::new(fx, fy, fz.plus(-GRAVITY)).map(|force| force.times(STEP));
         let torque = Vector3::new(tx, ty, tz);
-        let acceleration = rigid::angular_acceleration(&rotation, &spin, &torque, &inertia);
+        let momentum = rigid::conjugated(&rotation, &inertia, &spin);
+        let change = torque - rigid::cross(&spin, &momentum);
+        let acceleration = rigid::conjugated(&rotation, &inverse, &change);
         spin += acceleration.map(|rate| rate.times(STEP));
         position += velocity.map(|rate| rate.times(STEP));
-        rotation = rigid::integrate_rotation(&rotation, &spin, STEP);
+        rotation = rigid::turned(&rotation, &spin.map(|rate| rate.times(STEP)));
     }
     let offset = position - Vector3::from(TARGET.map(S::constant));
     let tilt = S::one() - rigid::rotate(&rotation, &Vector3::z()).z;
