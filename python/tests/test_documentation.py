@@ -168,7 +168,7 @@ def test_links_lead_somewhere(path):
     for target in [*targets, *labels.values()]:
         place, _, anchor = target.partition("#")
         if own := REPOSITORY.match(place):
-            linked = ROOT / place[own.end() :]
+            linked = ROOT / place[own.end() :].removesuffix("?raw=true")
         elif re.match(r"\w+:", place):
             continue
         else:
@@ -187,7 +187,7 @@ def test_links_of_the_guide_lead_somewhere_in_rustdoc_too(path):
     for label, target in definitions(prose(path)).items():
         place, _, anchor = target.partition("#")
         if own := REPOSITORY.match(anew[label]):
-            linked = ROOT / anew[label][own.end() :].partition("#")[0]
+            linked = ROOT / anew[label][own.end() :].partition("#")[0].removesuffix("?raw=true")
             assert linked == (GUIDE / place).resolve() and anew[label].partition("#")[2] == anchor, label
         elif place in {chapter.name for chapter in CHAPTERS}:
             assert anew[label] == f"crate::guide::{place.removesuffix('.md').replace('-', '_')}"
