@@ -9,6 +9,7 @@ use parry3d_f64::shape::{
 };
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_geometry::SplitMix64;
+use prehend_sim::contact::{GraspD, GraspDParameters};
 use prehend_sim::{
     Adaptive, Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
     HuntCrossley, KelvinVoigt, Law, Shape, ShapeOptions, State, StepCheckpointed, TimeSteps, World,
@@ -19,11 +20,16 @@ use super::catalog::{ROUND, SHARP, vector};
 /// How deep things are in each other \[m\].
 const DEPTH: f64 = 3e-4;
 
-fn laws() -> [Arc<dyn DynContactLaw>; 2] {
+fn laws() -> [Arc<dyn DynContactLaw>; 3] {
     let friction = Coulomb { friction: 0.5, slip_scale: 2e-2 };
     let held = BristleFriction { friction, deflection: 1e-4 };
     let normal = KelvinVoigt { stiffness: 1e7, damping: 2e5 };
-    [Arc::new(Law::new(normal, friction).unwrap()), Arc::new(Law::new(normal, held).unwrap())]
+    let graspd = GraspDParameters { stiffness: 1e3, offset: 1e-3, ..Default::default() };
+    [
+        Arc::new(Law::new(normal, friction).unwrap()),
+        Arc::new(Law::new(normal, held).unwrap()),
+        Arc::new(GraspD::new(graspd).unwrap()),
+    ]
 }
 
 /// Wrenches, and rates of deflections, as functions of a dimension of the second body: the value, the derivative and differences.
