@@ -1,6 +1,7 @@
 //! Completions and manual pages.
 
 use std::fs;
+use std::path::Path;
 
 use crate::fixture::Workplace;
 
@@ -31,4 +32,72 @@ fn every_command_has_a_manual_page() {
     fs::write(place.path("file"), "").unwrap();
     let said = place.prehend("man --out file");
     assert!(said.code == 1 && said.err.starts_with("error: file: "), "{}", said.err);
+}
+
+/// Commands of which `docs/COMMAND.md` has the options.
+const COMMANDS: [&str; 12] = [
+    "refine",
+    "initial",
+    "track",
+    "eval",
+    "check",
+    "calibrate",
+    "study",
+    "synth",
+    "export",
+    "info",
+    "settings",
+    "symmetry",
+];
+
+/// A command's help as Markdown: what it does, its usage, a table of options by heading.
+fn markdown(name: &str, help: &str) -> String {
+    let cell = |text: &str| text.replace('|', "\\|").replace('<', "\\<");
+    let (about, rest) = help.split_once("Usage: ").unwrap();
+    let (usage, rest) = rest.split_once("\n\n").unwrap();
+    let mut page = format!("\n## {name}\n\n{}\n\n```text\n{usage}\n```\n", about.trim());
+    let mut rows: Vec<(String, Vec<String>)> = Vec::new();
+    let flush = |page: &mut String, rows: &mut Vec<(String, Vec<String>)>| {
+        for (option, text) in rows.drain(..) {
+            *page += &format!("| `{}` | {} |\n", option.replace('|', "\\|"), cell(&text.join(" ")));
+        }
+    };
+    for line in rest.lines() {
+        let indent = line.len() - line.trim_start().len();
+        match (line.trim(), indent) {
+            ("", _) => {}
+            (heading, 0) => {
+                flush(&mut page, &mut rows);
+                page += &format!("\n| {} | |\n|---|---|\n", heading.trim_end_matches(':'));
+            }
+            (option, 1..=6) => rows.push((option.to_owned(), Vec::new())),
+            (text, _) => {
+                if let Some((_, words)) = rows.last_mut() {
+                    words.push(text.to_owned());
+                }
+            }
+        }
+    }
+    flush(&mut page, &mut rows);
+    page
+}
+
+/// `docs/COMMAND.md` has the options that the commands print; `PREHEND_WRITE_GOLDEN=1` puts them there.
+#[test]
+fn the_page_has_all_options() {
+    let place = Workplace::empty();
+    let mut page = "# Options of the command\n\nPrinted by `prehend COMMAND --help`; \
+                    `prehend COMMAND -h` is short.\n"
+        .to_owned();
+    for name in COMMANDS {
+        let help = place.succeed(&format!("{name} --help"));
+        // What all have is said once, by `prehend --help`.
+        let own = help.split("\nAll commands:").next().unwrap_or(&help);
+        page += &markdown(name, own);
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/COMMAND.md");
+    if std::env::var_os("PREHEND_WRITE_GOLDEN").is_some() {
+        return fs::write(file, page).unwrap();
+    }
+    assert!(fs::read_to_string(&file).unwrap() == page, "docs/COMMAND.md is another");
 }
