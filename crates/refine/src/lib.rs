@@ -1,24 +1,25 @@
 //! Refines the 6-DoF pose of an object held in a robot hand, from RGB-D, touch and physics.
 //!
-//! [`refine`] takes a [`PreparedFrame`] (a [`Frame`] of an [`Object`] in a [`Hand`]), an initial pose and a [`Strategy`] such as a
-//! [`Method`], and returns an [`Estimate`]: pose, posterior and trace.
+//! An [`Estimator`] of an [`Object`] refines [`Hypotheses`] in a [`Frame`] to an [`Estimate`]: pose, covariance, probability and modes. It also searches
+//! without an initial pose, and makes [trackers](tracker::Tracker).
 //!
 //! ```
 //! use prehend_refine::scene::default_scene;
-//! use prehend_refine::{PreparedFrame, Method, refine};
+//! use prehend_refine::{Estimator, Hypotheses};
 //!
 //! let scene = default_scene(1)?;
-//! let frame = PreparedFrame::new(&scene.frame, &scene.object)?;
-//! let estimate = refine(&frame, &scene.initial, &Method::default())?;
-//! let posterior = estimate.posterior.as_ref().ok_or("only other methods have none")?;
-//! println!("{} with probability {:.2}", estimate.t_cam_object(), posterior.probability());
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! let estimator = Estimator::new(scene.object);
+//! let estimate = estimator.refine(&scene.frame, &Hypotheses::from(scene.initial))?;
+//! println!("{} with probability {:?}", estimate.t_cam_object(), estimate.probability());
+//! # Ok::<(), prehend_refine::RefineError>(())
 //! ```
+//!
+//! A [`Factor`] adds evidence, a [`Strategy`] another way to refine; both read a [`PreparedFrame`].
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`symmetry`] | motions that map an object onto itself, all but its print too |
-//! | [`scene`] | what there is: observation, object, hand |
+//! | [`scene`] | frames, objects, hands |
 //! | [`problem`] | state, factors, noise models, normal equations, solver |
 //! | [`factor`] | one kind of evidence a file |
 //! | [`strategy`] | ways from an initial pose to a refined one; [`Method`] names them |

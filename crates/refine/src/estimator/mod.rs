@@ -26,17 +26,6 @@ use crate::strategy::{Diagnosis, Estimate, Fused, Observer, Strategy};
 use crate::tracker::Tracker;
 
 /// Estimator of the pose of one object in frames.
-///
-/// ```
-/// use prehend_refine::scene::default_scene;
-/// use prehend_refine::{Estimator, Hypotheses};
-///
-/// let scene = default_scene(1)?;
-/// let estimator = Estimator::new(scene.object);
-/// let estimate = estimator.refine(&scene.frame, &Hypotheses::from(scene.initial))?;
-/// println!("{} with probability {:?}", estimate.t_cam_object(), estimate.probability());
-/// # Ok::<(), prehend_refine::RefineError>(())
-/// ```
 #[derive(Clone)]
 pub struct Estimator {
     object: Arc<Object>,
