@@ -44,22 +44,22 @@
 //! ```
 //!
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For fixed and kinematic bodies the two are the same; of a link it is
-//! the pose of its frame, wherever its center of mass is.
+//! [`RigidBody::model_pose`] goes back, for renderers. For fixed and kinematic bodies the two are the same; a link's state is
+//! the pose of its frame.
 //!
-//! Errors say in words what is wrong and where. A `main` that returns `anyhow::Result` prints them so; with
-//! `Box<dyn Error>` it prints the fields alone.
+//! Return `anyhow::Result` from `main`: it prints messages of errors, `Box<dyn Error>` only their fields.
 //!
-//! [`World::simulate`] chooses its steps by the error of values and derivatives, whatever the stiffness of the contacts,
-//! and is an error where no step is short enough ([`Adaptive`](crate::Adaptive)). [`World::rollout`] gives the states in
-//! between too. Stiffness and damping from what you know of a contact: [`ContactCalibration`](crate::ContactCalibration).
+//! You choose no step: [`World::simulate`] and [`World::rollout`] (states at the times of [`TimeSteps`](crate::TimeSteps)) use
+//! [`Adaptive::default`](crate::Adaptive), which holds tolerances of states and derivatives whatever the stiffness, or returns an
+//! error. For [steps of your own](#steps-of-your-own-choice), ask [`World::check_time_step`] before and
+//! `simulate_with(…)?.resolution.is_fine()` afterwards; [`World::simulate_controlled`] has no such report. Stiffness and damping
+//! from depth at rest: [`ContactCalibration`](crate::ContactCalibration).
 //!
 //! # Bodies on a trajectory
-//! [`Body::kinematic`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
-//! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
-//! which its pose changes; one that forgets them is refused. Their derivatives are not checked: a pose by a variable speed with a
-//! constant velocity leads to wrong derivatives of all that it touches. It is looked at every millisecond at least, so motions should take
-//! longer than that.
+//! The pose and velocity of a [`Body::kinematic`], such as a robot's link, are those of a [`Trajectory`](crate::Trajectory); its
+//! initial state is ignored. Velocities must be the time derivatives of the pose; far from these, they are an error. Their own
+//! derivatives are not checked: if the pose has a variable speed and the velocity is a constant, derivatives of all that touches
+//! the body are wrong. Adaptive steps sample the trajectory at least every millisecond, and may miss shorter motions.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -92,12 +92,12 @@
 //! ```
 //!
 //! # Contacts that hold
-//! Friction that knows only the slip of the moment lets everything creep, slowly, at a part of its slip scale. What has to stay
-//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`BristleFriction`](crate::BristleFriction)). It costs
-//! five to ten times as much with derivatives: what only slides or bounces is better off with [`Coulomb`](crate::Coulomb) alone, whose
-//! documentation says how to choose a slip scale. Springs hold what presses deeper than a thousandth of their deflection.
+//! Regularized [`Coulomb`](crate::Coulomb) friction lets sticking contacts creep, at v_s T/√(µ²N² − T²) for slip scale v_s, tangential
+//! force T and normal force N. [`BristleFriction`](crate::BristleFriction) adds tangential springs and holds what rests deeper than a
+//! thousandth of its `deflection`: use it for stacks and grasps. With derivatives it costs five to ten times as much; for sliding
+//! and bouncing, `Coulomb` suffices, whose documentation says how to choose v_s.
 //!
-//! Samples of flat faces should be a lattice: [`Body::with_cuboid`] gives a box both samples and field, so that boxes touch
+//! Samples of flat faces should be a lattice: [`Body::with_cuboid`] gives a box samples and field, so that boxes touch
 //! each other; one that only stands on others may do with [`Surface::cuboid`](crate::Surface::cuboid). A ball is a single round sample
 //! ([`Surface::ball`](crate::Surface::ball)). Solid, uniform bodies: [`RigidBody::cuboid`], [`RigidBody::ball`].
 //!
@@ -136,13 +136,13 @@
 //! ```
 //!
 //! # Joints and robots
-//! Arms, doors, hands and grippers have [a page of their own](joints).
+//! Arms, doors, hands and grippers: module [`joints`], in `crates/sim/src/guide/joints.rs`.
 //!
 //! # Symmetric contact
-//! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
-//! felt, and faces where samples lie. Edges that cross are felt only at samples, too: their distances should be less than half of
-//! the smaller body's edges, or boxes turned against each other may fall through. Each direction is a contact of its own, whose
-//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both by their handle.
+//! If both bodies have samples and fields, each one's samples touch the other's field, with half of the force. Penetration is
+//! tested at samples, not where edges cross between them: keep the sample spacing below half of the smaller body's edges, or
+//! turned boxes may pass through each other. The directions are two contacts, along the axes of their own field's body;
+//! [`World::set_contact_param`] sets a parameter of both.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -170,13 +170,15 @@
 //!
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
-//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)). Contacts
-//! that make energy are an error here as by default, but only while no body is kinematic, or fixed with a velocity.
-//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
-//! every step, but for friction that sticks, and damps what is faster than it: with steps of a millisecond it simulates a stack at
-//! rest two to three times faster than the default; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
-//! contacts, impacts to come among them, demand it. All have derivatives, which are those of the steps taken: with steps
-//! that are too long they are exact and far from those of the motion, even where the values look right.
+//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)).
+//! An energy gain by contacts of more than a quarter of the largest kinetic energy is an error, as by default; it is not tested
+//! with motors, kinematic bodies, or fixed ones with a velocity.
+//!
+//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for every
+//! step, except where friction sticks, and damps faster motions: with steps of a millisecond it simulates a stack at rest two to
+//! three times faster than the default. [`SubStepped`](crate::SubStepped) divides the steps of any integrator where contacts and
+//! imminent impacts demand it. With steps that are too long, derivatives are exactly those of the steps and far from the motion's,
+//! even where values look right.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -213,14 +215,14 @@
 //!
 //! # A law of your own
 //! One function over the scalar, from gap and velocity to force ([`ContactLaw`](crate::ContactLaw)), along the axes of
-//! the body with the field. What it calls its parameters can carry derivatives:
+//! the body with the field. Its parameters can carry derivatives:
 //!
 //! ```
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
 //! # use prehend_sim::prelude::*;
-//! /// Pressure by the square of the depth, and a film whose drag grows with slip.
+//! /// Pressure k d² at depth d, drag −c N u at slip u: k [N/m⁴], c [s/m].
 //! struct Wet([f64; 2]);
 //!
 //! impl ContactLaw for Wet {
@@ -258,13 +260,13 @@
 //! # }
 //! ```
 //!
-//! The example `custom_contact_law` does this at length, and what follows.
+//! Longer: `examples/custom_contact_law.rs`.
 //!
 //! # Gradients, forward
-//! Write what you want to know once over the scalar: [`World::cast`] makes constants of a world, and any of its numbers may
-//! then be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass, an
-//! inertia or a center of mass is replaced together with its body: [`RigidBody::new`]. All of them in a row:
-//! [`World::parameters`]. Where the model's pose is given, a center of mass is in the start, too: [`RigidBody::at_rest`].
+//! Write the quantity once over the scalar: [`World::cast`] makes constants of a world; then overwrite the inputs.
+//! [`Fwd`](prehend_autodiff::Fwd) is for few. To vary mass, inertia or center of mass, replace the body's [`RigidBody`]. All numbers
+//! as one vector: [`World::parameters`]. If the center of mass varies at a fixed pose of the model, make the initial state by
+//! [`RigidBody::at_rest`] of the new body.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -306,16 +308,21 @@
 //! # }
 //! ```
 //!
-//! A rollout over [`Var`](prehend_autodiff::Var) records every operation. [`StepCheckpointed`](crate::StepCheckpointed),
-//! around any integrator, keeps a few hundred bytes a step instead; steps of [`Adaptive`](crate::Adaptive) are those of the
-//! rollout, not its parts, so give it many. For rollouts too long even for that, [`RolloutFunction`](crate::RolloutFunction) keeps the states alone.
+//! Memory of reverse mode, 10 000 steps of a free body on a fixed one:
+//!
+//! | call | a step | in all |
+//! |---|--:|--:|
+//! | `simulate_with(&SemiImplicitEuler, …)` over [`Var`](prehend_autodiff::Var) | 10 kB | 100 MB |
+//! | the same, [`StepCheckpointed::new(SemiImplicitEuler, &world)?`](crate::StepCheckpointed) | 0.5 to 1.3 kB | 5 to 13 MB |
+//! | [`RolloutFunction`](crate::RolloutFunction): `evaluate`, `vjp` | 104 bytes a body | 2 MB |
+//!
+//! The last two record one step of the rollout at a time, with [`Adaptive`](crate::Adaptive) all its substeps: give it many steps.
 //!
 //! # Identification
-//! What a world is made of, from what was seen of it: parameters have names, and least squares take residuals over the scalar as they
-//! are. A trial step may lead to a world that is refused, of negative friction for instance: residuals that are no numbers make it a
-//! bad step, and a shorter one is tried. A step that promises less than the error of what was seen is a waste of rollouts, of which
-//! each takes one ([`Criteria`](prehend_autodiff::optimize::Criteria)). What slides freely tells nothing of
-//! its mass. Angles jump by a turn: compare marks on a body instead, and look at the value that is left.
+//! Parameters from observed motion, by nonlinear least squares. Where a trial step leads to an invalid world, such as one of
+//! negative friction, return NaN residuals: the solver then tries a shorter step. Each trial costs a rollout: stop where the
+//! predicted decrease is below the observations' noise ([`Criteria`](prehend_autodiff::optimize::Criteria)). Mass is not
+//! identifiable from free sliding. Angles wrap: compare points of a body, and check the final cost.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -366,9 +373,9 @@
 //! ```
 //!
 //! # Together with other losses
-//! The states of a rollout over `Var` are numbers on the tape like all others. Their poses go on into a renderer's
-//! operation, a network or a sum of squares, where they come from may be anything as well, and one sweep goes back
-//! through all of it. A controller between steps ([`World::simulate_controlled`]) is differentiated with the rest:
+//! States of a rollout over `Var` are numbers on the tape. Initial states may be computed on it, poses may be inputs of a renderer
+//! or a network, and one reverse sweep differentiates the composition, with a controller between steps
+//! ([`World::simulate_controlled`]):
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -397,7 +404,8 @@
 //! ```
 //!
 //! # Contacts not yet made
-//! Leaky smoothing has the forces of none, but gradients feel samples that do not touch yet:
+//! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) has the forces of [`GapSmoothing::Hard`](crate::GapSmoothing::Hard). In
+//! gradients, the gap of samples up to `band` \[m\] away has slope α (`alpha` \[1\], 0 to 1) instead of 0:
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -427,15 +435,17 @@
 //! ```
 //!
 //! # What derivatives mean
-//! Those of [`World::simulate`] are the motion's, to a fraction of a percent through an impact, as long as forces grow from zero
-//! where contact begins, however fast: fields should be C², and damping should fade in, by
-//! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. A force that jumps at touch is refused: that
-//! is tried once, at 1 m/s, and jumps elsewhere, in depth or slip, are not looked for; kinks of a field are not seen. With steps of
-//! your own choice they are those of the steps: under
-//! [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the moment of an impact jumps from one step to the next, and a step
-//! too long for friction makes them meaningless, see [`Resolution`](crate::Resolution). Derivatives of
-//! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and
-//! where a field has no gradient they are finite.
+//! Derivatives are those of the substeps taken. [`Adaptive`](crate::Adaptive) substeps (default) are so short that these equal the
+//! motion's to 0.05 % through a bounce. With an integrator of your own they are those of its steps: under
+//! [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the time of an impact jumps from one step to the next, and steps too long for
+//! friction make them meaningless ([`Resolution`](crate::Resolution)).
+//!
+//! Forces must begin at zero: fields should be C², and damping should fade in, by
+//! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. `Adaptive` tests each contact once, at 1 m/s: a jump at
+//! touch is an error. Discontinuities in depth or slip, and kinks of a field, are not detected.
+//!
+//! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) is an exception. At rest, at gap zero and where a field has no gradient,
+//! derivatives are finite.
 
 pub mod joints;
 

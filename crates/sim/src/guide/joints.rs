@@ -1,14 +1,14 @@
 //! Joints and robots.
 //!
-//! Links that hang on each other by joints are bodies, too: they carry samples and fields and touch what others touch.
-//! [`World::add_articulation`] adds them; what is free to move are the joints. Their states follow those of the bodies, so begin with
-//! [`World::neutral_states`], set joints by [`World::set_joint`], and read them by [`World::joint_motion`]. States of links follow from them: what is written there is overwritten. Samples and
-//! fields go to a link once it is there: `world.bodies[finger] = world.bodies[finger].clone().with_cuboid(shape, 0.005)?`.
+//! Links are bodies with samples and fields, connected by joints: [`World::add_articulation`]. Their generalized coordinates are states of
+//! their own, after those of the bodies: begin with [`World::neutral_states`], set joints by [`World::set_joint`], and read them by
+//! [`World::joint_motion`]. States of links follow from these and are overwritten. Add samples and fields afterwards:
+//! `world.bodies[finger] = world.bodies[finger].clone().with_cuboid(shape, 0.005)?`.
 //!
-//! What acts along a joint is a [`JointLaw`](crate::joint_law::JointLaw): springs, dampers, dry friction, limits (no joint has any by itself), motors and servos. A
-//! controller sets their parameters by name; they keep these values for the whole step, however it is divided, so that smooth targets want short steps. Over
-//! numbers that carry derivatives, these pass through it; to end a run early it returns [`ControlFlow::Break`](std::ops::ControlFlow). A servo whose effort
-//! is at its bound has a derivative of 0 by its target.
+//! Forces along a joint are [`JointLaw`](crate::joint_law::JointLaw)s: springs, dampers, dry friction, limits (no joint has any by itself), motors and
+//! servos. A controller sets their parameters by name, constant over a step and its substeps: smooth targets need short steps.
+//! Derivatives pass through it; to end a run early it returns [`ControlFlow::Break`](std::ops::ControlFlow). A servo at its effort
+//! bound has a derivative of 0 by its target.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Vector3};
@@ -43,21 +43,20 @@
 //! # }
 //! ```
 //!
-//! Trees have no loops: [`World::add_bushing`] closes them by springs. Robots of MJCF come by [`World::add_mjcf`], with joints, actuators, tendons and loops; those of
-//! URDF ([`KinematicTree::from_urdf_file`](prehend_geometry::robot::KinematicTree::from_urdf_file)) by [`World::add_articulated_robot`], which names joints by the
-//! links that they move, or by [`World::add_robot`] if their joints simply go where they are told. Sensors:
-//! [`World::contact_wrench`], [`World::accelerometer`]. A joint type of your own is a function from coordinates to a pose
-//! ([`JointModel`](crate::articulated::JointModel)). [`World::linearize_step`] gives a step with its Jacobian in closed form.
+//! [`World::add_bushing`] closes loops by springs. Robots of MJCF: [`World::add_mjcf`], with joints, actuators, tendons and loops; of
+//! URDF ([`KinematicTree::from_urdf_file`](prehend_geometry::robot::KinematicTree::from_urdf_file)): [`World::add_articulated_robot`], which names joints by the
+//! links that they move, or [`World::add_robot`] with driven joints. Sensors: [`World::contact_wrench`], [`World::accelerometer`]. A custom
+//! joint type is a function from coordinates to a pose ([`JointModel`](crate::articulated::JointModel)). [`World::linearize_step`] gives a
+//! step with its Jacobian in closed form.
 //!
-//! For many inputs, such as a push per step, write the same over [`Var`](prehend_autodiff::Var): [`gradient`](prehend_autodiff::gradient) of a function of
-//! them hands value and gradient to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
+//! For many inputs, such as a push per step, write the same over [`Var`](prehend_autodiff::Var), and hand its
+//! [`gradient`](prehend_autodiff::gradient) to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
 //!
 //! Reverse mode keeps kinematics and dynamics of an articulation as one node each, whose adjoint is in closed form.
-//! [`BackwardEuler`](crate::BackwardEuler) moves no joints;
-//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with steps of 0.1 ms some ten times faster than the default. But
-//! [`World::simulate_controlled`] says nothing of steps that are too long: ask [`World::check_time_step`]. What presses should hold with
-//! [`BristleFriction`](crate::BristleFriction), as the guide's [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) and a slip scale of 1 cm/s a gripped box slides by 5 mm in two
-//! seconds.
+//! [`BackwardEuler`](crate::BackwardEuler) refuses joints; [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with
+//! steps of 0.1 ms some ten times faster than the default. [`World::simulate_controlled`] does not report steps that are too long:
+//! ask [`World::check_time_step`]. Grasps need [`BristleFriction`](crate::BristleFriction), see
+//! [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) with a slip scale of 1 cm/s a gripped box slides by 5 mm in two seconds.
 
 #[cfg(doc)]
 use crate::World;
