@@ -31,6 +31,7 @@ pub struct Estimator {
     object: Arc<Object>,
     settings: Settings,
     method: Method,
+    factors: Vec<Arc<dyn Factor>>,
     rig: Option<Arc<Rig>>,
     backend: Option<Arc<dyn Backend>>,
 }
@@ -49,7 +50,8 @@ impl Estimator {
     /// The fused estimator of default settings.
     pub fn new(object: impl Into<Arc<Object>>) -> Self {
         let (settings, method) = (Settings::default(), Method::default());
-        Self { object: object.into(), settings, method, rig: None, backend: None }
+        let (object, factors) = (object.into(), Vec::new());
+        Self { object, settings, method, factors, rig: None, backend: None }
     }
 
     /// With these settings.
@@ -65,11 +67,9 @@ impl Estimator {
         Self { method, ..self }
     }
 
-    /// With a user-defined factor in every frame, beside those of the fused estimator.
+    /// With a user-defined factor in every frame, beside those of the fused estimator; other methods refuse it.
     pub fn factor(mut self, factor: impl Factor + 'static) -> Self {
-        if let Method::Fused(fused) = self.method {
-            self.method = fused.with(factor).into();
-        }
+        self.factors.push(Arc::new(factor));
         self
     }
 
@@ -118,7 +118,7 @@ impl Estimator {
         let input = self.input(frame, &hypotheses.best)?;
         let prepared = input.prepared(self.backend.as_ref())?;
         let initial = State::new(&prepared, &hypotheses.best)?;
-        let mut estimate = self.method_of(hypotheses).run(&prepared, &initial, observe)?;
+        let mut estimate = self.method_of(hypotheses)?.run(&prepared, &initial, observe)?;
         if let Some(posterior) = &mut estimate.posterior {
             posterior.model_scale = input.model_scale;
         }
@@ -141,7 +141,7 @@ impl Estimator {
         refined: &Refined<'_>,
         hypotheses: &Hypotheses,
     ) -> Result<Vec<Diagnosis>, RefineError> {
-        let Method::Fused(fused) = self.method_of(hypotheses) else { return Ok(Vec::new()) };
+        let Method::Fused(fused) = self.method_of(hypotheses)? else { return Ok(Vec::new()) };
         let prepared = refined.input.prepared(self.backend.as_ref())?;
         let initial = State::new(&prepared, &hypotheses.best)?;
         fused.diagnose_estimate(&prepared, &initial, refined.estimate.clone())
@@ -156,9 +156,7 @@ impl Estimator {
         if let Some(rig) = &self.rig {
             tracker = tracker.with_rig(Arc::clone(rig));
         }
-        if let Method::Fused(fused) = &self.method {
-            tracker = fused.factors.iter().cloned().fold(tracker, Tracker::with);
-        }
+        tracker = self.factors.iter().cloned().fold(tracker, Tracker::with);
         Ok(match &self.backend {
             Some(backend) => tracker.with_backend(Arc::clone(backend)),
             None => tracker,
@@ -202,12 +200,20 @@ impl Estimator {
     }
 
     /// The method with the rig, and with alternatives of the initial pose.
-    fn method_of(&self, hypotheses: &Hypotheses) -> Method {
+    fn method_of(&self, hypotheses: &Hypotheses) -> Result<Method, RefineError> {
         let mut method = self.method.clone();
-        if let Method::Fused(fused) = &mut method {
-            fused.rig.clone_from(&self.rig);
-            fused.alternatives.clone_from(&hypotheses.alternatives);
+        match &mut method {
+            Method::Fused(fused) => {
+                fused.rig.clone_from(&self.rig);
+                fused.alternatives.clone_from(&hypotheses.alternatives);
+                fused.factors.extend(self.factors.iter().cloned());
+            }
+            _ if self.factors.is_empty() => {}
+            _ => {
+                let problem = "is of the fused method".to_owned();
+                return Err(RefineError::Setting { name: "factor", problem });
+            }
         }
-        method
+        Ok(method)
     }
 }
