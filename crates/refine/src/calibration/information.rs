@@ -16,6 +16,7 @@ pub(super) struct FrameInformation {
 }
 
 /// The play of a frame's hand pose and joints.
+#[derive(Clone)]
 pub(super) struct FramePlay {
     /// If the parameters do not change, and its derivatives by them.
     at_rest: DVector<f64>,
@@ -111,7 +112,12 @@ impl FrameInformation {
         prior: &DVector<f64>,
         covariance: Option<&DMatrix<f64>>,
     ) -> Option<f64> {
-        let (hessian, gradient) = self.of_rig(prior.len())?;
+        // Of the rig alone, the object's coefficients being what they may be beforehand.
+        let n = prior.len();
+        let coefficients = vec![0.0; self.gradient.len() - n];
+        let object = Elimination::new(&self.hessian, &self.gradient, &coefficients)?;
+        let hessian = self.hessian.view((0, 0), (n, n)) + object.hessian;
+        let gradient = self.gradient.rows(0, n) + object.gradient;
         let factor = (&hessian + DMatrix::from_diagonal(prior)).cholesky()?;
         let mut noise = hessian.clone();
         if let Some(covariance) = covariance {
@@ -121,14 +127,6 @@ impl FrameInformation {
         let squared = gradient.dot(&factor.solve(&gradient));
         // Of a frame that says nothing, both are zero.
         Some(squared / degrees.max(1e-9)).filter(|ratio| ratio.is_finite())
-    }
-
-    /// Hessian and gradient by the `n` parameters of the rig alone, the object's coefficients being what they may be beforehand.
-    pub(super) fn of_rig(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let (hessian, gradient) = (&self.hessian, &self.gradient);
-        let object = Elimination::new(hessian, gradient, &vec![0.0; gradient.len() - n])?;
-        let of_rig = hessian.view((0, 0), (n, n)) + object.hessian;
-        Some((of_rig, gradient.rows(0, n) + object.gradient))
     }
 }
 

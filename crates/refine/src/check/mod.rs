@@ -3,7 +3,6 @@
 //!
 //! One cause should make one warning: what a hand, a mesh or depth is needed for is not judged if that is at fault itself.
 
-mod border;
 mod correction;
 mod depth;
 mod hand;
@@ -21,16 +20,11 @@ use prehend_render::DepthImage;
 pub use self::correction::{
     Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
 };
-pub(crate) use self::model::likely_unit;
+pub(crate) use self::model::{check as check_object, likely_unit};
 pub use self::warning::{Subject, Warning};
 use crate::scene::{Frame, HandMeasurement, Object, View};
 
 use self::correction::settled_pose;
-
-/// Warnings of an object's model; none if all looks well. What was assumed of its mass and its inside matters if it is `held`.
-pub(crate) fn check_object(object: &Object, held: bool) -> Vec<Warning> {
-    model::check(object, held)
-}
 
 /// Warnings of an observation, and of the object at a pose (object → camera) in it; none if all looks well. Those of the object alone are
 /// [`check_object`]'s.

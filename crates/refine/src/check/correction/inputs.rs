@@ -64,14 +64,9 @@ impl Inputs {
         self
     }
 
-    /// With another camera.
-    fn seen_by(self, camera: impl FnOnce(&Camera) -> Camera) -> Self {
-        Self { camera: camera(&self.camera), ..self }
-    }
-
     /// With a correction, whose factor is `value`.
     pub(super) fn corrected(self, correction: Correction, value: f64) -> Self {
-        let Self { t_cam_object: pose, .. } = self;
+        let Self { camera, t_cam_object: pose, .. } = self;
         let q = pose.rotation.into_inner().coords;
         let inverse = Self { t_cam_object: pose.inverse(), ..self };
         let quaternion = |w, x, y, z| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
@@ -91,18 +86,16 @@ impl Inputs {
             Correction::OpenGlAxes => self.flipped(),
             Correction::OpenGlRotation => self.turned(self.flipped().t_cam_object.rotation),
             Correction::PrincipalPointSwapped => {
-                self.seen_by(|camera| Camera { cx: camera.cy, cy: camera.cx, ..*camera })
+                Self { camera: Camera { cx: camera.cy, cy: camera.cx, ..camera }, ..self }
             }
-            Correction::CameraOfOtherSize => self.seen_by(|camera| Camera {
-                width: camera.width,
-                height: camera.height,
-                ..camera.scaled(value)
-            }),
-            Correction::FocalLength => self.seen_by(|camera| Camera {
-                fx: camera.fx * value,
-                fy: camera.fy * value,
-                ..*camera
-            }),
+            Correction::CameraOfOtherSize => {
+                let Camera { width, height, .. } = camera;
+                Self { camera: Camera { width, height, ..camera.scaled(value) }, ..self }
+            }
+            Correction::FocalLength => {
+                let (fx, fy) = (camera.fx * value, camera.fy * value);
+                Self { camera: Camera { fx, fy, ..camera }, ..self }
+            }
             Correction::MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
             Correction::Translation => Self { is_placed: false, ..self },
         }

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{PosedRobot, RobotError};
 
-use super::fault::GraspFault;
+use super::error::GraspError;
 use super::preshape::Preshape;
 use super::settings::GraspSettings;
 use crate::scene::{Hand, Object};
@@ -59,7 +59,7 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspFault> {
+    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspError> {
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
             let (joints, t_hand_object) = self.draw_one(robot, preshape, settings, random)?;
@@ -69,7 +69,7 @@ impl Placement {
                 return Ok((joints, t_hand_object));
             }
         }
-        Err(GraspFault::NoRoom)
+        Err(GraspError::NoGrasp("the fingers keep the object from the palm".into()))
     }
 
     fn draw_one(
