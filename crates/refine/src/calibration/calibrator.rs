@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
-use super::information::{Eliminated, Elimination, FrameInformation};
+use super::information::{Elimination, FrameInformation};
 use super::pass::{Pass, PlaySquares, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
@@ -237,8 +237,10 @@ impl Calibrator {
                 // What frames that are alike get wrong of a surface does not average out; what they say of the rig does.
                 let share = views.share(*id);
                 let (of_object, pull) = (of_object * share, pull * share);
-                let object = Elimination::new(&of_object, &pull, coefficients);
-                eliminated.insert(*id, object.ok_or_else(not_finite)?.coefficients());
+                let object =
+                    Elimination::new(&of_object, &pull, coefficients).ok_or_else(not_finite)?;
+                let covariance = object.covariance();
+                eliminated.insert(*id, (object, covariance));
             }
         }
         let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;
@@ -252,7 +254,7 @@ impl Calibrator {
         }
         let share = 1.0 / self.averaged.max(1) as f64;
         let mut of_objects = BTreeMap::new();
-        for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
+        for (id, (Elimination { at_rest, by_parameters, .. }, of_object)) in &eliminated {
             if let (Some(field), Some(model)) =
                 (self.rig.objects.get_mut(id), self.models.get_mut(id))
             {

@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
-use super::information::{Eliminated, FrameInformation, FramePlay};
+use super::information::{Elimination, FrameInformation, FramePlay};
 use super::views::Views;
 
 /// What a visit has found of a frame.
@@ -114,7 +114,7 @@ impl Pass {
         &mut self,
         change: &DVector<f64>,
         covariance: &DMatrix<f64>,
-        objects: &BTreeMap<u32, Eliminated>,
+        objects: &BTreeMap<u32, (Elimination, DMatrix<f64>)>,
     ) {
         self.squares = PlaySquares::default();
         for (id, play) in &self.play {

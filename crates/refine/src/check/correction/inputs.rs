@@ -1,6 +1,6 @@
 //! Inputs of a frame that a correction may change.
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use prehend_render::Camera;
 
 use super::kind::Correction;
@@ -55,13 +55,10 @@ impl Inputs {
     }
 
     /// With axes of graphics engines (x right, y up, z back) made those of the camera.
-    fn flipped(mut self) -> Self {
-        let t_cv_gl = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
-            Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0)),
-        ));
-        self.t_cam_object =
-            Isometry3::from_parts(Translation3::identity(), t_cv_gl) * self.t_cam_object;
-        self
+    fn flipped(self) -> Self {
+        // Half a turn about x.
+        let t_cv_gl = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
+        Self { t_cam_object: t_cv_gl * self.t_cam_object, ..self }
     }
 
     /// With a correction, whose factor is `value`.
