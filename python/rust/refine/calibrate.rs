@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use prehend_refine::calibration::Calibrator;
 use prehend_refine::data::{AssetError, Assets, Target, user_cache};
-use prehend_refine::data::{Calibrated, CalibrationFrames, Passes};
+use prehend_refine::data::{Calibrated, CalibrationFrames};
 use pyo3::prelude::*;
 
 use super::dataset::Dataset;
@@ -53,7 +53,7 @@ pub(crate) fn _calibrate(
         let frames = CalibrationFrames::new(assets, told);
         let (joints, size) = frames.layout()?;
         let nominal = Calibrator::new(joints.unwrap_or(0), size, objects, settings)?;
-        Passes::new(&frames, passes, window).run(nominal, &mut |_| ())
+        frames.calibrate(nominal, passes, window, &mut |_| ())
     };
     let done = py.detach(learn).raise()?;
     let failed = done.failed.iter().map(|(index, error)| format!("{}: {error}", targets[*index]));

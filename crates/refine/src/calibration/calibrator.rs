@@ -5,11 +5,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
-use super::information::{Eliminated, Elimination, FrameInformation};
-use super::pass::{Pass, PlaySquares, Sums, Visit};
+use super::information::{Elimination, FrameInformation};
+use super::pass::{Pass, PlaySquares, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
-use super::views::Views;
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
@@ -49,10 +48,7 @@ pub struct Calibrator {
     /// How much frames disagree with the rig, half of them less; unknown as long as it is nominal.
     usual_disagreement: Option<f64>,
     /// What frames have said that are not visited any more, about the parameters that there are now.
-    kept: Sums,
-    kept_play: PlaySquares,
-    kept_disagreements: Vec<f64>,
-    kept_views: Views,
+    kept: Pass,
     /// Passes that were solved for since then.
     solved: usize,
     /// Solutions since then that the rig is the mean of; none while it is still on its way.
@@ -98,10 +94,7 @@ impl Calibrator {
             prior,
             models,
             usual_disagreement: None,
-            kept: Sums::default(),
-            kept_play: PlaySquares::default(),
-            kept_disagreements: Vec::new(),
-            kept_views: Views::default(),
+            kept: Pass::default(),
             solved: 0,
             averaged: 0,
         })
@@ -175,17 +168,13 @@ impl Calibrator {
     /// # Errors
     /// If there is none of that number.
     pub fn object(&self, obj_id: u32) -> Result<&Arc<Object>, RefineError> {
-        Ok(&self.model(obj_id)?.corrected)
+        let problem = || format!("is calibrated without object {obj_id}");
+        let model = self.models.get(&obj_id).map(|model| &model.corrected);
+        model.ok_or_else(|| RefineError::Setting { name: "rig", problem: problem() })
     }
 
     fn same_view(&self) -> [f64; 2] {
         [self.settings.same_view_angle, self.settings.same_view_distance]
-    }
-
-    fn model(&self, obj_id: u32) -> Result<&Model, RefineError> {
-        let problem = || format!("is calibrated without object {obj_id}");
-        let model = self.models.get(&obj_id);
-        model.ok_or_else(|| RefineError::Setting { name: "rig", problem: problem() })
     }
 
     /// What `frame`, corrected, says of the rig if its state is `state`.
@@ -219,19 +208,19 @@ impl Calibrator {
     /// If nothing or nothing finite was said, or a corrected model cannot be used.
     pub fn solve(&mut self, pass: &mut Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
-        if pass.sums.0.is_empty() && self.kept.0.is_empty() {
+        let mut all = self.kept.clone();
+        all.merge(pass, self.same_view());
+        let Pass { sums, views, disagreements, .. } = all;
+        if sums.0.is_empty() {
             let problem = "no frame says anything of it".into();
             return Err(RefineError::Setting { name: "rig", problem });
         }
         // What frames say of a rig that nothing is known of is no disagreement yet.
-        let all = self.kept_disagreements.iter().chain(&pass.disagreements).copied();
-        let usual = median(all).filter(|usual| *usual > 0.0);
-        self.usual_disagreement = usual.filter(|_| self.rig.is_known(&self.prior));
+        let usual = median(disagreements.into_iter()).filter(|usual| *usual > 0.0);
+        let variances = self.rig.covariance.diagonal();
+        let is_known = variances.component_mul(&self.prior).min() < 0.999;
+        self.usual_disagreement = usual.filter(|_| is_known);
         self.solved += 1;
-        let mut sums = self.kept.clone();
-        sums.merge(pass.sums.clone());
-        let mut views = self.kept_views.clone();
-        views.merge(&pass.views, self.same_view());
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.
@@ -248,8 +237,10 @@ impl Calibrator {
                 // What frames that are alike get wrong of a surface does not average out; what they say of the rig does.
                 let share = views.share(*id);
                 let (of_object, pull) = (of_object * share, pull * share);
-                let object = Elimination::new(&of_object, &pull, coefficients);
-                eliminated.insert(*id, object.ok_or_else(not_finite)?.coefficients());
+                let object =
+                    Elimination::new(&of_object, &pull, coefficients).ok_or_else(not_finite)?;
+                let covariance = object.covariance();
+                eliminated.insert(*id, (object, covariance));
             }
         }
         let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;
@@ -263,7 +254,7 @@ impl Calibrator {
         }
         let share = 1.0 / self.averaged.max(1) as f64;
         let mut of_objects = BTreeMap::new();
-        for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
+        for (id, (Elimination { at_rest, by_parameters, .. }, of_object)) in &eliminated {
             if let (Some(field), Some(model)) =
                 (self.rig.objects.get_mut(id), self.models.get_mut(id))
             {
@@ -277,7 +268,7 @@ impl Calibrator {
         let change = change * share;
         self.rig = self.rig.changed(change.as_slice());
         self.rig.covariance = covariance;
-        self.kept.shift(&change, &of_objects);
+        self.kept.sums.shift(&change, &of_objects);
         pass.sums.shift(&change, &of_objects);
         Ok(change.component_div(&deviations).amax())
     }
@@ -285,10 +276,7 @@ impl Calibrator {
     /// Keeps what the frames of a pass that was [solved](Self::solve) for have said; they need no visits any more. What a frame says is
     /// linear in the rig from then on, and its memory is free.
     pub fn keep(&mut self, pass: Pass) {
-        self.kept.merge(pass.sums);
-        self.kept_views.merge(&pass.views, self.same_view());
-        self.kept_play.merge(&pass.squares);
-        self.kept_disagreements.extend(pass.disagreements);
+        self.kept.merge(&pass, self.same_view());
         (self.solved, self.averaged) = (0, 0);
     }
 
@@ -297,7 +285,7 @@ impl Calibrator {
     fn take_play(&mut self, mut squares: PlaySquares) {
         let (expected, weight) = (self.settings.play, self.settings.play_weight);
         let sigmas = [expected.hand_translation, expected.hand_rotation, expected.joints];
-        squares.merge(&self.kept_play);
+        squares.merge(&self.kept.squares);
         squares.merge(&PlaySquares { sums: sigmas.map(|s| weight * s * s), frames: weight });
         let deviation = |sum: f64| (sum / squares.frames).sqrt();
         let [hand_translation, hand_rotation, joints] = squares.sums.map(deviation);

@@ -16,6 +16,7 @@ pub(super) struct FrameInformation {
 }
 
 /// The play of a frame's hand pose and joints.
+#[derive(Clone)]
 pub(super) struct FramePlay {
     /// If the parameters do not change, and its derivatives by them.
     at_rest: DVector<f64>,
@@ -111,7 +112,12 @@ impl FrameInformation {
         prior: &DVector<f64>,
         covariance: Option<&DMatrix<f64>>,
     ) -> Option<f64> {
-        let (hessian, gradient) = self.of_rig(prior.len())?;
+        // Of the rig alone, the object's coefficients being what they may be beforehand.
+        let n = prior.len();
+        let coefficients = vec![0.0; self.gradient.len() - n];
+        let object = Elimination::new(&self.hessian, &self.gradient, &coefficients)?;
+        let hessian = self.hessian.view((0, 0), (n, n)) + object.hessian;
+        let gradient = self.gradient.rows(0, n) + object.gradient;
         let factor = (&hessian + DMatrix::from_diagonal(prior)).cholesky()?;
         let mut noise = hessian.clone();
         if let Some(covariance) = covariance {
@@ -122,34 +128,26 @@ impl FrameInformation {
         // Of a frame that says nothing, both are zero.
         Some(squared / degrees.max(1e-9)).filter(|ratio| ratio.is_finite())
     }
-
-    /// Hessian and gradient by the `n` parameters of the rig alone, the object's coefficients being what they may be beforehand.
-    pub(super) fn of_rig(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let (hessian, gradient) = (&self.hessian, &self.gradient);
-        let object = Elimination::new(hessian, gradient, &vec![0.0; gradient.len() - n])?;
-        let of_rig = hessian.view((0, 0), (n, n)) + object.hessian;
-        Some((of_rig, gradient.rows(0, n) + object.gradient))
-    }
 }
 
 impl FramePlay {
     /// The squares that are expected of hand pose and joints if the parameters change so, and have that covariance then; of those of the object,
-    /// if it has any, `object` says how they depend on the others.
+    /// if it has any, `object` says how they depend on the others, with their covariance if these are known.
     pub(super) fn expected_squares(
         &self,
         change: &DVector<f64>,
         covariance: &DMatrix<f64>,
-        object: Option<&Eliminated>,
+        object: Option<&(Elimination, DMatrix<f64>)>,
     ) -> DVector<f64> {
         let n = change.len();
         let mut by_parameters = self.by_parameters.columns(0, n).into_owned();
         let mut play = self.at_rest.clone();
         let mut variances = self.variances.clone();
-        if let Some(object) = object {
+        if let Some((object, of_object)) = object {
             let by_object = self.by_parameters.columns(n, object.at_rest.len());
             by_parameters += by_object * &object.by_parameters;
             play += by_object * &object.at_rest;
-            variances += (by_object * &object.covariance).component_mul(&by_object).column_sum();
+            variances += (by_object * of_object).component_mul(&by_object).column_sum();
         }
         play += &by_parameters * change;
         variances += (&by_parameters * covariance).component_mul(&by_parameters).column_sum();
@@ -163,8 +161,9 @@ pub(super) struct Elimination {
     pub(super) hessian: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
-    at_rest: DVector<f64>,
-    by_parameters: DMatrix<f64>,
+    /// Change of the coefficients if the parameters do not change, and its derivatives by them.
+    pub(super) at_rest: DVector<f64>,
+    pub(super) by_parameters: DMatrix<f64>,
 }
 
 impl Elimination {
@@ -190,20 +189,10 @@ impl Elimination {
         })
     }
 
-    /// The coefficients, given the rig's parameters.
-    pub(super) fn coefficients(self) -> Eliminated {
-        let Self { factor, at_rest, by_parameters, .. } = self;
-        Eliminated { covariance: factor.inverse(), at_rest, by_parameters }
+    /// Covariance of the coefficients if the parameters are known.
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
+        self.factor.inverse()
     }
-}
-
-/// The coefficients of an object, given the rig's parameters.
-pub(super) struct Eliminated {
-    /// Their change if the parameters do not, and its derivatives by them.
-    pub(super) at_rest: DVector<f64>,
-    pub(super) by_parameters: DMatrix<f64>,
-    /// Their covariance if the parameters are known.
-    pub(super) covariance: DMatrix<f64>,
 }
 
 #[cfg(test)]

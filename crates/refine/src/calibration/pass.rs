@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
-use super::information::{Eliminated, FrameInformation, FramePlay};
+use super::information::{Elimination, FrameInformation, FramePlay};
 use super::views::Views;
 
 /// What a visit has found of a frame.
@@ -25,10 +25,10 @@ pub struct Visit {
 }
 
 /// What the frames of a pass have said. Sums are the same for the same order of frames.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Pass {
     pub(super) sums: Sums,
-    /// By frame, with its object's number.
+    /// By frame that is visited again, with its object's number.
     play: Vec<(u32, FramePlay)>,
     /// By frame, those left out among them.
     pub(super) disagreements: Vec<f64>,
@@ -50,10 +50,6 @@ impl Sums {
                 *of_gradient += gradient;
             }
         }
-    }
-
-    pub(super) fn merge(&mut self, other: Self) {
-        other.0.into_iter().for_each(|(id, (hessian, gradient))| self.add(id, hessian, gradient));
     }
 
     /// Says the same of parameters that have changed so, as have the coefficients of objects.
@@ -103,12 +99,22 @@ impl Pass {
         self.play.push((obj_id, play));
     }
 
+    /// Adds what the frames of `other` have said, but for their play by frame: those within `same_view` \[rad, m\] of each other show the same.
+    pub(super) fn merge(&mut self, other: &Self, same_view: [f64; 2]) {
+        for (id, (hessian, gradient)) in &other.sums.0 {
+            self.sums.add(*id, hessian.clone(), gradient.clone());
+        }
+        self.views.merge(&other.views, same_view);
+        self.squares.merge(&other.squares);
+        self.disagreements.extend(&other.disagreements);
+    }
+
     /// Finds the squares of the frames' play if the parameters change so, and have that covariance then.
     pub(super) fn expect_play(
         &mut self,
         change: &DVector<f64>,
         covariance: &DMatrix<f64>,
-        objects: &BTreeMap<u32, Eliminated>,
+        objects: &BTreeMap<u32, (Elimination, DMatrix<f64>)>,
     ) {
         self.squares = PlaySquares::default();
         for (id, play) in &self.play {

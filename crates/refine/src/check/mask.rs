@@ -1,11 +1,23 @@
-//! The mask against the object at the pose, and against what depth shows under it.
+//! The mask against the object at the pose, and against what depth shows under it and across its border: where that runs, one thing ends before another.
 
-use super::border::cut_share;
 use super::limits::{
-    HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_CUT, MASK_ON_HAND, MASK_OVERLAP, MASK_SHIFT,
+    HAND_REACH, HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_CUT, MASK_ON_HAND, MASK_OVERLAP,
+    MASK_SHIFT,
 };
 use super::warning::{Subject, Warning};
 use crate::scene::{Object, View, median};
+
+/// Distance from the border at which depth is read on both sides: cameras blur depth at edges \[px\].
+const STEP: usize = 5;
+
+/// Distance of the hand from where it is drawn, at most \[px\].
+const BESIDE: usize = 8;
+
+/// Depth that differs less is of the same surface \[m\].
+const SMOOTH: f64 = 10e-3;
+
+/// Fewest places along the border that tell anything.
+const LEAST_PLACES: usize = 50;
 
 /// Warning of a mask that is not that of the visible part of the object, whose center has depth `z` \[m\]. The pose is blamed if `mask_fits` what
 /// depth shows; what hides the object is not known if `hand_wrong`.
@@ -85,4 +97,43 @@ pub(super) fn off_object(
         format!("along {percent:.0} % of the mask's border the same surface goes on outside of it");
     let hint = "is the mask shifted, or too small?";
     (Some(Warning::new(Subject::Mask, (cut, ""), finding, hint)), false)
+}
+
+/// Part of the mask's border along which the surface goes on outside of the mask, and is not the hand's; none if depth tells too
+/// little.
+fn cut_share(view: &View<'_>) -> Option<f64> {
+    let width = view.size().0 as isize;
+    // All that is asked for is inside the image.
+    let margin = STEP + 1 + BESIDE;
+    let (mut places, mut cut) = (0_usize, 0_usize);
+    for (index, _) in view.inner_pixels(margin).filter(|(_, p)| p.masked) {
+        for outward in [1, -1, width, -width] {
+            let at = |steps: usize| index.wrapping_add_signed(steps as isize * outward);
+            if view.pixel(at(1)).masked {
+                continue;
+            }
+            let inside = view.pixel(index.wrapping_add_signed(-(STEP as isize) * outward));
+            let outside = view.pixel(at(STEP + 1));
+            let known = inside.sensor > 0.0 && outside.sensor > 0.0;
+            if !known || !inside.masked || outside.masked {
+                continue;
+            }
+            places += 1;
+            let smooth = f64::from((inside.sensor - outside.sensor).abs()) < SMOOTH;
+            cut += usize::from(smooth && !near_hand(view, at(STEP + 1), outside.sensor));
+        }
+    }
+    (places >= LEAST_PLACES).then(|| cut as f64 / places as f64)
+}
+
+/// True where the hand is drawn at or beside the pixel of that index, about as deep as `sensor` \[m\].
+fn near_hand(view: &View<'_>, index: usize, sensor: f32) -> bool {
+    let (width, reach) = (view.size().0 as isize, BESIDE as isize);
+    let steps = [-reach, 0, reach];
+    steps.iter().any(|dy| {
+        steps.iter().any(|dx| {
+            let hand = view.pixel(index.wrapping_add_signed(dy * width + dx)).hand;
+            hand > 0.0 && f64::from((hand - sensor).abs()) < HAND_REACH
+        })
+    })
 }

@@ -8,8 +8,8 @@ use super::warning::{Subject, Warning};
 use crate::MM_PER_M;
 use crate::scene::{Object, StatedSize};
 
-/// Warnings of the model of `object`; what was assumed of its mass and its inside matters if it is `held`.
-pub(super) fn check(object: &Object, held: bool) -> Vec<Warning> {
+/// Warnings of the model of `object`; none if all looks well. What was assumed of its mass and its inside matters if it is `held`.
+pub(crate) fn check(object: &Object, held: bool) -> Vec<Warning> {
     let warning = |value, finding: String, hint| Warning::new(Subject::Model, value, finding, hint);
     let (mut warnings, report) = (Vec::new(), &object.report);
     let stated = object.stated_size.as_ref();

@@ -26,7 +26,7 @@ pub use assets::{AssetError, Assets, Sensor, load_mesh};
 pub use bop::pose_from_matrix;
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
-pub use calibration::{Calibrated, CalibrationFrames, Passes};
+pub use calibration::{Calibrated, CalibrationFrames};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;

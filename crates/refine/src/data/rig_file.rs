@@ -98,85 +98,12 @@ impl Rig {
     /// If the file is missing or broken, naming the field.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
         let layout: RigLayout = read_json(file)?;
-        let field = |name: &str, problem: &dyn std::fmt::Display| {
-            Err(DatasetError::field(file, name, problem))
+        let range = match out_of_range(&read_json(file)?) {
+            Some(name) => Err((name, format!("is beyond ±{MAX_NUMBER:e}"))),
+            None => Ok(()),
         };
-        if let Some(name) = out_of_range(&read_json(file)?) {
-            return field(&name, &format!("is beyond ±{MAX_NUMBER:e}"));
-        }
-        let RigLayout { image_size: [width, height], camera, hand, play, covariance, objects } =
-            layout;
-        if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
-            return field("image_size", &"no image is of that size");
-        }
-        if !(1..=MOST_CELLS).contains(&camera.depth_cells) {
-            return field("camera.depth_cells", &format!("expected 1 to {MOST_CELLS}"));
-        }
-        let sizes = [camera.focal_scale + camera.aspect, camera.focal_scale - camera.aspect];
-        if camera.depth_scale <= 0.0 || sizes.iter().any(|size| *size <= -1.0) {
-            return field("camera", &"no depth or focal length is negative");
-        }
-        let warp = ImageWarp { depth: DepthField::new(width, height, camera.depth_cells) };
-        let (found, expected) = (camera.depth_offsets_m.len(), warp.depth.len());
-        if found != expected {
-            let problem = format!("expected {expected} coefficients, found {found}");
-            return field("camera.depth_offsets_m", &problem);
-        }
-        let mut rig = Self {
-            camera: CameraCalibrationError {
-                depth_scale: camera.depth_scale,
-                depth_bias: camera.depth_bias_m,
-                principal_point: Vector2::from(camera.principal_point_focal),
-                focal_scale: camera.focal_scale,
-                aspect: camera.aspect,
-            },
-            distortion: camera.distortion,
-            warp: warp.into(),
-            remaps: Arc::default(),
-            depth_offsets: camera.depth_offsets_m,
-            in_hand: (&hand.in_hand).into(),
-            in_camera: (&hand.in_camera).into(),
-            joints: hand.joints,
-            play,
-            covariance: covariance.0,
-            objects: BTreeMap::new(),
-        };
-        let n = rig.len();
-        if rig.covariance.nrows() != n {
-            return field("covariance", &format!("expected {n} rows of {n} numbers"));
-        }
-        for (id, object) in objects {
-            let ObjectLayout { sigma_m, length_scale_m, covariance, nodes_m, coefficients } =
-                object;
-            let count = nodes_m.len();
-            if count > MOST_NODES {
-                let problem = format!("expected up to {MOST_NODES} nodes");
-                return field(&format!("objects.{id}"), &problem);
-            }
-            if covariance.0.nrows() != count {
-                let problem = format!("expected {count} rows of {count} numbers");
-                return field(&format!("objects.{id}.covariance"), &problem);
-            }
-            let settings = ModelErrorSettings {
-                sigma: sigma_m,
-                length_scale: length_scale_m,
-                ..ModelErrorSettings::default()
-            };
-            let nodes = nodes_m.into_iter().map(Vector3::from).collect();
-            let columns: Vec<Vector3<f64>> = coefficients.into_iter().map(Vector3::from).collect();
-            let coefficients = match columns.as_slice() {
-                [] => Matrix3xX::zeros(0),
-                columns => Matrix3xX::from_columns(columns),
-            };
-            let Some(deviation) =
-                SurfaceDeviation::from_parts(settings, nodes, coefficients, covariance.0)
-            else {
-                let problem = "expected one coefficient for each node, and positive deviations";
-                return field(&format!("objects.{id}"), &problem);
-            };
-            rig.objects.insert(id, deviation);
-        }
-        Ok(rig)
+        let rig = range.and_then(|()| layout.rig());
+        rig.map_err(|(name, problem)| DatasetError::field(file, &name, problem))
     }
 
     /// Writes the rig; the file appears whole or not at all.
@@ -194,16 +121,13 @@ impl Rig {
             return Err(DatasetError::unusable(file, "the rig is not finite, and was not written"));
         }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
+            let coefficients = deviation.coefficients.column_iter();
             let layout = ObjectLayout {
                 sigma_m: deviation.settings.sigma,
                 length_scale_m: deviation.settings.length_scale,
                 covariance: Covariance(deviation.covariance.clone()),
                 nodes_m: deviation.nodes().iter().map(|node| (*node).into()).collect(),
-                coefficients: deviation
-                    .coefficients
-                    .column_iter()
-                    .map(|c| [c[0], c[1], c[2]])
-                    .collect(),
+                coefficients: coefficients.map(|c| [c[0], c[1], c[2]]).collect(),
             };
             (*id, layout)
         };
@@ -231,6 +155,82 @@ impl Rig {
         };
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
         write_atomically(file, format!("{text}\n").as_bytes())
+    }
+}
+
+/// Field at fault, and the problem.
+type Fault = (String, String);
+
+/// # Errors
+/// The field of that `name`, unless all `holds`.
+fn require(holds: bool, name: &str, problem: impl Into<String>) -> Result<(), Fault> {
+    if holds { Ok(()) } else { Err((name.to_owned(), problem.into())) }
+}
+
+impl RigLayout {
+    fn rig(self) -> Result<Rig, Fault> {
+        let RigLayout { image_size: [width, height], camera, hand, play, covariance, objects } =
+            self;
+        let is_size = |size: &usize| (1..=MOST_PIXELS).contains(size);
+        require([width, height].iter().all(is_size), "image_size", "no image is of that size")?;
+        let expected = format!("expected 1 to {MOST_CELLS}");
+        let cells = camera.depth_cells;
+        require((1..=MOST_CELLS).contains(&cells), "camera.depth_cells", expected)?;
+        let positive = camera.depth_scale > 0.0 && camera.focal_scale - camera.aspect.abs() > -1.0;
+        require(positive, "camera", "no depth or focal length is negative")?;
+        let warp = ImageWarp { depth: DepthField::new(width, height, cells) };
+        let (found, expected) = (camera.depth_offsets_m.len(), warp.depth.len());
+        let problem = format!("expected {expected} coefficients, found {found}");
+        require(found == expected, "camera.depth_offsets_m", problem)?;
+        let deviation =
+            |(id, object): (u32, ObjectLayout)| Ok::<_, Fault>((id, object.deviation(id)?));
+        let rig = Rig {
+            camera: CameraCalibrationError {
+                depth_scale: camera.depth_scale,
+                depth_bias: camera.depth_bias_m,
+                principal_point: Vector2::from(camera.principal_point_focal),
+                focal_scale: camera.focal_scale,
+                aspect: camera.aspect,
+            },
+            distortion: camera.distortion,
+            warp: warp.into(),
+            remaps: Arc::default(),
+            depth_offsets: camera.depth_offsets_m,
+            in_hand: (&hand.in_hand).into(),
+            in_camera: (&hand.in_camera).into(),
+            joints: hand.joints,
+            play,
+            covariance: covariance.0,
+            objects: objects.into_iter().map(deviation).collect::<Result<_, Fault>>()?,
+        };
+        let n = rig.len();
+        let expected = format!("expected {n} rows of {n} numbers");
+        require(rig.covariance.nrows() == n, "covariance", expected)?;
+        Ok(rig)
+    }
+}
+
+impl ObjectLayout {
+    /// Deviation of the surface of object `id`.
+    fn deviation(self, id: u32) -> Result<SurfaceDeviation, Fault> {
+        let name = format!("objects.{id}");
+        let count = self.nodes_m.len();
+        require(count <= MOST_NODES, &name, format!("expected up to {MOST_NODES} nodes"))?;
+        let settings = ModelErrorSettings {
+            sigma: self.sigma_m,
+            length_scale: self.length_scale_m,
+            ..ModelErrorSettings::default()
+        };
+        let nodes = self.nodes_m.into_iter().map(Vector3::from).collect();
+        let coefficients = Matrix3xX::from_iterator(
+            self.coefficients.len(),
+            self.coefficients.into_iter().flatten(),
+        );
+        let field = SurfaceDeviation::from_parts(settings, nodes, coefficients, self.covariance.0);
+        let problem = format!(
+            "expected one coefficient for each node, {count} rows of covariance, and positive deviations"
+        );
+        field.ok_or((name, problem))
     }
 }
 

@@ -81,11 +81,6 @@ impl Rig {
         }
     }
 
-    /// Whether frames have said anything of it, the inverse variances of its parameters being `prior` beforehand.
-    pub(crate) fn is_known(&self, prior: &DVector<f64>) -> bool {
-        self.covariance.diagonal().iter().zip(prior).any(|(now, prior)| now * prior < 0.999)
-    }
-
     /// Columns and rows of its images.
     pub fn image_size(&self) -> [usize; 2] {
         self.warp.depth.size()
@@ -99,11 +94,6 @@ impl Rig {
     /// Where what the image is off by begins among them: distortion, then coefficients of depth's field.
     pub(crate) fn first_warp(&self) -> usize {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
-    }
-
-    /// Where the coefficients of depth's field begin.
-    pub(crate) fn first_offset(&self) -> usize {
-        self.first_warp() + RADIAL
     }
 
     /// The parameters, zero where nothing is corrected.
@@ -201,8 +191,7 @@ impl Rig {
         if let Some(pixel) = camera.project(&said.center().into()) {
             let (at, first) = (layout.offset(Block::Camera) - object_rows, self.first_warp());
             for (k, weight) in self.warp.depth.weights(pixel.x, pixel.y) {
-                jacobian[(at + CameraCalibrationError::DEPTH_BIAS, self.first_offset() + k)] +=
-                    weight;
+                jacobian[(at + CameraCalibrationError::DEPTH_BIAS, first + RADIAL + k)] += weight;
             }
             let radial = radial_as_camera(&camera.ray(pixel.x, pixel.y).xy());
             jacobian.view_mut((at, first), radial.shape()).copy_from(&radial);

@@ -1,10 +1,13 @@
 //! Entries of a dataset's JSON files. Lengths in millimeters, as BOP has them.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
-use prehend_render::{Camera, DepthImage, Distortion, Mask};
+use prehend_render::{Distortion, Mask};
 use serde_json::{Map, Value, json};
 
+use super::files::Shot;
 use super::hand_files::{TAXELS, URDF};
 use crate::data::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
 use crate::scene::Inertial;
@@ -14,23 +17,53 @@ pub(super) const DEPTH_SCALE: f64 = 0.1;
 /// Forces are clipped at this many units, as sensors do.
 const FORCE_LIMIT: f64 = 10_000.0;
 
-/// Entry of `scene_camera.json`, with its lens if it is no pinhole, and the pose world → camera where there is a world.
-pub(super) fn camera(
-    camera: &Camera,
-    lens: Option<&Distortion>,
-    world: Option<&Isometry3<f64>>,
-) -> Value {
-    let mut entry = Map::from_iter([
-        ("cam_K".to_owned(), json!(camera.k())),
-        ("depth_scale".to_owned(), json!(DEPTH_SCALE)),
-    ]);
-    if let Some(distortion) = lens {
-        entry.insert("cam_dist".into(), self::lens(distortion));
+/// Entries of one image in its scene's files, by the file's name.
+pub(super) type ImageEntries = Map<String, Value>;
+
+impl Shot {
+    /// Entries of the image, which shows object `obj_id` and a hand whose joints have these names.
+    pub(super) fn entries(&self, obj_id: u32, names: &[String]) -> ImageEntries {
+        let Self { told, visible, whole, .. } = self;
+        let mut entries = ImageEntries::new();
+        let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
+        let mut truth = pose("m2c", &self.truth);
+        truth.insert("obj_id".into(), json!(obj_id));
+        add("scene_gt.json", json!([truth]));
+        let pixels = whole.pixels().iter().zip(told.depth.pixels());
+        let measured = pixels.filter(|(in_silhouette, z)| **in_silhouette && **z > 0.0).count();
+        let visibility = json!([{
+            "bbox_obj": bounding_box(whole),
+            "bbox_visib": bounding_box(visible),
+            "px_count_all": whole.count(),
+            "px_count_valid": measured,
+            "px_count_visib": visible.count(),
+            "visib_fract": visible.count() as f64 / whole.count().max(1) as f64,
+        }]);
+        add("scene_gt_info.json", visibility);
+        let mut camera = self.world.as_ref().map(|world| pose("w2c", world)).unwrap_or_default();
+        camera.insert("cam_K".into(), json!(told.camera.k()));
+        camera.insert("depth_scale".into(), json!(DEPTH_SCALE));
+        camera.extend(self.lens.as_ref().map(|model| ("cam_dist".into(), lens(model))));
+        add("scene_camera.json", Value::Object(camera));
+        let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
+            let joints: BTreeMap<_, _> = names.iter().zip(joints).collect();
+            let mut body = pose("b2c", t_cam_hand);
+            body.insert("name".into(), json!("hand"));
+            body.insert("urdf".into(), json!(URDF));
+            body.insert("joints".into(), json!(joints));
+            json!({ "gravity": told.gravity.unwrap_or_default().as_slice(), "bodies": [body] })
+        };
+        if let Some(hand) = &told.hand {
+            add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
+            if !hand.forces.is_empty() {
+                add("scene_tactile.json", touch(&hand.forces));
+            }
+        }
+        if let Some((t_cam_hand, joints)) = &self.hand {
+            add("scene_bodies_gt.json", bodies(t_cam_hand, joints));
+        }
+        entries
     }
-    if let Some(t_cam_world) = world {
-        entry.extend(pose("w2c", t_cam_world));
-    }
-    Value::Object(entry)
 }
 
 /// A lens, as `cam_dist` of a camera has it.
@@ -38,44 +71,8 @@ pub(super) fn lens(lens: &Distortion) -> Value {
     json!({ "model": lens.name(), "coefficients": lens.coefficients() })
 }
 
-/// Entry of `scene_gt.json`.
-pub(super) fn truth(obj_id: u32, t_cam_object: &Isometry3<f64>) -> Value {
-    let mut object = pose("m2c", t_cam_object);
-    object.insert("obj_id".into(), json!(obj_id));
-    json!([object])
-}
-
-/// Entry of `scene_gt_info.json`; `whole` is the silhouette that nothing hides, `depth` what was measured.
-pub(super) fn visibility(visible: &Mask, whole: &Mask, depth: &DepthImage) -> Value {
-    let measured = whole.pixels().iter().zip(depth.pixels()).filter(|(m, z)| **m && **z > 0.0);
-    json!([{
-        "bbox_obj": bounding_box(whole),
-        "bbox_visib": bounding_box(visible),
-        "px_count_all": whole.count(),
-        "px_count_valid": measured.count(),
-        "px_count_visib": visible.count(),
-        "visib_fract": visible.count() as f64 / whole.count().max(1) as f64,
-    }])
-}
-
-/// Entry of `scene_bodies.json` and `scene_bodies_gt.json`.
-pub(super) fn bodies(
-    gravity: &Vector3<f64>,
-    t_cam_hand: &Isometry3<f64>,
-    names: &[String],
-    joints: &[f64],
-) -> Value {
-    let joints: Map<String, Value> =
-        names.iter().cloned().zip(joints.iter().map(|&q| json!(q))).collect();
-    let mut body = pose("b2c", t_cam_hand);
-    body.insert("name".into(), json!("hand"));
-    body.insert("urdf".into(), json!(URDF));
-    body.insert("joints".into(), Value::Object(joints));
-    json!({ "gravity": gravity.as_slice(), "bodies": [body] })
-}
-
 /// Entry of `scene_tactile.json`.
-pub(super) fn touch(forces: &[Vector3<f64>]) -> Value {
+fn touch(forces: &[Vector3<f64>]) -> Value {
     // Whole units are written without a fraction.
     let units = |f: f64| {
         let units = (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use prehend_render::{Mask, depth_map};
 
-use super::files::{FRAME_FOLDERS, Shot, initial, write_entries, write_models};
-use super::hand_files::write_hand;
+use super::files::{FRAME_FOLDERS, Shot, write_entries, write_models};
+use super::hand_files::HandFiles;
 use crate::data::AssetError;
-use crate::data::bop::{create_folder, write_results};
+use crate::data::bop::{ResultRow, create_folder, write_results};
 use crate::scene::Scene;
 
 /// The only scene.
@@ -47,7 +47,8 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
         let entries = shot.write(&scene_dir, im_id, obj_id, &scene.hand.tree, 0)?;
         frames.insert(im_id as usize, entries);
         objects.insert(obj_id, &scene.object);
-        rows.push(initial(SCENE_ID, im_id, obj_id, scene.initial));
+        let (scene_id, t_cam_model) = (SCENE_ID, scene.initial);
+        rows.push(ResultRow { scene_id, im_id, obj_id, score: 1.0, t_cam_model, time: -1.0 });
     }
     write_entries(&scene_dir, &frames)?;
     for folder in ["models", "models_eval"] {
@@ -55,7 +56,8 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
         write_models(&dir.join(folder), models)?;
     }
     if let Some(scene) = scenes.first() {
-        write_hand(dir, &scene.urdf, &scene.hand.taxels)?;
+        let (robot, urdf) = (scene.hand.clone(), scene.urdf.clone());
+        HandFiles { robot, urdf, meshes: Vec::new() }.write(dir)?;
     }
     Ok(write_results(&dir.join("init.csv"), &rows)?)
 }

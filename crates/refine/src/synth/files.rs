@@ -11,9 +11,9 @@ use prehend_render::{Distortion, Mask};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::annotation;
+use super::annotation::{self, ImageEntries};
 use crate::data::AssetError;
-use crate::data::bop::{self, DatasetError, ResultRow, create_folder, write_atomically};
+use crate::data::bop::{self, DatasetError, create_folder, write_atomically};
 use crate::scene::{Frame, Inertial};
 
 /// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
@@ -92,36 +92,7 @@ impl Shot {
         mask("mask", &self.whole)?;
         Ok(self.entries(obj_id, hand.joint_names()))
     }
-
-    fn entries(&self, obj_id: u32, names: &[String]) -> ImageEntries {
-        let Self { told, visible, whole, .. } = self;
-        let mut entries = ImageEntries::new();
-        let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
-        add("scene_gt.json", annotation::truth(obj_id, &self.truth));
-        add("scene_gt_info.json", annotation::visibility(visible, whole, &told.depth));
-        add(
-            "scene_camera.json",
-            annotation::camera(&told.camera, self.lens.as_ref(), self.world.as_ref()),
-        );
-        let gravity = told.gravity.unwrap_or_default();
-        let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
-            annotation::bodies(&gravity, t_cam_hand, names, joints)
-        };
-        if let Some(hand) = &told.hand {
-            add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
-            if !hand.forces.is_empty() {
-                add("scene_tactile.json", annotation::touch(&hand.forces));
-            }
-        }
-        if let Some((t_cam_hand, joints)) = &self.hand {
-            add("scene_bodies_gt.json", bodies(t_cam_hand, joints));
-        }
-        entries
-    }
 }
-
-/// Entries of one image in its scene's files, by the file's name.
-pub(super) type ImageEntries = Map<String, Value>;
 
 /// The files that have an entry for each image. The camera's comes last: a scene that has it has all.
 pub(super) const NAMES: [&str; 6] = [
@@ -171,16 +142,6 @@ pub(super) fn write_models<'a>(
     }
     let text = format!("{:#}\n", Value::Object(info));
     Ok(write_atomically(&dir.join("models_info.json"), text.as_bytes())?)
-}
-
-/// An initial pose for a file of them.
-pub(super) fn initial(
-    scene_id: u32,
-    im_id: u32,
-    obj_id: u32,
-    t_cam_model: Isometry3<f64>,
-) -> ResultRow {
-    ResultRow { scene_id, im_id, obj_id, score: 1.0, t_cam_model, time: -1.0 }
 }
 
 #[cfg(test)]

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::annotation::ImageEntries;
 use super::error::SynthError;
 use super::files::{
-    FRAME_FOLDERS, ImageEntries, NAMES, initial, read_json, remove_temporary, write_entries,
-    write_models,
+    FRAME_FOLDERS, NAMES, read_json, remove_temporary, write_entries, write_models,
 };
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
@@ -281,8 +281,9 @@ fn initial_poses(
         for im_id in scene.images()? {
             for seen in truth.objects(scene_id, im_id)? {
                 let mut noise = sequence(from, purpose, scene_id, im_id);
+                let (obj_id, score, time) = (seen.obj_id, 1.0, -1.0);
                 let t_cam_model = level.perturb(&seen.t_cam_model, &mut noise);
-                rows.push(initial(scene_id, im_id, seen.obj_id, t_cam_model));
+                rows.push(ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time });
             }
         }
     }

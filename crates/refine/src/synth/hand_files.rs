@@ -22,9 +22,9 @@ pub struct HandFiles {
     /// The hand.
     pub robot: Arc<Hand>,
     /// Its URDF.
-    urdf: String,
+    pub(super) urdf: String,
     /// Mesh files that the URDF names: relative to its folder, and their content.
-    meshes: Vec<(PathBuf, Vec<u8>)>,
+    pub(super) meshes: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl HandFiles {
@@ -77,7 +77,11 @@ impl HandFiles {
             create_folder(file.parent().unwrap_or(root))?;
             write_atomically(&file, content)?;
         }
-        write_hand(root, &self.urdf, &self.robot.taxels)
+        create_folder(&root.join("hand"))?;
+        if !self.robot.taxels.is_empty() {
+            write_atomically(&root.join(TAXELS), taxel_table(&self.robot.taxels).as_bytes())?;
+        }
+        write_atomically(&root.join(URDF), self.urdf.as_bytes())
     }
 
     /// All that describes the hand, to be compared.
@@ -86,15 +90,6 @@ impl HandFiles {
         let table = taxel_table(&self.robot.taxels).into_bytes();
         self.urdf.bytes().chain(table).chain(meshes)
     }
-}
-
-/// Writes a hand's description to the dataset at `root`.
-pub(super) fn write_hand(root: &Path, urdf: &str, skin: &[Taxel]) -> Result<(), DatasetError> {
-    create_folder(&root.join("hand"))?;
-    if !skin.is_empty() {
-        write_atomically(&root.join(TAXELS), taxel_table(skin).as_bytes())?;
-    }
-    write_atomically(&root.join(URDF), urdf.as_bytes())
 }
 
 /// Values of the `filename` attributes of a URDF.

@@ -18,7 +18,7 @@ mod settings;
 pub use dataset::write_dataset;
 pub use error::SynthError;
 pub use generate::{DatasetSummary, GraspFailure, generate};
-pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, GraspSnapshot, Grasper, Preshape};
+pub use grasp::{Grasp, GraspError, GraspSettings, GraspSnapshot, Grasper};
 pub use hand_files::HandFiles;
 pub use plan::{SynthObject, SynthSettings};
 pub use pose_noise::NoiseLevel;

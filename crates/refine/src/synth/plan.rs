@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::ops::Not;
 use std::path::Path;
 
 use prehend_geometry::{SplitMix64, TriMesh};
@@ -39,13 +38,11 @@ pub struct SynthSettings {
     /// Rows of the images.
     pub height: NonZeroUsize,
     /// The camera's lens, if it is no pinhole.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lens")]
+    #[serde(serialize_with = "lens")]
     pub lens: Option<Distortion>,
     /// True if the dataset keeps silent about that lens, as about other faults of a rig.
-    #[serde(skip_serializing_if = "Not::not")]
     pub undeclared_lens: bool,
     /// A film of each grasp: the camera stands still, and the frames follow each other in time.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmSettings>,
     /// Sensor models.
     pub sensor: SensorSettings,

@@ -6,9 +6,8 @@ use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
 use prehend_render::{DepthImage, OutlinePoint, outline_points};
 
-use super::evidence::FrameImages;
+use super::evidence::{FrameImages, centroid};
 use super::inputs::Inputs;
-use super::settings::CorrectionSettings;
 use crate::scene::median;
 
 /// Pose, logarithm of the scale of depth, logarithm of the focal length.
@@ -30,22 +29,29 @@ pub(super) struct Aligned {
 /// A fit of inputs to what a frame shows.
 pub(super) struct PoseFit<'a> {
     pub(super) evidence: &'a FrameImages<'a>,
-    pub(super) settings: &'a CorrectionSettings,
     pub(super) hand: Option<&'a DepthImage>,
 }
 
 impl PoseFit<'_> {
+    /// Inputs with the object moved to where mask and depth have it, and their agreement with the frame there times the plausibility of the move, 0 to 1.
+    pub(super) fn fit(&self, inputs: &Inputs, sized: bool) -> Option<(f64, Aligned)> {
+        let aligned = self.align(inputs, sized)?;
+        let plausible = self.plausibility(inputs, &aligned.inputs.t_cam_object);
+        Some((plausible * self.evidence.agreement(&aligned.inputs, self.hand), aligned))
+    }
+
     /// With `start` moved and turned to where mask and depth have the object, and, if `sized`, with depth scaled; none where the object is not in view.
-    pub(super) fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
+    fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
         let start = self.placed(start)?;
         let radius = self.evidence.object().radius;
         let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
         // Steps in units of the radius.
         let units = SVector::from([radius, radius, radius, 1.0, 1.0, 1.0, size, 0.0]);
         let mut inputs = start;
-        for step in 0..self.settings.steps {
+        let settings = self.evidence.settings;
+        for step in 0..settings.steps {
             // From far to near: at first all counts that is within reach.
-            let width = 1.0 + 4.0 * (1.0 - step as f64 / self.settings.steps as f64);
+            let width = 1.0 + 4.0 * (1.0 - step as f64 / settings.steps as f64);
             let sum = self.sum(&inputs, &start, width)?;
             let step = sum.in_units(&units).damped_step(DAMPING).component_mul(&units);
             let center = self.evidence.center(&inputs).coords;
@@ -55,7 +61,7 @@ impl PoseFit<'_> {
             // What is measured stays what it is: the model is scaled.
             inputs.depth_scale *= step[6].exp();
             inputs.meters /= step[6].exp();
-            let limit = self.settings.largest_size;
+            let limit = settings.largest_size;
             let ratio = inputs.depth_scale / start.depth_scale;
             if !(limit.recip()..=limit).contains(&ratio) {
                 return None;
@@ -69,7 +75,9 @@ impl PoseFit<'_> {
     fn placed(&self, start: &Inputs) -> Option<Inputs> {
         let mut inputs = *start;
         let camera = inputs.camera;
-        let masked = self.mask_center(&inputs)?;
+        let is_masked = |index: &usize| self.evidence.is_masked(&inputs, *index);
+        let pixels = 0..self.evidence.mask.pixels().len();
+        let masked = centroid(camera.width, pixels.filter(is_masked))?;
         let measured = median(self.evidence.masked_points(&inputs).map(|(_, depth)| depth));
         // That the object is in view where it is sought, it is put before the mask.
         let mut center = self.evidence.center(&inputs);
@@ -85,22 +93,13 @@ impl PoseFit<'_> {
         for _ in 0..3 {
             let drawn = self.evidence.drawn(&inputs);
             let seen = || drawn.pixels().iter().enumerate().filter(|(_, z)| **z > 0.0);
-            let count = seen().count() as f64;
             let surface = median(seen().map(|(_, z)| f64::from(*z)));
             let z = match (measured, surface) {
                 (Some(measured), Some(surface)) => center.z + measured - surface,
                 _ => center.z,
             };
-            let width = camera.width;
-            let at = match count > 0.0 {
-                true => {
-                    seen()
-                        .map(|(i, _)| Vector2::new((i % width) as f64, (i / width) as f64))
-                        .sum::<Vector2<f64>>()
-                        / count
-                }
-                false => camera.project(&center)?,
-            };
+            let at = centroid(camera.width, seen().map(|(index, _)| index));
+            let at = at.or_else(|| camera.project(&center))?;
             if z <= 0.0 {
                 return None;
             }
@@ -110,18 +109,6 @@ impl PoseFit<'_> {
             center = to;
         }
         inputs.t_cam_object.translation.vector.iter().all(|v| v.is_finite()).then_some(inputs)
-    }
-
-    fn mask_center(&self, inputs: &Inputs) -> Option<Vector2<f64>> {
-        let width = inputs.camera.width;
-        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
-        for index in 0..self.evidence.mask.pixels().len() {
-            if self.evidence.is_masked(inputs, index) {
-                sum += Vector2::new((index % width) as f64, (index / width) as f64);
-                count += 1.0;
-            }
-        }
-        (count > 0.0).then(|| sum / count)
     }
 
     /// Sum of squares at `inputs`, kernels so many times as wide as errors are.
@@ -141,12 +128,12 @@ impl PoseFit<'_> {
         width: f64,
         sum: &mut Quadratic<UNKNOWNS>,
     ) {
-        let Self { evidence, settings, .. } = self;
-        let object = evidence.object();
+        let FrameImages { settings, .. } = self.evidence;
+        let object = self.evidence.object();
         let inverse = inputs.t_cam_object.inverse();
         let sigma = settings.depth * object.radius;
         let kernel = RobustKernel::Cauchy { scale: width };
-        let points: Vec<(Vector2<f64>, f64)> = evidence.masked_points(inputs).collect();
+        let points: Vec<(Vector2<f64>, f64)> = self.evidence.masked_points(inputs).collect();
         let share = settings.measurements / points.len().max(1) as f64;
         for (pixel, depth) in &points {
             let point = inputs.camera.unproject(pixel.x, pixel.y, *depth);
@@ -171,14 +158,14 @@ impl PoseFit<'_> {
         width: f64,
         sum: &mut Quadratic<UNKNOWNS>,
     ) -> Option<()> {
-        let Self { evidence, settings, .. } = self;
-        let camera = &inputs.camera;
-        let outline = outline_points(camera, &evidence.object().model, &inputs.t_cam_object);
+        let FrameImages { settings, .. } = self.evidence;
+        let (object, camera) = (self.evidence.object(), &inputs.camera);
+        let outline = outline_points(camera, &object.model, &inputs.t_cam_object);
         if outline.is_empty() {
             return None;
         }
         let kernel = RobustKernel::Cauchy { scale: width };
-        let reach = settings.reach * evidence.object().radius * camera.fx / center.z * width / 5.0;
+        let reach = settings.reach * object.radius * camera.fx / center.z * width / 5.0;
         let reach = reach.clamp(6.0, camera.width as f64 / 4.0);
         let length: f64 = outline.iter().map(|point| point.length).sum();
         for at in &outline {
@@ -223,7 +210,7 @@ impl PoseFit<'_> {
         }
         let border = along - 0.5 * side;
         let beyond = index(border + BEYOND)?;
-        let tolerance = self.settings.elsewhere * self.evidence.object().radius;
+        let tolerance = self.evidence.tolerance();
         let hides = |depth: f64| depth > 0.0 && depth < at.point.z - tolerance;
         let hand = self.hand.map_or(0.0, |hand| f64::from(hand.pixels()[beyond]) / inputs.meters);
         (!hides(self.evidence.sensor(inputs, beyond)) && !hides(hand)).then_some(border)
@@ -237,7 +224,7 @@ impl PoseFit<'_> {
         center: &Vector3<f64>,
         sum: &mut Quadratic<UNKNOWNS>,
     ) {
-        let turn = self.settings.turn;
+        let turn = self.evidence.settings.turn;
         let off =
             (inputs.t_cam_object.rotation * start.t_cam_object.rotation.inverse()).scaled_axis();
         let shift = self.shift_sigma(start);
@@ -253,14 +240,15 @@ impl PoseFit<'_> {
 
     /// Standard deviation of the translation.
     fn shift_sigma(&self, inputs: &Inputs) -> f64 {
-        let [of_distance, of_radius] = self.settings.shift;
+        let [of_distance, of_radius] = self.evidence.settings.shift;
         of_distance * self.evidence.center(inputs).z.abs()
             + of_radius * self.evidence.object().radius
     }
 
     /// Plausibility that `start` is in truth at `to`, 0 to 1.
-    pub(super) fn plausibility(&self, start: &Inputs, to: &Isometry3<f64>) -> f64 {
-        let turned = start.t_cam_object.rotation.angle_to(&to.rotation) / self.settings.turn;
+    fn plausibility(&self, start: &Inputs, to: &Isometry3<f64>) -> f64 {
+        let turned = start.t_cam_object.rotation.angle_to(&to.rotation);
+        let turned = turned / self.evidence.settings.turn;
         let moved = match start.is_placed {
             true => {
                 let moved = to * self.evidence.object().center - self.evidence.center(start);

@@ -5,6 +5,7 @@ use prehend_render::{DepthImage, Mask, depth_map};
 
 use super::inputs::Inputs;
 use super::settings::CorrectionSettings;
+use crate::check::limits::{HAND_PIXELS, HAND_REACH};
 use crate::error::RefineError;
 use crate::scene::{Frame, HandMeasurement, Object, hand_depth, median};
 
@@ -13,6 +14,7 @@ const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
 
 /// A frame's images and its object.
 pub(super) struct FrameImages<'a> {
+    pub(super) settings: &'a CorrectionSettings,
     read: &'a Object,
     /// The object at another scale, where its own does not render.
     scaled: Option<Box<Object>>,
@@ -34,7 +36,7 @@ impl<'a> FrameImages<'a> {
         observation: &'a Frame,
         object: &'a Object,
         t_cam_object: &Isometry3<f64>,
-        settings: &CorrectionSettings,
+        settings: &'a CorrectionSettings,
     ) -> Result<Self, RefineError> {
         observation.require_sizes()?;
         let Frame { camera, mask, depth, .. } = observation;
@@ -64,7 +66,8 @@ impl<'a> FrameImages<'a> {
         });
         let points = [true, false].map(|masked| points(&mask, &depth, masked, settings.points));
         let has_depth = !points[0].is_empty() || !points[1].is_empty();
-        Ok(Self { read: object, scaled, given, hand, mask, depth, has_depth, points })
+        let read = object;
+        Ok(Self { settings, read, scaled, given, hand, mask, depth, has_depth, points })
     }
 
     /// The object with a radius that renders: its unit of length is [`Inputs::meters`] of [`given`](Self::given).
@@ -114,6 +117,60 @@ impl<'a> FrameImages<'a> {
     pub(super) fn center(&self, inputs: &Inputs) -> Point3<f64> {
         inputs.t_cam_object * self.object().center
     }
+
+    /// Difference from the object's depth beyond which depth is of something else, in units of the object's length.
+    pub(super) fn tolerance(&self) -> f64 {
+        self.settings.elsewhere * self.object().radius
+    }
+
+    /// Mean of intersection over union of mask and visible object, of the part of the mask whose depth is the object's, and of the part
+    /// of the hand whose depth is the hand's, of those that are known: 0 to 1.
+    pub(super) fn agreement(&self, inputs: &Inputs, hand: Option<&DepthImage>) -> f64 {
+        let tolerance = self.tolerance();
+        let drawn = self.drawn(inputs);
+        let (mut both, mut masked_only, mut visible_only, mut known, mut near) =
+            (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (index, object) in drawn.pixels().iter().enumerate() {
+            let (object, sensor) = (f64::from(*object), self.sensor(inputs, index));
+            let masked = self.is_masked(inputs, index);
+            let hand = hand.map_or(0.0, |hand| f64::from(hand.pixels()[index]));
+            let before = |depth: f64| depth > 0.0 && depth < object - tolerance;
+            let hidden = !masked && before(sensor) || before(hand / inputs.meters);
+            match (masked, object > 0.0 && !hidden) {
+                (true, true) => both += 1.0,
+                (true, false) => masked_only += 1.0,
+                (false, true) => visible_only += 1.0,
+                (false, false) => {}
+            }
+            if sensor > 0.0 && masked {
+                known += 1.0;
+                near += f64::from(u8::from(object > 0.0 && (sensor - object).abs() < tolerance));
+            }
+        }
+        // What is in front, of which nothing else may be known, hides pixels of the object.
+        let weight = if self.has_depth { 1.0 } else { self.settings.hidden };
+        let overlap = both / f64::max(both + masked_only + weight * visible_only, 1.0);
+        let shares = [
+            Some(overlap),
+            self.has_depth.then(|| near / f64::max(known, 1.0)),
+            hand.and_then(|hand| self.hand_share(inputs, hand)),
+        ];
+        let shares: Vec<f64> = shares.into_iter().flatten().collect();
+        shares.iter().sum::<f64>() / shares.len() as f64
+    }
+
+    /// Part of the hand, beside the mask, whose depth is the hand's; none where too little of it is seen.
+    pub(super) fn hand_share(&self, inputs: &Inputs, hand: &DepthImage) -> Option<f64> {
+        let (mut count, mut near) = (0, 0);
+        for (index, hand) in hand.pixels().iter().enumerate() {
+            let sensor = self.sensor(inputs, index) * inputs.meters;
+            if *hand > 0.0 && sensor > 0.0 && !self.is_masked(inputs, index) {
+                count += 1;
+                near += usize::from((sensor - f64::from(*hand)).abs() < HAND_REACH);
+            }
+        }
+        (count >= HAND_PIXELS).then(|| near as f64 / count as f64)
+    }
 }
 
 /// Some `limit` pixels with depth that are `masked`, or are not, on a regular grid.
@@ -123,8 +180,21 @@ fn points(mask: &Mask, depth: &DepthImage, masked: bool, limit: usize) -> Vec<(V
     let all: Vec<usize> = (0..mask.pixels().len()).filter(there).collect();
     // An odd stride does not follow the columns.
     let stride = (all.len() / limit.max(1)).max(1) | 1;
-    let point = |&i: &usize| {
-        (Vector2::new((i % width) as f64, (i / width) as f64), f64::from(depth.pixels()[i]))
-    };
+    let point = |&i: &usize| (place(i, width), f64::from(depth.pixels()[i]));
     all.iter().step_by(stride).map(point).collect()
+}
+
+/// Column and row of a pixel \[px\].
+fn place(index: usize, width: usize) -> Vector2<f64> {
+    Vector2::new((index % width) as f64, (index / width) as f64)
+}
+
+/// Mean column and row of `pixels`, by index, of an image of that width; none of none.
+pub(super) fn centroid(width: usize, pixels: impl Iterator<Item = usize>) -> Option<Vector2<f64>> {
+    let (mut sum, mut count) = (Vector2::zeros(), 0.0);
+    pixels.for_each(|index| {
+        sum += place(index, width);
+        count += 1.0;
+    });
+    (count > 0.0).then(|| sum / count)
 }

@@ -1,6 +1,6 @@
 //! Inputs of a frame that a correction may change.
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use prehend_render::Camera;
 
 use super::kind::Correction;
@@ -55,23 +55,15 @@ impl Inputs {
     }
 
     /// With axes of graphics engines (x right, y up, z back) made those of the camera.
-    fn flipped(mut self) -> Self {
-        let t_cv_gl = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
-            Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0)),
-        ));
-        self.t_cam_object =
-            Isometry3::from_parts(Translation3::identity(), t_cv_gl) * self.t_cam_object;
-        self
-    }
-
-    /// With another camera.
-    fn seen_by(self, camera: impl FnOnce(&Camera) -> Camera) -> Self {
-        Self { camera: camera(&self.camera), ..self }
+    fn flipped(self) -> Self {
+        // Half a turn about x.
+        let t_cv_gl = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
+        Self { t_cam_object: t_cv_gl * self.t_cam_object, ..self }
     }
 
     /// With a correction, whose factor is `value`.
     pub(super) fn corrected(self, correction: Correction, value: f64) -> Self {
-        let Self { t_cam_object: pose, .. } = self;
+        let Self { camera, t_cam_object: pose, .. } = self;
         let q = pose.rotation.into_inner().coords;
         let inverse = Self { t_cam_object: pose.inverse(), ..self };
         let quaternion = |w, x, y, z| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
@@ -91,18 +83,16 @@ impl Inputs {
             Correction::OpenGlAxes => self.flipped(),
             Correction::OpenGlRotation => self.turned(self.flipped().t_cam_object.rotation),
             Correction::PrincipalPointSwapped => {
-                self.seen_by(|camera| Camera { cx: camera.cy, cy: camera.cx, ..*camera })
+                Self { camera: Camera { cx: camera.cy, cy: camera.cx, ..camera }, ..self }
             }
-            Correction::CameraOfOtherSize => self.seen_by(|camera| Camera {
-                width: camera.width,
-                height: camera.height,
-                ..camera.scaled(value)
-            }),
-            Correction::FocalLength => self.seen_by(|camera| Camera {
-                fx: camera.fx * value,
-                fy: camera.fy * value,
-                ..*camera
-            }),
+            Correction::CameraOfOtherSize => {
+                let Camera { width, height, .. } = camera;
+                Self { camera: Camera { width, height, ..camera.scaled(value) }, ..self }
+            }
+            Correction::FocalLength => {
+                let (fx, fy) = (camera.fx * value, camera.fy * value);
+                Self { camera: Camera { fx, fy, ..camera }, ..self }
+            }
             Correction::MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
             Correction::Translation => Self { is_placed: false, ..self },
         }

@@ -1,43 +1,91 @@
 //! Mistakes in inputs by name: what would correct them, and what to say of them.
 
-/// A mistake in a frame's inputs that has a name, by what corrects it. Those that are more common come first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+use strum::EnumMessage;
+
+/// A mistake in a frame's inputs that has a name, by what corrects it, with its message for `message`. Those that are more common come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumMessage)]
 pub enum Correction {
     /// Translations of poses are in another unit.
+    #[strum(message = "{poses}: {t}: translations are in another unit; multiply {t} by {times}")]
     PoseUnit,
     /// The mesh is in another unit.
+    #[strum(message = "{mesh}: the mesh is in another unit; multiply its vertices by {times}")]
     ModelUnit,
     /// Depth is in another unit.
+    #[strum(
+        message = "{camera}: {depth_scale}: depth is in another unit; multiply {depth_scale} by {times}"
+    )]
     DepthUnit,
     /// Mesh and translations of poses are both in another unit.
+    #[strum(
+        message = "{mesh} and {poses}: {t}: mesh and translations are both in another unit; multiply vertices and {t} by {times}"
+    )]
     ModelAndPoseUnit,
     /// Poses map the camera into the object.
+    #[strum(
+        message = "{poses}: {R} and {t}: poses are inverted (camera in the object's frame, inverted extrinsics); invert them: R ← Rᵀ, t ← −Rᵀt"
+    )]
     PoseInverted,
     /// Rotations are transposed.
+    #[strum(message = "{poses}: {R}: rotations are transposed; write R row by row, R ← Rᵀ")]
     RotationTransposed,
     /// Quaternions (x, y, z, w) were read as (w, x, y, z).
+    #[strum(
+        message = "{poses}: {R}: quaternions are in the other order: (x, y, z, w) was taken for (w, x, y, z) where {R} was made; convert them again"
+    )]
     QuaternionXyzw,
     /// Quaternions (w, x, y, z) were read as (x, y, z, w).
+    #[strum(
+        message = "{poses}: {R}: quaternions are in the other order: (w, x, y, z) was taken for (x, y, z, w) where {R} was made; convert them again"
+    )]
     QuaternionWxyz,
     /// Poses are in the axes of graphics engines: x right, y up, z back.
+    #[strum(
+        message = "{poses}: {R} and {t}: the camera has the axes of OpenGL (y up, z back), not of OpenCV; negate the second and third row of R and of t"
+    )]
     OpenGlAxes,
     /// Rotations alone are in these axes.
+    #[strum(
+        message = "{poses}: {R}: the camera has the axes of OpenGL (y up, z back), not of OpenCV; negate the second and third row of R"
+    )]
     OpenGlRotation,
     /// Poses map such a camera into the object.
+    #[strum(
+        message = "{poses}: {R} and {t}: poses are inverted, of a camera with axes of OpenGL in the object's frame; invert them (R ← Rᵀ, t ← −Rᵀt), then negate the second and third row of R and of t"
+    )]
     PoseInvertedOpenGl,
     /// Masks are set where the object is not.
+    #[strum(
+        message = "{masks}: masks are inverted; make pixels of the object non-zero and all others zero"
+    )]
     MaskInverted,
     /// The two coordinates of the principal point are exchanged.
+    #[strum(
+        message = "{camera}: {K}: cx and cy are swapped; exchange them (cx is entry 2 and cy entry 5, counted from 0)"
+    )]
     PrincipalPointSwapped,
     /// Intrinsics are of images of another size.
+    #[strum(
+        message = "{camera}: {K}: intrinsics are of images of another size; multiply fx, fy, cx and cy by {times}"
+    )]
     CameraOfOtherSize,
     /// Depth is off by a factor.
+    #[strum(
+        message = "{camera}: {depth_scale}: depth is in another unit; multiply {depth_scale} by {times}"
+    )]
     DepthScale,
     /// Translations of poses are wrong.
+    #[strum(
+        message = "{poses}: {t}: translations are wrong while rotations fit; check their unit, and that they are of the model's origin in the camera frame"
+    )]
     Translation,
     /// The model is too small or too large.
+    #[strum(message = "{mesh}: the model is too {size}; multiply its vertices by {times}")]
     ModelScale,
     /// Focal lengths are wrong.
+    #[strum(
+        message = "{camera}: {K}: the focal length is too {focal}; multiply fx and fy by {times}"
+    )]
     FocalLength,
 }
 
@@ -141,83 +189,26 @@ impl Correction {
 
     /// Message: the mistake with file and field, and what to do about it.
     pub(super) fn message(self, names: &FieldNames, factor: f64) -> String {
-        let FieldNames {
-            poses,
-            rotation: r,
-            translation: t,
-            mesh,
-            camera,
-            intrinsics,
-            depth_scale,
-            masks,
-        } = names;
-        let times = digits(factor);
-        match self {
-            Self::PoseUnit => {
-                format!("{poses}: {t}: translations are in another unit; multiply {t} by {times}")
-            }
-            Self::ModelUnit => {
-                format!("{mesh}: the mesh is in another unit; multiply its vertices by {times}")
-            }
-            Self::ModelAndPoseUnit => format!(
-                "{mesh} and {poses}: {t}: mesh and translations are both in another unit; multiply vertices and {t} by {times}"
-            ),
-            Self::DepthUnit | Self::DepthScale => {
-                format!(
-                    "{camera}: {depth_scale}: depth is in another unit; multiply {depth_scale} by {times}"
-                )
-            }
-            Self::PoseInverted => format!(
-                "{poses}: {r} and {t}: poses are inverted (camera in the object's frame, inverted extrinsics); invert them: R ← Rᵀ, t ← −Rᵀt"
-            ),
-            Self::PoseInvertedOpenGl => format!(
-                "{poses}: {r} and {t}: poses are inverted, of a camera with axes of OpenGL in the object's frame; invert them (R ← Rᵀ, t ← −Rᵀt), then negate the second and third row of R and of t"
-            ),
-            Self::RotationTransposed => {
-                format!("{poses}: {r}: rotations are transposed; write R row by row, R ← Rᵀ")
-            }
-            Self::QuaternionXyzw => format!(
-                "{poses}: {r}: quaternions are in the other order: (x, y, z, w) was taken for (w, x, y, z) where {r} was made; convert them again"
-            ),
-            Self::QuaternionWxyz => format!(
-                "{poses}: {r}: quaternions are in the other order: (w, x, y, z) was taken for (x, y, z, w) where {r} was made; convert them again"
-            ),
-            Self::OpenGlAxes => format!(
-                "{poses}: {r} and {t}: the camera has the axes of OpenGL (y up, z back), not of OpenCV; negate the second and third row of R and of t"
-            ),
-            Self::OpenGlRotation => format!(
-                "{poses}: {r}: the camera has the axes of OpenGL (y up, z back), not of OpenCV; negate the second and third row of R"
-            ),
-            Self::MaskInverted => {
-                format!(
-                    "{masks}: masks are inverted; make pixels of the object non-zero and all others zero"
-                )
-            }
-            Self::PrincipalPointSwapped => format!(
-                "{camera}: {intrinsics}: cx and cy are swapped; exchange them (cx is entry 2 and cy entry 5, counted from 0)"
-            ),
-            Self::CameraOfOtherSize => format!(
-                "{camera}: {intrinsics}: intrinsics are of images of another size; multiply fx, fy, cx and cy by {times}"
-            ),
-            Self::Translation => format!(
-                "{poses}: {t}: translations are wrong while rotations fit; check their unit, and that they are of the model's origin in the camera frame"
-            ),
-            Self::ModelScale => {
-                format!(
-                    "{mesh}: the model is too {}; multiply its vertices by {times}",
-                    size(factor)
-                )
-            }
-            Self::FocalLength => format!(
-                "{camera}: {intrinsics}: the focal length is too {}; multiply fx and fy by {times}",
-                if factor > 1.0 { "short" } else { "long" }
-            ),
-        }
+        let (size, focal) = if factor > 1.0 { ("small", "short") } else { ("large", "long") };
+        let words: [(&str, &str); 11] = [
+            ("{times}", &digits(factor)),
+            ("{size}", size),
+            ("{focal}", focal),
+            ("{R}", names.rotation),
+            ("{t}", names.translation),
+            ("{K}", names.intrinsics),
+            ("{depth_scale}", names.depth_scale),
+            ("{poses}", &names.poses),
+            ("{mesh}", &names.mesh),
+            ("{camera}", &names.camera),
+            ("{masks}", &names.masks),
+        ];
+        words
+            .iter()
+            .fold(self.get_message().unwrap_or_default().to_owned(), |text, (name, word)| {
+                text.replace(name, word)
+            })
     }
-}
-
-fn size(factor: f64) -> &'static str {
-    if factor > 1.0 { "small" } else { "large" }
 }
 
 /// A factor with three digits.

@@ -5,7 +5,6 @@
 //! of a list is applied and judged alike; the best one is told if it gains clearly on average over the frames. The scale of models and the focal length, of
 //! which a few percent matter, are unknowns of the same fit.
 
-mod agreement;
 mod alignment;
 mod evidence;
 mod finding;

@@ -2,10 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Matrix6x2, Vector2};
 use prehend_autodiff::Quadratic;
-use prehend_render::DepthImage;
 use rayon::prelude::*;
 
-use super::agreement::{agreement, hand_share};
 use super::alignment::{Aligned, PoseFit};
 use super::evidence::FrameImages;
 use super::inputs::Inputs;
@@ -65,7 +63,8 @@ impl CorrectionTrial {
             // The hand is seen by another camera elsewhere.
             let own =
                 (inputs.camera != given.camera).then(|| evidence.hand_drawn(inputs)).flatten();
-            fit(&evidence, own.as_ref().or(hand_drawn.as_ref()), inputs, sized, settings)
+            let hand = own.as_ref().or(hand_drawn.as_ref());
+            PoseFit { evidence: &evidence, hand }.fit(inputs, sized)
         };
         let agreement = fit(&given, false).map_or(0.0, |(agreement, _)| agreement);
         let sized = fit(&given, true);
@@ -75,7 +74,7 @@ impl CorrectionTrial {
             let size = Size::of(&aligned, &given)?;
             let focal = given.corrected(Correction::FocalLength, size.scale.exp());
             let share =
-                |inputs: &Inputs| hand_share(&evidence, inputs, &evidence.hand_drawn(inputs)?);
+                |inputs: &Inputs| evidence.hand_share(inputs, &evidence.hand_drawn(inputs)?);
             let gain = share(&focal).zip(share(&given)).map(|(focal, given)| focal - given);
             Some(Size { hand_gain: gain, ..size })
         });
@@ -111,23 +110,10 @@ pub(in crate::check) fn settled_pose(
 ) -> Option<Isometry3<f64>> {
     let evidence = FrameImages::new(observation, object, t_cam_object, settings).ok()?;
     let hand = evidence.hand_drawn(&evidence.given);
-    let (agreement, aligned) = fit(&evidence, hand.as_ref(), &evidence.given, false, settings)?;
+    let fit = PoseFit { evidence: &evidence, hand: hand.as_ref() };
+    let (agreement, aligned) = fit.fit(&evidence.given, false)?;
     let Inputs { meters, t_cam_object, .. } = aligned.inputs;
     (agreement >= settings.fair && meters == 1.0).then_some(t_cam_object)
-}
-
-/// Inputs with the object moved to where mask and depth have it, and their agreement with the frame there times the plausibility of the move, 0 to 1.
-fn fit(
-    evidence: &FrameImages<'_>,
-    hand: Option<&DepthImage>,
-    inputs: &Inputs,
-    sized: bool,
-    settings: &CorrectionSettings,
-) -> Option<(f64, Aligned)> {
-    let pose_fit = PoseFit { evidence, settings, hand };
-    let aligned = pose_fit.align(inputs, sized)?;
-    let plausible = pose_fit.plausibility(inputs, &aligned.inputs.t_cam_object);
-    Some((plausible * agreement(evidence, &aligned.inputs, hand, settings), aligned))
 }
 
 impl Size {

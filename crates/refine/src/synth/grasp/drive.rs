@@ -31,15 +31,6 @@ const MIN_LEVER: f64 = 5e-3;
 /// Contacts that push with a smaller part of the grip say nothing of where it will act.
 const FELT: f64 = 0.05;
 
-/// Drive of a hand for the moment.
-#[derive(Clone, Debug)]
-pub(super) struct Effort {
-    /// Factors on the speeds.
-    pub(super) pace: Vec<f64>,
-    /// Force at which fingers stop, at the mean lever \[N\].
-    pub(super) grip: f64,
-}
-
 impl<'a> Drive<'a> {
     pub(super) fn new(robot: &'a Hand, preshape: &Preshape, settings: &GraspSettings) -> Self {
         let tree = &robot.tree;
@@ -80,13 +71,13 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// By how much the joints move in the next step.
+    /// Change of the joint positions in the next step, with these factors on their speeds (`pace`) and `grip`, the force at which fingers stop at the mean lever \[N\].
     ///
     /// A joint advances at its speed where nothing resists, and stops where the contacts on all that it moves push against
     /// it with the grip; beyond `yield_ratio` times that it gives way; between the two it keeps still, as a geared motor
     /// does. The step is implicit in the stiffness of the contacts: (D + dt K) q̇ = τ_limit − τ, D = τ_limit/speed, where
     /// τ_limit is the torque that the same contacts would exert if they pushed with the grip.
-    pub(super) fn change(&self, simulation: &Simulation<'_>, effort: &Effort) -> Vec<f64> {
+    pub(super) fn change(&self, simulation: &Simulation<'_>, pace: &[f64], grip: f64) -> Vec<f64> {
         let count = self.speed.len();
         let screws = self.robot.tree.screws(simulation.poses());
         // Torques against closing, and the forces that make them.
@@ -107,8 +98,8 @@ impl<'a> Drive<'a> {
         }
         let limit = |v: usize| {
             let lever = resisting[v] / pressing[v];
-            let known = pressing[v] > FELT * effort.grip && lever > MIN_LEVER;
-            effort.grip * if known { lever } else { self.lever[v] }
+            let known = pressing[v] > FELT * grip && lever > MIN_LEVER;
+            grip * if known { lever } else { self.lever[v] }
         };
         let error = |v: usize| {
             let (limit, resisting) = (limit(v), resisting[v]);
@@ -122,7 +113,7 @@ impl<'a> Drive<'a> {
             .filter(|&v| self.speed[v] != 0.0 && error(v) != 0.0)
             .filter(|&v| self.has_room(v, simulation.joints()[v], error(v)))
             .collect();
-        let fastest = |v: usize| self.speed[v].abs() * effort.pace[v];
+        let fastest = |v: usize| self.speed[v].abs() * pace[v];
         let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| {
             let (a, b) = (active[i], active[j]);
             let own = if i == j { limit(a) / fastest(a) } else { 0.0 };

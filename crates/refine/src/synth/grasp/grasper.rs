@@ -8,12 +8,12 @@ use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
 use prehend_sim::contact::LawError;
 use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, RigidBody};
 
-use super::drive::{Drive, Effort};
-use super::fault::{GraspError, GraspFault};
+use super::drive::Drive;
+use super::error::GraspError;
 use super::placement::Placement;
 use super::preshape::Preshape;
 use super::settings::GraspSettings;
-use super::simulation::{Medium, Setup, Simulation};
+use super::simulation::{Setup, Simulation};
 use super::skin::Skin;
 use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
@@ -69,16 +69,14 @@ impl<'a> Grasper<'a> {
     /// Prepares grasps of `object` by `robot`.
     ///
     /// # Errors
-    /// If a setting is out of its range, the pre-shape is not the robot's, nothing closes, a taxel is on no link, or the
-    /// object cannot be simulated.
+    /// If a setting is out of its range, nothing closes, a taxel is on no link, or the object cannot be simulated.
     pub fn new(
         robot: &'a Hand,
         object: &Object,
         settings: &GraspSettings,
     ) -> Result<Self, GraspError> {
         settings.check()?;
-        let preshape = settings.preshape.clone().map_or_else(|| Preshape::of(robot), Ok)?;
-        preshape.check(robot.tree.joint_names().len())?;
+        let preshape = Preshape::of(robot)?;
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);
         let body = body.map_err(|reason| GraspError::Object(object.name.clone(), reason))?;
@@ -110,20 +108,19 @@ impl<'a> Grasper<'a> {
     ///
     /// # Errors
     /// The reason that there is none.
-    pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
+    pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspError> {
         let mut random = SplitMix64::new(seed);
         let (robot, settings) = (self.setup.robot, &self.settings);
         let (joints, t_hand_object) =
             self.placement.draw(robot, &self.preshape, settings, &mut random)?;
         let weight = self.setup.body.mass() * settings.gravity;
         let mut pace = |_: &f64| 1.0 + settings.speed_spread * (2.0 * random.uniform() - 1.0);
-        let pace = self.preshape.speed.iter().map(&mut pace).collect();
+        let pace: Vec<f64> = self.preshape.speed.iter().map(&mut pace).collect();
         let grip = settings.grip + settings.grip_per_weight * weight;
-        let effort = Effort { pace, grip };
         let mut simulation = Simulation::new(&self.setup, &joints, &t_hand_object)?;
-        self.close(&mut simulation, &effort)?;
+        self.close(&mut simulation, &pace, grip)?;
         self.check_links(&simulation)?;
-        let (drift, turn) = self.hold(&mut simulation, &effort, &mut random)?;
+        let (drift, turn) = self.hold(&mut simulation, &pace, grip, &mut random)?;
         self.check_rest(&simulation, 1.0)?;
         let links = self.check_links(&simulation)?;
         let (joints, t_hand_object) = (simulation.joints().to_vec(), simulation.t_hand_object());
@@ -144,13 +141,13 @@ impl<'a> Grasper<'a> {
     /// [`trajectory`](Self::trajectory).
     ///
     /// # Errors
-    /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
+    /// [`GraspError::NoGrasp`] if none of `tries` seeds leads to one.
     pub fn sequence(
         &self,
         first_seed: u64,
         tries: u64,
         steps: usize,
-    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
+    ) -> Result<Vec<GraspSnapshot>, GraspError> {
         self.first_that_holds(first_seed, tries, |grasp, seed| self.trajectory(grasp, seed, steps))
     }
 
@@ -159,27 +156,32 @@ impl<'a> Grasper<'a> {
         &self,
         first_seed: u64,
         tries: u64,
-        moments: impl Fn(&Grasp, u64) -> Result<Vec<GraspSnapshot>, GraspFault>,
-    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
-        let mut last = GraspFault::NoContact(0);
-        for k in 0..tries {
-            let seed = first_seed.wrapping_add(k);
+        moments: impl Fn(&Grasp, u64) -> Result<Vec<GraspSnapshot>, GraspError>,
+    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+        let mut last = None;
+        for seed in (0..tries).map(|k| first_seed.wrapping_add(k)) {
             match self.grasp(seed).and_then(|grasp| moments(&grasp, seed)) {
                 Ok(moments) => return Ok(moments),
-                Err(fault) => last = fault,
+                Err(error) => last = Some(error),
             }
         }
-        Err(GraspFault::Exhausted(tries, Box::new(last)))
+        let last = last.map_or_else(String::new, |error| format!("; the last: {error}"));
+        Err(GraspError::NoGrasp(format!("no grasp after {tries} tries{last}")))
     }
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
     /// creeping, and whether the object is held will be seen.
-    fn close(&self, simulation: &mut Simulation<'_>, effort: &Effort) -> Result<(), GraspFault> {
+    fn close(
+        &self,
+        simulation: &mut Simulation<'_>,
+        pace: &[f64],
+        grip: f64,
+    ) -> Result<(), GraspError> {
         let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
         let mut still = 0;
         for _ in 0..steps(self.settings.closing_time) {
-            let change = self.drive.change(simulation, effort);
-            simulation.advance(&change, Medium::Viscous)?;
+            let change = self.drive.change(simulation, pace, grip);
+            simulation.advance(&change, None)?;
             let (speed, spin) = simulation.speed();
             let rests =
                 self.drive.is_at_rest(&change, STILL.0) && speed < STILL.1 && spin < STILL.2;
@@ -192,27 +194,29 @@ impl<'a> Grasper<'a> {
     }
 
     /// Refuses an object that moves faster than this many times what counts as still.
-    fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspFault> {
+    fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspError> {
         let (speed, spin) = simulation.speed();
         let rests = speed < times * STILL.1 && spin < times * STILL.2;
-        if rests { Ok(()) } else { Err(GraspFault::Restless) }
+        let error = "hand and object did not come to rest";
+        if rests { Ok(()) } else { Err(GraspError::NoGrasp(error.into())) }
     }
 
     /// Lets gravity pull in several directions; how far the object moves and turns at most.
     fn hold(
         &self,
         simulation: &mut Simulation<'_>,
-        effort: &Effort,
+        pace: &[f64],
+        grip: f64,
         random: &mut SplitMix64,
-    ) -> Result<(f64, f64), GraspFault> {
+    ) -> Result<(f64, f64), GraspError> {
         let start = simulation.t_hand_object();
         let (mut drift, mut turn) = (0.0, 0.0);
         for _ in 0..self.settings.hold_directions {
             let gravity = random_direction(random) * self.settings.gravity;
             let steps = (self.settings.hold_time / self.settings.time_step).ceil() as usize;
             for _ in 0..steps {
-                let change = self.drive.change(simulation, effort);
-                simulation.advance(&change, Medium::Gravity(gravity))?;
+                let change = self.drive.change(simulation, pace, grip);
+                simulation.advance(&change, Some(gravity))?;
                 let (distance, angle) = self.moved(&start, &simulation.t_hand_object())?;
                 drift = distance.max(drift);
                 turn = angle.max(turn);
@@ -226,23 +230,27 @@ impl<'a> Grasper<'a> {
         &self,
         from: &Isometry3<f64>,
         to: &Isometry3<f64>,
-    ) -> Result<(f64, f64), GraspFault> {
+    ) -> Result<(f64, f64), GraspError> {
         let center: Point3<f64> = *self.setup.body.com();
         let (distance, angle) =
             ((to * center - from * center).norm(), from.rotation.angle_to(&to.rotation));
         let stays = distance <= self.settings.slip_distance && angle <= self.settings.slip_angle;
-        if stays { Ok((distance, angle)) } else { Err(GraspFault::Slipped { distance, angle }) }
+        if stays {
+            return Ok((distance, angle));
+        }
+        let (distance, angle) = (distance * 1e3, angle.to_degrees());
+        Err(GraspError::NoGrasp(format!("the object slipped by {distance:.1} mm and {angle:.1}°")))
     }
 
     /// Links that touch, if they are enough.
-    fn check_links(&self, simulation: &Simulation<'_>) -> Result<Vec<usize>, GraspFault> {
+    fn check_links(&self, simulation: &Simulation<'_>) -> Result<Vec<usize>, GraspError> {
         let mut forces = vec![0.0; simulation.poses().len()];
         for touch in simulation.touches() {
             forces[touch.link] += touch.force.norm();
         }
         let links: Vec<usize> = (0..forces.len()).filter(|&l| forces[l] > TOUCHING).collect();
         if links.len() < self.settings.links {
-            return Err(GraspFault::NoContact(links.len()));
+            return Err(GraspError::NoGrasp(format!("{} links touch the object", links.len())));
         }
         Ok(links)
     }
@@ -252,18 +260,19 @@ impl<'a> Grasper<'a> {
         &self,
         joints: &[f64],
         t_hand_object: &Isometry3<f64>,
-    ) -> Result<(f64, f64), GraspFault> {
+    ) -> Result<(f64, f64), GraspError> {
         let hand = self.setup.robot.posed(&Isometry3::identity(), joints)?;
         let hand = SolidUnion::new(&hand.mesh_parts())?;
         let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
         if volume > self.settings.intersection_volume {
-            return Err(GraspFault::TooDeep(volume));
+            let error = format!("hand and object share {volume:.2} cm³");
+            return Err(GraspError::NoGrasp(error));
         }
         let surface = ClosestPoints::new(&hand.mesh())?;
         let area = self.contact.contact_area_cm2(t_hand_object, &surface);
         let (least, most) = self.settings.contact_area;
         if !(least..=most).contains(&area) {
-            return Err(GraspFault::ContactArea(area));
+            return Err(GraspError::NoGrasp(format!("the contact area is {area:.1} cm²")));
         }
         Ok((area, volume))
     }

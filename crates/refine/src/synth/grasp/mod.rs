@@ -5,7 +5,7 @@
 //! is a rigid body that touches their distance fields by penalty contacts with friction.
 
 mod drive;
-mod fault;
+mod error;
 mod film;
 mod grasper;
 mod placement;
@@ -18,9 +18,8 @@ mod skin;
 mod tests;
 mod trajectory;
 
-pub use fault::{GraspError, GraspFault};
+pub use error::GraspError;
 pub use grasper::{Grasp, Grasper};
-pub use preshape::Preshape;
 pub use settings::GraspSettings;
 pub use trajectory::GraspSnapshot;
 pub(super) use trajectory::Waves;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_geometry::robot::{PosedRobot, RobotError};
+use prehend_geometry::robot::PosedRobot;
 
-use super::fault::GraspFault;
+use super::error::GraspError;
 use super::preshape::Preshape;
 use super::settings::GraspSettings;
 use crate::scene::{Hand, Object};
@@ -59,67 +59,58 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspFault> {
+    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspError> {
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
-            let (joints, t_hand_object) = self.draw_one(robot, preshape, settings, random)?;
+            let both_ways = |random: &mut SplitMix64| 2.0 * random.uniform() - 1.0;
+            let open = preshape.open.iter().zip(&preshape.spread);
+            let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
+            let joints = robot.tree.clamp_joints(&open)?;
+            let aligned = random.uniform() < settings.aligned;
+            let t_palm_axes = if aligned {
+                let quarter = std::f64::consts::FRAC_PI_2;
+                let roll = quarter * (4.0 * random.uniform()).floor();
+                let flip = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+                let long = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), flip * quarter);
+                let tilt = Vector3::from_fn(|_, _| settings.tilt * random.normal());
+                UnitQuaternion::from_scaled_axis(tilt)
+                    * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll)
+                    * long
+            } else {
+                let four = nalgebra::Vector4::from_fn(|_, _| random.normal());
+                UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(four))
+            };
+            let t_palm_object = t_palm_axes * self.axes.inverse();
+            // Where along a long object it is held.
+            let slide = 0.6 * both_ways(random) * (self.half_length - 0.04).max(0.0);
+            let long = t_palm_axes * Vector3::x();
+            let across = Vector3::new(random.normal(), random.normal(), 0.0) * settings.offset;
+            let clearance = settings.clearance * random.uniform().powi(2) + 1e-3;
+            let at = |height: f64| {
+                let middle = long * slide + across;
+                let middle = Vector3::new(middle.x, middle.y, height);
+                let shift = middle - t_palm_object * self.center.coords;
+                preshape.t_hand_palm
+                    * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
+            };
+            let hand = robot.posed(&Isometry3::identity(), &joints)?;
+            let mut height = FAR;
+            // No point comes nearer by more than the object moves.
+            for _ in 0..MOST_ADVANCES {
+                let room = self.distance(&hand, &at(height)) - clearance;
+                if room < 2e-4 || height < -FAR {
+                    break;
+                }
+                height -= room;
+            }
+            let t_hand_object = at(height);
             let gap = |p: &Point3<f64>| (t_hand_object * p - palm).norm();
             let gap = self.probes.iter().map(gap).fold(f64::INFINITY, f64::min);
             if gap < settings.clearance + NEAR_PALM {
                 return Ok((joints, t_hand_object));
             }
         }
-        Err(GraspFault::NoRoom)
-    }
-
-    fn draw_one(
-        &self,
-        robot: &Hand,
-        preshape: &Preshape,
-        settings: &GraspSettings,
-        random: &mut SplitMix64,
-    ) -> Result<(Vec<f64>, Isometry3<f64>), RobotError> {
-        let both_ways = |random: &mut SplitMix64| 2.0 * random.uniform() - 1.0;
-        let open = preshape.open.iter().zip(&preshape.spread);
-        let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
-        let joints = robot.tree.clamp_joints(&open)?;
-        let aligned = random.uniform() < settings.aligned;
-        let t_palm_axes = if aligned {
-            let quarter = std::f64::consts::FRAC_PI_2;
-            let roll = quarter * (4.0 * random.uniform()).floor();
-            let flip = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
-            let long = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), flip * quarter);
-            let tilt = Vector3::from_fn(|_, _| settings.tilt * random.normal());
-            UnitQuaternion::from_scaled_axis(tilt)
-                * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll)
-                * long
-        } else {
-            let four = nalgebra::Vector4::from_fn(|_, _| random.normal());
-            UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(four))
-        };
-        let t_palm_object = t_palm_axes * self.axes.inverse();
-        // Where along a long object it is held.
-        let slide = 0.6 * both_ways(random) * (self.half_length - 0.04).max(0.0);
-        let long = t_palm_axes * Vector3::x();
-        let across = Vector3::new(random.normal(), random.normal(), 0.0) * settings.offset;
-        let clearance = settings.clearance * random.uniform().powi(2) + 1e-3;
-        let at = |height: f64| {
-            let middle = long * slide + across;
-            let middle = Vector3::new(middle.x, middle.y, height);
-            let shift = middle - t_palm_object * self.center.coords;
-            preshape.t_hand_palm * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
-        };
-        let hand = robot.posed(&Isometry3::identity(), &joints)?;
-        let mut height = FAR;
-        // No point comes nearer by more than the object moves.
-        for _ in 0..MOST_ADVANCES {
-            let room = self.distance(&hand, &at(height)) - clearance;
-            if room < 2e-4 || height < -FAR {
-                break;
-            }
-            height -= room;
-        }
-        Ok((joints, at(height)))
+        Err(GraspError::NoGrasp("the fingers keep the object from the palm".into()))
     }
 
     fn distance(&self, hand: &PosedRobot, t_hand_object: &Isometry3<f64>) -> f64 {

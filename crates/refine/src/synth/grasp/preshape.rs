@@ -4,21 +4,21 @@ use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::JOINT_NAMES;
 use prehend_geometry::robot::KinematicTree as Tree;
 
-use super::fault::GraspError;
+use super::error::GraspError;
 use super::self_collision::ball;
 use crate::scene::Hand;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Preshape {
+pub(super) struct Preshape {
     /// Positions before closing \[rad or m\].
-    pub open: Vec<f64>,
+    pub(super) open: Vec<f64>,
     /// By how much these are varied, uniformly and both ways \[rad or m\].
-    pub spread: Vec<f64>,
+    pub(super) spread: Vec<f64>,
     /// Speeds of closing with their sign \[rad/s or m/s\]; zero for joints that keep still.
-    pub speed: Vec<f64>,
+    pub(super) speed: Vec<f64>,
     /// The palm's frame: origin on the palm where objects should be, z out of it, y the axis about which fingers wrap.
-    pub t_hand_palm: Isometry3<f64>,
+    pub(super) t_hand_palm: Isometry3<f64>,
 }
 
 /// Speeds of the fastest joints of a hand without a pre-shape of its own.
@@ -32,7 +32,7 @@ impl Preshape {
     ///
     /// # Errors
     /// As [`Preshape::guess`].
-    pub fn of(robot: &Hand) -> Result<Self, GraspError> {
+    pub(super) fn of(robot: &Hand) -> Result<Self, GraspError> {
         Self::built_in(&robot.tree).map_or_else(|| Self::guess(robot), Ok)
     }
 
@@ -62,7 +62,7 @@ impl Preshape {
     ///
     /// # Errors
     /// [`GraspError::NoFingers`] if no joint does so.
-    pub fn guess(robot: &Hand) -> Result<Self, GraspError> {
+    pub(super) fn guess(robot: &Hand) -> Result<Self, GraspError> {
         let tree = &robot.tree;
         let limits = tree.joint_limits();
         let bounded = |&(lower, upper): &(f64, f64)| lower.is_finite() && upper.is_finite();
@@ -154,21 +154,6 @@ impl Preshape {
             speed,
             t_hand_palm: frame(&origin, &out, &axis),
         })
-    }
-
-    pub(super) fn check(&self, joints: usize) -> Result<(), GraspError> {
-        let counts =
-            [("open positions", &self.open), ("spreads", &self.spread), ("speeds", &self.speed)];
-        for (what, list) in counts {
-            let found = list.len();
-            if found != joints || list.iter().any(|v| !v.is_finite()) {
-                return Err(GraspError::Setting(format!(
-                    "the pre-shape has {found} {what} for a robot with {joints} joints, or one is not finite"
-                )));
-            }
-        }
-        let moves = self.speed.iter().any(|s| *s != 0.0);
-        if moves { Ok(()) } else { Err(GraspError::NoFingers) }
     }
 }
 

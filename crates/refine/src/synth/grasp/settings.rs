@@ -2,17 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fault::GraspError;
-use super::preshape::Preshape;
+use super::error::GraspError;
 use crate::synth::settings::{numbers, preset};
 
 /// Settings of a [`Grasper`](super::Grasper). The defaults suit a hand of human size and household objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GraspSettings {
-    /// The open hand and its speeds of closing; [`Preshape::of`] the robot if absent.
-    #[serde(skip)]
-    pub preshape: Option<Preshape>,
     /// Stiffness of contacts per area \[N/m³\]: total normal force over the volume that hand and object share.
     pub stiffness: f64,
     /// Coefficient of friction; skins of rubber have 0.7 to 1.

@@ -53,15 +53,6 @@ pub(super) struct Touch {
     pub(super) stiffness: f64,
 }
 
-/// Surroundings of the object while the simulation advances.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Medium {
-    /// It floats and loses its speed.
-    Viscous,
-    /// Gravity, hand frame \[m/s²\].
-    Gravity(Vector3<f64>),
-}
-
 /// One hand and one object, at one moment.
 pub(super) struct Simulation<'a> {
     setup: &'a Setup<'a>,
@@ -141,11 +132,11 @@ impl<'a> Simulation<'a> {
         (linear.norm(), angular.norm())
     }
 
-    /// One time step, during which the joints move by `change`.
+    /// One time step, during which the joints move by `change`, under `gravity` (hand frame \[m/s²\]); without, the object floats and loses its speed.
     pub(super) fn advance(
         &mut self,
         change: &[f64],
-        medium: Medium,
+        gravity: Option<Vector3<f64>>,
     ) -> Result<(), SimulationError> {
         let dt = self.setup.time_step;
         self.joints.iter_mut().zip(change).for_each(|(q, d)| *q += d);
@@ -162,16 +153,13 @@ impl<'a> Simulation<'a> {
         self.poses = poses;
         let state = self.states[self.object];
         let mut load = Vector6::zeros();
-        self.world.gravity = Vector3::zeros();
-        match medium {
-            Medium::Gravity(gravity) => self.world.gravity = gravity,
-            Medium::Viscous => {
-                let rate = 1.0 / (self.setup.damping_time + dt);
-                let inertia = self.setup.body.world_inertia(&state.pose.rotation);
-                load.fixed_rows_mut::<3>(0)
-                    .copy_from(&(state.linear * (-rate * self.setup.body.mass())));
-                load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
-            }
+        self.world.gravity = gravity.unwrap_or_default();
+        if gravity.is_none() {
+            let rate = 1.0 / (self.setup.damping_time + dt);
+            let inertia = self.setup.body.world_inertia(&state.pose.rotation);
+            let drag = state.linear * (-rate * self.setup.body.mass());
+            load.fixed_rows_mut::<3>(0).copy_from(&drag);
+            load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
         }
         self.world.bodies[self.object].external_wrench = load;
         self.update_broad_phase()?;
@@ -200,7 +188,6 @@ impl<'a> Simulation<'a> {
         done
     }
 
-    /// Replaces the law of all contacts.
     fn set_friction_law(&mut self, law: &Arc<dyn DynContactLaw>) {
         self.world.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(law)));
     }

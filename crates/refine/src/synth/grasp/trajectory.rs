@@ -3,10 +3,9 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use super::drive::Effort;
-use super::fault::GraspFault;
+use super::error::GraspError;
 use super::grasper::{Grasp, Grasper};
-use super::simulation::{Medium, Simulation};
+use super::simulation::Simulation;
 use crate::synth::pose_noise::random_direction;
 
 /// One moment of an object held in a hand, as it truly is.
@@ -44,13 +43,13 @@ impl Grasper<'_> {
     /// grasp and seed.
     ///
     /// # Errors
-    /// [`GraspFault::Slipped`] if the object does not stay in the hand; faults of the simulation.
+    /// [`GraspError::NoGrasp`] if the object does not stay in the hand; faults of the simulation.
     pub fn trajectory(
         &self,
         grasp: &Grasp,
         seed: u64,
         steps: usize,
-    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
+    ) -> Result<Vec<GraspSnapshot>, GraspError> {
         let mut random = SplitMix64::new(seed);
         let down = random_direction(&mut random) * self.settings.gravity;
         self.moments(grasp, &mut random, steps, &UnitQuaternion::identity(), &down)
@@ -64,7 +63,7 @@ impl Grasper<'_> {
         steps: usize,
         turn: &UnitQuaternion<f64>,
         down: &Vector3<f64>,
-    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
+    ) -> Result<Vec<GraspSnapshot>, GraspError> {
         let settings = &self.settings;
         let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(random));
         let squeezing = Waves::new(random);
@@ -86,8 +85,8 @@ impl Grasper<'_> {
                 step >= settling && slips.at(moments.len(), &simulation, settings.time_step);
             let grip = grasp.grip * (1.0 + settings.squeeze * wave.max(0.0));
             let grip = if slipping { LOOSE * grip } else { grip };
-            let change = self.drive.change(&simulation, &Effort { pace: pace.clone(), grip });
-            simulation.advance(&change, Medium::Gravity(gravity))?;
+            let change = self.drive.change(&simulation, &pace, grip);
+            simulation.advance(&change, Some(gravity))?;
             if step < settling {
                 continue;
             }

@@ -50,35 +50,20 @@ fn blurred(image: &RgbImage, sigma: f64) -> RgbImage {
     let total = bell(0) + 2.0 * (1..=reach).map(bell).sum::<f64>();
     let weights: Vec<f32> = (0..=reach).map(|d| (bell(d) / total) as f32).collect();
     let (width, height) = (image.width(), image.height());
-    let mut across = RgbImage::filled(width, height, [0.0; 3]);
-    for (target, row) in
-        across.pixels_mut().chunks_mut(width.max(1)).zip(image.pixels().chunks(width.max(1)))
-    {
-        for (x, value) in target.iter_mut().enumerate() {
-            *value = mean(&weights, |d, far| row[shift(x, d, far, width)]);
+    // First across, then down: places along a line of that many pixels, `stride` apart.
+    [(1, width), (width, height)].into_iter().fold(image.clone(), |image, (stride, length)| {
+        let mut soft = RgbImage::filled(width, height, [0.0; 3]);
+        for (i, value) in soft.pixels_mut().iter_mut().enumerate() {
+            let at = i / stride % length;
+            let pixel = |place: usize| image.pixels()[i - at * stride + place * stride];
+            *value = pixel(at).map(|v| v * weights[0]);
+            for (d, weight) in weights.iter().enumerate().skip(1) {
+                let (ahead, back) = (pixel((at + d).min(length - 1)), pixel(at.saturating_sub(d)));
+                (0..3).for_each(|c| value[c] += weight * (ahead[c] + back[c]));
+            }
         }
-    }
-    let mut down = RgbImage::filled(width, height, [0.0; 3]);
-    for (y, target) in down.pixels_mut().chunks_mut(width.max(1)).enumerate() {
-        for (x, value) in target.iter_mut().enumerate() {
-            *value = mean(&weights, |d, far| across.pixels()[shift(y, d, far, height) * width + x]);
-        }
-    }
-    down
-}
-
-/// `at` moved by `d` forwards (`far`) or backwards, within 0..size.
-fn shift(at: usize, d: usize, far: bool, size: usize) -> usize {
-    if far { (at + d).min(size - 1) } else { at.saturating_sub(d) }
-}
-
-fn mean(weights: &[f32], pixel: impl Fn(usize, bool) -> [f32; 3]) -> [f32; 3] {
-    let mut sum = pixel(0, true).map(|v| v * weights[0]);
-    for (d, weight) in weights.iter().enumerate().skip(1) {
-        let (ahead, back) = (pixel(d, true), pixel(d, false));
-        (0..3).for_each(|c| sum[c] += weight * (ahead[c] + back[c]));
-    }
-    sum
+        soft
+    })
 }
 
 #[cfg(test)]

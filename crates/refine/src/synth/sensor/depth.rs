@@ -10,11 +10,8 @@ impl DepthSettings {
     /// Errors that stay the same through a grasp.
     pub(super) fn bias(&self, camera: &Camera, noise: &mut SplitMix64) -> DepthBias {
         let scale = (1.0 + self.scale * noise.normal()) as f32;
-        let cell = camera.width as f64 / 3.0;
-        let mut warp = match self.warp > 0.0 {
-            true => smooth_field(camera.width, camera.height, cell, noise),
-            false => vec![0.0; camera.width * camera.height],
-        };
+        let (size, cell) = ((camera.width, camera.height), camera.width as f64 / 3.0);
+        let mut warp = field(self.warp, size, cell, noise);
         warp.iter_mut().for_each(|v| *v *= self.warp as f32);
         DepthBias { scale, warp }
     }
@@ -50,11 +47,8 @@ impl DepthSettings {
         biased: impl Fn(usize, f32) -> f32,
         noise: &mut SplitMix64,
     ) {
-        let (width, height) = (depth.width(), depth.height());
-        let correlated = match self.correlated_noise > 0.0 {
-            true => smooth_field(width, height, self.correlation, noise),
-            false => vec![0.0; width * height],
-        };
+        let size = (depth.width(), depth.height());
+        let correlated = field(self.correlated_noise, size, self.correlation, noise);
         let near = |fault: f64, z: f32| fault as f32 * (z / 0.5) * (z / 0.5);
         for (i, z) in depth.pixels_mut().iter_mut().enumerate().filter(|(_, z)| **z > 0.0) {
             let true_z = *z;
@@ -137,6 +131,14 @@ impl DepthSettings {
             }
         }
         lost
+    }
+}
+
+/// A [`smooth_field`]; zeros, and no number drawn, for a fault of strength zero.
+fn field(strength: f64, size: (usize, usize), cell: f64, noise: &mut SplitMix64) -> Vec<f32> {
+    match strength > 0.0 {
+        true => smooth_field(size.0, size.1, cell, noise),
+        false => vec![0.0; size.0 * size.1],
     }
 }
 

@@ -13,8 +13,9 @@ const WIDEST: f64 = 3.0;
 
 /// A camera's lens, and the pinhole camera whose images become its own.
 pub(in crate::synth) struct SimulatedLens {
-    model: Distortion,
-    is_declared: bool,
+    pub(super) model: Distortion,
+    /// True if datasets tell of the model.
+    pub(super) is_declared: bool,
     /// Sees what the lens shows, `FINE` times finer.
     pub(super) pinhole: Camera,
     /// Pinhole at the resolution of the images, for the background.
@@ -37,16 +38,6 @@ impl SimulatedLens {
         let color = Remap::distort(pinhole, camera.scaled(FINE as f64), &model);
         let centers = Remap::distort(pinhole, *camera, &model);
         Self { model, is_declared, pinhole, background, color, centers }
-    }
-
-    /// Model that the dataset states.
-    pub(super) fn declared(&self) -> Option<Distortion> {
-        self.is_declared.then_some(self.model)
-    }
-
-    /// Model that the dataset does not state.
-    pub(super) fn undeclared(&self) -> Option<Distortion> {
-        (!self.is_declared).then_some(self.model)
     }
 
     /// Images through the lens of what its pinhole sees.

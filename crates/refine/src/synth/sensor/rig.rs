@@ -103,8 +103,8 @@ impl<'a> SensorRig<'a> {
             "taxel_gains": self.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(),
             "taxel_offsets_n": self.taxels.iter().map(felt).collect::<Vec<_>>(),
         });
-        if let Some(lens) = self.lens.and_then(SimulatedLens::undeclared) {
-            faults["cam_dist"] = annotation::lens(&lens);
+        if let Some(lens) = self.lens.filter(|lens| !lens.is_declared) {
+            faults["cam_dist"] = annotation::lens(&lens.model);
         }
         faults
     }
@@ -116,8 +116,8 @@ impl<'a> SensorRig<'a> {
         moments: &[GraspSnapshot],
         noise: &mut SplitMix64,
     ) -> FilmScene {
-        let first = |moment| self.viewpoint(&self.bodies(moment), moment, noise);
-        let t_cam_hand = moments.first().map_or_else(Isometry3::identity, first);
+        let mut first = |moment: &GraspSnapshot| self.viewpoint(moment, noise);
+        let t_cam_hand = moments.first().map_or_else(Isometry3::identity, &mut first);
         FilmScene::new(settings, moments, &t_cam_hand, &self.object.center, noise)
     }
 
@@ -128,13 +128,9 @@ impl<'a> SensorRig<'a> {
         bodies
     }
 
-    fn viewpoint(
-        &self,
-        bodies: &[(&RenderModel, Isometry3<f64>)],
-        moment: &GraspSnapshot,
-        noise: &mut SplitMix64,
-    ) -> Isometry3<f64> {
-        self.settings.viewpoint.choose(&self.camera, bodies, &moment.gravity, noise)
+    fn viewpoint(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Isometry3<f64> {
+        let bodies = self.bodies(moment);
+        self.settings.viewpoint.choose(&self.camera, &bodies, &moment.gravity, noise)
     }
 
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand, from anywhere or as a frame of that number in a film.
@@ -147,24 +143,21 @@ impl<'a> SensorRig<'a> {
         film: Option<(&FilmScene, usize)>,
         noise: &mut SplitMix64,
     ) -> Result<Shot, DistortionError> {
-        let mut bodies = self.bodies(moment);
         let t_cam_hand = match film {
             Some((film, frame)) => film.t_cam_hand(frame, moment),
-            None => self.viewpoint(&bodies, moment, noise),
+            None => self.viewpoint(moment, noise),
         };
+        let mut bodies = self.bodies(moment);
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
         let gravity = t_cam_hand.rotation * moment.gravity;
-        let mut seen = match film {
-            Some((film, frame)) => {
-                let mut paints = Vec::new();
-                for (model, pose, paint) in film.passing(frame) {
-                    bodies.push((model, pose));
-                    paints.push(paint);
-                }
-                self.render(&bodies, &paints, &gravity, &mut film.surroundings.clone())
-            }
-            None => self.render(&bodies, &[], &gravity, noise),
-        };
+        let mut paints = Vec::new();
+        for (model, pose, paint) in film.iter().flat_map(|(film, frame)| film.passing(*frame)) {
+            bodies.push((model, pose));
+            paints.push(paint);
+        }
+        let mut still = film.map(|(film, _)| film.surroundings.clone());
+        let mut seen =
+            self.render(&bodies, &paints, &gravity, still.as_mut().unwrap_or(&mut *noise));
         if let Some(lens) = self.lens {
             seen = lens.photograph(&seen)?;
         }
@@ -173,10 +166,8 @@ impl<'a> SensorRig<'a> {
         if let Some(play) = self.settings.play.draw(&slides(self.robot), noise) {
             (t_cam_hand_told, joints) = play.apply(&t_cam_hand_told, &joints);
         }
-        let gains = match film {
-            Some((film, _)) => self.settings.color.gains(&mut film.surroundings.clone()),
-            None => self.settings.color.gains(noise),
-        };
+        let mut still = film.map(|(film, _)| film.surroundings.clone());
+        let gains = self.settings.color.gains(still.as_mut().unwrap_or(&mut *noise));
         let told = Frame {
             camera: self.errors.camera(&self.camera),
             color: self.settings.color.expose(&seen.color, gains, noise),
@@ -188,7 +179,7 @@ impl<'a> SensorRig<'a> {
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));
-        let lens = self.lens.and_then(SimulatedLens::declared);
+        let lens = self.lens.filter(|lens| lens.is_declared).map(|lens| lens.model);
         let TrueView { whole, visible, .. } = seen;
         Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }

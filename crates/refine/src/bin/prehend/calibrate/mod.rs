@@ -13,9 +13,9 @@ use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::calibration::Calibrator;
 use prehend_refine::data::Assets;
+use prehend_refine::data::CalibrationFrames;
 use prehend_refine::data::bop::{ResultRow, check_writable};
 use prehend_refine::data::identity::canonical;
-use prehend_refine::data::{CalibrationFrames, Passes};
 use prehend_refine::evaluate::report::Report;
 use prehend_refine::scene::Object;
 
@@ -82,8 +82,8 @@ impl Calibrate {
         let settings = self.settings.load()?.calibration();
         let nominal = Calibrator::new(joints.unwrap_or(0), size, objects.clone(), settings)?;
         let bar = progress(self.passes.get() * jobs.len(), "calibrating");
-        let passes = Passes::new(&frames, self.passes, self.window);
-        let done = passes.run(nominal.clone(), &mut |visits| bar.inc(visits as u64))?;
+        let progress = &mut |visits: usize| bar.inc(visits as u64);
+        let done = frames.calibrate(nominal.clone(), self.passes, self.window, progress)?;
         bar.finish_and_clear();
         let target = |index: &usize| frames.poses[*index].0;
         failures.extend(done.failed.iter().map(|(index, e)| format!("{}: {e}", target(index))));
