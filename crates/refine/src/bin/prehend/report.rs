@@ -34,11 +34,11 @@ pub(crate) fn pose_figures(
 ) -> Vec<Figure> {
     let length = |sigmas: [f64; 3]| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt();
     vec![
-        ERROR.figure(error.map(|[meters, _]| 1e3 * meters)),
-        TURN_ERROR.figure(error.map(|[_, radians]| radians.to_degrees())),
-        PROBABILITY.figure(confidence.map(|c| c.probability)),
-        SIGMA.figure(confidence.map(|c| length(c.deviation_mm))),
-        TURN_SIGMA.figure(confidence.map(|c| length(c.deviation_deg))),
+        (ERROR, error.map(|[meters, _]| 1e3 * meters)),
+        (TURN_ERROR, error.map(|[_, radians]| radians.to_degrees())),
+        (PROBABILITY, confidence.map(|c| c.probability)),
+        (SIGMA, confidence.map(|c| length(c.deviation_mm))),
+        (TURN_SIGMA, confidence.map(|c| length(c.deviation_deg))),
     ]
 }
 

@@ -39,8 +39,7 @@ pub fn write_page(
     }
     for record in records.iter().filter(|record| record.key.method != TRUTH) {
         let value = |metric: usize, factor: f64| Some(factor * record.metrics[metric]?);
-        let figure =
-            |(column, metric, factor): (Column, _, _)| column.figure(value(metric, factor));
+        let figure = |(column, metric, factor)| (column, value(metric, factor));
         let failed = (!record.is_scored()).then(|| record.status.clone());
         let frame = FrameReport {
             name: record.frame_label(),
@@ -49,8 +48,9 @@ pub fn write_page(
             remarks: failed.into_iter().collect(),
             figures: METRICS.map(figure).into(),
             posterior: None,
+            drawing: None,
         };
-        report.add_frame(frame, None);
+        report.add_frame(frame);
     }
     report.finish()
 }
