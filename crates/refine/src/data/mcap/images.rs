@@ -80,32 +80,32 @@ pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
         return Ok(depth);
     }
     let image = decode::<Stamped<RosImage<'_>>>(data)?.content;
-    let big = image.is_bigendian != 0;
+    let is_big = image.is_bigendian != 0;
     let pixels: Vec<f32> = match image.encoding {
         "16UC1" | "mono16" => {
-            let millimeters = |bytes: [u8; 2]| match big {
-                true => u16::from_be_bytes(bytes),
-                false => u16::from_le_bytes(bytes),
-            };
-            let meters = |bytes| match millimeters(bytes) {
+            let meters = |bytes| match u16::from_le_bytes(ordered(is_big, bytes)) {
                 u16::MAX => 0.0,
                 units => (f64::from(units) * MILLIMETER) as f32,
             };
             rows(&image, 2)?.flat_map(|row| row.as_chunks().0).map(|b| meters(*b)).collect()
         }
         "32FC1" => {
-            let meters = |bytes: [u8; 4]| match big {
-                true => f32::from_be_bytes(bytes),
-                false => f32::from_le_bytes(bytes),
-            };
             // Where nothing was measured there is no number.
             let measured = |z: f32| if z.is_finite() && z > 0.0 { z } else { 0.0 };
             let all = rows(&image, 4)?.flat_map(|row| row.as_chunks().0);
-            all.map(|b| measured(meters(*b))).collect()
+            all.map(|b| measured(f32::from_le_bytes(ordered(is_big, *b)))).collect()
         }
         other => return Err(format!("depth encoded as {other:?} is not read")),
     };
     sized(&image, |width, height| DepthImage::new(width, height, pixels))
+}
+
+/// The bytes of a number, the lowest first.
+fn ordered<const N: usize>(is_big: bool, mut bytes: [u8; N]) -> [u8; N] {
+    if is_big {
+        bytes.reverse();
+    }
+    bytes
 }
 
 /// Whole numbers of depth are millimeters (REP 118).

@@ -1,5 +1,9 @@
 //! One page that shows a run.
 
+mod document;
+mod frame;
+mod scene;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,10 +12,12 @@ use base64::engine::general_purpose::STANDARD;
 use prehend_geometry::TriMesh;
 use prehend_render::RgbImage;
 
-use super::document::{Block, Chart, Document, LabeledPicture};
-use super::frame::{DrawnFrame, FrameDrawing, FrameReport, loss_chart, residuals};
+use self::document::{Block, Document, LabeledPicture};
+pub use self::document::{Chart, Column, Figure, Series};
+pub use self::frame::{DrawnFrame, FrameDrawing, FrameReport};
+use self::frame::{loss_chart, residuals};
+use self::scene::{encoded_hand, encoded_scene, object_mesh};
 use super::picture::compared;
-use super::scene::{encoded_hand, encoded_scene, object_mesh};
 use crate::data::AssetError;
 use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::error::RefineError;
@@ -66,9 +72,10 @@ impl Report {
         &mut self,
         title: &str,
         headings: impl IntoIterator<Item = S>,
-        rows: Vec<Vec<String>>,
+        rows: impl IntoIterator<Item = impl Into<Vec<String>>>,
     ) {
         let headings = headings.into_iter().map(Into::into).collect();
+        let rows = rows.into_iter().map(Into::into).collect();
         self.document.blocks.push(Block::Table { title: title.to_owned(), headings, rows });
     }
 

@@ -62,6 +62,18 @@ pub struct Column {
     pub digits: usize,
 }
 
+impl Column {
+    /// A column by filter word, heading and unit, with so many decimal places.
+    pub const fn new(
+        key: &'static str,
+        name: &'static str,
+        unit: &'static str,
+        digits: usize,
+    ) -> Self {
+        Self { key, name, unit, digits }
+    }
+}
+
 /// A number of a frame in its column's unit, where it is known.
 pub type Figure = (Column, Option<f64>);
 
