@@ -36,6 +36,9 @@ pub enum AssetError {
     /// A robot description or its joints are at fault.
     #[error(transparent)]
     Robot(#[from] prehend_geometry::robot::RobotError),
+    /// A robot description in MJCF is at fault.
+    #[error(transparent)]
+    Mjcf(#[from] prehend_geometry::mjcf::MjcfError),
     /// A taxel layout is at fault.
     #[error(transparent)]
     Taxels(#[from] prehend_geometry::hand::TaxelError),

@@ -1,12 +1,11 @@
 //! Evaluation models: what metrics need of an object, prepared once for many poses.
 
 use nalgebra::Isometry3;
-use prehend_geometry::TriMesh;
 use prehend_geometry::cloud::diameter;
 use prehend_render::{Camera, DepthImage, ModelError, RenderModel, depth_map};
 
-use crate::data::AssetError;
 use crate::data::bop::{DatasetError, ModelInfo, Models};
+use crate::data::{AssetError, ContactModel, load_mesh};
 use crate::error::RefineError;
 use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
 
@@ -29,15 +28,18 @@ pub(super) struct EvaluationModel {
     /// Its diameter \[m\].
     pub(super) diameter: f64,
     drawn: RenderModel,
+    /// What contact with the hand is measured by.
+    pub(super) contact: ContactModel,
 }
 
 impl EvaluationModel {
-    /// The object `obj_id` of `models`, whose mesh \[m\] is `mesh`. Without an entry of `models_info.json` it has no
+    /// The object `obj_id` of `models`. Without an entry of `models_info.json` it has no
     /// symmetries, and the diameter of its vertices.
     ///
     /// # Errors
-    /// If `models_info.json` is broken or the mesh cannot be rendered.
-    pub(super) fn new(models: &Models, obj_id: u32, mesh: TriMesh) -> Result<Self, AssetError> {
+    /// If `models_info.json` or the mesh is broken, or the latter cannot be rendered.
+    pub(super) fn new(models: &Models, obj_id: u32) -> Result<Self, AssetError> {
+        let mesh = load_mesh(models, obj_id)?;
         let (symmetries, diameter) = match model_info(models, obj_id)? {
             Some(info) => (info.symmetries, info.diameter),
             None => (Default::default(), diameter(&mesh.vertices)),
@@ -46,9 +48,10 @@ impl EvaluationModel {
             object: format!("{obj_id}"),
             reason: e.to_string(),
         };
+        let contact = ContactModel::new(&mesh);
         let mesh = mesh.faced_outward();
         let drawn = RenderModel::new(&mesh).map_err(unusable)?;
-        Ok(Self { points: ScoredModel::new(mesh.vertices, symmetries), diameter, drawn })
+        Ok(Self { points: ScoredModel::new(mesh.vertices, symmetries), diameter, drawn, contact })
     }
 
     /// The visible surface discrepancy (0..=1) for each of BOP's tolerances. `sensed` is the depth image of the scene \[m\],

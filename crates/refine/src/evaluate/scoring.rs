@@ -10,23 +10,17 @@ use prehend_render::DepthImage;
 
 use super::model::{EvaluationModel, model_info};
 use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
-use crate::data::{AssetError, ContactModel, load_mesh};
+use crate::data::{AssetError, ContactModel};
 use crate::evaluate::metrics::{Contact, ScoredRow, oe_symmetric_deg, pe_cm};
 use crate::symmetry::Symmetries;
 
-/// What scoring needs of an object, prepared once.
-struct Model {
-    evaluation: EvaluationModel,
-    contact: ContactModel,
-}
-
 /// What scoring needs of one image.
-struct Image {
+pub(super) struct Image {
     scene_and_image: (u32, u32),
-    /// `None` if the dataset says of no hand, or of several.
-    hand: Option<TrueHand>,
+    /// `None` until it is asked for; the inner one if the dataset says of no hand, or of several.
+    hand: Option<Option<TrueHand>>,
     /// `None` if the dataset has no depth, or nothing of it was measured.
-    depth: Option<DepthImage>,
+    pub(super) depth: Option<DepthImage>,
 }
 
 /// The hand where it truly is in one image, as one body: its parts overlap each other.
@@ -39,12 +33,12 @@ struct TrueHand {
 
 /// Scores poses of one dataset.
 pub struct Scorer<'a> {
-    truth: GroundTruth<'a>,
-    dataset: &'a Dataset,
+    pub(super) truth: GroundTruth<'a>,
+    pub(super) dataset: &'a Dataset,
     trees: HashMap<PathBuf, KinematicTree>,
-    models: HashMap<u32, Model>,
+    pub(super) models: HashMap<u32, EvaluationModel>,
     /// That of the row scored last: rows come image by image, and hands are large.
-    image: Option<Image>,
+    pub(super) image: Option<Image>,
 }
 
 impl<'a> Scorer<'a> {
@@ -92,22 +86,21 @@ impl<'a> Scorer<'a> {
         let (scene_id, im_id, obj_id) = (row.scene_id, row.im_id, row.obj_id);
         let truth = self.true_pose(row)?;
         self.prepare_model(obj_id)?;
-        let image = match self.image.take() {
-            Some(image) if image.scene_and_image == (scene_id, im_id) => image,
-            _ => self.read_image(scene_id, im_id)?,
-        };
+        let mut image = self.take_image(scene_id, im_id)?;
+        if image.hand.is_none() {
+            image.hand = Some(self.true_hand(scene_id, im_id)?);
+        }
         let Image { depth, hand, .. } = self.image.insert(image);
         let model = &self.models[&obj_id];
         let (width, height) =
             depth.as_ref().map_or((0, 0), |depth| (depth.width(), depth.height()));
         let camera = self.dataset.frame(scene_id, im_id)?.camera(width, height);
-        let evaluation = &model.evaluation;
-        let mut score = evaluation.points.score(&row.t_cam_model, &truth, &camera);
+        let mut score = model.points.score(&row.t_cam_model, &truth, &camera);
         if let Some(sensed) = depth {
-            let errors = evaluation.vsd(&row.t_cam_model, &truth, &camera, sensed);
-            score = score.with_visible_surface(&errors, evaluation.diameter, camera.width);
+            let errors = model.vsd(&row.t_cam_model, &truth, &camera, sensed);
+            score = score.with_visible_surface(&errors, model.diameter, camera.width);
         }
-        if let Some(hand) = hand {
+        if let Some(Some(hand)) = hand {
             let estimate = hand.contact(&model.contact, &row.t_cam_model)?;
             score =
                 score.with_contact(estimate, hand.true_contact(obj_id, &model.contact, &truth)?);
@@ -115,25 +108,24 @@ impl<'a> Scorer<'a> {
         Ok(ScoredRow { scene_id, im_id, obj_id, score })
     }
 
-    fn prepare_model(&mut self, id: u32) -> Result<(), AssetError> {
-        if self.models.contains_key(&id) {
-            return Ok(());
+    pub(super) fn prepare_model(&mut self, id: u32) -> Result<(), AssetError> {
+        if !self.models.contains_key(&id) {
+            self.models.insert(id, EvaluationModel::new(self.truth.models(), id)?);
         }
-        let mesh = load_mesh(self.truth.models(), id)?;
-        let contact = ContactModel::new(&mesh);
-        let evaluation = EvaluationModel::new(self.truth.models(), id, mesh)?;
-        self.models.insert(id, Model { evaluation, contact });
         Ok(())
     }
 
-    fn read_image(&mut self, scene: u32, image: u32) -> Result<Image, AssetError> {
-        let hand = self.true_hand(scene, image)?;
+    /// The image, read unless it is the last one.
+    pub(super) fn take_image(&mut self, scene: u32, image: u32) -> Result<Image, DatasetError> {
+        if let Some(known) = self.image.take_if(|known| known.scene_and_image == (scene, image)) {
+            return Ok(known);
+        }
         let depth = match self.dataset.frame(scene, image)?.depth() {
             Ok(depth) => Some(depth),
             Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
-            Err(broken) => return Err(broken.into()),
+            Err(broken) => return Err(broken),
         };
-        Ok(Image { scene_and_image: (scene, image), hand, depth })
+        Ok(Image { scene_and_image: (scene, image), hand: None, depth })
     }
 
     fn true_hand(&mut self, scene: u32, image: u32) -> Result<Option<TrueHand>, AssetError> {
@@ -234,8 +226,8 @@ mod tests {
         for row in &rows {
             let alone = Scorer::new(&dataset).score(row).unwrap();
             assert_eq!(json(&scorer.score(row).unwrap()), json(&alone));
-            let hand = scorer.image.as_ref().unwrap().hand.as_ref();
-            assert_eq!(hand.unwrap().truths.len(), 1);
+            let hand = scorer.image.as_ref().unwrap().hand.as_ref().unwrap();
+            assert_eq!(hand.as_ref().unwrap().truths.len(), 1);
         }
 
         let info = GroundTruth::new(&dataset).models().dir().join("models_info.json");

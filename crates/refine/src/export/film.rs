@@ -23,18 +23,11 @@ const OBJECT: [f32; 3] = [0.85, 0.6, 0.3];
 pub struct SceneFilm {
     /// Images a second.
     rate: f64,
-    first: Option<First>,
+    /// Id of the first image, and the film's frame → that of glTF.
+    first: Option<(u32, UnitQuaternion<f64>)>,
     hand: Option<(Arc<Hand>, Vec<FilmBody>)>,
     objects: BTreeMap<(u32, usize), FilmBody>,
-    camera: Vec<FilmKey>,
-}
-
-/// Properties that all images have of the first.
-struct First {
-    im_id: u32,
-    r_gltf_base: UnitQuaternion<f64>,
-    vertical_angle: f64,
-    aspect: f64,
+    camera: Option<FilmCamera>,
 }
 
 impl SceneFilm {
@@ -47,8 +40,7 @@ impl SceneFilm {
             let problem = format!("{rate} is no number of images a second");
             return Err(RefineError::Setting { name: "rate", problem });
         }
-        let (first, hand, objects, camera) = (None, None, BTreeMap::new(), Vec::new());
-        Ok(Self { rate, first, hand, objects, camera })
+        Ok(Self { rate, first: None, hand: None, objects: BTreeMap::new(), camera: None })
     }
 
     /// Adds the image `im_id` with its hand, later than all before. `t_base_cam` takes the camera's frame to that of the film, which is the same in all
@@ -76,26 +68,27 @@ impl SceneFilm {
             links.extend(bodies.iter_mut().zip(shown));
         }
         let camera = &observation.camera;
-        let first = self.first.get_or_insert_with(|| {
-            let up = observation.gravity.map_or_else(|| -Vector3::y(), |gravity| -gravity);
-            First {
-                im_id,
-                r_gltf_base: upright(&(t_base_cam * up), &(t_base_cam * Vector3::z())),
-                vertical_angle: 2.0 * (camera.height as f64 / (2.0 * camera.fy)).atan(),
-                aspect: camera.width as f64 * camera.fy / (camera.height as f64 * camera.fx),
-            }
+        let film = self.camera.get_or_insert_with(|| FilmCamera {
+            vertical_angle: 2.0 * (camera.height as f64 / (2.0 * camera.fy)).atan(),
+            aspect: camera.width as f64 * camera.fy / (camera.height as f64 * camera.fx),
+            keys: Vec::new(),
         });
-        let time = f64::from(im_id - first.im_id.min(im_id)) / self.rate;
+        let (first, _) = *self.first.get_or_insert_with(|| {
+            let up = observation.gravity.map_or_else(|| -Vector3::y(), |gravity| -gravity);
+            (im_id, upright(&(t_base_cam * up), &(t_base_cam * Vector3::z())))
+        });
+        let time = f64::from(im_id - first.min(im_id)) / self.rate;
         for (body, t_cam_link) in links {
             body.keys.push(FilmKey { time, t_base_body: t_base_cam * t_cam_link });
         }
-        self.camera.push(FilmKey { time, t_base_body: *t_base_cam });
+        film.keys.push(FilmKey { time, t_base_body: *t_base_cam });
         Ok(())
     }
 
     /// Adds the place of an object, object → camera \[m\], in the image that was added last.
     pub fn add_object(&mut self, target: &Target, object: &Object, t_cam_object: &Isometry3<f64>) {
-        let Some(FilmKey { time, t_base_body }) = self.camera.last().copied() else { return };
+        let last = self.camera.as_ref().and_then(|camera| camera.keys.last());
+        let Some(FilmKey { time, t_base_body }) = last.copied() else { return };
         let Target { obj_id, instance, .. } = *target;
         let body = self.objects.entry((obj_id, instance)).or_insert_with(|| FilmBody {
             name: match instance {
@@ -114,16 +107,10 @@ impl SceneFilm {
     /// # Errors
     /// Those of [`GlbFilm::save`], as where images did not come in their order.
     pub fn save(self, path: &Path) -> Result<(), MeshError> {
-        let Self { first, hand, objects, camera: keys, .. } = self;
-        let mut bodies = hand.map(|(_, bodies)| bodies).unwrap_or_default();
-        bodies.extend(objects.into_values());
-        let r_gltf_base = first.as_ref().map_or_else(UnitQuaternion::identity, |f| f.r_gltf_base);
-        let camera = first.map(|First { vertical_angle, aspect, .. }| FilmCamera {
-            vertical_angle,
-            aspect,
-            keys,
-        });
-        GlbFilm { r_gltf_base, bodies, camera }.save(path)
+        let mut bodies = self.hand.map(|(_, bodies)| bodies).unwrap_or_default();
+        bodies.extend(self.objects.into_values());
+        let r_gltf_base = self.first.map_or_else(UnitQuaternion::identity, |(_, r)| r);
+        GlbFilm { r_gltf_base, bodies, camera: self.camera }.save(path)
     }
 }
 

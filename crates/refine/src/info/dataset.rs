@@ -7,10 +7,9 @@ use std::path::Path;
 use prehend_render::image_size;
 use serde_json::{Value, json};
 
-use super::InfoError;
 use crate::check::likely_unit;
 use crate::data::bop::{Dataset, DatasetError, DatasetScene};
-use crate::data::load_mesh;
+use crate::data::{AssetError, load_mesh};
 use crate::symmetry::Symmetries;
 
 /// Name of the split; scenes; ids of the objects that there are models of, and how many of them have a known mass, and symmetries; columns and rows of the first image.
@@ -18,7 +17,7 @@ pub(super) fn read(
     path: &Path,
     split: Option<&str>,
     warnings: &mut Vec<String>,
-) -> Result<Value, InfoError> {
+) -> Result<Value, AssetError> {
     let dataset = match split {
         Some(split) => Dataset::open_split(path, split)?,
         None => Dataset::open(path)?,

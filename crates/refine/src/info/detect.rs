@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
-use super::{DescribeOptions, InfoError, dataset, frame, image, mesh, poses, rig, robot};
+use super::{DescribeOptions, dataset, frame, image, mesh, poses, rig, robot};
+use crate::data::AssetError;
 use crate::data::bop::{DatasetError, UniqueMap, read_json, read_text};
 
 /// Kind and fields. A file is known by its extension, and where that leaves it open by its outermost element or its fields.
@@ -13,7 +14,7 @@ pub(super) fn read(
     path: &Path,
     options: &DescribeOptions,
     warnings: &mut Vec<String>,
-) -> Result<(&'static str, Value), InfoError> {
+) -> Result<(&'static str, Value), AssetError> {
     if path.is_dir() {
         let split = options.split.as_deref();
         return Ok(("dataset", dataset::read(path, split, warnings)?));
@@ -49,7 +50,7 @@ pub(super) fn read(
 }
 
 /// The error of a file that is nothing known.
-pub(super) fn unknown(path: &Path, problem: &str) -> InfoError {
+pub(super) fn unknown(path: &Path, problem: &str) -> AssetError {
     let known = "meshes (PLY, OBJ, STL, glTF), URDF, MJCF, BOP datasets, frames and rigs (JSON), poses (CSV) and images (PNG, JPEG)";
     DatasetError::unusable(path, format!("{problem}; known are {known}")).into()
 }
@@ -100,16 +101,19 @@ mod tests {
             ("a.csv", "a,b\n1,2\n", "are not those of a BOP results file"),
         ] {
             let error = refused(name, text);
-            assert!(matches!(&error, InfoError::Data(DatasetError::Unusable { .. })), "{error}");
+            assert!(
+                matches!(&error, AssetError::Dataset(DatasetError::Unusable { .. })),
+                "{error}"
+            );
             assert!(error.to_string().contains(problem), "{error}");
         }
-        assert!(matches!(refused("a.ply", "ply"), InfoError::Mesh(_)));
-        assert!(matches!(refused("a.urdf", "<robot/>"), InfoError::Robot(_)));
-        assert!(matches!(refused("a.xml", "<mujoco><a"), InfoError::Mjcf(_)));
-        assert!(matches!(refused("a.png", "png"), InfoError::Data(_)));
+        assert!(matches!(refused("a.ply", "ply"), AssetError::Mesh(_)));
+        assert!(matches!(refused("a.urdf", "<robot/>"), AssetError::Robot(_)));
+        assert!(matches!(refused("a.xml", "<mujoco><a"), AssetError::Mjcf(_)));
+        assert!(matches!(refused("a.png", "png"), AssetError::Dataset(_)));
         let none = describe(&dir.path().join("none"), &DescribeOptions::default()).unwrap_err();
-        assert!(matches!(none, InfoError::Data(DatasetError::Missing { .. })));
+        assert!(matches!(none, AssetError::Dataset(DatasetError::Missing { .. })));
         let empty = describe(dir.path(), &DescribeOptions::default()).unwrap_err();
-        assert!(matches!(empty, InfoError::Data(_)) && empty.to_string().contains("no scene"));
+        assert!(matches!(empty, AssetError::Dataset(_)) && empty.to_string().contains("no scene"));
     }
 }

@@ -6,16 +6,16 @@ use prehend_geometry::KinematicTree;
 use prehend_geometry::hand::load_taxels;
 use serde_json::{Value, json};
 
-use super::{InfoError, mesh};
-use crate::data::FrameParts;
+use super::mesh;
 use crate::data::bop::{Body, DatasetError, TactileReading};
+use crate::data::{AssetError, FrameParts};
 
 /// From this force on a taxel counts as touched \[N\].
 const TOUCH: f64 = 0.1;
 
 /// Images: size, focal lengths, whether they were taken through a lens, share of pixels with depth (0 to 1), pixels of the mask. The object: file, mesh, mass, initial place in the camera
 /// frame \[m\]. Gravity there \[m/s²\]. The hand: name, joints, taxels, and how many of those feel more than 0.1 N, null without forces.
-pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, InfoError> {
+pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, AssetError> {
     let parts = FrameParts::read(path)?;
     let mass_kg = parts.mass();
     if mass_kg.is_none() {

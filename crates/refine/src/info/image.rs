@@ -5,12 +5,12 @@ use std::path::Path;
 use prehend_render::{DepthImage, ImageError, Mask, RgbImage};
 use serde_json::{Value, json};
 
-use super::InfoError;
+use crate::data::AssetError;
 use crate::data::bop::DatasetError;
 
 /// Size, and `pixels`: `color` with the mean of each channel (0 to 1); `depth`, 16-bit gray, with the number of pixels that are not zero and the range
 /// of those in units of the file; `gray` with the number of pixels that are not zero and their bounds (left, top, width, height).
-pub(super) fn read(path: &Path) -> Result<Value, InfoError> {
+pub(super) fn read(path: &Path) -> Result<Value, AssetError> {
     match DepthImage::load(path, 1.0) {
         Ok(depth) => {
             let valid: Vec<f32> = depth.pixels().iter().copied().filter(|z| *z > 0.0).collect();

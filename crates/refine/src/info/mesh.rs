@@ -6,8 +6,9 @@ use prehend_geometry::mass::mass_properties;
 use prehend_geometry::{MeshReport, TriMesh};
 use serde_json::{Value, json};
 
-use super::{DescribeOptions, InfoError};
+use super::DescribeOptions;
 use crate::check::likely_unit;
+use crate::data::AssetError;
 
 /// Where units of meshes are said.
 const UNITS: &str = "--mesh-unit, mesh_unit in a frame file, millimeters in BOP's folders";
@@ -17,7 +18,7 @@ pub(super) fn read(
     path: &Path,
     options: &DescribeOptions,
     warnings: &mut Vec<String>,
-) -> Result<Value, InfoError> {
+) -> Result<Value, AssetError> {
     let mesh = TriMesh::load(path)?.scaled(options.mesh_unit);
     let mut fields = of(&mesh, warnings);
     match options.density.map(|density| (density, mass_properties(&mesh, density))) {

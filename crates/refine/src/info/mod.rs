@@ -5,7 +5,6 @@
 
 mod dataset;
 mod detect;
-mod error;
 mod frame;
 mod image;
 mod mesh;
@@ -21,7 +20,7 @@ use prehend_geometry::ReadOptions;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-pub use self::error::InfoError;
+use crate::data::AssetError;
 
 /// How a thing is read that does not say so itself.
 #[derive(Clone, Debug)]
@@ -59,8 +58,8 @@ pub struct Description {
 /// Describes what is at `path`.
 ///
 /// # Errors
-/// [`InfoError`], naming the file: if there is nothing, or nothing that is known, or it is broken.
-pub fn describe(path: &Path, options: &DescribeOptions) -> Result<Description, InfoError> {
+/// [`AssetError`], naming the file: if there is nothing, or nothing that is known, or it is broken.
+pub fn describe(path: &Path, options: &DescribeOptions) -> Result<Description, AssetError> {
     let mut warnings = Vec::new();
     let (kind, value) = detect::read(path, options, &mut warnings)?;
     let fields = match value {

@@ -5,17 +5,16 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::InfoError;
 use super::detect::unknown;
-use crate::data::Times;
 use crate::data::bop::{ResultRow, read_results};
+use crate::data::{AssetError, Times};
 
 /// Malformed lines that are named, at most.
 const NAMED: usize = 5;
 
 /// Numbers of poses, malformed lines, images and timed poses; ids of scenes and objects; lowest, mean and highest score; methods, as the file of
 /// times beside this one has them.
-pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, InfoError> {
+pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, AssetError> {
     let results = read_results(path)?;
     let (rows, errors) = (&results.rows, &results.errors);
     if rows.is_empty() && !errors.is_empty() {

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::InfoError;
+use crate::data::AssetError;
 use crate::rig::Rig;
 
 /// Size of images, joints of the hand, objects whose surfaces are corrected, and values and standard deviations of the parameters
 /// \[m, rad; focal lengths\], without the coefficients of the depth field.
-pub(super) fn read(path: &Path) -> Result<Value, InfoError> {
+pub(super) fn read(path: &Path) -> Result<Value, AssetError> {
     let rig = Rig::load(path)?;
     let variances = rig.covariance.diagonal();
     let parameters = rig.parameters().into_iter().zip(variances.iter());

@@ -9,7 +9,7 @@ use prehend_geometry::robot::{Drive, Motion};
 use prehend_geometry::{KinematicTree, ReadOptions};
 use serde_json::{Value, json};
 
-use super::InfoError;
+use crate::data::AssetError;
 
 /// A joint that is not fixed: name (empty where it has none), motion, moved link, smallest and largest position \[rad or m\], joint that it follows.
 type Joint<'a> = (&'a str, &'static str, &'a str, Option<(f64, f64)>, Option<&'a str>);
@@ -19,7 +19,7 @@ pub(super) fn of_urdf(
     path: &Path,
     options: &ReadOptions,
     warnings: &mut Vec<String>,
-) -> Result<Value, InfoError> {
+) -> Result<Value, AssetError> {
     let tree = KinematicTree::from_urdf_file_with(path, options)?;
     warnings.extend_from_slice(tree.warnings());
     let joint = |joint: &prehend_geometry::robot::Joint| {
@@ -62,7 +62,7 @@ pub(super) fn of_mjcf(
     path: &Path,
     options: &ReadOptions,
     warnings: &mut Vec<String>,
-) -> Result<Value, InfoError> {
+) -> Result<Value, AssetError> {
     let model = Model::from_file_with(path, options)?;
     warnings.extend(model.warnings.iter().map(ToString::to_string));
     let joints = model.bodies.iter().flat_map(|body| body.joints.iter().map(move |j| (body, j)));

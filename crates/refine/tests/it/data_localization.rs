@@ -3,7 +3,8 @@
 use std::fs;
 
 use prehend_refine::data::bop::{Dataset, read_results};
-use prehend_refine::evaluate::localization::{LocalizationScorer, summarize_localization};
+use prehend_refine::evaluate::Scorer;
+use prehend_refine::evaluate::localization::summarize_localization;
 use serde_json::Value;
 
 use crate::data;
@@ -23,11 +24,11 @@ fn recalls_are_those_of_the_golden_errors() {
     };
     let (golden, models) = (json("inhand_frames.json"), json("models_eval/models_info.json"));
     let dataset = Dataset::open(&root).unwrap();
-    let mut scorer = LocalizationScorer::new(&dataset);
+    let mut scorer = Scorer::new(&dataset);
     let targets = scorer.targets(None).unwrap();
     for set in ["init_low", "init_high"] {
         let rows = read_results(&root.join(format!("{set}_bopinhand-test.csv"))).unwrap().rows;
-        let scores: Vec<_> = targets.iter().map(|t| scorer.score(t, &rows).unwrap()).collect();
+        let scores: Vec<_> = targets.iter().map(|t| scorer.localize(t, &rows).unwrap()).collect();
         let ours = summarize_localization(&scores).overall;
         assert_eq!((ours.targets, ours.estimates), (18, 18));
 

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use nalgebra::{Translation3, Vector3};
 use prehend_refine::data::bop::{Dataset, GroundTruth, ResultRow};
+use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::localization::{
-    AverageRecall, LocalizationScorer, LocalizationTarget, summarize_localization,
+    AverageRecall, LocalizationTarget, summarize_localization,
 };
 use prehend_refine::scene::default_scene;
 use prehend_refine::synth::write_dataset;
@@ -46,9 +47,9 @@ fn moved(row: &ResultRow, by: Vector3<f64>, score: f64) -> ResultRow {
 
 fn recall(dir: &Path, rows: &[ResultRow]) -> AverageRecall {
     let dataset = Dataset::open(dir).unwrap();
-    let mut scorer = LocalizationScorer::new(&dataset);
+    let mut scorer = Scorer::new(&dataset);
     let targets = scorer.targets(None).unwrap();
-    let scores: Vec<_> = targets.iter().map(|t| scorer.score(t, rows).unwrap()).collect();
+    let scores: Vec<_> = targets.iter().map(|t| scorer.localize(t, rows).unwrap()).collect();
     summarize_localization(&scores).overall
 }
 
@@ -120,10 +121,10 @@ fn the_best_scores_count_and_the_most_visible_instances_are_meant() {
         (info["0"][0]["visib_fract"], info["0"][1]["visib_fract"]) = (0.5.into(), 0.6.into());
     });
     let dataset = Dataset::open(dir.path()).unwrap();
-    let mut scorer = LocalizationScorer::new(&dataset);
-    let found = |scorer: &mut LocalizationScorer, instances, rows: &[ResultRow]| {
+    let mut scorer = Scorer::new(&dataset);
+    let found = |scorer: &mut Scorer, instances, rows: &[ResultRow]| {
         let target = LocalizationTarget { scene_id: 1, im_id: 0, obj_id: 5, instances };
-        summarize_localization(&[scorer.score(&target, rows).unwrap()]).overall
+        summarize_localization(&[scorer.localize(&target, rows).unwrap()]).overall
     };
     assert_eq!(found(&mut scorer, 1, &rows[1..2]).ar, Some(1.0));
     assert_eq!(found(&mut scorer, 1, &rows[..1]).ar_mssd, 0.0);
@@ -141,12 +142,12 @@ fn faults_name_file_and_field() {
         let rows = true_rows(dir.path());
         damage(dir.path());
         let dataset = Dataset::open(dir.path()).unwrap();
-        let mut scorer = LocalizationScorer::new(&dataset);
+        let mut scorer = Scorer::new(&dataset);
         let targets = match scorer.targets(list.map(|name| dir.path().join(name)).as_deref()) {
             Ok(targets) => targets,
             Err(error) => return error.to_string(),
         };
-        scorer.score(&targets[0], &rows).unwrap_err().to_string()
+        scorer.localize(&targets[0], &rows).unwrap_err().to_string()
     };
     let remove = |name: &'static str| move |dir: &Path| fs::remove_file(dir.join(name)).unwrap();
     let list = |text: &'static str| move |dir: &Path| fs::write(dir.join("list"), text).unwrap();

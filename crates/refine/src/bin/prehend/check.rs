@@ -95,17 +95,17 @@ impl Check {
             match checked {
                 Ok((picture, warnings)) => {
                     // Of many frames some alone were tried.
-                    let alike =
-                        |t: &Target| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id);
                     let is_meant = |targets: &[Target]| match targets {
                         [only] => only == target,
-                        all => all.iter().any(alike),
+                        all => all
+                            .iter()
+                            .any(|t| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id)),
                     };
-                    let of_frame = || findings.iter().filter(|(_, targets, _)| is_meant(targets));
-                    let mut remarks: Vec<String> =
-                        of_frame().map(|(.., message)| message.clone()).collect();
+                    let own = findings.iter().filter(|(_, targets, _)| is_meant(targets));
+                    let (found, mut remarks): (Vec<_>, Vec<_>) =
+                        own.map(|(found, _, message)| (found, message.clone())).unzip();
                     for warning in &warnings {
-                        if of_frame().any(|(found, ..)| found.explains(warning)) {
+                        if found.iter().any(|found| found.explains(warning)) {
                             continue;
                         }
                         let text = warning.to_string();

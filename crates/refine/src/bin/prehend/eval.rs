@@ -7,9 +7,7 @@ use anyhow::bail;
 use clap::Args;
 use prehend_refine::data::bop::{Dataset, ResultRow};
 use prehend_refine::evaluate::Scorer;
-use prehend_refine::evaluate::localization::{
-    LocalizationScorer, seconds_per_image, summarize_localization,
-};
+use prehend_refine::evaluate::localization::{seconds_per_image, summarize_localization};
 use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
@@ -82,7 +80,7 @@ impl Eval {
         failures: &[String],
     ) -> anyhow::Result<ExitCode> {
         let Input { selection, poses } = &self.input;
-        let mut scorer = LocalizationScorer::new(dataset);
+        let mut scorer = Scorer::new(dataset);
         let mut targets = scorer.targets(self.targets.as_deref())?;
         targets.retain(|t| selection.admits(t.scene_id, t.im_id, t.obj_id));
         if targets.is_empty() {
@@ -91,7 +89,7 @@ impl Eval {
         let seconds = seconds_per_image(poses, rows)?;
         let mut scores = Vec::new();
         for target in progress(targets.len(), "scoring").wrap_iter(targets.iter()) {
-            scores.push(scorer.score(target, rows)?);
+            scores.push(scorer.localize(target, rows)?);
         }
         let summary = summarize_localization(&scores);
         if self.json {

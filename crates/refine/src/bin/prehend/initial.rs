@@ -97,13 +97,6 @@ struct FoundPose {
     weight: f64,
 }
 
-impl From<&PoseCandidate> for FoundPose {
-    fn from(found: &PoseCandidate) -> Self {
-        let pose = PlainPose::from(&found.t_cam_object);
-        Self { pose, cost: found.cost, weight: found.weight }
-    }
-}
-
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
@@ -181,11 +174,14 @@ impl Initial {
             if searched.contains_key(&index) {
                 continue;
             }
-            let found =
-                guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend));
-            match found {
+            match guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend)) {
                 Ok(found) => {
-                    let found: Vec<FoundPose> = found.iter().map(FoundPose::from).collect();
+                    let found = found.iter().map(|c| FoundPose {
+                        pose: (&c.t_cam_object).into(),
+                        cost: c.cost,
+                        weight: c.weight,
+                    });
+                    let found: Vec<FoundPose> = found.collect();
                     searched.insert(index, journal.append(index, &found)?);
                 }
                 Err(error) => all.failures.push(format!("{target}: {error}")),

@@ -18,7 +18,7 @@ use prehend_refine::data::{MaskSource, Target, find_targets};
 use prehend_refine::rig::Rig;
 use prehend_refine::{Hypotheses, Method};
 use prehend_render::{Backend, Device};
-use strum::VariantNames;
+use strum::{Display, VariantNames};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -64,7 +64,8 @@ pub(crate) struct Masks {
 }
 
 /// Kind of masks.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Display, ValueEnum)]
+#[strum(serialize_all = "lowercase")]
 enum MaskKind {
     /// mask_visib/, or --detections where they are given
     Files,
@@ -89,12 +90,7 @@ impl Masks {
             (MaskKind::Box, detections) => MaskSource::Boxes(detections),
             (MaskKind::Silhouette, None) => MaskSource::Silhouettes,
             (MaskKind::None, None) => MaskSource::None,
-            (kind, Some(_)) => {
-                bail!(
-                    "--mask-source {}: does not use --detections",
-                    format!("{kind:?}").to_lowercase()
-                )
-            }
+            (kind, Some(_)) => bail!("--mask-source {kind}: does not use --detections"),
         })
     }
 
@@ -102,10 +98,9 @@ impl Masks {
     pub(crate) fn require_files_or_detections(&self) -> anyhow::Result<()> {
         match self.mask_source {
             MaskKind::Files => Ok(()),
-            kind => bail!(
-                "--mask-source {}: the search needs masks: of files, or of --detections",
-                format!("{kind:?}").to_lowercase()
-            ),
+            kind => {
+                bail!("--mask-source {kind}: the search needs masks: of files, or of --detections")
+            }
         }
     }
 

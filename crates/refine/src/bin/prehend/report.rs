@@ -3,29 +3,20 @@
 use prehend_refine::evaluate::report::{Column, Figure};
 use prehend_refine::strategy::PosteriorSummary;
 
-const fn column(
-    key: &'static str,
-    name: &'static str,
-    unit: &'static str,
-    digits: usize,
-) -> Column {
-    Column { key, name, unit, digits }
-}
-
-const ERROR: Column = column("error", "error", "mm", 2);
-const TURN_ERROR: Column = column("turned-error", "turned wrong", "°", 2);
-const PROBABILITY: Column = column("probability", "probability", "", 3);
-const SIGMA: Column = column("sigma", "σ", "mm", 2);
-const TURN_SIGMA: Column = column("turned-sigma", "σ of rotation", "°", 2);
-pub(crate) const MOVED: Column = column("moved", "moved", "mm", 1);
-pub(crate) const TURNED: Column = column("turned", "turned", "°", 1);
-pub(crate) const INITIAL_ERROR: Column = column("initial-error", "error before", "mm", 1);
+const ERROR: Column = Column::new("error", "error", "mm", 2);
+const TURN_ERROR: Column = Column::new("turned-error", "turned wrong", "°", 2);
+const PROBABILITY: Column = Column::new("probability", "probability", "", 3);
+const SIGMA: Column = Column::new("sigma", "σ", "mm", 2);
+const TURN_SIGMA: Column = Column::new("turned-sigma", "σ of rotation", "°", 2);
+pub(crate) const MOVED: Column = Column::new("moved", "moved", "mm", 1);
+pub(crate) const TURNED: Column = Column::new("turned", "turned", "°", 1);
+pub(crate) const INITIAL_ERROR: Column = Column::new("initial-error", "error before", "mm", 1);
 pub(crate) const INITIAL_TURN: Column =
-    column("initial-turned-error", "turned wrong before", "°", 1);
-pub(crate) const SECONDS: Column = column("seconds", "time", "s", 3);
-pub(crate) const ITERATIONS: Column = column("iterations", "iterations", "", 0);
-pub(crate) const MILLISECONDS: Column = column("milliseconds", "time", "ms", 1);
-pub(crate) const MOMENT: Column = column("moment", "moment", "s", 2);
+    Column::new("initial-turned-error", "turned wrong before", "°", 1);
+pub(crate) const SECONDS: Column = Column::new("seconds", "time", "s", 3);
+pub(crate) const ITERATIONS: Column = Column::new("iterations", "iterations", "", 0);
+pub(crate) const MILLISECONDS: Column = Column::new("milliseconds", "time", "ms", 1);
+pub(crate) const MOMENT: Column = Column::new("moment", "moment", "s", 2);
 
 /// What is known of a pose by its error \[m, rad\], where the truth is known, and by how sure it is.
 pub(crate) fn pose_figures(
@@ -34,11 +25,11 @@ pub(crate) fn pose_figures(
 ) -> Vec<Figure> {
     let length = |sigmas: [f64; 3]| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt();
     vec![
-        ERROR.figure(error.map(|[meters, _]| 1e3 * meters)),
-        TURN_ERROR.figure(error.map(|[_, radians]| radians.to_degrees())),
-        PROBABILITY.figure(confidence.map(|c| c.probability)),
-        SIGMA.figure(confidence.map(|c| length(c.deviation_mm))),
-        TURN_SIGMA.figure(confidence.map(|c| length(c.deviation_deg))),
+        (ERROR, error.map(|[meters, _]| 1e3 * meters)),
+        (TURN_ERROR, error.map(|[_, radians]| radians.to_degrees())),
+        (PROBABILITY, confidence.map(|c| c.probability)),
+        (SIGMA, confidence.map(|c| length(c.deviation_mm))),
+        (TURN_SIGMA, confidence.map(|c| length(c.deviation_deg))),
     ]
 }
 

@@ -12,7 +12,7 @@ use prehend_refine::Workers;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::Dataset;
 use prehend_refine::evaluate::study::{
-    Design, InitialPose, Kind, Record, Runner, Shard, StudyFile, Sweep, tables, write_page,
+    Design, InitialPose, Kind, Record, Runner, StudyFile, Sweep, tables, write_page,
 };
 
 use crate::options::{Selection, limit_threads, named, open_rig};
@@ -58,8 +58,8 @@ pub(crate) struct Study {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Do part i (from 0) of n only: frames i, i+n, … of those asked for
-    #[arg(long, value_name = "I/N", help_heading = "Running")]
-    shard: Option<Shard>,
+    #[arg(long, value_name = "I/N", value_parser = shard, help_heading = "Running")]
+    shard: Option<(usize, usize)>,
     /// Worker threads; the results are the same for any number [default: all cores]
     #[arg(long, value_name = "N", help_heading = "Running")]
     threads: Option<NonZeroUsize>,
@@ -71,9 +71,8 @@ impl Study {
         let dataset = self.selection.open()?;
         let (design, rig) = (self.design(&dataset)?, open_rig(self.rig.as_deref())?);
         let (mut frames, unreadable) = self.initial_poses()?;
-        if let Some(shard) = self.shard {
-            let mut places = 0..;
-            frames.retain(|_| places.next().is_some_and(|place| shard.holds(place)));
+        if let Some((index, count)) = self.shard {
+            frames = frames.into_iter().skip(index).step_by(count).collect();
         }
 
         let mut table = StudyFile::open(&self.out, self.restart)?;
@@ -171,4 +170,24 @@ fn level_and_file(text: &str) -> (String, PathBuf) {
     }
     let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     (stem.strip_prefix("init_").map_or(stem.clone(), str::to_owned), file)
+}
+
+/// Part i of n of a study, of every n-th initial pose from the i-th on.
+fn shard(text: &str) -> Result<(usize, usize), &'static str> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    let shard = parts.filter(|(index, count)| index < count);
+    shard.ok_or("is no shard: expected i/n with i from 0 to n-1, such as 0/4")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_parts_of_a_whole() {
+        assert_eq!(["0/3", "2/3"].map(shard), [Ok((0, 3)), Ok((2, 3))]);
+        for text in ["3/3", "1", "a/2", "-1/2", "0/0"] {
+            assert!(shard(text).is_err(), "{text}");
+        }
+    }
 }

@@ -41,22 +41,17 @@ impl Lensed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::mcap::messages::{Header, RegionOfInterest};
 
     #[test]
     fn rectified_images_have_the_projections_camera_and_no_lens() {
         let info = CameraInfo {
-            header: Header::default(),
             height: 48,
             width: 64,
             distortion_model: "plumb_bob".to_owned(),
             d: vec![0.1, 0.0, 0.0, 0.0, 0.0],
             k: [60.0, 0.0, 31.5, 0.0, 61.0, 23.5, 0.0, 0.0, 1.0],
-            r: [0.0; 9],
             p: [50.0, 0.0, 30.0, 0.0, 0.0, 51.0, 20.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-            binning_x: 0,
-            binning_y: 0,
-            roi: RegionOfInterest::default(),
+            ..CameraInfo::default()
         };
         let raw = Lensed::new(&info, "/c/image_raw").unwrap();
         assert_eq!((raw.camera.k()[0], raw.lens.unwrap().coefficients()[0]), (60.0, 0.1));

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
+use prehend_render::{Camera, DistortionError, Remap};
 
+use super::camera::Lensed;
 use super::images::{self, describe};
 use super::reader::MessageReader;
 use super::recording::{Recording, messages, moment, type_of};
@@ -119,64 +120,54 @@ impl<'a> Frames<'a> {
             DatasetError::field(&recording.file, &field, problem)
         };
         let of = |stream: &Stream, problem| fault(&stream.topic.name, problem);
-        let lens_fault = |e: DistortionError| of(&self.first, e.to_string());
-        let kind = &self.first.topic.kind;
-        let (color, alone) = match recording.topics.has_color {
-            true => (Some(images::color(kind, first).map_err(|e| of(&self.first, e))?), None),
-            false => (None, Some(images::depth(kind, first).map_err(|e| of(&self.first, e))?)),
-        };
-        let size = color.as_ref().map(|image| (image.width(), image.height()));
-        let size = size.or(alone.as_ref().map(|image| (image.width(), image.height())));
-        let (width, height) = size.unwrap_or_default();
-        let camera = Camera { width, height, ..recording.camera.camera };
+        let of_first = |problem| of(&self.first, problem);
+        let lens_fault = |e: DistortionError| of_first(e.to_string());
         let check_size = |stream: &Stream, width, height, camera: &Camera| {
             let (w, h) = (camera.width, camera.height);
             let problem = format!("{width}x{height} pixels, its camera_info is of {w}x{h}");
             if (w, h) == (width, height) { Ok(()) } else { Err(of(stream, problem)) }
         };
-        check_size(&self.first, width, height, &recording.camera.camera)?;
-        let mut color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
-        let (mut depth, registered) = match (alone, depth, &self.depth) {
-            (Some(depth), ..) => (depth, true),
-            (None, Some(data), Some(stream)) => {
-                let depth = images::depth(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
-                match &recording.depth_camera {
-                    None => (depth, true),
-                    Some(own) => {
-                        check_size(stream, depth.width(), depth.height(), &own.camera)?;
-                        let place = recording.in_camera(&stream.topic.frame_id, at);
-                        let place = place.map_err(|e| of(stream, e))?;
-                        let own = DepthCamera::beside(own.camera, own.lens, place);
-                        let depth = own.register(depth, &camera, &recording.depth_remaps);
-                        (depth.map_err(|e| of(stream, e.to_string()))?, false)
-                    }
-                }
-            }
-            _ => (DepthImage::filled(width, height, 0.0), false),
-        };
-        let mut mask = match (mask, &self.mask) {
-            (Some(data), Some(stream)) => {
-                images::mask(&stream.topic.kind, data).map_err(|e| of(stream, e))?
-            }
-            _ => Mask::filled(width, height, false),
-        };
-        if let Some(lens) = recording.camera.lens {
-            let remap: &Remap = &recording.remaps.get(camera, lens);
-            color = remap.rgb(&color).map_err(lens_fault)?;
-            mask = remap.mask(&mask).map_err(lens_fault)?;
-            if registered {
-                depth = remap.depth(&depth).map_err(lens_fault)?;
+        let Lensed { camera, lens } = recording.camera;
+        let mut frame = Frame::new(camera);
+        let kind = &self.first.topic.kind;
+        if recording.topics.has_color {
+            frame.color = images::color(kind, first).map_err(of_first)?;
+            check_size(&self.first, frame.color.width(), frame.color.height(), &camera)?;
+        } else {
+            frame.depth = images::depth(kind, first).map_err(of_first)?;
+            check_size(&self.first, frame.depth.width(), frame.depth.height(), &camera)?;
+        }
+        let mut registered = false;
+        if let (Some(data), Some(stream)) = (depth, &self.depth) {
+            frame.depth = images::depth(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
+            if let Some(own) = &recording.depth_camera {
+                check_size(stream, frame.depth.width(), frame.depth.height(), &own.camera)?;
+                let place = recording.in_camera(&stream.topic.frame_id, at);
+                let place = place.map_err(|e| of(stream, e))?;
+                let own = DepthCamera::beside(own.camera, own.lens, place);
+                let depth = own.register(frame.depth, &camera, &recording.depth_remaps);
+                frame.depth = depth.map_err(|e| of(stream, e.to_string()))?;
+                registered = true;
             }
         }
-        let mut observation = Frame::new(camera).color(color).depth(depth).mask(mask);
-        let checked = observation.check_sizes();
-        checked.map_err(|(image, problem)| fault(image, problem))?;
-        observation.gravity = recording.gravity(at);
+        if let (Some(data), Some(stream)) = (mask, &self.mask) {
+            frame.mask = images::mask(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
+        }
+        if let Some(lens) = lens {
+            let remap: &Remap = &recording.remaps.get(camera, lens);
+            frame.color = remap.rgb(&frame.color).map_err(lens_fault)?;
+            frame.mask = remap.mask(&frame.mask).map_err(lens_fault)?;
+            if !registered {
+                frame.depth = remap.depth(&frame.depth).map_err(lens_fault)?;
+            }
+        }
+        frame.check_sizes().map_err(|(image, problem)| fault(image, problem))?;
+        frame.gravity = recording.gravity(at);
         if let Some(hand) = self.hand {
             let measured = recording.hand(hand, at).map_err(|e| fault("the hand", e))?;
-            observation.hand = Some(measured);
+            frame.hand = Some(measured);
         }
-        Ok(observation)
+        Ok(frame)
     }
 }
 

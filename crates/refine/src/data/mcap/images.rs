@@ -7,7 +7,9 @@ use prehend_render::{DepthImage, Mask, RgbImage};
 
 use crate::data::bop::drop_saturated;
 
-use super::messages::{CompressedImage, Header, Named, RosImage, decode};
+use super::messages::{
+    COMPRESSED_IMAGE, CompressedImage, Header, IMAGE, RosImage, Stamped, decode,
+};
 
 /// What a topic of images shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,12 +22,12 @@ pub(super) enum Content {
 
 /// When and in which frame a message was taken, and what it shows by what it says of itself.
 pub(super) fn describe(kind: &str, data: &[u8]) -> Result<(Header, Content), String> {
-    let (header, encoding) = if kind == RosImage::TYPE {
-        let image: RosImage<'_> = decode(data)?;
-        (image.header, image.encoding)
+    let (header, encoding) = if kind == IMAGE {
+        let image: Stamped<RosImage<'_>> = decode(data)?;
+        (image.header, image.content.encoding)
     } else {
-        let image: CompressedImage<'_> = decode(data)?;
-        (image.header, image.format)
+        let image: Stamped<CompressedImage<'_>> = decode(data)?;
+        (image.header, image.content.format)
     };
     let encoding = encoding.to_ascii_lowercase();
     let has = |names: &[&str]| names.iter().any(|name| encoding.starts_with(name));
@@ -41,11 +43,11 @@ pub(super) fn describe(kind: &str, data: &[u8]) -> Result<(Header, Content), Str
 
 /// A color image.
 pub(super) fn color(kind: &str, data: &[u8]) -> Result<RgbImage, String> {
-    if kind == CompressedImage::TYPE {
-        let image: CompressedImage<'_> = decode(data)?;
+    if kind == COMPRESSED_IMAGE {
+        let image = decode::<Stamped<CompressedImage<'_>>>(data)?.content;
         return RgbImage::decode(image.data, Path::new(image.format)).map_err(|e| e.to_string());
     }
-    let image: RosImage<'_> = decode(data)?;
+    let image = decode::<Stamped<RosImage<'_>>>(data)?.content;
     let [r, g, b, channels] = match image.encoding {
         "rgb8" => [0, 1, 2, 3],
         "bgr8" | "8UC3" => [2, 1, 0, 3],
@@ -62,8 +64,8 @@ pub(super) fn color(kind: &str, data: &[u8]) -> Result<RgbImage, String> {
 
 /// Depth \[m\].
 pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
-    if kind == CompressedImage::TYPE {
-        let image: CompressedImage<'_> = decode(data)?;
+    if kind == COMPRESSED_IMAGE {
+        let image = decode::<Stamped<CompressedImage<'_>>>(data)?.content;
         // `compressed_depth_image_transport` puts what 32-bit images are quantized with before the PNG.
         let png = match image.format.contains("compressedDepth") {
             true => image.data.get(12..).unwrap_or_default(),
@@ -77,33 +79,33 @@ pub(super) fn depth(kind: &str, data: &[u8]) -> Result<DepthImage, String> {
         drop_saturated(&mut depth, MILLIMETER);
         return Ok(depth);
     }
-    let image: RosImage<'_> = decode(data)?;
-    let big = image.is_bigendian != 0;
+    let image = decode::<Stamped<RosImage<'_>>>(data)?.content;
+    let is_big = image.is_bigendian != 0;
     let pixels: Vec<f32> = match image.encoding {
         "16UC1" | "mono16" => {
-            let millimeters = |bytes: [u8; 2]| match big {
-                true => u16::from_be_bytes(bytes),
-                false => u16::from_le_bytes(bytes),
-            };
-            let meters = |bytes| match millimeters(bytes) {
+            let meters = |bytes| match u16::from_le_bytes(ordered(is_big, bytes)) {
                 u16::MAX => 0.0,
                 units => (f64::from(units) * MILLIMETER) as f32,
             };
             rows(&image, 2)?.flat_map(|row| row.as_chunks().0).map(|b| meters(*b)).collect()
         }
         "32FC1" => {
-            let meters = |bytes: [u8; 4]| match big {
-                true => f32::from_be_bytes(bytes),
-                false => f32::from_le_bytes(bytes),
-            };
             // Where nothing was measured there is no number.
             let measured = |z: f32| if z.is_finite() && z > 0.0 { z } else { 0.0 };
             let all = rows(&image, 4)?.flat_map(|row| row.as_chunks().0);
-            all.map(|b| measured(meters(*b))).collect()
+            all.map(|b| measured(f32::from_le_bytes(ordered(is_big, *b)))).collect()
         }
         other => return Err(format!("depth encoded as {other:?} is not read")),
     };
     sized(&image, |width, height| DepthImage::new(width, height, pixels))
+}
+
+/// The bytes of a number, the lowest first.
+fn ordered<const N: usize>(is_big: bool, mut bytes: [u8; N]) -> [u8; N] {
+    if is_big {
+        bytes.reverse();
+    }
+    bytes
 }
 
 /// Whole numbers of depth are millimeters (REP 118).
@@ -153,30 +155,30 @@ mod tests {
 
     fn image(encoding: &str, size: [u32; 2], step: u32, data: &[u8]) -> Vec<u8> {
         let [width, height] = size;
-        let header = Header::default();
-        encode(&RosImage { header, height, width, encoding, is_bigendian: 0, step, data }).unwrap()
+        let content = RosImage { height, width, encoding, is_bigendian: 0, step, data };
+        encode(&Stamped { header: Header::default(), content }).unwrap()
     }
 
     #[test]
     fn pixels_are_read_by_their_encoding_and_padding_is_left_out() {
         let bytes = [10, 20, 30, 40, 50, 60, 0, 0, 70, 80, 90, 100, 110, 120];
         let level = |bytes: [u8; 3]| bytes.map(|b| f32::from(b) / 255.0);
-        let read = |encoding| color(RosImage::TYPE, &image(encoding, [2, 2], 8, &bytes)).unwrap();
+        let read = |encoding| color(IMAGE, &image(encoding, [2, 2], 8, &bytes)).unwrap();
         assert_eq!(read("rgb8").pixels()[1], level([40, 50, 60]));
         assert_eq!(read("bgr8").pixels()[2], level([90, 80, 70]));
         let two = [0x10, 0x27, 0, 0];
-        let read = depth(RosImage::TYPE, &image("16UC1", [2, 1], 4, &two)).unwrap();
+        let read = depth(IMAGE, &image("16UC1", [2, 1], 4, &two)).unwrap();
         assert_eq!(read.pixels(), [10.0, 0.0]);
         let floats = [1.5f32, f32::NAN, -1.0].map(f32::to_le_bytes).concat();
-        let read = depth(RosImage::TYPE, &image("32FC1", [3, 1], 12, &floats)).unwrap();
+        let read = depth(IMAGE, &image("32FC1", [3, 1], 12, &floats)).unwrap();
         assert_eq!(read.pixels(), [1.5, 0.0, 0.0]);
-        let read = mask(RosImage::TYPE, &image("mono8", [3, 1], 3, &[0, 1, 255])).unwrap();
+        let read = mask(IMAGE, &image("mono8", [3, 1], 3, &[0, 1, 255])).unwrap();
         assert_eq!(read.pixels(), [false, true, true]);
     }
 
     #[test]
     fn what_is_no_image_is_told() {
-        let told = |bytes: &[u8]| color(RosImage::TYPE, bytes).unwrap_err();
+        let told = |bytes: &[u8]| color(IMAGE, bytes).unwrap_err();
         assert!(told(&image("rgb8", [2, 2], 6, &[0; 11])).contains("11 bytes in rows of 6"));
         assert!(told(&image("rgb8", [u32::MAX, u32::MAX], u32::MAX, &[0; 9])).contains("9 bytes"));
         assert!(told(&image("bayer_rggb8", [1, 1], 1, &[0])).contains("bayer_rggb8"));

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::{Cursor, ErrorKind, Read};
+use std::iter;
 
 use mcap::read::ChannelAccumulator;
 use mcap::records::{Record, op};
@@ -18,22 +19,18 @@ const BLOCK: usize = 1 << 20;
 
 /// Messages in the order of the file; nothing after the first error. What else there is, attachments and indices, is not looked at.
 pub(super) struct MessageReader<'a> {
-    /// The file, and the chunk of it that is being read.
-    open: Vec<RecordReader<'a>>,
+    /// Records of the file, and of the chunk of it that is being read.
+    open: Vec<Records<'a>>,
     channels: ChannelAccumulator<'static>,
 }
 
-/// Records in their order.
-struct RecordReader<'a> {
-    source: Box<dyn Read + Send + 'a>,
-    reader: LinearReader,
-}
+/// Kind and content of records, in their order.
+type Records<'a> = Box<dyn Iterator<Item = McapResult<(u8, Vec<u8>)>> + Send + 'a>;
 
 impl<'a> MessageReader<'a> {
     pub(super) fn new(source: impl Read + Send + 'a) -> Self {
         let options = LinearReaderOptions::default().with_emit_chunks(true);
-        let file = RecordReader::new(source, options);
-        Self { open: vec![file], channels: ChannelAccumulator::default() }
+        Self { open: vec![records(source, options)], channels: ChannelAccumulator::default() }
     }
 
     fn read(&mut self) -> McapResult<Option<Message<'static>>> {
@@ -53,7 +50,7 @@ impl<'a> MessageReader<'a> {
                     .with_skip_start_magic(true)
                     .with_skip_end_magic(true)
                     .with_validate_chunk_crcs(true);
-                self.open.push(RecordReader::new(chunk, options));
+                self.open.push(records(chunk, options));
             } else if matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
                 let message = message(&mut self.channels, parse_record(opcode, &record)?)?;
                 if message.is_some() {
@@ -77,23 +74,15 @@ impl Iterator for MessageReader<'_> {
     }
 }
 
-impl<'a> RecordReader<'a> {
-    fn new(source: impl Read + Send + 'a, options: LinearReaderOptions) -> Self {
-        let options = options.with_record_length_limit(LONGEST);
-        Self { source: Box::new(source), reader: LinearReader::new_with_options(options) }
-    }
-}
-
-impl Iterator for RecordReader<'_> {
-    /// Kind and content.
-    type Item = McapResult<(u8, Vec<u8>)>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+fn records<'a>(mut source: impl Read + Send + 'a, options: LinearReaderOptions) -> Records<'a> {
+    let options = options.with_record_length_limit(LONGEST);
+    let mut reader = LinearReader::new_with_options(options);
+    Box::new(iter::from_fn(move || {
         loop {
-            match self.reader.next_event()? {
+            match reader.next_event()? {
                 Ok(LinearReadEvent::ReadRequest(count)) => {
-                    match self.source.read(self.reader.insert(count.min(BLOCK))) {
-                        Ok(read) => self.reader.notify_read(read),
+                    match source.read(reader.insert(count.min(BLOCK))) {
+                        Ok(read) => reader.notify_read(read),
                         Err(error) if error.kind() == ErrorKind::Interrupted => {}
                         Err(error) => return Some(Err(error.into())),
                     }
@@ -104,7 +93,7 @@ impl Iterator for RecordReader<'_> {
                 Err(error) => return Some(Err(error)),
             }
         }
-    }
+    }))
 }
 
 /// The message that a record is, if it is one; `channels` learn of schemas and channels.

@@ -14,8 +14,8 @@ use super::camera::Lensed;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
-    CameraInfo, CompressedImage, Header, JointState, Named, RosImage, TransformMessage,
-    Vector3Stamped, WrenchStamped, decode,
+    CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, Header, IMAGE, JOINT_STATE, JointState, Stamped,
+    TRANSFORMS, TransformStamped, VECTOR, WRENCH, decode,
 };
 use super::reader::MessageReader;
 use super::series::TimeSeries;
@@ -111,9 +111,8 @@ impl Recording {
             None => None,
         };
         let faults = found.faults.iter().map(|(topic, (problem, count))| {
-            let more =
-                if *count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
-            format!("{}: {topic}: {problem}{more}", file.display())
+            let text = format!("{}: {topic}: {problem}", file.display());
+            if *count > 1 { format!("{text} (and {} more)", count - 1) } else { text }
         });
         Ok(Self {
             file: file.to_owned(),
@@ -155,13 +154,9 @@ impl Recording {
     /// Gravity in the camera's frame \[m/s²\], if that, or where up is, is known.
     pub(super) fn gravity(&self, at: i64) -> Option<Vector3<f64>> {
         if let Some((frame, series)) = &self.readings.gravity {
-            let told = series.nearest(at, i64::MAX)?;
-            return match plain(frame) == self.camera_frame() {
-                true => Some(told),
-                false => {
-                    Some(self.readings.transforms.between(self.camera_frame(), frame, at)? * told)
-                }
-            };
+            let measured = series.nearest(at, i64::MAX)?;
+            let t_cam = self.readings.transforms.between(self.camera_frame(), frame, at)?;
+            return Some(t_cam * measured);
         }
         if !self.readings.transforms.knows(&self.world) {
             return None;
@@ -264,47 +259,44 @@ impl RecordingIndex {
         if message.channel.message_encoding != "cdr" {
             return Ok(());
         }
-        if kind == RosImage::TYPE || kind == CompressedImage::TYPE {
+        if kind == IMAGE || kind == COMPRESSED_IMAGE {
             *self.counts.entry(topic.to_owned()).or_default() += 1;
             if !self.images.contains_key(topic) {
                 let (header, content) = describe(kind, data)?;
                 self.images.insert(topic.to_owned(), (kind.to_owned(), header, content));
             }
-        } else if kind == CameraInfo::TYPE {
+        } else if kind == CAMERA_INFO {
             if !self.cameras.contains_key(topic) {
-                self.cameras.insert(topic.to_owned(), decode(data)?);
+                let info: Stamped<CameraInfo> = decode(data)?;
+                self.cameras.insert(topic.to_owned(), info.content);
             }
-        } else if kind == JointState::TYPE {
-            let JointState { header, name, position, .. } = self.keep(data)?;
-            for (name, position) in name.into_iter().zip(position) {
+        } else if kind == JOINT_STATE {
+            let Stamped { header, content }: Stamped<JointState> = self.keep(data)?;
+            for (name, position) in content.name.into_iter().zip(content.position) {
                 let series = self.readings.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);
             }
-        } else if kind == TransformMessage::TYPE {
+        } else if kind == TRANSFORMS {
             let fixed = topic.ends_with("tf_static");
-            let TransformMessage { transforms } = self.keep(data)?;
-            for transform in &transforms {
-                self.readings.transforms.add(
-                    transform,
-                    moment(&transform.header, message),
-                    fixed,
-                )?;
+            for transform in self.keep::<Vec<TransformStamped>>(data)? {
+                let at = moment(&transform.header, message);
+                self.readings.transforms.add(&transform, at, fixed)?;
             }
-        } else if kind == Vector3Stamped::TYPE && topic.ends_with("gravity") {
-            let Vector3Stamped { header, vector } = self.keep(data)?;
-            let (at, vector) = (moment(&header, message), Vector3::from(vector));
+        } else if kind == VECTOR && topic.ends_with("gravity") {
+            let Stamped { header, content }: Stamped<[f64; 3]> = self.keep(data)?;
+            let vector = Vector3::from(content);
             check_gravity(&vector).map_err(|e| e.to_string())?;
             let first = || (header.frame_id.clone(), TimeSeries::default());
             let (frame, series) = self.readings.gravity.get_or_insert_with(first);
             if *frame == header.frame_id {
-                series.push(at, vector);
+                series.push(moment(&header, message), vector);
             }
-        } else if kind == WrenchStamped::TYPE {
-            let WrenchStamped { header, force, .. } = self.keep(data)?;
-            let at = moment(&header, message);
-            let series =
-                self.readings.forces.entry(plain(&header.frame_id).to_owned()).or_default();
-            series.push(at, force.into());
+        } else if kind == WRENCH {
+            let Stamped { header, content: [force, _] }: Stamped<[[f64; 3]; 2]> =
+                self.keep(data)?;
+            let frame = plain(&header.frame_id).to_owned();
+            let series = self.readings.forces.entry(frame).or_default();
+            series.push(moment(&header, message), force.into());
         }
         Ok(())
     }

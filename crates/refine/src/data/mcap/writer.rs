@@ -11,9 +11,9 @@ use prehend_render::{Camera, RgbImage};
 use serde::Serialize;
 
 use super::messages::{
-    CameraInfo, Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Float64, Header,
-    JointState, KeyValue, Marker, Named, PoseWithCovarianceStamped, RosImage, Time,
-    TransformMessage, TransformStamped, Vector3Stamped, WrenchStamped, encode,
+    CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, CompressedImage, DIAGNOSTICS, DiagnosticStatus,
+    Header, IMAGE, JOINT_STATE, JointState, MARKER, Marker, NUMBER, POSE, RosImage, RosTransform,
+    Stamped, TRANSFORMS, Time, TransformStamped, VECTOR, WRENCH, encode,
 };
 use super::recording::taxel_frame;
 use super::schemas::schema;
@@ -75,8 +75,7 @@ impl RecordingWriter {
             let turn = UnitQuaternion::rotation_between(gravity, &-Vector3::z());
             let t_world_cam = Isometry3::from_parts(Default::default(), turn.unwrap_or_default());
             placed.push(transform(at, WORLD, CAMERA, &t_world_cam));
-            let (header, vector) = (header(at, CAMERA), (*gravity).into());
-            self.write("/gravity", at, &Vector3Stamped { header, vector })?;
+            self.stamped(("/gravity", VECTOR), at, CAMERA, <[f64; 3]>::from(*gravity))?;
         }
         if let Some(measured) = hand {
             let root = &measured.hand.tree.links()[0].name;
@@ -84,10 +83,11 @@ impl RecordingWriter {
             self.felt(at, measured)?;
         }
         if !placed.is_empty() {
-            self.write("/tf", at, &TransformMessage { transforms: placed })?;
+            self.write(("/tf", TRANSFORMS), at, &placed)?;
         }
-        self.write("/camera/color/camera_info", at, &camera_info(at, camera))?;
-        self.write("/camera/depth/camera_info", at, &camera_info(at, camera))?;
+        for topic in ["/camera/color/camera_info", "/camera/depth/camera_info"] {
+            self.stamped((topic, CAMERA_INFO), at, CAMERA, camera_info(camera))?;
+        }
         self.image("/camera/color/image_rect_color", at, size, "rgb8", &color.to_bytes())?;
         let meters: Vec<u8> = depth.pixels().iter().flat_map(|z| z.to_le_bytes()).collect();
         self.image("/camera/depth/image_rect", at, size, "32FC1", &meters)?;
@@ -102,17 +102,15 @@ impl RecordingWriter {
     fn felt(&mut self, at: i64, measured: &HandMeasurement) -> Result<(), DatasetError> {
         let hand = &measured.hand;
         let joints = JointState {
-            header: header(at, ""),
             name: hand.tree.joint_names().to_vec(),
             position: measured.joints.clone(),
             ..JointState::default()
         };
-        self.write("/joint_states", at, &joints)?;
+        self.stamped(("/joint_states", JOINT_STATE), at, "", joints)?;
         for (taxel, force) in hand.taxels.iter().zip(&measured.forces) {
             if !HandMeasurement::is_unknown(force) {
-                let header = header(at, &taxel_frame(taxel.index));
-                let (force, torque) = ((*force).into(), Vector3::zeros().into());
-                self.write("/hand/taxels", at, &WrenchStamped { header, force, torque })?;
+                let (frame, wrench) = (taxel_frame(taxel.index), [(*force).into(), [0.0; 3]]);
+                self.stamped(("/hand/taxels", WRENCH), at, &frame, wrench)?;
             }
         }
         Ok(())
@@ -126,17 +124,16 @@ impl RecordingWriter {
         let corner = |face: &[u32; 3], k: usize| mesh.vertices[face[k] as usize].coords.into();
         let corners = mesh.faces.iter().flat_map(|face| (0..3).map(move |k| corner(face, k)));
         let marker = Marker {
-            header: header(at, OBJECT),
             ns: "object".to_owned(),
             kind: Marker::TRIANGLES,
             pose: (&Isometry3::identity()).into(),
-            scale: Vector3::repeat(1.0).into(),
-            color: Color { r: 0.35, g: 0.6, b: 0.9, a: 0.9 },
+            scale: [1.0; 3],
+            color: [0.35, 0.6, 0.9, 0.9],
             frame_locked: true,
             points: corners.collect(),
             ..Marker::default()
         };
-        self.write("/prehend/object", at, &marker)
+        self.stamped(("/prehend/object", MARKER), at, OBJECT, marker)
     }
 
     /// What was found of the object, and `overlay`, a picture of it.
@@ -153,24 +150,20 @@ impl RecordingWriter {
             tracked;
         let probability = posterior.as_ref().map_or(0.0, Posterior::probability);
         if *status != TrackStatus::Lost {
-            let transforms = vec![transform(at, CAMERA, OBJECT, t_cam_object)];
-            self.write("/tf", at, &TransformMessage { transforms })?;
+            let placed = Vec::from([transform(at, CAMERA, OBJECT, t_cam_object)]);
+            self.write(("/tf", TRANSFORMS), at, &placed)?;
         }
         if let Some(posterior) = posterior {
             let origin = Point3::from(t_cam_object.translation.vector);
             let covariance = posterior.covariance_at(&origin);
-            let covariance = std::array::from_fn(|r| std::array::from_fn(|c| covariance[(r, c)]));
-            let (header, pose) = (header(at, CAMERA), t_cam_object.into());
-            self.write(
-                "/prehend/pose",
-                at,
-                &PoseWithCovarianceStamped { header, pose, covariance },
-            )?;
+            // Of x, y, z and the rotations about these axes, row-major.
+            let covariance: [[f64; 6]; 6] = covariance.transpose().into();
+            let pose = (RosTransform::from(t_cam_object), covariance);
+            self.stamped(("/prehend/pose", POSE), at, CAMERA, pose)?;
         }
-        self.write("/prehend/probability", at, &Float64 { data: probability })?;
+        self.write(("/prehend/probability", NUMBER), at, &probability)?;
         let mut message = status.name().to_owned();
         message.extend(rejection.map(|doubt| format!(": {doubt}")));
-        let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
         let status = DiagnosticStatus {
             level: match status {
                 TrackStatus::Tracked | TrackStatus::Relocalized => 0,
@@ -181,17 +174,15 @@ impl RecordingWriter {
             message,
             hardware_id: String::new(),
             values: vec![
-                value("probability within 5 mm and 5°", format!("{probability:.3}")),
-                value("iterations", iterations.to_string()),
-                value("milliseconds", format!("{:.1}", timing.total().as_secs_f64() * 1e3)),
+                ["probability within 5 mm and 5°".into(), format!("{probability:.3}")],
+                ["iterations".into(), iterations.to_string()],
+                ["milliseconds".into(), format!("{:.1}", timing.total().as_secs_f64() * 1e3)],
             ],
         };
-        let header = header(at, CAMERA);
-        self.write("/diagnostics", at, &DiagnosticArray { header, status: vec![status] })?;
+        self.stamped(("/diagnostics", DIAGNOSTICS), at, CAMERA, vec![status])?;
         let jpeg = overlay.to_jpeg(QUALITY).map_err(|e| DatasetError::writing(&self.file, e))?;
-        let header = self::header(at, CAMERA);
-        let picture = CompressedImage { header, format: "jpeg", data: &jpeg };
-        self.write("/prehend/overlay", at, &picture)
+        let picture = CompressedImage { format: "jpeg", data: &jpeg };
+        self.stamped(("/prehend/overlay", COMPRESSED_IMAGE), at, CAMERA, picture)
     }
 
     fn image(
@@ -204,41 +195,43 @@ impl RecordingWriter {
     ) -> Result<(), DatasetError> {
         let step = (data.len() / height.max(1)) as u32;
         let (width, height) = (width as u32, height as u32);
-        let header = header(at, CAMERA);
-        self.write(
-            topic,
-            at,
-            &RosImage { header, height, width, encoding, is_bigendian: 0, step, data },
-        )
+        let image = RosImage { height, width, encoding, is_bigendian: 0, step, data };
+        self.stamped((topic, IMAGE), at, CAMERA, image)
     }
 
-    fn write<T: Serialize + Named>(
+    /// A message of the moment `at` \[ns\] in `frame`, to a topic of a type.
+    fn stamped<T: Serialize>(
         &mut self,
-        topic: &str,
+        topic: (&str, &str),
+        at: i64,
+        frame: &str,
+        content: T,
+    ) -> Result<(), DatasetError> {
+        self.write(topic, at, &Stamped { header: header(at, frame), content })
+    }
+
+    fn write<T: Serialize>(
+        &mut self,
+        (topic, kind): (&str, &str),
         at: i64,
         message: &T,
     ) -> Result<(), DatasetError> {
-        let data = encode(message).map_err(|e| DatasetError::writing(&self.file, e))?;
-        let written = self.channel::<T>(topic).and_then(|(channel_id, sequence)| {
+        let Self { writer, channels, file } = self;
+        let mut write = || -> mcap::McapResult<()> {
+            let data = encode(message)?;
+            let (channel_id, sequence) = match channels.get(topic) {
+                Some(known) => *known,
+                None => {
+                    let schema = writer.add_schema(kind, "ros2msg", schema(kind).as_bytes())?;
+                    (writer.add_channel(schema, topic, "cdr", &BTreeMap::new())?, 0)
+                }
+            };
+            channels.insert(topic.to_owned(), (channel_id, sequence.wrapping_add(1)));
             let time = u64::try_from(at).unwrap_or_default();
             let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
-            self.writer.write_to_known_channel(&header, &data)
-        });
-        written.map_err(|e| DatasetError::writing(&self.file, e))
-    }
-
-    /// Number of the channel of `topic`, and of its next message.
-    fn channel<T: Named>(&mut self, topic: &str) -> Result<(u16, u32), mcap::McapError> {
-        if !self.channels.contains_key(topic) {
-            let text = schema(T::TYPE);
-            let schema = self.writer.add_schema(T::TYPE, "ros2msg", text.as_bytes())?;
-            let id = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new())?;
-            self.channels.insert(topic.to_owned(), (id, 0));
-        }
-        let (id, next) = self.channels.entry(topic.to_owned()).or_default();
-        let sequence = *next;
-        *next = next.wrapping_add(1);
-        Ok((*id, sequence))
+            writer.write_to_known_channel(&header, &data)
+        };
+        write().map_err(|e| DatasetError::writing(file, e))
     }
 }
 
@@ -256,10 +249,9 @@ fn transform(at: i64, parent: &str, child: &str, pose: &Isometry3<f64>) -> Trans
 }
 
 /// A pinhole camera.
-fn camera_info(at: i64, camera: &Camera) -> CameraInfo {
+fn camera_info(camera: &Camera) -> CameraInfo {
     let k = camera.k();
     CameraInfo {
-        header: header(at, CAMERA),
         height: camera.height as u32,
         width: camera.width as u32,
         distortion_model: "plumb_bob".to_owned(),

@@ -1,33 +1,17 @@
 //! Which true poses the estimates of one target find.
 
-use crate::evaluate::metrics::{NormalizedErrors, THRESHOLDS};
+use crate::evaluate::metrics::{NormalizedErrors, THRESHOLDS, VSD_TOLERANCES};
 
-/// How often true poses of one target are found, summed over the settings of each metric.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Found {
-    /// By VSD, over its ten tolerances and ten thresholds.
-    pub(super) vsd: usize,
-    /// By MSSD, over its ten thresholds.
-    pub(super) mssd: usize,
-    /// By MSPD, over its ten thresholds.
-    pub(super) mspd: usize,
-}
-
-impl Found {
-    /// By the errors of each estimate (in order of descending score) against each true pose.
-    pub(super) fn new(errors: &[Vec<NormalizedErrors>]) -> Self {
-        let over_thresholds = |error: &dyn Fn(&NormalizedErrors) -> f64| -> usize {
-            let of_metric = |row: &Vec<NormalizedErrors>| row.iter().map(error).collect();
-            let errors: Vec<Vec<f64>> = errors.iter().map(of_metric).collect();
-            THRESHOLDS.iter().map(|&threshold| count_matches(&errors, threshold)).sum()
-        };
-        let tolerances = errors.iter().flatten().next().map_or(0, |e| e.vsd.len());
-        Self {
-            vsd: (0..tolerances).map(|k| over_thresholds(&|e| e.vsd[k])).sum(),
-            mssd: over_thresholds(&|e| e.mssd),
-            mspd: over_thresholds(&|e| e.mspd),
-        }
-    }
+/// Number of times that true poses of one target are found by VSD (summed over its ten tolerances and ten thresholds), MSSD and MSPD (over their ten
+/// thresholds), from the errors of each estimate, in order of descending score, against each true pose.
+pub(super) fn count_found(errors: &[Vec<NormalizedErrors>]) -> [usize; 3] {
+    let over_thresholds = |error: &dyn Fn(&NormalizedErrors) -> f64| -> usize {
+        let of_metric = |row: &Vec<NormalizedErrors>| row.iter().map(error).collect();
+        let errors: Vec<Vec<f64>> = errors.iter().map(of_metric).collect();
+        THRESHOLDS.iter().map(|&threshold| count_matches(&errors, threshold)).sum()
+    };
+    let vsd = (0..VSD_TOLERANCES.len()).map(|k| over_thresholds(&|e| e.vsd[k])).sum();
+    [vsd, over_thresholds(&|e| e.mssd), over_thresholds(&|e| e.mspd)]
 }
 
 /// The number of true poses that are matched when each estimate in turn takes the one that is nearest, below `threshold`
@@ -66,8 +50,7 @@ mod tests {
     #[test]
     fn each_metric_counts_its_own_settings() {
         // Below 0.35 … 0.5, below 0.15 … 0.5, and below none.
-        let found = Found::new(&[vec![errors(0.31, 0.12, 0.5)]]);
-        assert_eq!(found, Found { vsd: 40, mssd: 8, mspd: 0 });
-        assert_eq!(Found::new(&[]), Found::default());
+        assert_eq!(count_found(&[vec![errors(0.31, 0.12, 0.5)]]), [40, 8, 0]);
+        assert_eq!(count_found(&[]), [0; 3]);
     }
 }

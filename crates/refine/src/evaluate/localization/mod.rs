@@ -17,7 +17,6 @@ mod summary;
 mod target;
 mod time;
 
-pub use scorer::LocalizationScorer;
 pub use summary::{AverageRecall, LocalizationSummary, summarize_localization};
 pub use target::{LocalizationTarget, TargetScore};
 pub use time::seconds_per_image;

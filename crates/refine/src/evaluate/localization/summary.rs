@@ -42,8 +42,7 @@ impl AverageRecall {
             has_depth &= score.has_depth;
             targets += score.target.instances;
             estimates += score.estimates;
-            let of_target = [score.found.vsd, score.found.mssd, score.found.mspd];
-            found.iter_mut().zip(of_target).for_each(|(sum, of_target)| *sum += of_target);
+            found.iter_mut().zip(score.found).for_each(|(sum, of_target)| *sum += of_target);
         }
         let recall = |found: usize, settings: usize| match targets {
             0 => 0.0,
@@ -94,14 +93,12 @@ impl LocalizationSummary {
 
 #[cfg(test)]
 mod tests {
-    use super::super::matching::Found;
     use super::super::target::LocalizationTarget;
     use super::*;
 
     fn score(obj_id: u32, instances: usize, estimates: usize, found: [usize; 3]) -> TargetScore {
         let target = LocalizationTarget { scene_id: 1, im_id: 0, obj_id, instances };
-        let [vsd, mssd, mspd] = found;
-        TargetScore { target, estimates, found: Found { vsd, mssd, mspd }, has_depth: true }
+        TargetScore { target, estimates, found, has_depth: true }
     }
 
     #[test]

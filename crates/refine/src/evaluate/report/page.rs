@@ -1,5 +1,9 @@
 //! One page that shows a run.
 
+mod document;
+mod frame;
+mod scene;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,10 +12,12 @@ use base64::engine::general_purpose::STANDARD;
 use prehend_geometry::TriMesh;
 use prehend_render::RgbImage;
 
-use super::document::{Block, Chart, Document, Figure, LabeledPicture};
-use super::frame::{DrawnFrame, FrameDrawing, FrameEntry, FrameReport, loss_chart, residuals};
-use super::picture::{compared, image_and_outline};
-use super::scene::{encoded_hand, encoded_scene, object_mesh};
+use self::document::{Block, Document, LabeledPicture};
+pub use self::document::{Chart, Column, Figure, Series};
+pub use self::frame::{DrawnFrame, FrameDrawing, FrameReport};
+use self::frame::{loss_chart, residuals};
+use self::scene::{encoded_hand, encoded_scene, object_mesh};
+use super::picture::compared;
 use crate::data::AssetError;
 use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::error::RefineError;
@@ -66,9 +72,10 @@ impl Report {
         &mut self,
         title: &str,
         headings: impl IntoIterator<Item = S>,
-        rows: Vec<Vec<String>>,
+        rows: impl IntoIterator<Item = impl Into<Vec<String>>>,
     ) {
         let headings = headings.into_iter().map(Into::into).collect();
+        let rows = rows.into_iter().map(Into::into).collect();
         self.document.blocks.push(Block::Table { title: title.to_owned(), headings, rows });
     }
 
@@ -106,15 +113,15 @@ impl Report {
         self.document.blocks.push(Block::Chart(chart));
     }
 
-    /// Adds a frame, as it was drawn if it was.
-    pub fn add_frame(&mut self, frame: FrameReport, drawn: Option<DrawnFrame>) {
+    /// Adds a frame.
+    pub fn add_frame(&mut self, frame: FrameReport) {
         let columns = &mut self.document.columns;
-        for Figure { column, .. } in &frame.figures {
+        for (column, _) in &frame.figures {
             if !columns.contains(column) {
                 columns.push(*column);
             }
         }
-        self.document.frames.push(FrameEntry::new(frame, drawn));
+        self.document.frames.push(frame);
     }
 
     /// Draws what there is of a frame, for [`add_frame`](Self::add_frame).
@@ -124,15 +131,8 @@ impl Report {
     pub fn draw(&mut self, drawing: &FrameDrawing<'_>) -> Result<DrawnFrame, AssetError> {
         let FrameDrawing { input, initial, t_cam_object, trace, .. } = drawing;
         let (observation, object) = (&input.frame, &input.object);
-        let pictures = match initial {
-            Some(initial) => labeled(
-                ["initial", "refined"],
-                &compared(observation, object, initial, t_cam_object),
-            ),
-            None => {
-                labeled(["image", "outline"], &image_and_outline(observation, object, t_cam_object))
-            }
-        };
+        let labels = if initial.is_some() { ["initial", "refined"] } else { ["image", "outline"] };
+        let pictures = labeled(labels, &compared(observation, object, *initial, t_cam_object));
         let hand = observation.hand.as_ref().map(|measured| self.hand(&measured.hand));
         let index = self.object(object);
         let (_, mesh, number) = &self.objects[index];
@@ -172,7 +172,8 @@ impl Report {
     /// If it cannot be written.
     pub fn finish(mut self) -> Result<PathBuf, DatasetError> {
         let Document { columns, frames, .. } = &mut self.document;
-        columns.retain(|column| frames.iter().any(|frame| frame.figures.contains_key(column.key)));
+        let figures = || frames.iter().flat_map(|frame| &frame.figures);
+        columns.retain(|column| figures().any(|(own, value)| own == column && value.is_some()));
         let file = self.folder.join("index.html");
         let fail = |e: serde_json::Error| DatasetError::Write {
             file: file.clone(),

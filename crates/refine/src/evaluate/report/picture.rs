@@ -23,32 +23,21 @@ pub fn before_and_after(
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
 ) -> RgbImage {
-    side_by_side(&compared(observation, object, before, after))
+    side_by_side(&compared(observation, object, Some(before), after))
 }
 
-/// The image around the object with the outline at `before`, and with that at `after`.
+/// The image around the object with the outline at `before`, or none without, and with that at `after`.
 pub(super) fn compared(
     observation: &Frame,
     object: &Object,
-    before: &Isometry3<f64>,
+    before: Option<&Isometry3<f64>>,
     after: &Isometry3<f64>,
 ) -> [RgbImage; 2] {
     let (image, window) = (brightened(observation), window(observation, object, after));
-    [(before, BEFORE), (after, AFTER)].map(|(pose, color)| {
-        cut(&outlined(image.clone(), observation, object, pose, color), window)
+    [(before, BEFORE), (Some(after), AFTER)].map(|(pose, color)| match pose {
+        Some(pose) => cut(&outlined(image.clone(), observation, object, pose, color), window),
+        None => cut(&image, window),
     })
-}
-
-/// The image around the object, and the same with the object's outline.
-#[cfg(feature = "cli")]
-pub(super) fn image_and_outline(
-    observation: &Frame,
-    object: &Object,
-    t_cam_object: &Isometry3<f64>,
-) -> [RgbImage; 2] {
-    let (image, window) = (brightened(observation), window(observation, object, t_cam_object));
-    let outlined = outlined(image.clone(), observation, object, t_cam_object, AFTER);
-    [cut(&image, window), cut(&outlined, window)]
 }
 
 /// The image around the object twice, with outlines of object and hand: as an observation, a model and a pose (object → camera \[m\]) have

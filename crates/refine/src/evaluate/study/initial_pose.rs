@@ -1,7 +1,6 @@
 //! The initial poses of a study.
 
 use std::path::Path;
-use std::str::FromStr;
 
 use crate::data::bop::{DatasetError, ResultRow, read_results};
 use crate::data::identity::file_fingerprint;
@@ -51,47 +50,9 @@ impl InitialPose {
     }
 }
 
-/// One of several parts of a study: initial pose k of those asked for belongs to part k mod `count`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    index: usize,
-    count: usize,
-}
-
-impl Shard {
-    /// True if initial pose `k` belongs to it.
-    pub fn holds(self, k: usize) -> bool {
-        k % self.count == self.index
-    }
-}
-
-impl FromStr for Shard {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let parts =
-            text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-        let shard = parts.map(|(index, count)| Self { index, count });
-        let whole = shard.filter(|shard| shard.index < shard.count);
-        whole.ok_or("is no shard: expected i/n with i from 0 to n-1, such as 0/4")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shards_part_the_frames() {
-        let shards: Vec<Shard> = ["0/3", "1/3", "2/3"].map(|t| t.parse().unwrap()).into();
-        for frame in 0..10 {
-            assert_eq!(shards.iter().filter(|s| s.holds(frame)).count(), 1);
-        }
-        assert!(shards[1].holds(4) && !shards[1].holds(3));
-        for text in ["3/3", "1", "a/2", "-1/2", "0/0"] {
-            assert!(text.parse::<Shard>().is_err(), "{text}");
-        }
-    }
 
     #[test]
     fn filters_keep_the_numbers_of_frames() {

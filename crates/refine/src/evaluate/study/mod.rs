@@ -18,7 +18,7 @@ mod tables;
 
 pub use design::Design;
 pub use file::StudyFile;
-pub use initial_pose::{InitialPose, Shard};
+pub use initial_pose::InitialPose;
 pub use kind::Kind;
 pub use page::write_page;
 pub use record::{COLUMNS, Key, Record};

@@ -7,18 +7,14 @@ use crate::data::bop::DatasetError;
 use crate::evaluate::metrics::Table;
 use crate::evaluate::report::{Column, FrameReport, Report};
 
-const fn column(key: &'static str, name: &'static str, unit: &'static str) -> Column {
-    Column { key, name, unit, digits: 2 }
-}
-
 /// The metrics of the table of frames by their place in [`Record::metrics`], with the factor of their unit.
 const METRICS: [(Column, usize, f64); 6] = [
-    (column("error", "error", "mm"), 0, 10.0),
-    (column("turned-error", "turned wrong", "°"), 2, 1.0),
-    (column("adi", "ADI", "mm"), 4, 1.0),
-    (column("mssd", "MSSD", "mm"), 5, 1.0),
-    (column("contact", "|ΔCA|", "cm²"), 9, 1.0),
-    (column("volume", "|ΔIV|", "cm³"), 10, 1.0),
+    (Column::new("error", "error", "mm", 2), 0, 10.0),
+    (Column::new("turned-error", "turned wrong", "°", 2), 2, 1.0),
+    (Column::new("adi", "ADI", "mm", 2), 4, 1.0),
+    (Column::new("mssd", "MSSD", "mm", 2), 5, 1.0),
+    (Column::new("contact", "|ΔCA|", "cm²", 2), 9, 1.0),
+    (Column::new("volume", "|ΔIV|", "cm³", 2), 10, 1.0),
 ];
 
 /// Writes the page of a study to a folder and returns its path: its tables, and all poses.
@@ -39,8 +35,7 @@ pub fn write_page(
     }
     for record in records.iter().filter(|record| record.key.method != TRUTH) {
         let value = |metric: usize, factor: f64| Some(factor * record.metrics[metric]?);
-        let figure =
-            |(column, metric, factor): (Column, _, _)| column.figure(value(metric, factor));
+        let figure = |(column, metric, factor)| (column, value(metric, factor));
         let failed = (!record.is_scored()).then(|| record.status.clone());
         let frame = FrameReport {
             name: record.frame_label(),
@@ -49,8 +44,9 @@ pub fn write_page(
             remarks: failed.into_iter().collect(),
             figures: METRICS.map(figure).into(),
             posterior: None,
+            drawing: None,
         };
-        report.add_frame(frame, None);
+        report.add_frame(frame);
     }
     report.finish()
 }

@@ -88,14 +88,10 @@ impl Prediction {
     }
 
     fn is_finite(&self) -> bool {
-        let arrays = [&self.errors, &self.sigmas, &self.bounds].into_iter().flatten();
+        let Self { errors, sigmas, bounds, squared_distances, probabilities, .. } = self;
         let others = [self.probability, self.cost, self.weight];
-        arrays
-            .chain(&self.probabilities)
-            .chain(&self.squared_distances)
-            .chain(&others)
-            .flatten()
-            .all(|v| v.is_finite())
+        let all = [&errors[..], sigmas, bounds, squared_distances, probabilities, &others].concat();
+        all.into_iter().flatten().all(f64::is_finite)
     }
 }
 

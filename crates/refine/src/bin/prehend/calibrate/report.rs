@@ -78,13 +78,12 @@ pub(super) fn write(
         let values =
             [Some(old.size), new.map(|new| new.size), old.offset, new.and_then(|new| new.offset)];
         let name = format!("{} [{}]", old.sensor, old.unit);
-        std::iter::once(name).chain(values.map(number)).collect()
+        std::iter::once(name).chain(values.map(number)).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<String>> = old.iter().map(row).collect();
     report.add_table(
         "Residuals by sensor, where all calibrations are believed: medians over frames of the frames' medians",
         ["sensor", "size before", "size after", "offset before", "offset after"],
-        rows,
+        old.iter().map(row),
     );
     let picture = depth_residual_picture(&before, &after, BRIGHTEST);
     let what = format!(
@@ -93,17 +92,13 @@ pub(super) fn write(
         BRIGHTEST * 1e3
     );
     report.add_comparison(&what, &picture)?;
-    let parameters: Vec<Vec<String>> =
-        parameter_rows(&done.calibrator).into_iter().map(Vec::from).collect();
     report.add_table(
         "Parameters: lengths in meters, angles in radians, the principal point in focal lengths",
         ["parameter", "value", "standard deviation", "beforehand"],
-        parameters,
+        parameter_rows(&done.calibrator),
     );
-    let left_out: Vec<Vec<String>> =
-        done.left_out.values().map(|frame| vec![frame.clone()]).collect();
-    if !left_out.is_empty() {
-        report.add_table("Left out", ["frame"], left_out);
+    if !done.left_out.is_empty() {
+        report.add_table("Left out", ["frame"], done.left_out.values().map(|f| [f.clone()]));
     }
     for (&index, alone) in &drawn {
         let target = frames.poses[index].0;

@@ -20,33 +20,23 @@ use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::options::{MethodOptions, OutputOptions, record};
-use crate::options::{Job, Masks, Selection, beside, open_rig, write_poses};
+use super::Refine;
+use super::options::record;
+use crate::options::{Job, Selection, beside, open_rig, write_poses};
 use crate::report;
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
-/// Frames of a dataset, and where their objects are about.
-pub(super) struct DatasetInputs<'a> {
-    pub(super) selection: &'a Selection,
-    pub(super) poses: &'a Path,
-    /// Rivals of the poses, where these come from a search.
-    pub(super) hypotheses: Option<&'a Path>,
-    pub(super) masks: &'a Masks,
-    /// Poses of other objects of the images.
-    pub(super) neighbors: Option<&'a Path>,
-    /// The rig's file.
-    pub(super) rig: Option<&'a Path>,
-}
-
 /// A refinement of a dataset's frames.
 pub(super) struct DatasetRun<'a> {
-    pub(super) inputs: DatasetInputs<'a>,
+    pub(super) options: &'a Refine,
+    pub(super) selection: &'a Selection,
+    pub(super) poses: &'a Path,
+    /// Alternatives of the poses, where these come from a search.
+    pub(super) hypotheses: Option<PathBuf>,
     pub(super) out: &'a Path,
-    pub(super) output: &'a OutputOptions,
-    pub(super) options: &'a MethodOptions,
     /// The method that the options make.
     pub(super) method: Method,
-    /// What renders.
+    /// The device that renders.
     pub(super) backend: Arc<dyn Backend>,
 }
 
@@ -67,15 +57,21 @@ struct RefinedFrame {
     trace: Option<Trace>,
 }
 
+impl RefinedFrame {
+    fn all_warnings(&self) -> Vec<String> {
+        self.object_warnings.iter().chain(&self.warnings).cloned().collect()
+    }
+}
+
 impl DatasetRun<'_> {
     pub(super) fn run(&self) -> anyhow::Result<ExitCode> {
-        let name = self.options.method();
-        let json = self.output.json;
-        let DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig } = &self.inputs;
-        let dataset = selection.open()?;
-        let (jobs, mut failures) = selection.jobs_with_hypotheses(poses, *hypotheses)?;
-        let assets = Assets::new(&dataset, self.options.seed).with_cache(cache());
-        let mut assets = assets.with_rig(open_rig(*rig)?).with_masks(masks.source()?);
+        let Refine { masks, neighbors, rig, output, method, .. } = self.options;
+        let (name, json) = (method.method(), output.json);
+        let dataset = self.selection.open()?;
+        let hypotheses = self.hypotheses.as_deref();
+        let (jobs, mut failures) = self.selection.jobs_with_hypotheses(self.poses, hypotheses)?;
+        let assets = Assets::new(&dataset, method.seed).with_cache(cache());
+        let mut assets = assets.with_rig(open_rig(rig.as_deref())?).with_masks(masks.source()?);
         if let Some(file) = neighbors {
             let ReadResults { rows, errors, .. } = read_results(file)?;
             failures.extend(errors.iter().map(|error| format!("{}: {error}", file.display())));
@@ -83,10 +79,10 @@ impl DatasetRun<'_> {
         }
         let assets = Mutex::new(assets);
         let create = |folder| Report::create(folder, "Refined poses");
-        let report = self.output.report.as_deref().map(create).transpose()?;
+        let report = output.report.as_deref().map(create).transpose()?;
         let journal = beside(self.out, "journal");
         let (mut journal, mut refined): (_, BTreeMap<usize, RefinedFrame>) =
-            Journal::open(&journal, &self.identity(&dataset)?, self.output.restart)?;
+            Journal::open(&journal, &self.identity(&dataset)?, output.restart)?;
         let mut times = Times::open(&beside(self.out, "times.csv"), !refined.is_empty())?;
         let open: Vec<(usize, &Job)> =
             jobs.iter().enumerate().filter(|(index, _)| !refined.contains_key(index)).collect();
@@ -96,7 +92,7 @@ impl DatasetRun<'_> {
         bar.set_position(refined.len() as u64);
         bar.reset_eta();
         // To be timed, frames come one after another, each with all threads.
-        let workers = if self.output.time { 1 } else { open.len() };
+        let workers = if output.time { 1 } else { open.len() };
         Workers::new(workers, rayon::current_num_threads())?.run(
             &open,
             || |(_, job): &(usize, &Job)| guard(|| self.refine(&assets, job)),
@@ -128,7 +124,7 @@ impl DatasetRun<'_> {
         failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}{}", jobs[i].target, hint(e))));
         let seconds = |index: usize| times.of(index, name);
         // Files have no times unless asked: a resumed run would not end with the same ones.
-        let timed = |index| seconds(index).filter(|_| self.output.time);
+        let timed = |index| seconds(index).filter(|_| output.time);
         let row = |(&index, refined): (&usize, &RefinedFrame)| ResultRow {
             t_cam_model: (&refined.pose).into(),
             // BOP leaves open what a score is; here it is the probability of being right, and that of the initial pose where the method knows none.
@@ -146,7 +142,7 @@ impl DatasetRun<'_> {
                 say(format!("{count} poses refined in {mean:.2} s each, written to {out}"))?;
             }
             // A full disk must not cost the poses.
-            if let Some(Err(error)) = self.output.details.as_deref().map(|file| {
+            if let Some(Err(error)) = output.details.as_deref().map(|file| {
                 let details = |(&i, r): (&usize, &RefinedFrame)| details(&jobs[i], r, timed(i));
                 write_details(file, &refined.iter().map(details).collect::<Vec<_>>())
             }) {
@@ -172,27 +168,29 @@ impl DatasetRun<'_> {
     }
 
     fn keeps_trace(&self) -> bool {
-        self.output.json || self.output.report.is_some()
+        self.options.output.json || self.options.output.report.is_some()
     }
 
     fn identity(&self, dataset: &Dataset) -> anyhow::Result<Identity> {
-        let DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig } = &self.inputs;
+        let Refine { masks, neighbors, rig, output, method, .. } = self.options;
+        let fingerprint =
+            |file: &Option<PathBuf>| file.as_deref().map(file_fingerprint).transpose();
         Ok(Identity::of(&json!({
             "command": "refine",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
-            "poses": file_fingerprint(poses)?,
-            "hypotheses": hypotheses.map(file_fingerprint).transpose()?,
+            "poses": file_fingerprint(self.poses)?,
+            "hypotheses": fingerprint(&self.hypotheses)?,
             "masks": masks.identity()?,
-            "neighbors": neighbors.map(file_fingerprint).transpose()?,
-            "rig": rig.map(file_fingerprint).transpose()?,
-            "filters": selection.filters(),
-            "method": self.options.method(),
+            "neighbors": fingerprint(neighbors)?,
+            "rig": fingerprint(rig)?,
+            "filters": self.selection.filters(),
+            "method": method.method(),
             "settings": record(&self.method)?,
-            "seed": self.options.seed,
+            "seed": method.seed,
             "backend": self.backend.name(),
             "history kept": self.keeps_trace(),
-            "diagnosed": self.output.diagnose,
+            "diagnosed": output.diagnose,
         })))
     }
 
@@ -206,7 +204,7 @@ impl DatasetRun<'_> {
         let hypotheses = job.hypotheses();
         let frame = &input.frame;
         let refined = estimator.run(frame, &hypotheses, &mut |_| ControlFlow::Continue(()))?;
-        let diagnosis = match self.output.diagnose {
+        let diagnosis = match self.options.output.diagnose {
             true => DiagnosisSummary::of(&estimator.diagnose(&refined, &hypotheses)?),
             false => Vec::new(),
         };
@@ -238,7 +236,7 @@ impl DatasetRun<'_> {
         let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
         let scorer = Scorer::new(dataset);
         report.add_fact("dataset", dataset.split_dir().display().to_string());
-        report.add_fact("method", self.options.method());
+        report.add_fact("method", self.options.method.method());
         report.add_fact("version", env!("CARGO_PKG_VERSION"));
         let is_fused = matches!(self.method, Method::Fused(_));
         let drawn = least_sure(refined);
@@ -248,7 +246,7 @@ impl DatasetRun<'_> {
         let bar = progress(refined.len(), "reporting");
         for (&index, refined) in bar.wrap_iter(refined.iter()) {
             let job = &jobs[index];
-            let (frame, fault) = frame_report(&scorer, job, refined, seconds(index));
+            let (mut frame, fault) = frame_report(&scorer, job, refined, seconds(index));
             let t_cam_object = (&refined.pose).into();
             let mut draw = || -> Result<_, AssetError> {
                 let initial = &job.row.t_cam_model;
@@ -265,9 +263,9 @@ impl DatasetRun<'_> {
             };
             let mut failed = |e| failures.push(format!("{}: report: {e}", job.target));
             let drawing = drawn.contains(&index).then(&mut draw).transpose();
-            let drawn = drawing.map_err(&mut failed).unwrap_or_default();
+            frame.drawing = drawing.map_err(&mut failed).unwrap_or_default();
             fault.map(failed);
-            report.add_frame(frame, drawn);
+            report.add_frame(frame);
         }
         report.finish()
     }
@@ -317,17 +315,16 @@ fn frame_report(
     });
     let confidence = refined.confidence.as_ref();
     let mut figures = report::pose_figures(error, confidence);
+    let moved = (pose.translation.vector - initial.translation.vector).norm();
     figures.extend([
-        report::MOVED
-            .figure(Some(1e3 * (pose.translation.vector - initial.translation.vector).norm())),
-        report::TURNED.figure(Some(pose.rotation.angle_to(&initial.rotation).to_degrees())),
-        report::INITIAL_ERROR.figure(initial_error.map(|[meters, _]| 1e3 * meters)),
-        report::INITIAL_TURN.figure(initial_error.map(|[_, radians]| radians.to_degrees())),
-        report::SECONDS.figure(seconds),
-        report::ITERATIONS.figure(Some(refined.iterations as f64)),
+        (report::MOVED, Some(1e3 * moved)),
+        (report::TURNED, Some(pose.rotation.angle_to(&initial.rotation).to_degrees())),
+        (report::INITIAL_ERROR, initial_error.map(|[meters, _]| 1e3 * meters)),
+        (report::INITIAL_TURN, initial_error.map(|[_, radians]| radians.to_degrees())),
+        (report::SECONDS, seconds),
+        (report::ITERATIONS, Some(refined.iterations as f64)),
     ]);
-    let mut remarks: Vec<String> =
-        refined.object_warnings.iter().chain(&refined.warnings).cloned().collect();
+    let mut remarks = refined.all_warnings();
     let mut flags = confidence.map_or_else(Vec::new, report::flags);
     if !remarks.is_empty() {
         flags.push("warning".to_owned());
@@ -335,7 +332,7 @@ fn frame_report(
     remarks.extend(refined.diagnosis.iter().map(DiagnosisSummary::to_string));
     let posterior = refined.confidence.clone();
     let (name, status) = (job.target.to_string(), String::new());
-    (FrameReport { name, status, flags, remarks, figures, posterior }, fault)
+    (FrameReport { name, status, flags, remarks, figures, posterior, drawing: None }, fault)
 }
 
 /// What the table has of a frame.
@@ -347,14 +344,13 @@ fn details(job: &Job, refined: &RefinedFrame, seconds: Option<f64>) -> FrameDeta
         posterior: refined.confidence.clone(),
         iterations: refined.iterations,
         seconds,
-        warnings: refined.object_warnings.iter().chain(&refined.warnings).cloned().collect(),
+        warnings: refined.all_warnings(),
         track: None,
     }
 }
 
 fn summary(job: &Job, refined: &RefinedFrame, seconds: Option<f64>) -> serde_json::Value {
     let t_mm = refined.pose.translation_m.map(|v| v * 1e3);
-    let warnings: Vec<&String> = refined.object_warnings.iter().chain(&refined.warnings).collect();
     json!({
         "scene_id": job.row.scene_id,
         "im_id": job.row.im_id,
@@ -364,7 +360,7 @@ fn summary(job: &Job, refined: &RefinedFrame, seconds: Option<f64>) -> serde_jso
         "iterations": refined.iterations,
         "t_cam_model_mm": t_mm,
         "quaternion_wxyz": refined.pose.quaternion_wxyz,
-        "warnings": warnings,
+        "warnings": refined.all_warnings(),
         "confidence": refined.confidence,
         "diagnosis": refined.diagnosis,
         "trace": refined.trace,

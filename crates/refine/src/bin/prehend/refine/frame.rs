@@ -13,19 +13,19 @@ use prehend_refine::{Method, Refined};
 use prehend_render::Backend;
 use serde_json::json;
 
-use super::options::{MethodOptions, OutputOptions, record};
+use super::Refine;
+use super::options::record;
 use crate::options::open_rig;
 use crate::terminal::{cache, progress, say};
 
 /// Refines the frame of `file`; the pose goes to the output file, and to standard output without one or with `--json`.
 pub(super) fn refine_frame(
     file: &Path,
-    output: &OutputOptions,
-    method: &MethodOptions,
+    options: &Refine,
     backend: Arc<dyn Backend>,
-    rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
-    let (rig, cache) = (open_rig(rig)?, cache());
+    let Refine { output, method, rig, .. } = options;
+    let (rig, cache) = (open_rig(rig.as_deref())?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
     let mut estimator = input.estimator(&method.configured()?).backend(backend);
     // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.

@@ -11,7 +11,7 @@ use anyhow::bail;
 use clap::Args;
 use prehend_refine::data::bop::check_writable;
 
-use self::dataset::{DatasetInputs, DatasetRun};
+use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
 use crate::options::{
@@ -57,31 +57,24 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, hypotheses, masks, neighbors, .. } = &self;
-        let Self { frame, rig, output, method, rendering, .. } = &self;
+        let Self { selection, poses, output, method, .. } = &self;
         let named = |out: &PathBuf| match selection {
             Some(selection) => selection.results_file(out, method.method()),
             None => Ok(out.clone()),
         };
         let out = output.out.as_ref().map(named).transpose()?;
         // What cannot be written must be known before the work, not after it.
-        if let Some(out) = &out {
-            check_writable(out)?;
-        }
+        out.as_deref().map(check_writable).transpose()?;
         output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
-        let backend = rendering.open()?;
-        match (frame, selection, poses, &out) {
-            (Some(file), ..) => refine_frame(file, output, method, backend, rig.as_deref()),
+        let backend = self.rendering.open()?;
+        match (&self.frame, selection, poses, &out) {
+            (Some(file), ..) => refine_frame(file, &self, backend),
             (None, Some(selection), Some(poses), Some(out)) => {
-                let configured = method.configured()?;
-                let options = method;
-                let (method, rig) = (configured, rig.as_deref());
                 let beside = Some(beside(poses, HYPOTHESES)).filter(|file| file.exists());
-                let hypotheses = hypotheses.clone().or(beside);
-                let (hypotheses, neighbors) = (hypotheses.as_deref(), neighbors.as_deref());
-                let inputs = DatasetInputs { selection, poses, hypotheses, masks, neighbors, rig };
-                DatasetRun { inputs, out, output, options, method, backend }.run()
+                let hypotheses = self.hypotheses.clone().or(beside);
+                let (options, method) = (&self, method.configured()?);
+                DatasetRun { options, selection, poses, hypotheses, out, method, backend }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }

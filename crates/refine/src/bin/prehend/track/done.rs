@@ -5,20 +5,27 @@ use std::time::Duration;
 use prehend_refine::data::bop::ResultRow;
 use prehend_refine::data::details::{FrameDetails, TrackDetails};
 use prehend_refine::data::{PlainPose, Target};
+use prehend_refine::evaluate::report::DrawnFrame;
 use prehend_refine::strategy::PosteriorSummary;
-use prehend_refine::tracker::{Rejection, Timing, TrackStatus, Tracked};
+use prehend_refine::tracker::{Rejection, Timing, TrackStatus};
 use serde_json::json;
 
 /// A frame that is done, without what nobody asks for afterwards: there may be many.
 pub(super) struct Done {
+    pub(super) target: Target,
     pub(super) row: ResultRow,
-    /// By the clock of a log \[ns\], if it is of one.
+    /// Time since the first frame.
+    pub(super) time: Duration,
+    /// Time by the clock of a log \[ns\], if it is of one.
     pub(super) stamp: Option<i64>,
     pub(super) status: TrackStatus,
     pub(super) rejection: Option<Rejection>,
     pub(super) iterations: usize,
     pub(super) cost: f64,
     pub(super) timing: Timing,
+    /// Posterior, if it is asked for afterwards and there is one.
+    pub(super) posterior: Option<PosteriorSummary>,
+    pub(super) drawing: Option<DrawnFrame>,
 }
 
 /// What became of `frames`, which are not empty.
@@ -48,33 +55,28 @@ pub(super) fn told(frames: &[Done]) -> String {
     format!("{text}: {}", counts.join(", "))
 }
 
-/// What the table has of a frame, its time among it if that is `timed`.
-pub(super) fn details(
-    target: Target,
-    tracked: &Tracked,
-    stamp: Option<i64>,
-    timed: bool,
-) -> FrameDetails {
+/// Row of the table of a frame, with its time if that is `timed`.
+pub(super) fn details(frame: &Done, timed: bool) -> FrameDetails {
     FrameDetails {
-        target,
-        t_cam_model: tracked.t_cam_object,
+        target: frame.target,
+        t_cam_model: frame.row.t_cam_model,
         initial: None,
-        posterior: tracked.posterior.as_ref().map(PosteriorSummary::from),
-        iterations: tracked.iterations,
-        seconds: timed.then(|| tracked.timing.total().as_secs_f64()),
+        posterior: frame.posterior.clone(),
+        iterations: frame.iterations,
+        seconds: timed.then(|| frame.timing.total().as_secs_f64()),
         warnings: Vec::new(),
         track: Some(TrackDetails {
-            status: tracked.status.name(),
-            rejection: tracked.rejection.map(|doubt| doubt.to_string()),
-            cost: tracked.cost,
-            stamp,
+            status: frame.status.name(),
+            rejection: frame.rejection.map(|doubt| doubt.to_string()),
+            cost: frame.cost,
+            stamp: frame.stamp,
         }),
     }
 }
 
 /// A frame as JSON.
 pub(super) fn summary(frame: &Done) -> serde_json::Value {
-    let Done { row, stamp, status, rejection, iterations, cost, timing } = frame;
+    let Done { row, stamp, status, rejection, iterations, cost, timing, .. } = frame;
     let pose = PlainPose::from(&row.t_cam_model);
     let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
     json!({

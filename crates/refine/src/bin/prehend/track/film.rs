@@ -1,45 +1,32 @@
-//! What is tracked: frames, one after the other.
+//! Frames of films, one after the other, and logs of them.
 
 use std::time::Duration;
 
-use prehend_refine::data::{Assets, FrameInput, Target};
-
-use super::images::Images;
+use prehend_refine::data::{FrameInput, Target};
+use prehend_refine::scene::{Frame, Object};
+use prehend_refine::tracker::Tracked;
 
 /// A frame of a film.
 pub(super) struct Moment {
     pub(super) target: Target,
-    /// Since the first one.
+    /// Time since the first one.
     pub(super) time: Duration,
-    /// By the clock of a log \[ns\], if it is of one.
+    /// Time by the clock of a log \[ns\], if it is of one.
     pub(super) stamp: Option<i64>,
     pub(super) input: anyhow::Result<FrameInput>,
 }
 
-/// Frames in the order of time.
-pub(super) trait Film {
-    /// The next one; none after the last.
-    fn next(&mut self) -> Option<Moment>;
-}
+/// A log that is being written.
+pub(super) trait FrameLog {
+    /// Adds a frame and what was found in it, `time` after the first, or at the moment `stamp` \[ns\].
+    fn add(
+        &mut self,
+        moment: (Duration, Option<i64>),
+        object: &Object,
+        observation: &Frame,
+        tracked: &Tracked,
+    ) -> anyhow::Result<()>;
 
-/// Images of a scene as the frames of a film.
-pub(super) struct SceneFilm<'a, 'd> {
-    pub(super) assets: &'a mut Assets<'d>,
-    pub(super) images: Images,
-    /// What is followed, in the first image.
-    pub(super) start: Target,
-    /// Images a second, by their ids.
-    pub(super) rate: f64,
-}
-
-impl Film for SceneFilm<'_, '_> {
-    fn next(&mut self) -> Option<Moment> {
-        let Self { assets, images, start, rate } = self;
-        let im_id = images.next(assets)?;
-        let target = Target { im_id, ..*start };
-        let seconds = f64::from(im_id - start.im_id) / *rate;
-        let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let input = assets.load(&target, &[]).map_err(anyhow::Error::from);
-        Some(Moment { target, time, stamp: None, input })
-    }
+    /// Puts the log in its place.
+    fn finish(self: Box<Self>) -> anyhow::Result<()>;
 }

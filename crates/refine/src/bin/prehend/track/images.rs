@@ -1,11 +1,10 @@
-//! The images that are tracked, one after the other.
+//! A scene that grows while it is tracked.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-use std::vec;
 
 use anyhow::{anyhow, bail};
 use prehend_refine::data::Assets;
@@ -18,22 +17,6 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// Time after which an image that has not arrived may be one that never will: if a later one is there.
 const PATIENCE: Duration = Duration::from_millis(100);
-
-/// Ids of a scene's images in ascending order: those that it has, or those that it gets.
-pub(super) enum Images {
-    Listed(vec::IntoIter<u32>),
-    Watched(Watch),
-}
-
-impl Images {
-    /// The next one; none after the last.
-    pub(super) fn next(&mut self, assets: &mut Assets<'_>) -> Option<u32> {
-        match self {
-            Self::Listed(images) => images.next(),
-            Self::Watched(watch) => watch.next(assets),
-        }
-    }
-}
 
 /// Is set when Ctrl-C is pressed; pressed again, it ends the process.
 pub(super) fn stop_on_ctrl_c() -> anyhow::Result<Arc<AtomicBool>> {
@@ -75,7 +58,7 @@ impl Watch {
 
     /// Waits for the next image until all of it is there. One that is overtaken by a later one comes as it is, and so does what has been
     /// begun when the time is up: reading it says what is wrong.
-    fn next(&mut self, assets: &mut Assets<'_>) -> Option<u32> {
+    pub(super) fn next(&mut self, assets: &mut Assets<'_>) -> Option<u32> {
         let mut last_look = Instant::now();
         let start = last_look;
         while !self.stop.load(Ordering::Relaxed) {

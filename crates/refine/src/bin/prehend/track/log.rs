@@ -8,15 +8,15 @@ use anyhow::{Context, anyhow, bail};
 use prehend_geometry::TriMesh;
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
-use prehend_refine::data::mcap::{Frames, ImageTopics, Recording, RecordingWriter};
-use prehend_refine::data::{FrameInput, Target};
-use prehend_refine::rig::Rig;
+use prehend_refine::data::FrameInput;
+use prehend_refine::data::mcap::{ImageTopics, RecordedFrame, Recording, RecordingWriter};
 use prehend_refine::scene::{Frame, Hand, Object};
 use prehend_refine::tracker::{TrackStatus, Tracked};
 use prehend_render::{RenderModel, draw_outline};
 
-use super::film::{Film, Moment};
+use super::film::{FrameLog, Moment};
 use super::log_options::LogOptions;
+use super::{Start, Tracking};
 use crate::terminal::cache;
 
 /// Logs of datasets begin so late, since `tf` takes the moment zero for any moment.
@@ -35,16 +35,15 @@ fn color_of(status: TrackStatus) -> [f32; 3] {
     }
 }
 
-/// A recording, with what is tracked in it.
-pub(super) struct Log {
+/// Recording that `options` name, with the object and the hand.
+struct Log {
     recording: Recording,
     object: Arc<Object>,
     hand: Option<Arc<Hand>>,
 }
 
 impl Log {
-    /// Opens the recording that `options` name, with the object and the hand.
-    pub(super) fn open(options: &LogOptions, file: &Path) -> anyhow::Result<Self> {
+    fn open(options: &LogOptions, file: &Path) -> anyhow::Result<Self> {
         let mesh =
             options.mesh.as_ref().ok_or_else(|| anyhow!("--mcap needs --mesh, the object"))?;
         let surface = TriMesh::load(mesh)?.scaled(options.mesh_unit.meters());
@@ -75,74 +74,49 @@ impl Log {
         let recording = Recording::open(file, &topics, &options.world)?;
         Ok(Self { recording, object, hand })
     }
-
-    /// What is tracked.
-    pub(super) fn object(&self) -> &Arc<Object> {
-        &self.object
-    }
-
-    /// What was wrong with the recording.
-    pub(super) fn faults(&self) -> &[String] {
-        self.recording.faults()
-    }
-
-    /// How many frames there are.
-    pub(super) fn count(&self) -> usize {
-        self.recording.count()
-    }
-
-    /// Its frames as a film that begins with `start`, corrected by `rig`.
-    pub(super) fn film(&self, start: Target, rig: Option<Arc<Rig>>) -> anyhow::Result<LogFilm<'_>> {
-        let frames = self.recording.frames(self.hand.as_ref())?;
-        Ok(LogFilm { log: self, frames, next: start, first: None, rig })
-    }
 }
 
-/// The frames of a log.
-pub(super) struct LogFilm<'a> {
-    log: &'a Log,
-    frames: Frames<'a>,
-    next: Target,
-    /// When the first one was taken \[ns\].
-    first: Option<i64>,
-    rig: Option<Arc<Rig>>,
-}
-
-impl Film for LogFilm<'_> {
-    fn next(&mut self) -> Option<Moment> {
-        let frame = self.frames.next()?;
-        let target = self.next;
-        self.next.im_id += 1;
-        let first = *self.first.get_or_insert(frame.nanoseconds);
-        let time = Duration::from_nanos(frame.nanoseconds.saturating_sub(first).max(0) as u64);
+/// Follows the object of the recording `file` from `start` on.
+pub(super) fn track(
+    file: &Path,
+    (start, initial): Start,
+    tracking: &mut Tracking<'_>,
+) -> anyhow::Result<()> {
+    let Log { recording, object, hand } = Log::open(&tracking.options.log, file)?;
+    tracking.failures.extend_from_slice(recording.faults());
+    let rig = tracking.rig.clone();
+    let (mut target, mut first) = (start, None);
+    let moment = |RecordedFrame { nanoseconds, frame }: RecordedFrame| {
+        let since = nanoseconds.saturating_sub(*first.get_or_insert(nanoseconds));
         let input = || {
-            let mut observation = frame.frame?;
-            if let Some(rig) = &self.rig {
-                observation = rig.corrected(&observation)?;
+            let mut frame = frame?;
+            if let Some(rig) = &rig {
+                frame = rig.corrected(&frame)?;
             }
-            let object = Arc::clone(&self.log.object);
-            Ok(FrameInput { frame: observation, object, rig: self.rig.clone() })
+            Ok(FrameInput { frame, object: Arc::clone(&object), rig: rig.clone() })
         };
-        let stamp = Some(frame.nanoseconds);
-        let input = input();
-        Some(Moment { target, time, stamp, input })
-    }
+        let time = Duration::from_nanos(since.max(0) as u64);
+        let moment = Moment { target, time, stamp: Some(nanoseconds), input: input() };
+        target.im_id += 1;
+        moment
+    };
+    let mut film = recording.frames(hand.as_ref())?.map(moment);
+    tracking.follow(&mut film, recording.count(), &object, initial)
 }
 
-/// A log that is being written.
-pub(super) struct LogWriter {
+/// Begins a log.
+pub(super) fn create(file: &Path) -> anyhow::Result<Box<dyn FrameLog>> {
+    Ok(Box::new(LogWriter { writer: RecordingWriter::create(file)?, model: None }))
+}
+
+struct LogWriter {
     writer: RecordingWriter,
-    /// Of the object, once there is one.
+    /// Surface of the object, once there is one.
     model: Option<RenderModel>,
 }
 
-impl LogWriter {
-    pub(super) fn create(file: &Path) -> anyhow::Result<Self> {
-        Ok(Self { writer: RecordingWriter::create(file)?, model: None })
-    }
-
-    /// A frame and what was found in it, `time` after the first, or at the moment `stamp` \[ns\].
-    pub(super) fn add(
+impl FrameLog for LogWriter {
+    fn add(
         &mut self,
         (time, stamp): (Duration, Option<i64>),
         object: &Object,
@@ -167,7 +141,7 @@ impl LogWriter {
         Ok(self.writer.tracked(at, tracked, &overlay)?)
     }
 
-    pub(super) fn finish(self) -> anyhow::Result<()> {
+    fn finish(self: Box<Self>) -> anyhow::Result<()> {
         Ok(self.writer.finish()?)
     }
 }

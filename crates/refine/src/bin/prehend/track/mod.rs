@@ -3,14 +3,15 @@
 mod done;
 mod film;
 mod images;
-#[cfg_attr(not(feature = "mcap"), path = "no_log.rs")]
+#[cfg(feature = "mcap")]
 mod log;
 mod log_options;
 mod report;
 
 use std::collections::BTreeMap;
+use std::iter;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,27 +19,25 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use indicatif::ProgressBar;
 use nalgebra::Isometry3;
-use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
     Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
 };
-use prehend_refine::data::details::{FrameDetails, write_details};
+use prehend_refine::data::details::write_details;
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::rig::Rig;
 use prehend_refine::scene::Object;
-use prehend_refine::strategy::Posterior;
-use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
+use prehend_refine::strategy::{Posterior, PosteriorSummary};
+use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, TrackerSettings};
+use prehend_refine::{Estimator, Settings};
 use prehend_render::Backend;
 use serde_json::json;
 
-use self::done::{Done, summary, told};
-use self::film::{Film, Moment, SceneFilm};
-use self::images::{Images, Watch, select_scene, stop_on_ctrl_c};
-use self::log::{Log, LogWriter};
+use self::done::{Done, details, summary, told};
+use self::film::{FrameLog, Moment};
+use self::images::{Watch, select_scene, stop_on_ctrl_c};
 use self::log_options::LogOptions;
 use self::report::FilmReport;
 use crate::options::{
@@ -132,47 +131,49 @@ pub(crate) struct Track {
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
 type Start = (Target, Option<Isometry3<f64>>);
 
-/// What becomes of the frames.
-struct Outcome {
-    frames: Vec<Done>,
-    /// What the table has of them, if one is written.
-    details: Option<Vec<FrameDetails>>,
-    failures: Vec<String>,
-    /// The poses as they come, if they are written so.
-    rows: Option<ResultsWriter>,
-    /// What was sensed and found, if that is recorded.
-    log: Option<LogWriter>,
-    report: Option<FilmReport>,
+/// Stands for logs in builds without them.
+#[cfg(not(feature = "mcap"))]
+mod log {
+    use std::path::Path;
+
+    use super::*;
+
+    const NONE: &str =
+        "this build reads and writes no logs: cargo install --path crates/refine --features mcap";
+
+    pub(super) fn track(_: &Path, _: Start, _: &mut Tracking<'_>) -> anyhow::Result<()> {
+        bail!("--mcap: {NONE}")
+    }
+
+    pub(super) fn create(_: &Path) -> anyhow::Result<Box<dyn FrameLog>> {
+        bail!("--mcap-out: {NONE}")
+    }
 }
 
-/// How objects are followed.
-struct Following {
-    settings: TrackerSettings,
+/// A run: how objects are followed, and what has become of the frames.
+struct Tracking<'a> {
+    options: &'a Track,
+    settings: Settings,
     backend: Arc<dyn Backend>,
     rig: Option<Arc<Rig>>,
     /// Whether to end before the film does, so that what is recorded is kept.
     stop: Option<Arc<AtomicBool>>,
-}
-
-impl Following {
-    /// A tracker of an object.
-    fn begin(&self, object: Arc<Object>) -> Result<Tracker, RefineError> {
-        let tracker = Tracker::new(object, self.settings.clone())?;
-        let tracker = tracker.with_backend(Arc::clone(&self.backend));
-        Ok(match &self.rig {
-            Some(rig) => tracker.with_rig(Arc::clone(rig)),
-            None => tracker,
-        })
-    }
+    frames: Vec<Done>,
+    failures: Vec<String>,
+    /// The poses as they come, if they are written so.
+    rows: Option<ResultsWriter>,
+    /// Log of what was sensed and found, if that is recorded.
+    log: Option<Box<dyn FrameLog>>,
+    report: Option<FilmReport>,
 }
 
 impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
         let outputs = [Some(&self.out), self.log.mcap_out.as_ref()];
         outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
-        let log = &self.log;
-        if let Some(written) = log.mcap_out.as_deref().map(canonical)
-            && [&self.details, &log.mcap, &self.poses]
+        let mcap_out = self.log.mcap_out.as_deref();
+        if let Some(written) = mcap_out.map(canonical)
+            && [&self.details, &self.log.mcap, &self.poses]
                 .into_iter()
                 .flatten()
                 .chain([&self.out])
@@ -193,44 +194,41 @@ impl Track {
         let TrackerSettings { budget: in_time, recovery, .. } = &mut settings.tracker;
         *in_time = budget.map_err(|e| anyhow!("--budget: {e}"))?.or(*in_time);
         *recovery = self.recovery.unwrap_or(*recovery);
-        let (record, settings) = (settings.to_toml()?, settings.tracker());
+        let record = settings.to_toml()?;
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let rig = open_rig(self.rig.as_deref())?;
         // A scene that is watched ends by itself.
-        let stop = (log.mcap_out.is_some() && watched.is_none()).then(stop_on_ctrl_c);
-        let following = Following { settings, backend, rig, stop: stop.transpose()? };
-        let log = self.log.mcap_out.as_deref().map(LogWriter::create).transpose()?;
+        let stop = (mcap_out.is_some() && watched.is_none()).then(stop_on_ctrl_c);
+        let stop = stop.transpose()?;
+        let log = mcap_out.map(log::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
         let report = self.report.as_deref().map(FilmReport::create).transpose()?;
-        let mut outcome = Outcome {
-            frames: Vec::new(),
-            details: self.details.is_some().then(Vec::new),
-            failures: Vec::new(),
-            rows,
-            log,
-            report,
-        };
+        let (frames, failures) = (Vec::new(), Vec::new());
+        let options = &self;
+        let mut tracking =
+            Tracking { options, settings, backend, rig, stop, frames, failures, rows, log, report };
         match (&self.log.mcap, &selection) {
-            (Some(file), _) => self.track_log(file, &following, &mut outcome)?,
-            (None, Some(selection)) => {
-                self.track_scenes(selection, watched, &following, &mut outcome)?;
-            }
+            (Some(file), _) => log::track(file, self.start_in_log()?, &mut tracking)?,
+            (None, Some(selection)) => tracking.track_scenes(selection, watched)?,
             (None, None) => bail!("--dataset or --mcap: there is nothing to be tracked"),
         }
-        let Outcome { frames, details, mut failures, rows, log, report } = outcome;
+        let Tracking { mut frames, mut failures, rows, log, report, .. } = tracking;
         if rows.is_none() {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
             failures.push("no image has come".to_owned());
         }
-        let table = self.details.as_ref().zip(details).filter(|_| !frames.is_empty());
-        if let Some(Err(error)) = table.map(|(file, rows)| write_details(file, &rows)) {
+        let table = self.details.as_deref().filter(|_| !frames.is_empty()).map(|file| {
+            let rows: Vec<_> = frames.iter().map(|frame| details(frame, self.time)).collect();
+            write_details(file, &rows)
+        });
+        if let Some(Err(error)) = table {
             failures.push(format!("--details: {error}"));
         }
         let log = log.filter(|_| !frames.is_empty());
-        if let Some(Err(error)) = log.map(LogWriter::finish) {
+        if let Some(Err(error)) = log.map(FrameLog::finish) {
             failures.push(format!("--mcap-out: {error:#}"));
         }
         let page = report.filter(|_| !frames.is_empty()).map(|report| {
@@ -238,7 +236,7 @@ impl Track {
             let finished = selection.as_ref().filter(|_| watched.is_none());
             let dataset = finished.map(Selection::open).transpose()?;
             let scorer = dataset.as_ref().map(Scorer::new);
-            anyhow::Ok(report.finish(scorer.as_ref(), &mut failures)?)
+            anyhow::Ok(report.finish(&mut frames, scorer.as_ref(), &mut failures)?)
         });
         let page = page.transpose().unwrap_or_else(|error| {
             failures.push(format!("--report: {error:#}"));
@@ -255,92 +253,17 @@ impl Track {
         Ok(exit_code(frames.len(), &failures))
     }
 
-    /// Follows objects through scenes of a dataset.
-    fn track_scenes(
-        &self,
-        selection: &Selection,
-        watched: Option<u32>,
-        following: &Following,
-        outcome: &mut Outcome,
-    ) -> anyhow::Result<()> {
-        let idle = Duration::try_from_secs_f64(self.idle).map_err(|e| anyhow!("--idle: {e}"))?;
-        let dataset = selection.open()?;
-        let (starts, failures) = self.starts(selection, &dataset, watched)?;
-        outcome.failures = failures;
-        if outcome.log.is_some() && starts.len() > 1 {
-            bail!(
-                "--mcap-out has one object, not {}: --scene and --object say which",
-                starts.len()
-            );
-        }
-        if let Some(report) = &mut outcome.report {
-            report.share(starts.len());
-        }
-        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
-        assets = assets.with_rig(following.rig.clone()).with_masks(self.masks.source()?);
-        assets = assets.with_optional_masks();
-        for &(start, initial) in &starts {
-            let watch = watched.map(|scene_id| Watch::new(scene_id, start.im_id, idle));
-            let followed = || {
-                let object = assets.object(start.obj_id)?;
-                let (images, count) = match watch.transpose()? {
-                    Some(watch) => (Images::Watched(watch), 0),
-                    None => self.images(selection, &assets, start)?,
-                };
-                let bar = progress(count, "tracking");
-                let assets = &mut assets;
-                let mut film = SceneFilm { assets, images, start, rate: self.rate };
-                self.follow(&mut film, &bar, &object, initial, following, outcome)
-            };
-            if let Err(error) = followed() {
-                let Target { scene_id, obj_id, .. } = start;
-                outcome.failures.push(format!("scene {scene_id} object {obj_id}: {error:#}"));
-            }
-        }
-        Ok(())
-    }
-
-    /// Images of the scene of `start` from there on, and how many there are.
-    fn images(
-        &self,
-        selection: &Selection,
-        assets: &Assets<'_>,
-        start: Target,
-    ) -> anyhow::Result<(Images, usize)> {
-        let Target { scene_id, im_id: first, .. } = start;
-        let mut ids = assets.dataset().scene(scene_id)?.moments()?;
-        ids.retain(|id| *id >= first && selection.admits_image(scene_id, *id));
-        if ids.is_empty() {
-            bail!("no image from image {first} on");
-        }
-        let count = ids.len();
-        Ok((Images::Listed(ids.into_iter()), count))
-    }
-
-    /// Follows an object through a robot's log.
-    fn track_log(
-        &self,
-        file: &Path,
-        following: &Following,
-        outcome: &mut Outcome,
-    ) -> anyhow::Result<()> {
-        let log = Log::open(&self.log, file)?;
-        outcome.failures.extend_from_slice(log.faults());
-        let mut start = Target { scene_id: 0, im_id: 0, obj_id: 1, instance: 0 };
-        let mut initial = None;
-        if let Some(file) = &self.poses {
-            let ReadResults { rows, errors, .. } = read_results(file)?;
-            let first = rows.first();
-            let first = first.ok_or_else(|| match errors.first() {
-                Some(error) => anyhow!("{}: {error}", file.display()),
-                None => anyhow!("{}: no poses: there is nothing but a header", file.display()),
-            })?;
-            let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = *first;
-            (start, initial) = (Target { scene_id, im_id, obj_id, ..start }, Some(t_cam_model));
-        }
-        let bar = progress(log.count(), "tracking");
-        let mut film = log.film(start, following.rig.clone())?;
-        self.follow(&mut film, &bar, log.object(), initial, following, outcome)
+    /// Where to begin to follow the object of a robot's log.
+    fn start_in_log(&self) -> anyhow::Result<Start> {
+        let start = Target { scene_id: 0, im_id: 0, obj_id: 1, instance: 0 };
+        let Some(file) = &self.poses else { return Ok((start, None)) };
+        let ReadResults { rows, errors, .. } = read_results(file)?;
+        let Some(first) = rows.first() else {
+            let nothing = "no poses: there is nothing but a header";
+            bail!("{}: {}", file.display(), errors.first().map_or(nothing, |error| error));
+        };
+        let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = *first;
+        Ok((Target { scene_id, im_id, obj_id, ..start }, Some(t_cam_model)))
     }
 
     /// What to follow, in order, and what is wrong with rows of the poses.
@@ -380,44 +303,92 @@ impl Track {
         }
         Ok((earliest.into_values().collect(), faults))
     }
+}
 
-    /// Follows `object` through `film`, from `initial` on if that is known.
+impl Tracking<'_> {
+    /// Follows objects through scenes of a dataset.
+    fn track_scenes(&mut self, selection: &Selection, watched: Option<u32>) -> anyhow::Result<()> {
+        let Track { idle, rate, masks, .. } = self.options;
+        let idle = Duration::try_from_secs_f64(*idle).map_err(|e| anyhow!("--idle: {e}"))?;
+        let dataset = selection.open()?;
+        let (starts, failures) = self.options.starts(selection, &dataset, watched)?;
+        self.failures = failures;
+        if self.log.is_some() && starts.len() > 1 {
+            let count = starts.len();
+            bail!("--mcap-out has one object, not {count}: --scene and --object say which");
+        }
+        if let Some(report) = &mut self.report {
+            report.share(starts.len());
+        }
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        assets = assets.with_rig(self.rig.clone()).with_masks(masks.source()?);
+        assets = assets.with_optional_masks();
+        for &(start, initial) in &starts {
+            let Target { scene_id, im_id: first, obj_id, .. } = start;
+            let watch = watched.map(|scene_id| Watch::new(scene_id, first, idle));
+            let followed = || {
+                let object = assets.object(obj_id)?;
+                let mut watch = watch.transpose()?;
+                let mut ids = Vec::new();
+                if watch.is_none() {
+                    ids = assets.dataset().scene(scene_id)?.moments()?;
+                    ids.retain(|id| *id >= first && selection.admits_image(scene_id, *id));
+                    if ids.is_empty() {
+                        bail!("no image from image {first} on");
+                    }
+                }
+                let (count, mut ids) = (ids.len(), ids.into_iter());
+                let mut film = iter::from_fn(|| {
+                    let im_id = match &mut watch {
+                        Some(watch) => watch.next(&mut assets),
+                        None => ids.next(),
+                    }?;
+                    let target = Target { im_id, ..start };
+                    let seconds = f64::from(im_id - first) / *rate;
+                    let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+                    let input = assets.load(&target, &[]).map_err(anyhow::Error::from);
+                    Some(Moment { target, time, stamp: None, input })
+                });
+                self.follow(&mut film, count, &object, initial)
+            };
+            if let Err(error) = followed() {
+                self.failures.push(format!("scene {scene_id} object {obj_id}: {error:#}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Follows `object` through `film`, of `count` frames or 0 if nobody knows, from `initial` on if that is known.
     fn follow(
-        &self,
-        film: &mut dyn Film,
-        bar: &ProgressBar,
+        &mut self,
+        film: &mut dyn Iterator<Item = Moment>,
+        count: usize,
         object: &Arc<Object>,
         initial: Option<Isometry3<f64>>,
-        following: &Following,
-        outcome: &mut Outcome,
     ) -> anyhow::Result<()> {
-        let mut tracker: Option<Tracker> = None;
-        let stopped = || following.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
-        if let Some(report) = &mut outcome.report {
-            report.begin(bar.length());
+        let Self { options, stop, frames, failures, rows, log, report, .. } = self;
+        let bar = progress(count, "tracking");
+        let estimator = Estimator::new(Arc::clone(object)).settings(self.settings.clone());
+        let estimator = estimator.backend(Arc::clone(&self.backend)).rig(self.rig.clone());
+        let mut tracker = estimator.tracker()?;
+        initial.iter().for_each(|pose| tracker.start_from(pose));
+        let stopped = || stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        let keeps_posterior = options.details.is_some() || report.is_some();
+        if let Some(report) = report {
+            report.begin(count);
         }
         while !stopped()
             && let Some(Moment { target, time, stamp, input }) = film.next()
         {
-            let Outcome { log, failures, report, .. } = outcome;
             // What was sensed is given back where it is asked for once more.
             let frame = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
                 let input = input?;
-                let observation = &input.frame;
-                let tracker = match &mut tracker {
-                    Some(tracker) => tracker,
-                    none => {
-                        let mut new = following.begin(Arc::clone(object))?;
-                        initial.iter().for_each(|pose| new.start_from(pose));
-                        none.insert(new)
-                    }
-                };
                 if log.is_none() && report.is_none() {
                     return Ok((tracker.push(input.frame, time)?, None));
                 }
-                let tracked = tracker.track(observation, time)?;
-                let written =
-                    log.as_mut().map(|w| w.add((time, stamp), object, observation, &tracked));
+                let tracked = tracker.track(&input.frame, time)?;
+                let moment = (time, stamp);
+                let written = log.as_mut().map(|w| w.add(moment, object, &input.frame, &tracked));
                 if let Some(Err(error)) = written {
                     // Of a log with a gap nobody would know.
                     failures.push(format!("--mcap-out: {error:#}; it was given up"));
@@ -429,37 +400,41 @@ impl Track {
                 Ok((tracked, input)) => {
                     bar.set_message(tracked.status.name());
                     if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
-                        warn(bar, target, format!("lost: {doubt}"));
+                        warn(&bar, target, format!("lost: {doubt}"));
                     }
                     let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
                     let mut row = row(&target, tracked.t_cam_object, score);
-                    if self.time {
+                    if options.time {
                         row.time = tracked.timing.total().as_secs_f64();
                     }
-                    if let Some(rows) = &mut outcome.rows {
+                    if let Some(rows) = rows {
                         rows.add(&row)?;
                     }
-                    if let Some((report, input)) = outcome.report.as_mut().zip(input)
-                        && let Err(error) =
-                            report.add((target, time), &input, &tracked, row.clone())
-                    {
-                        outcome.failures.push(format!("{target}: report: {error}"));
-                    }
-                    if let Some(details) = &mut outcome.details {
-                        details.push(done::details(target, &tracked, stamp, self.time));
-                    }
+                    let posterior = tracked.posterior.as_ref().filter(|_| keeps_posterior);
+                    let posterior = posterior.map(PosteriorSummary::from);
+                    let drawn = report.as_mut().zip(input);
+                    let drawn = drawn
+                        .map(|(report, input)| report.draw(&input, &tracked, posterior.as_ref()));
+                    let drawing = drawn.transpose().unwrap_or_else(|error| {
+                        failures.push(format!("{target}: report: {error}"));
+                        None
+                    });
                     let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
-                    outcome.frames.push(Done {
+                    frames.push(Done {
+                        target,
                         row,
+                        time,
                         stamp,
                         status,
                         rejection,
                         iterations,
                         cost,
                         timing,
+                        posterior,
+                        drawing: drawing.flatten(),
                     });
                 }
-                Err(error) => outcome.failures.push(format!("{target}: {error:#}")),
+                Err(error) => failures.push(format!("{target}: {error:#}")),
             }
             bar.inc(1);
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::frame::FrameEntry;
+use super::frame::FrameReport;
 use super::scene::{EncodedHand, EncodedMesh};
 
 /// All that a page shows.
@@ -13,7 +13,7 @@ pub(super) struct Document {
     pub(super) blocks: Vec<Block>,
     /// Those that a frame has a figure for, in their order there.
     pub(super) columns: Vec<Column>,
-    pub(super) frames: Vec<FrameEntry>,
+    pub(super) frames: Vec<FrameReport>,
     /// Numbered as scenes of frames name them.
     pub(super) meshes: Vec<EncodedMesh>,
     pub(super) hands: Vec<EncodedHand>,
@@ -63,20 +63,19 @@ pub struct Column {
 }
 
 impl Column {
-    /// A figure of this column.
-    pub fn figure(self, value: Option<f64>) -> Figure {
-        Figure { column: self, value }
+    /// A column by filter word, heading and unit, with so many decimal places.
+    pub const fn new(
+        key: &'static str,
+        name: &'static str,
+        unit: &'static str,
+        digits: usize,
+    ) -> Self {
+        Self { key, name, unit, digits }
     }
 }
 
-/// A number of a frame, where it is known.
-#[derive(Clone, Copy, Debug)]
-pub struct Figure {
-    /// Its column.
-    pub column: Column,
-    /// In the column's unit.
-    pub value: Option<f64>,
-}
+/// A number of a frame in its column's unit, where it is known.
+pub type Figure = (Column, Option<f64>);
 
 /// Curves over one axis.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -1,7 +1,9 @@
 //! What a page shows of a frame.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::document::{Chart, Figure, LabeledPicture, Series};
 use super::scene::EncodedScene;
@@ -11,7 +13,7 @@ use crate::estimator::EstimatorInput;
 use crate::strategy::{PosteriorSummary, Trace};
 
 /// A frame: a row of the table, and words.
-#[derive(Clone, Debug, Default)]
+#[derive(Serialize)]
 pub struct FrameReport {
     /// Which frame.
     pub name: String,
@@ -22,9 +24,18 @@ pub struct FrameReport {
     /// Sentences.
     pub remarks: Vec<String>,
     /// Its numbers.
+    #[serde(serialize_with = "by_key")]
     pub figures: Vec<Figure>,
     /// How sure the pose is, where that is known.
     pub posterior: Option<PosteriorSummary>,
+    /// The frame as it was drawn, if it was.
+    pub drawing: Option<DrawnFrame>,
+}
+
+/// Known figures by the keys of their columns.
+fn by_key<S: Serializer>(figures: &[Figure], serializer: S) -> Result<S::Ok, S::Error> {
+    let known = figures.iter().filter_map(|(column, value)| Some((column.key, (*value)?)));
+    serializer.collect_map(known.collect::<BTreeMap<_, _>>())
 }
 
 /// What there is to draw of a frame.
@@ -39,19 +50,6 @@ pub struct FrameDrawing<'a> {
     pub covariance: Option<&'a [[f64; 6]; 6]>,
     /// How the search went, where that was kept.
     pub trace: Option<&'a Trace>,
-}
-
-/// A frame as the page has it.
-#[derive(Serialize)]
-pub(super) struct FrameEntry {
-    pub(super) name: String,
-    pub(super) status: String,
-    pub(super) flags: Vec<String>,
-    pub(super) remarks: Vec<String>,
-    /// By the keys of columns.
-    pub(super) figures: serde_json::Map<String, serde_json::Value>,
-    pub(super) posterior: Option<PosteriorSummary>,
-    pub(super) drawing: Option<DrawnFrame>,
 }
 
 /// A frame that is drawn.
@@ -70,15 +68,6 @@ pub(super) struct ResidualEntry {
     unit: &'static str,
     before: Option<f64>,
     after: f64,
-}
-
-impl FrameEntry {
-    pub(super) fn new(frame: FrameReport, drawing: Option<DrawnFrame>) -> Self {
-        let FrameReport { name, status, flags, remarks, figures, posterior } = frame;
-        let known = figures.iter().filter_map(|figure| Some((figure.column.key, figure.value?)));
-        let figures = known.map(|(key, value)| (key.to_owned(), value.into())).collect();
-        Self { name, status, flags, remarks, figures, posterior, drawing }
-    }
 }
 
 /// Residuals at both poses, by sensor.
