@@ -2,29 +2,24 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use nalgebra::{Point3, Translation3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{KinematicTree, RobotError};
 use prehend_geometry::shapes::{RoundedBox, rounded_box};
 
-use crate::data::bop::{Tactile, TactileReading};
+use crate::data::bop::{Body, Tactile, TactileReading};
 use crate::scene::{
     BinaryContact, ContactPatch, Hand, HandMeasurement, ProximityReading, TouchReading,
 };
 
-/// A body of a frame.
-pub(crate) struct PlacedBody {
-    pub(crate) name: String,
+/// A body of a frame, with its shape.
+pub(crate) struct PlacedBody<'b> {
+    pub(crate) body: &'b Body,
     /// A robot's, or of one link.
     pub(crate) tree: Arc<KinematicTree>,
     /// Positions of its own joints \[rad or m\].
     pub(crate) joints: Vec<f64>,
-    pub(crate) is_hand: bool,
-    /// Its coordinates → camera coordinates \[m\].
-    pub(crate) t_cam_body: Isometry3<f64>,
-    /// Standard deviations of that in each direction and about each axis \[m, rad\], where they are said.
-    pub(crate) sigmas: [Option<f64>; 2],
 }
 
 /// Edge, thickness and largest face of the plate that stands for a plane \[m\]: faces that reach behind the camera are not drawn.
@@ -52,17 +47,17 @@ fn plate() -> TriMesh {
 
 /// Bodies of a frame, the one first that the others are placed beside: the first hand, or else the first body. The others are in the order of their
 /// names, so that frames which list them in another one have the same robot.
-pub(crate) struct Bodies(Vec<PlacedBody>);
+pub(crate) struct Bodies<'b>(Vec<PlacedBody<'b>>);
 
-impl Bodies {
+impl<'b> Bodies<'b> {
     /// `None` of none.
-    pub(crate) fn new(mut bodies: Vec<PlacedBody>) -> Option<Self> {
-        let first = bodies.iter().position(|body| body.is_hand).unwrap_or(0);
+    pub(crate) fn new(mut bodies: Vec<PlacedBody<'b>>) -> Option<Self> {
+        let first = bodies.iter().position(|placed| placed.body.as_hand().is_some()).unwrap_or(0);
         if bodies.is_empty() {
             return None;
         }
         bodies[..=first].rotate_right(1);
-        bodies[1..].sort_by(|a, b| a.name.cmp(&b.name));
+        bodies[1..].sort_by(|a, b| a.body.name.cmp(&b.body.name));
         Some(Self(bodies))
     }
 
@@ -72,47 +67,49 @@ impl Bodies {
     /// If their links cannot be told apart.
     pub(crate) fn tree(&self) -> Result<KinematicTree, RobotError> {
         let first = KinematicTree::clone(&self.0[0].tree);
-        self.0[1..].iter().try_fold(first, |all, body| all.with_floating(&body.name, &body.tree))
+        let mut others = self.0[1..].iter();
+        others.try_fold(first, |all, placed| all.with_floating(&placed.body.name, &placed.tree))
     }
 
     /// Where they are; `hand` is all of them.
     pub(crate) fn measured(&self, hand: Arc<Hand>) -> HandMeasurement {
         let first = &self.0[0];
-        let mut measured = HandMeasurement::new(hand, first.t_cam_body, first.joints.clone());
-        measured.pose_sigmas = first.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
+        let mut measured = HandMeasurement::new(hand, first.body.t_cam_base, first.joints.clone());
+        measured.pose_sigmas =
+            first.body.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
         if self.0.len() == 1 {
             return measured;
         }
         measured.joint_sigmas = vec![None; first.joints.len()];
-        for body in &self.0[1..] {
-            let beside = first.t_cam_body.inverse() * body.t_cam_body;
+        for PlacedBody { body, joints, .. } in &self.0[1..] {
+            let beside = first.body.t_cam_base.inverse() * body.t_cam_base;
             measured.joints.extend(KinematicTree::floating_joints(&beside));
-            measured.joints.extend(&body.joints);
+            measured.joints.extend(joints);
             let exact = EXACT_PLACE;
             let [place, turn] = body.sigmas.map(|sigma| sigma.unwrap_or_default().max(exact));
             let said = [[place; 3], [exact; 3], [turn; 3]].concat();
             measured.joint_sigmas.extend(said.into_iter().map(Some));
-            measured.joint_sigmas.extend(body.joints.iter().map(|_| None));
+            measured.joint_sigmas.extend(joints.iter().map(|_| None));
         }
         measured
     }
 
     /// What `link` of the body called `name` is called in [`tree`](Self::tree); `None` if there is none.
     fn link_name(&self, name: &str, link: &str) -> Option<String> {
-        let at = self.0.iter().position(|body| body.name == name)?;
+        let at = self.0.iter().position(|placed| placed.body.name == name)?;
         self.0[at].tree.link_index(link)?;
         Some(if at == 0 { link.to_owned() } else { format!("{name}/{link}") })
     }
 
     /// Whether there is a body of that name.
     pub(crate) fn has(&self, name: &str) -> bool {
-        self.0.iter().any(|body| body.name == name)
+        self.0.iter().any(|placed| placed.body.name == name)
     }
 
     /// Their names, for messages.
     pub(crate) fn names(&self) -> String {
-        let quoted: Vec<String> = self.0.iter().map(|body| format!("{:?}", body.name)).collect();
-        quoted.join(", ")
+        let quoted = self.0.iter().map(|placed| format!("{:?}", placed.body.name));
+        quoted.collect::<Vec<_>>().join(", ")
     }
 
     /// `taxels` of the body called `name` as those of the whole robot.
@@ -181,16 +178,26 @@ impl Bodies {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+
+    use nalgebra::{Isometry3, UnitQuaternion};
     use prehend_geometry::DistanceField;
     use prehend_geometry::robot::RobotShape;
 
     use super::*;
+    use crate::data::bop::{BodyKind, Origin};
 
-    fn body(name: &str, is_hand: bool, t_cam_body: Isometry3<f64>) -> PlacedBody {
-        let tree = Arc::new(KinematicTree::rigid("base", vec![plate()]));
+    fn body(name: &str, is_hand: bool, t_cam_base: Isometry3<f64>) -> Body {
+        let hand = BodyKind::Hand { urdf: PathBuf::new(), joints: BTreeMap::new() };
+        let kind = if is_hand { hand } else { BodyKind::Plane };
         let sigmas = [Some(1e-3), None];
-        PlacedBody { name: name.into(), tree, joints: Vec::new(), is_hand, t_cam_body, sigmas }
+        Body { name: name.into(), kind, t_cam_base, sigmas, origin: Origin::default() }
+    }
+
+    fn placed(body: &Body) -> PlacedBody<'_> {
+        let tree = Arc::new(KinematicTree::rigid("base", vec![plate()]));
+        PlacedBody { body, tree, joints: Vec::new() }
     }
 
     #[test]
@@ -202,7 +209,7 @@ mod tests {
             body("left", true, place(0.2)),
             body("right", true, Isometry3::translation(0.0, 0.0, 0.7)),
         ];
-        let bodies = Bodies::new(bodies).unwrap();
+        let bodies = Bodies::new(bodies.iter().map(placed).collect()).unwrap();
         assert_eq!(bodies.names(), "\"left\", \"right\", \"table\"");
         let tree = bodies.tree().unwrap();
         let hand = Arc::new(Hand::new(tree.clone(), Vec::new()).unwrap());

@@ -5,10 +5,9 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use prehend_geometry::open_plain;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -42,9 +41,8 @@ impl Journal {
     ) -> Result<(Self, BTreeMap<usize, E>), DatasetError> {
         let fault = |error: io::Error| DatasetError::unusable(path, error);
         let (mut file, bytes) = open_locked(path, restart)?;
-        let own = header(path, identity)?;
-        let advice = " (--restart discards the whole journal)";
-        let Parsed { header, entries, length } = parse(path, &bytes, &own, advice)?;
+        let own = serde_json::to_string(identity).map_err(|e| unrecorded(path, 0, e))?;
+        let Parsed { header, entries, length } = parse(path, &bytes, &own)?;
         let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity));
         if !differences.is_empty() {
             let problem = format!(
@@ -62,23 +60,6 @@ impl Journal {
         Ok((journal, entries))
     }
 
-    /// What a journal says of its run, and its entries; for reading alone.
-    ///
-    /// # Errors
-    /// If it cannot be read, is no journal, or is damaged.
-    pub fn read<E: DeserializeOwned>(
-        path: &Path,
-    ) -> Result<(Identity, BTreeMap<usize, E>), DatasetError> {
-        let bytes = open_plain(path).and_then(|mut file| {
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map(|_| bytes)
-        });
-        let bytes = bytes.map_err(|e| DatasetError::unusable(path, e))?;
-        let advice = ": the run that wrote it must be repeated";
-        let Parsed { header, entries, .. } = parse(path, &bytes, "", advice)?;
-        Ok((header.ok_or_else(|| foreign(path))?, entries))
-    }
-
     /// Records a finished frame on disk and returns it as a resumed run would read it.
     ///
     /// # Errors
@@ -88,9 +69,9 @@ impl Journal {
         index: usize,
         entry: &E,
     ) -> Result<E, DatasetError> {
-        let text = line(&self.path, index, entry)?;
-        let back: JournalLine<E> =
-            serde_json::from_str(&text).map_err(|e| unrecorded(&self.path, index, e))?;
+        let fault = |error| unrecorded(&self.path, index, error);
+        let text = serde_json::to_string(&JournalLine { index, entry }).map_err(fault)?;
+        let back: JournalLine<E> = serde_json::from_str(&text).map_err(fault)?;
         self.write_line(&text)?;
         Ok(back.entry)
     }
@@ -113,16 +94,6 @@ impl Journal {
     }
 }
 
-/// The first line of a run's journal.
-fn header(path: &Path, identity: &Identity) -> Result<String, DatasetError> {
-    serde_json::to_string(identity).map_err(|e| unrecorded(path, 0, e))
-}
-
-/// The line of a frame.
-fn line<E: Serialize>(path: &Path, index: usize, entry: &E) -> Result<String, DatasetError> {
-    serde_json::to_string(&JournalLine { index, entry }).map_err(|e| unrecorded(path, index, e))
-}
-
 fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetError {
     DatasetError::unusable(path, format!("frame {index} cannot be recorded: {error}"))
 }
@@ -141,12 +112,10 @@ struct Parsed<E> {
 }
 
 /// `own` is the first line that this run would write: of a file without a whole line, what may be overwritten is a part of it.
-/// `advice` is what to do about damage.
 fn parse<E: DeserializeOwned>(
     path: &Path,
     bytes: &[u8],
     own: &str,
-    advice: &str,
 ) -> Result<Parsed<E>, DatasetError> {
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
@@ -161,7 +130,9 @@ fn parse<E: DeserializeOwned>(
     let mut length = first.len();
     for (number, line) in (2..).zip(lines) {
         let JournalLine { index, entry } = serde_json::from_slice(line).map_err(|_| {
-            DatasetError::unusable(path, format!("line {number} is damaged{advice}"))
+            let problem =
+                format!("line {number} is damaged (--restart discards the whole journal)");
+            DatasetError::unusable(path, problem)
         })?;
         entries.insert(index, entry);
         length += line.len();

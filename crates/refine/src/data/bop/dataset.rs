@@ -17,14 +17,14 @@ use crate::scene::RemapCache;
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
 /// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.
 /// Those belong to [`super::GroundTruth`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Dataset {
     root: PathBuf,
     split_dir: PathBuf,
-    scenes: BTreeMap<u32, DatasetScene>,
-    models: Models,
+    scenes: Arc<BTreeMap<u32, DatasetScene>>,
+    models: Arc<Models>,
     /// What all cameras have in common.
-    pub(super) camera: JsonFile,
+    pub(super) camera: Arc<JsonFile>,
 }
 
 /// One scene of a split; its files are read when first needed.
@@ -38,6 +38,9 @@ pub struct DatasetScene {
     pub(super) tactile: JsonFile,
     /// `scene_gt.json`; estimators may read the masks' objects alone.
     pub(super) objects: JsonFile,
+    /// `scene_gt_info.json` and `scene_bodies_gt.json`, for [`super::GroundTruth`] alone.
+    pub(super) visibility: JsonFile,
+    pub(super) true_bodies: JsonFile,
     pub(super) shared: Arc<SceneCaches>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
@@ -113,9 +116,9 @@ impl Dataset {
         Self {
             root: root.to_owned(),
             split_dir: split_dir.to_owned(),
-            scenes: scenes.into_iter().map(scene).collect(),
-            models: Models::new(root.join("models")),
-            camera,
+            scenes: Arc::new(scenes.into_iter().map(scene).collect()),
+            models: Arc::new(Models::new(root.join("models"))),
+            camera: Arc::new(camera),
         }
     }
 
@@ -165,13 +168,16 @@ impl DatasetScene {
         camera: &JsonFile,
         shared: &Arc<SceneCaches>,
     ) -> Self {
+        let file = |name: &str| JsonFile::new(dir.join(name));
         Self {
             id,
             root: root.to_path_buf(),
             camera: scene_camera(&dir, camera),
-            bodies: JsonFile::new(dir.join("scene_bodies.json")),
-            tactile: JsonFile::new(dir.join("scene_tactile.json")),
-            objects: JsonFile::new(dir.join("scene_gt.json")),
+            bodies: file("scene_bodies.json"),
+            tactile: file("scene_tactile.json"),
+            objects: file("scene_gt.json"),
+            visibility: file("scene_gt_info.json"),
+            true_bodies: file("scene_bodies_gt.json"),
             shared: Arc::clone(shared),
             rigs: OnceLock::new(),
             dir,

@@ -1,7 +1,5 @@
 //! The truth about a dataset, for scoring only.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
@@ -16,16 +14,8 @@ use super::numbers::{Numbers, Rotation, pose};
 /// `models_eval/`.
 #[derive(Debug)]
 pub struct GroundTruth<'a> {
-    dataset: &'a Dataset,
-    scenes: BTreeMap<u32, TrueScene>,
+    pub(super) dataset: &'a Dataset,
     models: Models,
-}
-
-/// The files of one scene.
-#[derive(Debug)]
-pub(super) struct TrueScene {
-    pub(super) visibility: JsonFile,
-    bodies: JsonFile,
 }
 
 /// An object where it truly is.
@@ -49,17 +39,9 @@ struct ObjectEntry {
 impl<'a> GroundTruth<'a> {
     /// The truth about the split that `dataset` shows; nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
-        let scene = |dir: &std::path::Path| TrueScene {
-            visibility: JsonFile::new(dir.join("scene_gt_info.json")),
-            bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
-        };
         let eval = dataset.root().join("models_eval");
         let models = if eval.is_dir() { eval } else { dataset.models().dir().to_path_buf() };
-        Self {
-            dataset,
-            scenes: dataset.scenes().map(|s| (s.id(), scene(s.dir()))).collect(),
-            models: Models::new(models),
-        }
+        Self { dataset, models: Models::new(models) }
     }
 
     /// The models to score with: `models_eval/` where the dataset has it, else `models/`.
@@ -129,11 +111,7 @@ impl<'a> GroundTruth<'a> {
     }
 
     fn bodies_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
-        let own = &self.scene(scene_id)?.bodies;
-        Ok(if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies })
-    }
-
-    pub(super) fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
-        self.dataset.scene(scene_id).map(|scene| &self.scenes[&scene.id()])
+        let scene = self.dataset.scene(scene_id)?;
+        Ok(if scene.true_bodies.exists() { &scene.true_bodies } else { &scene.bodies })
     }
 }

@@ -24,9 +24,9 @@ mod models_info;
 mod numbers;
 mod one_camera;
 mod optics;
+mod origin;
 mod pose;
 mod results;
-mod stated;
 mod touch;
 mod visibility;
 
@@ -51,12 +51,12 @@ pub use models::{ModelInfo, Models};
 pub(crate) use models_info::extent_to_bop;
 pub use models_info::write_symmetries;
 pub(crate) use numbers::{Lens, NonNegative, Numbers, Positive, Real, Rotation};
-pub(crate) use optics::{DepthWarning, Optics, check_size};
+pub(crate) use optics::{Optics, check_size};
+pub(crate) use origin::Origin;
 pub use pose::pose_from_matrix;
 pub(crate) use pose::{rotation_to_row_major, translation_to_mm};
 pub use results::{
     ReadResults, ResultRow, ResultsWriter, read_results, share_image_times, write_results,
 };
-pub(crate) use stated::Stated;
 pub(crate) use touch::TactileEntry;
 pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};

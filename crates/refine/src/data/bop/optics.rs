@@ -25,11 +25,15 @@ pub(crate) struct Optics<'a> {
     pub(crate) depth_remaps: &'a RemapCache,
 }
 
-/// A warning about the depth image in a file: of values that are none, or of one that measures nothing.
+/// Kind of a warning about a depth image: values that are none, or nothing measured.
+#[derive(Clone, Copy)]
 pub(crate) enum DepthWarning {
-    Saturated(String),
+    Saturated,
     Empty,
 }
+
+/// Hears of a warning about the depth image in a file.
+pub(crate) type Warn<'a> = &'a dyn Fn(&Path, DepthWarning, &str);
 
 impl Optics<'_> {
     /// The camera of an image of `width` by `height` pixels.
@@ -52,11 +56,11 @@ impl Optics<'_> {
         &self,
         file: &Path,
         color: Option<(usize, usize)>,
-        warn: &dyn Fn(&Path, DepthWarning),
+        warn: Warn<'_>,
     ) -> Result<DepthImage, DatasetError> {
         let mut stored = DepthImage::load(file, self.depth_unit)?;
         if let Some(warning) = drop_saturated(&mut stored, self.depth_unit) {
-            warn(file, DepthWarning::Saturated(warning));
+            warn(file, DepthWarning::Saturated, &warning);
         }
         let size = (stored.width(), stored.height());
         let depth = match &self.depth_camera {
@@ -110,7 +114,7 @@ impl Optics<'_> {
         &self,
         color: Option<&Path>,
         depth: Option<&Path>,
-        warn: &dyn Fn(&Path, DepthWarning),
+        warn: Warn<'_>,
     ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
@@ -121,7 +125,7 @@ impl Optics<'_> {
         let depth = depth.map(|file| self.depth(file, size, warn)).transpose();
         let depth = match depth {
             Err(DatasetError::NoDepth { file }) if color.is_some() => {
-                warn(&file, DepthWarning::Empty);
+                warn(&file, DepthWarning::Empty, "every depth is zero: color alone is used");
                 None
             }
             read => read?,

@@ -23,7 +23,7 @@ impl GroundTruth<'_> {
         im_id: u32,
         count: usize,
     ) -> Result<Vec<f64>, DatasetError> {
-        let file = &self.scene(scene_id)?.visibility;
+        let file = &self.dataset.scene(scene_id)?.visibility;
         let entries: Vec<VisibilityEntry> = file.entry(im_id)?;
         if entries.len() != count {
             let problem = format!("has {} objects but scene_gt.json {count}", entries.len());
