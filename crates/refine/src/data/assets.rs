@@ -13,7 +13,7 @@ use crate::data::bop::{
 };
 use crate::data::frame_input::FrameInput;
 use crate::data::mask_source::{MaskSource, Sought};
-use crate::data::robots::Robots;
+use crate::data::robots::{Robots, kept};
 use crate::error::{Panicked, RefineError};
 use crate::method::Method;
 use crate::rig::Rig;
@@ -171,16 +171,14 @@ impl<'a> Assets<'a> {
     /// # Errors
     /// If the model is missing or broken.
     pub fn object(&mut self, id: u32) -> Result<Arc<Object>, AssetError> {
-        if let Some(object) = self.objects.get(&id) {
-            return Ok(Arc::clone(object));
-        }
-        let mut object = load_object(self.dataset.models(), id, self.seed)?;
-        if let Some(rig) = &self.rig {
-            object = rig.corrected_object(id, &object)?.unwrap_or(object);
-        }
-        let object = Arc::new(object);
-        self.objects.insert(id, Arc::clone(&object));
-        Ok(object)
+        let Self { dataset, seed, rig, objects, .. } = self;
+        kept(objects, id, || {
+            let mut object = load_object(dataset.models(), id, *seed)?;
+            if let Some(rig) = rig {
+                object = rig.corrected_object(id, &object)?.unwrap_or(object);
+            }
+            Ok(Arc::new(object))
+        })
     }
 
     /// The object of `target`, and what its image shows: see [`Assets::observation`].

@@ -94,11 +94,17 @@ impl<'b> Bodies<'b> {
         measured
     }
 
-    /// What `link` of the body called `name` is called in [`tree`](Self::tree); `None` if there is none.
-    fn link_name(&self, name: &str, link: &str) -> Option<String> {
-        let at = self.0.iter().position(|placed| placed.body.name == name)?;
-        self.0[at].tree.link_index(link)?;
-        Some(if at == 0 { link.to_owned() } else { format!("{name}/{link}") })
+    /// What `link` of the body called `name` is called in [`tree`](Self::tree).
+    ///
+    /// # Errors
+    /// If there is none.
+    fn link_name(&self, name: &str, link: &str) -> Result<String, String> {
+        let mut named = self.0.iter().enumerate().filter(|(_, placed)| placed.body.name == name);
+        let found = named.next().filter(|(_, placed)| placed.tree.link_index(link).is_some());
+        match found.ok_or_else(|| format!("{name:?} has no link {link:?}"))? {
+            (0, _) => Ok(link.to_owned()),
+            _ => Ok(format!("{name}/{link}")),
+        }
     }
 
     /// Whether there is a body of that name.
@@ -115,12 +121,10 @@ impl<'b> Bodies<'b> {
     /// `taxels` of the body called `name` as those of the whole robot.
     ///
     /// # Errors
-    /// The name of a link that does not exist.
+    /// If one is on a link that does not exist.
     pub(crate) fn skin(&self, name: &str, taxels: &[Taxel]) -> Result<Vec<Taxel>, String> {
-        let named = |taxel: &Taxel| match self.link_name(name, &taxel.link) {
-            Some(link) => Ok(Taxel { link, ..taxel.clone() }),
-            None => Err(taxel.link.clone()),
-        };
+        let named =
+            |taxel: &Taxel| Ok(Taxel { link: self.link_name(name, &taxel.link)?, ..taxel.clone() });
         taxels.iter().map(named).collect()
     }
 
@@ -135,38 +139,19 @@ impl<'b> Bodies<'b> {
         layout: &[Taxel],
     ) -> Result<Option<TouchReading>, String> {
         let link = |name: &str| {
-            let all = self.link_name(&tactile.body, name);
-            let found = all.and_then(|all| tree.link_index(&all));
-            found.ok_or_else(|| format!("{:?} has no link {name:?}", tactile.body))
-        };
-        let counted = |readings: usize| match layout.len() == readings {
-            true => Ok(()),
-            false => {
-                let taxels = layout.len();
-                Err(format!("expected {taxels} readings, one a taxel, found {readings}"))
-            }
-        };
-        let places = || {
-            let place = |taxel: &Taxel| Ok((link(&taxel.link)?, taxel.position));
-            layout.iter().map(place).collect::<Result<Vec<(usize, Point3<f64>)>, String>>()
+            let found = tree.link_index(&self.link_name(&tactile.body, name)?);
+            found.ok_or_else(|| format!("the robot has no link {name:?}"))
         };
         Ok(Some(match &tactile.reading {
             TactileReading::Force { .. } => return Ok(None),
             TactileReading::Binary { contact, .. } => {
-                counted(contact.len())?;
-                let places = places()?.into_iter().zip(contact);
-                let known = places.filter_map(|((link, position), touched)| {
-                    Some(BinaryContact { link, position, touched: (*touched)? })
-                });
-                TouchReading::Binary(known.collect())
+                let probe = |link, position, touched| BinaryContact { link, position, touched };
+                TouchReading::Binary(probes(layout, contact, link, probe)?)
             }
             TactileReading::Proximity { distance, .. } => {
-                counted(distance.len())?;
-                let places = places()?.into_iter().zip(distance);
-                let known = places.filter_map(|((link, position), distance)| {
-                    Some(ProximityReading { link, position, distance: (*distance)? })
-                });
-                TouchReading::Proximity(known.collect())
+                let probe =
+                    |link, position, distance| ProximityReading { link, position, distance };
+                TouchReading::Proximity(probes(layout, distance, link, probe)?)
             }
             TactileReading::Patch { link: name, points, normals } => {
                 let (points, normals) = (points.clone(), normals.clone());
@@ -174,6 +159,27 @@ impl<'b> Bodies<'b> {
             }
         }))
     }
+}
+
+/// Readings of the taxels of `layout` whose `values` are known.
+///
+/// # Errors
+/// If there is not one value a taxel, or a link does not exist.
+fn probes<T: Copy, R>(
+    layout: &[Taxel],
+    values: &[Option<T>],
+    link: impl Fn(&str) -> Result<usize, String>,
+    probe: impl Fn(usize, Point3<f64>, T) -> R,
+) -> Result<Vec<R>, String> {
+    let (taxels, readings) = (layout.len(), values.len());
+    if taxels != readings {
+        return Err(format!("expected {taxels} readings, one a taxel, found {readings}"));
+    }
+    let read = layout.iter().zip(values).map(|(taxel, value)| {
+        let link = link(&taxel.link)?;
+        Ok(value.map(|value| probe(link, taxel.position, value)))
+    });
+    read.filter_map(Result::transpose).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Hands and other bodies of a dataset, and what is felt, each prepared once.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::hash::Hash;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -70,25 +72,17 @@ impl Robots {
         body: &'b Body,
         objects: &HashMap<u32, Arc<Object>>,
     ) -> Result<PlacedBody<'b>, AssetError> {
-        let shape = BodyShape::of(body);
-        let tree = match self.trees.get(&shape) {
-            Some(tree) => Arc::clone(tree),
-            None => {
-                let tree = Arc::new(match &body.kind {
-                    BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
-                    BodyKind::Plane => plane(),
-                    BodyKind::Object { obj_id } => match objects.get(obj_id) {
-                        Some(object) => solid(&object.mesh),
-                        None => {
-                            return Err(body.origin.fault("obj_id", "has no model here").into());
-                        }
-                    },
-                    BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
-                });
-                self.trees.insert(shape, Arc::clone(&tree));
-                tree
-            }
-        };
+        let tree = kept(&mut self.trees, BodyShape::of(body), || -> Result<_, AssetError> {
+            Ok(Arc::new(match &body.kind {
+                BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
+                BodyKind::Plane => plane(),
+                BodyKind::Object { obj_id } => match objects.get(obj_id) {
+                    Some(object) => solid(&object.mesh),
+                    None => return Err(body.origin.fault("obj_id", "has no model here").into()),
+                },
+                BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
+            }))
+        })?;
         let joints = match body.as_hand() {
             None => Vec::new(),
             Some((_, joints)) => {
@@ -117,34 +111,26 @@ impl Robots {
             _ => None,
         });
         let key = (shapes, force.map(|(sensor, taxels, _)| (sensor.body.clone(), taxels.clone())));
-        let known = self.hands.get(&key).cloned();
-        let mut skin = Vec::new();
-        if let Some((Tactile { body, origin, .. }, taxels, force)) = force {
-            let (layout, file) = (self.layout(taxels)?, taxels.display());
-            if known.is_none() {
-                skin = all.skin(body, &layout).map_err(|link| {
-                    let problem = format!("{file}: {body:?} has no link {link:?}");
-                    origin.fault("taxels", problem)
-                })?;
+        let layout = force.map(|(_, taxels, _)| self.layout(taxels)).transpose()?;
+        let hand = kept(&mut self.hands, key, || -> Result<_, AssetError> {
+            let mut skin = Vec::new();
+            if let (Some((sensor, taxels, _)), Some(layout)) = (force, &layout) {
+                let named = |e| format!("{}: {e}", taxels.display());
+                let made = all.skin(&sensor.body, layout).map_err(named);
+                skin = made.map_err(|problem| sensor.origin.fault("taxels", problem))?;
             }
-            if !force.is_empty() && force.len() != layout.len() {
-                let (expected, found) = (layout.len(), force.len());
+            let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
+            Ok(Arc::new(made.map_err(|e| origin.fault("bodies", e))?))
+        })?;
+        let mut measured = all.measured(Arc::clone(&hand));
+        if let (Some((sensor, taxels, force)), Some(layout)) = (force, layout) {
+            let (expected, found) = (layout.len(), force.len());
+            if found != 0 && found != expected {
+                let file = taxels.display();
                 let problem =
                     format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                return Err(origin.fault(forces, problem).into());
+                return Err(sensor.origin.fault(forces, problem).into());
             }
-        }
-        let hand = match known {
-            Some(hand) => hand,
-            None => {
-                let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
-                let hand = Arc::new(made.map_err(|e| origin.fault("bodies", e))?);
-                self.hands.insert(key, Arc::clone(&hand));
-                hand
-            }
-        };
-        let mut measured = all.measured(Arc::clone(&hand));
-        if let Some((.., force)) = force {
             measured.forces.clone_from(force);
         }
         for sensor in tactile {
@@ -160,13 +146,23 @@ impl Robots {
 
     /// A layout of taxels.
     fn layout(&mut self, file: &Path) -> Result<Arc<[Taxel]>, AssetError> {
-        if let Some(known) = self.layouts.get(file) {
-            return Ok(Arc::clone(known));
-        }
-        let layout: Arc<[Taxel]> = load_taxels(file)?.into();
-        self.layouts.insert(file.to_owned(), Arc::clone(&layout));
-        Ok(layout)
+        kept(&mut self.layouts, file.to_owned(), || Ok(load_taxels(file)?.into()))
     }
+}
+
+/// Value of `key`, made and kept if it is not there yet.
+///
+/// # Errors
+/// Those of `make`.
+pub(super) fn kept<K: Hash + Eq, V: ?Sized, E>(
+    values: &mut HashMap<K, Arc<V>>,
+    key: K,
+    make: impl FnOnce() -> Result<Arc<V>, E>,
+) -> Result<Arc<V>, E> {
+    Ok(Arc::clone(match values.entry(key) {
+        Entry::Occupied(known) => known.into_mut(),
+        Entry::Vacant(unknown) => unknown.insert(make()?),
+    }))
 }
 
 impl BodyShape {

@@ -76,7 +76,7 @@ impl Detections {
     /// Reads a file of detections.
     ///
     /// # Errors
-    /// When the file is absent or broken, and [`DatasetError::Field`] for an entry without a box or a mask, or with run lengths that do not fill its mask.
+    /// When the file is absent or broken, and [`DatasetError::Unusable`] for an entry without a box or a mask, or with run lengths that do not fill its mask.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
         let entries: Vec<Entry> = read_json(file)?;
         let mut by_image: BTreeMap<_, Vec<Detection>> = BTreeMap::new();

@@ -28,7 +28,6 @@ mod origin;
 mod pose;
 mod results;
 mod touch;
-mod visibility;
 
 pub use arrival::Stamp;
 pub use bodies::{Body, BodyKind, SceneBodies};

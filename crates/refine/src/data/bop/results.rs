@@ -141,8 +141,8 @@ pub fn share_image_times(rows: &mut [ResultRow]) {
 /// Writes rows with every digit of their values, atomically: the file appears whole or not at all.
 ///
 /// # Errors
-/// [`DatasetError::Field`] for a row with a value that is not finite (nothing is written), and
-/// [`DatasetError::Write`].
+/// [`DatasetError::Unusable`] for a row with a value that is not finite (nothing is written), and
+/// [`DatasetError::Unusable`].
 pub fn write_results(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
     let mut text = header();
     for (i, row) in rows.iter().enumerate() {
@@ -163,7 +163,7 @@ impl ResultsWriter {
     /// A new file with nothing but the header; an existing one is replaced.
     ///
     /// # Errors
-    /// [`DatasetError::Write`].
+    /// [`DatasetError::Unusable`].
     pub fn create(path: &Path) -> Result<Self, DatasetError> {
         let file = plain_target(path).and_then(File::create);
         let file = file.map_err(|e| DatasetError::writing(path, e))?;

@@ -30,7 +30,7 @@ impl DetailsFormat {
     /// The format of the file `path`.
     ///
     /// # Errors
-    /// [`DatasetError::Write`] if the extension is of none, or of one that needs a feature this build is without.
+    /// [`DatasetError::Unusable`] if the extension is of none, or of one that needs a feature this build is without.
     pub fn of(path: &Path) -> Result<Self, DatasetError> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let problem = match extension.to_ascii_lowercase().as_str() {
@@ -51,7 +51,7 @@ impl DetailsFormat {
 /// alone.
 ///
 /// # Errors
-/// Those of [`DetailsFormat::of`], and [`DatasetError::Write`].
+/// Those of [`DetailsFormat::of`], and [`DatasetError::Unusable`].
 pub fn write_details(path: &Path, frames: &[FrameDetails]) -> Result<(), DatasetError> {
     let columns = details_table(frames);
     let content = match DetailsFormat::of(path)? {
