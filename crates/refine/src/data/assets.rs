@@ -11,10 +11,10 @@ use crate::baselines::GradientKind;
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, Origin, ResultRow, SceneBodies,
 };
-use crate::data::frame_input::FrameInput;
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::{Robots, kept};
 use crate::error::{Panicked, RefineError};
+use crate::estimator::Estimator;
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{Frame, Inertial, Object, StatedSize, Target, check_gravity};
@@ -349,4 +349,22 @@ fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError
 /// If the model is missing or broken.
 pub fn load_mesh(models: &Models, id: u32) -> Result<TriMesh, AssetError> {
     Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETER))
+}
+
+/// A frame and its object, both corrected by the rig, where that is known.
+#[derive(Clone)]
+pub struct FrameInput {
+    /// Frame.
+    pub frame: Frame,
+    /// The object.
+    pub object: Arc<Object>,
+    /// The rig.
+    pub rig: Option<Arc<Rig>>,
+}
+
+impl FrameInput {
+    /// Estimator of the object by `method`.
+    pub fn estimator(&self, method: &Method) -> Estimator {
+        Estimator::new(Arc::clone(&self.object)).method(method.clone()).rig(self.rig.clone())
+    }
 }

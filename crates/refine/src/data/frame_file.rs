@@ -12,13 +12,12 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::{GridCache, TriMesh};
 use serde::Deserialize;
 
-use crate::data::assets::AssetError;
+use crate::data::assets::{AssetError, FrameInput};
 use crate::data::bop::{
     Body, BodyEntry, BodyKind, DatasetError, DepthCamera, FramePose, Intrinsics, LengthUnit, Lens,
     NonNegative, Numbers, Optics, Origin, Positive, Real, Rotation, Tactile, TactileEntry,
     TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
 };
-use crate::data::frame_input::FrameInput;
 use crate::data::robots::Robots;
 use crate::rig::Rig;
 use crate::scene::{Frame, HandMeasurement, Object, RemapCache, check_gravity};

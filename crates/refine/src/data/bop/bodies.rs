@@ -6,11 +6,9 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
-use super::error::DatasetError;
-use super::frame_pose::{FramePose, LengthUnit};
+use super::error::{DatasetError, Origin};
 use super::json::{JsonFile, UniqueMap};
-use super::numbers::{NonNegative, Numbers, Real, Rotation, pose};
-use super::origin::Origin;
+use super::numbers::{FramePose, LengthUnit, NonNegative, Numbers, Real, Rotation, pose};
 
 /// A body whose shape is known, and its pose as well as is said.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,12 +10,10 @@ use serde::Deserialize;
 
 use super::bodies::SceneBodies;
 use super::dataset::{Dataset, DatasetScene};
-use super::depth_camera::DepthCamera;
-use super::error::DatasetError;
+use super::error::{DatasetError, Origin};
 use super::json::JsonFile;
 use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
-use super::optics::{DepthWarning, Optics, check_size};
-use super::origin::Origin;
+use super::optics::{DepthCamera, DepthWarning, Optics, check_size};
 use super::touch::Tactile;
 use crate::scene::Frame;
 

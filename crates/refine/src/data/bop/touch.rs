@@ -6,10 +6,9 @@ use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::error::DatasetError;
+use super::error::{DatasetError, Origin};
 use super::json::JsonFile;
 use super::numbers::{NonNegative, Numbers};
-use super::origin::Origin;
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
