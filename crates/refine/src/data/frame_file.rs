@@ -196,11 +196,10 @@ pub fn load_frame_file(
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
     let parts = FrameParts::read(file)?;
     let robot = parts.robot(file, cache)?;
-    let FrameParts { frame: mut observation, mesh, mesh_file, layout, .. } = parts;
+    let FrameParts { frame: mut observation, mesh, mesh_file, mass, obj_id, .. } = parts;
     let name = mesh_file.display().to_string();
-    let mass = layout.mass_kg.map(|mass| mass.0);
     let mut object = Object::with_mass(&name, mesh, mass, seed).map_err(|e| fault(&e))?;
-    if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
+    if let (Some(rig), Some(id)) = (&rig, obj_id) {
         match rig.corrected_object(id, &object).map_err(|e| fault(&e))? {
             Some(corrected) => object = corrected,
             // As of a dataset: other objects are seen by the same rig.
@@ -212,7 +211,7 @@ pub fn load_frame_file(
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
-    Ok((FrameInput { frame: observation, object: Arc::new(object), rig }, layout.pose.0))
+    Ok((FrameInput { frame: observation, object: Arc::new(object), rig }, parts.t_cam_object))
 }
 
 /// Content of a frame file as it is there: nothing is derived from it yet.
@@ -226,7 +225,14 @@ pub(crate) struct FrameParts {
     pub(crate) bodies: Vec<Body>,
     /// The robot's forces first, empty where they are not said.
     pub(crate) tactile: Vec<Tactile>,
-    layout: FrameLayout,
+    /// The initial pose, object → camera \[m\].
+    pub(crate) t_cam_object: Isometry3<f64>,
+    /// Mass of the object \[kg\], where the file says it.
+    pub(crate) mass: Option<f64>,
+    /// True if the images were taken through a lens.
+    pub(crate) has_lens: bool,
+    /// The object's number in a rig.
+    obj_id: Option<u32>,
 }
 
 impl FrameParts {
@@ -255,7 +261,17 @@ impl FrameParts {
             let view = camera.images().read(file, &format!("cameras[{k}]."), false)?;
             observation = observation.with_view(view, camera.pose.0);
         }
-        Ok(Self { frame: observation, mesh, mesh_file, bodies, tactile, layout })
+        Ok(Self {
+            frame: observation,
+            mesh,
+            mesh_file,
+            bodies,
+            tactile,
+            t_cam_object: layout.pose.0,
+            mass: layout.mass_kg.map(|mass| mass.0),
+            has_lens: layout.lens.is_some(),
+            obj_id: layout.obj_id,
+        })
     }
 
     /// All bodies as one robot, and what that measures; `None` of none.
@@ -271,21 +287,6 @@ impl FrameParts {
             AssetError::Dataset(error) => error,
             other => DatasetError::unusable(file, other),
         })
-    }
-
-    /// The initial pose, object → camera \[m\].
-    pub(crate) fn t_cam_object(&self) -> &Isometry3<f64> {
-        &self.layout.pose.0
-    }
-
-    /// Mass of the object \[kg\], where the file says it.
-    pub(crate) fn mass(&self) -> Option<f64> {
-        self.layout.mass_kg.map(|mass| mass.0)
-    }
-
-    /// True if the images were taken through a lens.
-    pub(crate) fn has_lens(&self) -> bool {
-        self.layout.lens.is_some()
     }
 }
 

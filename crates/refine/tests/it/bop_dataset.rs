@@ -244,7 +244,7 @@ fn an_absent_or_broken_file_spoils_only_what_needs_it() {
     assert!(matches!(frame.tactile(), Err(DatasetError::Unusable { file, .. }) if file == tactile));
     assert_eq!(frame.rgb_path(), Err(DatasetError::Missing { file: rgb }));
     assert!(frame.depth().is_ok() && frame.mask(0).is_ok());
-    assert!(dataset.frame(4, 3).unwrap().observation(0).is_ok());
+    assert!(dataset.frame(4, 3).unwrap().rgb_path().is_ok());
 }
 
 #[test]

@@ -114,7 +114,23 @@ impl Dataset {
         shared: &Arc<SceneCaches>,
     ) -> Self {
         let camera = JsonFile::new(root.join("camera.json"));
-        let scene = |(id, dir)| (id, DatasetScene::new(id, dir, root, &camera, shared));
+        let scene = |(id, dir): (u32, PathBuf)| {
+            let file = |name: &str| JsonFile::new(dir.join(name));
+            let scene = DatasetScene {
+                id,
+                root: root.to_owned(),
+                camera: scene_camera(&dir, &camera),
+                bodies: file("scene_bodies.json"),
+                tactile: file("scene_tactile.json"),
+                objects: file("scene_gt.json"),
+                visibility: file("scene_gt_info.json"),
+                true_bodies: file("scene_bodies_gt.json"),
+                shared: Arc::clone(shared),
+                rigs: OnceLock::new(),
+                dir,
+            };
+            (id, scene)
+        };
         Self {
             root: root.to_owned(),
             split_dir: split_dir.to_owned(),
@@ -163,29 +179,6 @@ impl Dataset {
 }
 
 impl DatasetScene {
-    fn new(
-        id: u32,
-        dir: PathBuf,
-        root: &Path,
-        camera: &JsonFile,
-        shared: &Arc<SceneCaches>,
-    ) -> Self {
-        let file = |name: &str| JsonFile::new(dir.join(name));
-        Self {
-            id,
-            root: root.to_path_buf(),
-            camera: scene_camera(&dir, camera),
-            bodies: file("scene_bodies.json"),
-            tactile: file("scene_tactile.json"),
-            objects: file("scene_gt.json"),
-            visibility: file("scene_gt_info.json"),
-            true_bodies: file("scene_bodies_gt.json"),
-            shared: Arc::clone(shared),
-            rigs: OnceLock::new(),
-            dir,
-        }
-    }
-
     /// The scene's id.
     pub fn id(&self) -> u32 {
         self.id

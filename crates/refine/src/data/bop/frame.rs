@@ -142,14 +142,20 @@ impl DatasetImage<'_> {
 
     /// The files of the image's masks, in any order.
     fn mask_files(&self) -> impl Iterator<Item = PathBuf> + use<> {
-        let files = fs::read_dir(self.scene.dir().join("mask_visib"));
-        let prefix = format!("{:06}_", self.im_id);
-        files.into_iter().flatten().flatten().map(|file| file.path()).filter(move |path| {
-            path.file_name()
-                .and_then(|name| name.to_str())
-                .and_then(|name| name.strip_prefix(&prefix)?.split_once('.'))
-                .is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
+        self.mask_listing().filter(|path| {
+            let name = path.file_name().and_then(|name| name.to_str()?.split_once('.'));
+            name.is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
         })
+    }
+
+    /// All files in the folder of masks that begin as the image's do.
+    pub(super) fn mask_listing(&self) -> impl Iterator<Item = PathBuf> + use<> {
+        let files = fs::read_dir(self.scene.dir().join("mask_visib")).into_iter().flatten();
+        let prefix = format!("{:06}_", self.im_id);
+        let is_of_image = move |path: &PathBuf| {
+            path.file_name().and_then(|name| name.to_str()).is_some_and(|n| n.starts_with(&prefix))
+        };
+        files.flatten().map(|file| file.path()).filter(is_of_image)
     }
 
     /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.

@@ -12,7 +12,7 @@ use super::error::DatasetError;
 use super::files::write_atomically;
 use super::json::{JsonFile, UniqueMap, read_json};
 use super::numbers::{Numbers, Positive, Real};
-use super::pose::{pose_from_bop, rotation_to_row_major, translation_to_mm};
+use super::pose::{pose_from_matrix, rotation_to_row_major, translation_to_mm};
 use crate::MM_PER_M;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
@@ -176,12 +176,9 @@ impl TryFrom<Numbers<16>> for SymmetryMotion {
     type Error = String;
 
     fn try_from(numbers: Numbers<16>) -> Result<Self, String> {
-        let m = numbers.0;
-        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err("the last row must be 0 0 0 1".into());
-        }
-        let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-        pose_from_bop(&r, &[m[3], m[7], m[11]]).map(Self)
+        let mut motion = pose_from_matrix(&numbers.0)?;
+        motion.translation.vector /= 1000.0;
+        Ok(Self(motion))
     }
 }
 
@@ -332,7 +329,7 @@ mod tests {
             (4, "4.inertia_kg_m2: is not symmetric"),
             (5, "5.symmetries_continuous[0].axis: has no direction"),
             (6, "6.symmetries_discrete[0]: not orthonormal"),
-            (7, "7.symmetries_discrete[0]: the last row must be 0 0 0 1"),
+            (7, "7.symmetries_discrete[0]: the matrix's last row must be 0 0 0 1"),
         ] {
             let error = models.info(id).unwrap_err().to_string();
             assert!(error.contains(problem), "{error}");
