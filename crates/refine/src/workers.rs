@@ -87,9 +87,7 @@ impl Workers {
             outcome
         })
     }
-}
 
-impl Workers {
     /// Does the `work` of all `indices` side by side; `each` hears of them in their order, so that sums are the same for any number of threads.
     pub fn run_in_order<T: Send>(
         &self,
@@ -97,19 +95,16 @@ impl Workers {
         work: impl Fn(usize) -> T + Sync,
         mut each: impl FnMut(usize, T),
     ) {
-        let mut waiting = BTreeMap::new();
-        let mut next = indices.iter();
-        let mut expected = next.next();
+        let (mut waiting, mut next) = (BTreeMap::new(), 0);
+        let places: Vec<usize> = (0..indices.len()).collect();
         let Ok(()) = self.run(
-            indices,
-            || |&index: &usize| work(index),
-            |&index, outcome| -> Result<(), Infallible> {
-                waiting.insert(index, outcome);
-                while let Some((index, outcome)) =
-                    expected.and_then(|index| waiting.remove_entry(index))
-                {
-                    each(index, outcome);
-                    expected = next.next();
+            &places,
+            || |&at: &usize| work(indices[at]),
+            |&at, outcome| -> Result<(), Infallible> {
+                waiting.insert(at, outcome);
+                while let Some(outcome) = waiting.remove(&next) {
+                    each(indices[next], outcome);
+                    next += 1;
                 }
                 Ok(())
             },

@@ -9,7 +9,7 @@ use prehend_geometry::hand::load_taxels;
 use prehend_geometry::{DistanceField, GridCache, KinematicTree, SdfGrid, TriMesh, mjcf};
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
 use prehend_refine::data::{
-    Assets, FrameInput, Journal, Target, Times, find_targets, load_frame_file,
+    Assets, FrameInput, Identity, Journal, Target, Times, find_targets, load_frame_file,
 };
 use prehend_refine::evaluate::study::StudyFile;
 use prehend_refine::rig::Rig;
@@ -284,8 +284,11 @@ fn rig(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
 fn journal(small: &SmallDataset, bytes: &[u8]) -> Result<()> {
     let file = small.path("broken.journal");
     fs::write(&file, bytes)?;
-    let (identity, entries) = Journal::read::<Value>(&file)?;
-    // What a resumed run takes over is the same.
+    // The run that wrote it.
+    let identity: Identity =
+        serde_json::from_slice(bytes.split(|b| *b == b'\n').next().unwrap_or_default())?;
+    let (journal, entries) = Journal::open::<Value>(&file, &identity, false)?;
+    drop(journal);
     let (journal, again) = Journal::open::<Value>(&file, &identity, false)?;
     assert_eq!(entries, again);
     journal.discard()?;

@@ -1,17 +1,15 @@
 //! Chamfer distance: the two-way distance between the object's surface and the depth points on it.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::KdTree;
 use prehend_render::{Camera, DepthImage};
-use rayon::prelude::*;
 
+use super::matcher::{Matcher, PointPair};
 use super::wide;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Object, PreparedFrame};
+use crate::scene::PreparedFrame;
 
 /// Settings of [`ChamferDepthFactor`].
 #[derive(Clone, Debug, PartialEq)]
@@ -34,22 +32,12 @@ impl Default for ChamferDepthSettings {
 /// the surface that faces the camera and is not hidden by the hand: a hidden triangle has no depth
 /// point near it at the true pose. Both distances go through Cauchy's loss: masks leak and edges fly.
 pub struct ChamferDepthFactor {
-    object: Arc<Object>,
+    matcher: Matcher,
     camera: Camera,
-    tree: KdTree,
-    /// Nearest elements of the last search, for each depth point a face and for each surface sample a depth point: where a search begins
-    /// changes how long it takes, not what it finds.
-    nearest: [Vec<AtomicU32>; 2],
     /// Depth of the hand, where it may hide the object.
     hand: Arc<DepthImage>,
     /// Noise of one direction.
     noise: NoiseModel,
-}
-
-/// A point of the object's surface and the depth point it is matched with, in the camera frame \[m\].
-struct PointPair {
-    surface: Point3<f64>,
-    cloud: Point3<f64>,
 }
 
 impl ChamferDepthFactor {
@@ -61,45 +49,11 @@ impl ChamferDepthFactor {
         frame: &PreparedFrame<'_>,
         settings: &ChamferDepthSettings,
     ) -> Result<Self, RefineError> {
-        let object = Arc::clone(frame.object());
-        let points = frame.masked_points(settings.points)?;
-        let tree = KdTree::new(&points).map_err(|_| RefineError::NoDepth)?;
-        let nearest = [points.len(), object.samples.len()]
-            .map(|n| (0..n).map(|_| AtomicU32::new(u32::MAX)).collect());
+        let matcher = Matcher::new(frame, settings.points)?;
         let (camera, hand) = (frame.observation().camera, Arc::clone(frame.hand_depth()));
         let effective_samples = 0.5 * settings.noise.effective_samples;
         let noise = NoiseModel { effective_samples, ..settings.noise };
-        Ok(Self { object, camera, tree, nearest, hand, noise })
-    }
-
-    /// Each depth point with the mesh.
-    fn to_mesh(&self, state: &State) -> Vec<PointPair> {
-        let t_object_cam = state.t_cam_object.inverse();
-        let pair = |(p, nearest): (&Point3<f64>, &AtomicU32)| {
-            let (query, face) = (t_object_cam * p, nearest.load(Ordering::Relaxed));
-            let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
-            nearest.store(closest.face, Ordering::Relaxed);
-            Some(PointPair { surface: state.t_cam_object * closest.point, cloud: *p })
-        };
-        self.tree.points().par_iter().zip(&self.nearest[0]).filter_map(pair).collect()
-    }
-
-    /// Each visible surface sample with the depth points.
-    fn to_cloud(&self, state: &State) -> Vec<PointPair> {
-        let samples = self.object.samples.par_iter().zip(&self.nearest[1]);
-        samples
-            .filter_map(|(sample, nearest)| {
-                let surface = state.t_cam_object * sample.point;
-                let normal = state.t_cam_object * sample.normal;
-                if !self.sees(&surface, &normal) {
-                    return None;
-                }
-                let point = nearest.load(Ordering::Relaxed) as usize;
-                let found = self.tree.nearest_with_hint(&surface, f64::INFINITY, point)?.index;
-                nearest.store(found as u32, Ordering::Relaxed);
-                Some(PointPair { surface, cloud: self.tree.points()[found] })
-            })
-            .collect()
+        Ok(Self { matcher, camera, hand, noise })
     }
 
     /// True of a surface point of the object that the camera sees, as far as facing and the hand decide.
@@ -124,16 +78,17 @@ impl Factor for ChamferDepthFactor {
     }
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        let (to_mesh, to_cloud) = (self.to_mesh(state), self.to_cloud(state));
+        let to_mesh = self.matcher.to_surface(state);
+        let to_cloud = self.matcher.to_cloud(state, |point, normal| self.sees(point, normal));
         if to_cloud.is_empty() {
             // A pose that shows the camera nothing, whose mean distance would be nothing's: as if all of the object were as far
             // from the depth points as it is large.
-            let cost = self.noise.weighting(1).cost(2.0 * self.object.radius);
+            let cost = self.noise.weighting(1).cost(2.0 * self.matcher.object.radius);
             rows.add_constant(self.noise.effective_samples * cost);
         }
         for pairs in [to_mesh, to_cloud] {
             let weighting = self.noise.weighting(pairs.len());
-            for PointPair { surface, cloud } in pairs {
+            for PointPair { surface, cloud, .. } in pairs {
                 let offset = cloud - surface;
                 let distance = offset.norm();
                 rows.add(distance, &weighting, |row| {
@@ -179,11 +134,11 @@ mod tests {
     fn each_depth_point_is_matched_with_its_nearest_surface_point() {
         let (frame, state) = fixture(0);
         let factor = factor(&frame);
-        let pairs = factor.to_mesh(&state);
-        assert!(pairs.len() == factor.tree.points().len() && pairs.len() > 100);
-        for PointPair { surface, cloud } in pairs {
+        let pairs = factor.matcher.to_surface(&state);
+        assert!(pairs.len() == factor.matcher.cloud.points().len() && pairs.len() > 100);
+        for PointPair { surface, cloud, .. } in pairs {
             let local = state.t_cam_object.inverse() * cloud;
-            let (distance, _) = factor.object.surface.signed_distance(&local);
+            let (distance, _) = factor.matcher.object.surface.signed_distance(&local);
             assert!(((cloud - surface).norm() - distance.abs()).abs() < 1e-12);
         }
     }

@@ -165,8 +165,8 @@ impl Heuristic {
                 .map(|factor| CandidateStep::of(factor.as_ref(), &state, radius, length))
                 .collect();
             let total: f64 = candidates.iter().map(|c| c.cost).sum();
-            let gain: f64 = candidates.iter().map(CandidateStep::gain).sum();
-            let weight = |c: &CandidateStep| if gain > 0.0 { c.gain() / gain } else { 0.0 };
+            let gain: f64 = candidates.iter().map(|c| c.gain).sum();
+            let weight = |c: &CandidateStep| if gain > 0.0 { c.gain / gain } else { 0.0 };
             let weights: Vec<f64> = candidates.iter().map(weight).collect();
             let step: Vector6<f64> =
                 weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
@@ -229,7 +229,8 @@ impl Strategy for Heuristic {
 /// A step along one factor's gradient and what it does to that factor.
 struct CandidateStep {
     cost: f64,
-    cost_after: f64,
+    /// Decrease of the factor's own cost by the step; 0 if there is none.
+    gain: f64,
     step: Vector6<f64>,
     /// Length of `step`, where a rotation counts by how far it moves the object's surface \[m\].
     length: f64,
@@ -246,14 +247,9 @@ impl CandidateStep {
         let hessian = Matrix6::from_column_slice(equations.hessian().as_slice());
         let equations = Quadratic { value: cost, gradient, hessian };
         let (step, length) = damped_step(&equations, radius, DAMPING, length);
-        let cost_after = factor.cost(&state.retract(&[Block::ObjectPose], step.as_slice()));
-        Self { cost, cost_after, step, length }
-    }
-
-    /// Decrease of the factor's own cost by the step; 0 if there is none.
-    fn gain(&self) -> f64 {
-        let gain = self.cost - self.cost_after;
-        if gain.is_finite() { gain.max(0.0) } else { 0.0 }
+        let gain = cost - factor.cost(&state.retract(&[Block::ObjectPose], step.as_slice()));
+        let gain = if gain.is_finite() { gain.max(0.0) } else { 0.0 };
+        Self { cost, gain, step, length }
     }
 }
 

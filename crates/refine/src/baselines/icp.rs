@@ -1,10 +1,10 @@
 //! The paper's first baseline: point-to-point iterative closest points.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use prehend_autodiff::Quadratic;
-use prehend_geometry::{KdTree, RobustKernel, icp};
-use rayon::prelude::*;
+use prehend_geometry::{RobustKernel, icp};
 
+use super::matcher::{Matcher, PointPair};
 use super::rendering_settings;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
@@ -46,27 +46,15 @@ impl Strategy for Icp {
         initial: &State,
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
-        let object = frame.object();
-        let cloud = KdTree::new(&frame.masked_points(self.points)?);
-        let cloud = cloud.map_err(|_| RefineError::NoDepth)?;
+        let matcher = Matcher::new(frame, self.points)?;
         let judge = Recorder::judge(frame, self.checkpoint, &rendering_settings())?;
         let names = std::iter::once("icp");
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         let rule =
             StepRule { iterations: self.iterations, tolerance: self.step_tolerance, damping: 1e-3 };
-        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, _| {
-            let t_object_cam = state.t_cam_object.inverse();
-            let to_mesh = pairs(cloud.points(), |p| {
-                let closest = object.surface.closest(&(t_object_cam * p), f64::INFINITY)?;
-                Some((state.t_cam_object * closest.point, *p))
-            });
-            let to_cloud = pairs(&object.samples, |sample| {
-                let surface = state.t_cam_object * sample.point;
-                let nearest = cloud.nearest(&surface, f64::INFINITY)?;
-                Some((surface, cloud.points()[nearest.index]))
-            });
-            let mut sum = mean_square(state, &to_mesh);
-            sum += &mean_square(state, &to_cloud);
+        walk(&mut recorder, initial.clone(), matcher.object.radius, &rule, |state, _| {
+            let mut sum = mean_square(state, &matcher.to_surface(state));
+            sum += &mean_square(state, &matcher.to_cloud(state, |_, _| true));
             (sum.value, sum)
         });
         Ok(recorder.estimate(None))
@@ -77,19 +65,11 @@ impl Strategy for Icp {
     }
 }
 
-/// Points of the surface, each with the depth point it is matched with, in the order of `items`.
-fn pairs<T: Sync>(
-    items: &[T],
-    pair: impl Fn(&T) -> Option<(Point3<f64>, Point3<f64>)> + Sync + Send,
-) -> Vec<(Point3<f64>, Point3<f64>)> {
-    items.par_iter().with_min_len(64).filter_map(pair).collect()
-}
-
 /// The mean squared distance of `pairs` \[m²\].
-fn mean_square(state: &State, pairs: &[(Point3<f64>, Point3<f64>)]) -> Quadratic<6> {
+fn mean_square(state: &State, pairs: &[PointPair]) -> Quadratic<6> {
     let center = state.center().into();
     let mut sums = icp::NormalEquations::new();
-    for (surface, cloud) in pairs {
+    for PointPair { surface, cloud, .. } in pairs {
         let target = icp::Match { point: *cloud, normal: Vector3::zeros() };
         sums.add(icp::Metric::PointToPoint, RobustKernel::Squared, surface, &target, &center);
     }

@@ -3,6 +3,7 @@
 mod chamfer_depth;
 mod heuristic;
 mod icp;
+mod matcher;
 mod robust_icp;
 mod stability;
 mod stability_loss;

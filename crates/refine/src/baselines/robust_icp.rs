@@ -1,13 +1,12 @@
 //! A strong, simple baseline: robust point-to-plane iterative closest points.
 
-use nalgebra::{Point3, Vector3};
 use prehend_geometry::{RobustKernel, icp};
-use rayon::prelude::*;
 
+use super::matcher::{Matcher, PointPair};
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::scene::{Object, PreparedFrame};
+use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
 
 /// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
@@ -47,19 +46,16 @@ impl Strategy for RobustIcp {
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
         let &Self { iterations, points, first_scale, last_scale, damping } = self;
-        let object = frame.object();
-        let point = |place| DepthPoint { place, face: None };
-        let mut cloud: Vec<DepthPoint> =
-            frame.masked_points(points)?.into_iter().map(point).collect();
+        let matcher = Matcher::new(frame, points)?;
         let shrinking = 0.75 * iterations as f64;
         let names = std::iter::once("robust-icp");
         let mut recorder = Recorder::new(names, initial, iterations, None, observe);
         // A step of no length at all says only that no point counts any more.
         let rule = StepRule { iterations, tolerance: 0.0, damping };
-        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, index| {
+        walk(&mut recorder, initial.clone(), matcher.object.radius, &rule, |state, index| {
             let done = (index as f64 / shrinking.max(1.0)).min(1.0);
             let scale = first_scale * (last_scale / first_scale).powf(done);
-            let sums = match_all(&mut cloud, object, state, RobustKernel::Cauchy { scale });
+            let sums = match_all(&matcher, state, RobustKernel::Cauchy { scale });
             (sums.rms(), sums.quadratic)
         });
         Ok(recorder.estimate(None))
@@ -70,35 +66,15 @@ impl Strategy for RobustIcp {
     }
 }
 
-/// A depth point in the camera frame \[m\], and the face it was matched with last.
-struct DepthPoint {
-    place: Point3<f64>,
-    face: Option<u32>,
-}
-
 /// The sum of robust losses of the points' distances to the planes of the faces nearest to them.
-fn match_all(
-    cloud: &mut [DepthPoint],
-    object: &Object,
-    state: &State,
-    kernel: RobustKernel,
-) -> icp::NormalEquations {
-    let t_object_cam = state.t_cam_object.inverse();
+fn match_all(matcher: &Matcher, state: &State, kernel: RobustKernel) -> icp::NormalEquations {
     let center = state.center().into();
-    let of_point = |point: &mut DepthPoint| -> Option<(Point3<f64>, icp::Match)> {
-        let local = t_object_cam * point.place;
-        let face = point.face.unwrap_or(u32::MAX);
-        let closest = object.surface.closest_with_hint(&local, f64::INFINITY, face)?;
-        point.face = Some(closest.face);
-        let normal: Vector3<f64> = state.t_cam_object * object.normals[closest.face as usize];
-        let surface = state.t_cam_object * closest.point;
-        let faces_camera = normal.dot(&surface.coords) < 0.0;
-        faces_camera.then_some((surface, icp::Match { point: point.place, normal }))
-    };
-    let matches: Vec<_> = cloud.par_iter_mut().with_min_len(64).filter_map(of_point).collect();
     let mut sums = icp::NormalEquations::new();
-    for (surface, target) in &matches {
-        sums.add(icp::Metric::PointToPlane, kernel, surface, target, &center);
+    for PointPair { surface, normal, cloud } in matcher.to_surface(state) {
+        if normal.dot(&surface.coords) < 0.0 {
+            let target = icp::Match { point: cloud, normal };
+            sums.add(icp::Metric::PointToPlane, kernel, &surface, &target, &center);
+        }
     }
     sums
 }

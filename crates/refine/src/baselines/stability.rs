@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_autodiff::Quadratic;
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
     Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
     StepError, Surface, TimeSteps, World,
 };
 
-use super::stability_loss::{StabilityJacobian, StabilityLoss, StabilityWeights};
+use super::stability_loss::{StabilityLoss, StabilityWeights};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{PreparedFrame, check_gravity};
@@ -171,12 +172,16 @@ impl Factor for StabilityFactor {
         let center = Point3::from(state.center());
         let (moved, precision) = self.displacement(state);
         // A rollout that blew up has no derivative.
-        let linearized = self.stable(pose).linearize(pose, &center).ok();
-        let StabilityJacobian { value: loss, gradient, normal: jtj } = linearized
-            .filter(StabilityJacobian::is_finite)
-            .unwrap_or_else(|| StabilityJacobian::constant(BLOWN_UP));
+        let is_finite = |model: &Quadratic<6>| {
+            let derivatives = model.gradient.iter().chain(&model.hessian);
+            (2.0 * model.value).is_finite() && { derivatives }.all(|x| x.is_finite())
+        };
+        let linearized = self.stable(pose).linearize(pose, &center).ok().filter(is_finite);
+        let blown_up = Quadratic { value: 0.5 * BLOWN_UP, ..Quadratic::zeros() };
+        let Quadratic { value, gradient, hessian } = linearized.unwrap_or(blown_up);
+        let loss = 2.0 * value;
         let slope = self.settings.weight / (1.0 + loss);
-        let (mut gradient, mut hessian) = (gradient * slope, jtj * (2.0 * slope));
+        let (mut gradient, mut hessian) = (gradient * (2.0 * slope), hessian * (2.0 * slope));
         for k in 0..3 {
             gradient[k] += precision * moved[k];
             hessian[(k, k)] += precision;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
-use prehend_autodiff::{Fwd, Scalar};
+use prehend_autodiff::{Fwd, Quadratic, Scalar};
 use prehend_sim::{
     BodyId, RigidBody, SemiImplicitEuler, SimulationError, State, Step, StepError, TimeSteps, World,
 };
@@ -51,33 +51,6 @@ pub(super) struct StabilityLoss {
     pub(super) weights: StabilityWeights,
 }
 
-/// A [`StabilityLoss`] with its derivatives by a left twist (translation \[m\], rotation \[rad\]) of the object's pose.
-///
-/// With the residuals r and their Jacobian J the loss is |r|² and the gradient 2Jᵀr, so the Gauss–Newton step solves
-/// JᵀJ δ = −gradient/2. Under leaky smoothing these are the leaky derivatives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct StabilityJacobian {
-    /// The loss.
-    pub(super) value: f64,
-    /// Its gradient.
-    pub(super) gradient: Vector6<f64>,
-    /// JᵀJ.
-    pub(super) normal: Matrix6<f64>,
-}
-
-impl StabilityJacobian {
-    /// The loss `value` without derivatives.
-    pub(super) fn constant(value: f64) -> Self {
-        Self { value, gradient: Vector6::zeros(), normal: Matrix6::zeros() }
-    }
-
-    /// True if the loss and its derivatives are numbers: residuals may be too large to be squared.
-    pub(super) fn is_finite(&self) -> bool {
-        let derivatives = self.gradient.iter().chain(&self.normal);
-        self.value.is_finite() && { derivatives }.all(|x| x.is_finite())
-    }
-}
-
 /// Fraction of the longest stable step that is used, for semi-implicit Euler 1 of √5 − 1: derivatives of rollouts at the
 /// limit grow.
 const SAFETY: f64 = 1.0 / 1.236;
@@ -97,7 +70,8 @@ impl StabilityLoss {
         Ok(rollouts.iter().sum::<f64>() / STARTS as f64)
     }
 
-    /// The loss and its derivatives by a twist of `pose` about the point `center` (world frame).
+    /// The loss and its derivatives by a left twist (translation \[m\], rotation \[rad\]) of `pose` about the point `center` (world
+    /// frame); the loss is twice the value of the residuals' model. Under leaky smoothing these are the leaky derivatives.
     ///
     /// # Errors
     /// See [`Self::value`].
@@ -105,35 +79,30 @@ impl StabilityLoss {
         &self,
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
-    ) -> Result<StabilityJacobian, SimulationError> {
+    ) -> Result<Quadratic<6>, SimulationError> {
         let world = self.world.cast::<Fwd<6>>();
         let rollouts: Vec<SVector<Fwd<6>, 12>> = self
             .starts(pose)
             .par_iter()
             .map(|start| self.residual(&world, &start.pose_variables()))
             .collect::<Result<_, SimulationError>>()?;
-        let mut sum = StabilityJacobian::constant(0.0);
+        let mut sum = Quadratic::zeros();
         for residual in &rollouts {
-            let mut rollout = StabilityJacobian::constant(0.0);
+            let mut rollout = Quadratic::zeros();
             for r in residual {
-                let slope = Vector6::from(r.derivative);
-                rollout.value += r.value * r.value;
-                rollout.gradient += slope * (2.0 * r.value);
-                rollout.normal += slope * slope.transpose();
+                rollout.add_row(&Vector6::from(r.derivative), r.value, 1.0);
             }
-            sum.value += rollout.value;
-            sum.gradient += rollout.gradient;
-            sum.normal += rollout.normal;
+            sum += &rollout;
         }
         // A left twist about the center moves the center of mass by δt + δθ × (com − center).
         let com = pose * self.rigid.com();
         let mut chain = Matrix6::identity();
         chain.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(com - center)));
         let count = STARTS as f64;
-        Ok(StabilityJacobian {
+        Ok(Quadratic {
             value: sum.value / count,
             gradient: chain.tr_mul(&sum.gradient) / count,
-            normal: chain.transpose() * sum.normal * chain / count,
+            hessian: chain.transpose() * sum.hessian * chain / count,
         })
     }
 
@@ -247,8 +216,9 @@ mod tests {
         for field in fields {
             let loss = loss_on(field, GapSmoothing::Softplus { width: 3e-4 });
             let (pose, center) = (pose(), Point3::new(0.02, -0.01, 0.05));
-            let StabilityJacobian { value, gradient, normal } =
+            let Quadratic { value, gradient, hessian: normal } =
                 loss.linearize(&pose, &center).unwrap();
+            let (value, gradient) = (2.0 * value, 2.0 * gradient);
             assert!((value - loss.value(&pose).unwrap()).abs() <= 1e-9 * value && value > 0.0);
             let differences = finite_difference_gradient(
                 |x| {
@@ -273,10 +243,10 @@ mod tests {
         let mut now = before;
         for _ in 0..30 {
             let center = pose * loss.rigid.com();
-            let StabilityJacobian { gradient, normal, .. } =
+            let Quadratic { gradient, hessian: normal, .. } =
                 loss.linearize(&pose, &center).unwrap();
             let damped = normal + Matrix6::identity() * damping * normal.norm();
-            let step = damped.cholesky().unwrap().solve(&(gradient * -0.5));
+            let step = damped.cholesky().unwrap().solve(&-gradient);
             let candidate = perturb_about(&pose, &center.coords, &step);
             let value = loss.value(&candidate).unwrap();
             if value < now {
@@ -315,11 +285,10 @@ mod tests {
         let mut loss = loss(GapSmoothing::Hard);
         loss.perturbation = 0.0;
         let high = Isometry3::translation(0.0, 0.0, 1.0);
-        let StabilityJacobian { value, gradient, .. } =
-            loss.linearize(&high, &Point3::origin()).unwrap();
+        let Quadratic { value, gradient, .. } = loss.linearize(&high, &Point3::origin()).unwrap();
         // Semi-implicit Euler falls g dt² n(n+1)/2: by (n+1)/n further than ½gt².
         let displacement = 21.0 / 20.0;
-        assert!((value - (1.0 + displacement * displacement)).abs() < 1e-12, "{value}");
+        assert!((2.0 * value - (1.0 + displacement * displacement)).abs() < 1e-12, "{value}");
         assert!(gradient.norm() < 1e-12);
     }
 

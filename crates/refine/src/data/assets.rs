@@ -1,7 +1,7 @@
 //! Objects and hands of a dataset, each loaded once and shared by all frames.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
-use std::ops::Deref;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
@@ -9,12 +9,12 @@ use prehend_geometry::{GridCache, TriMesh};
 
 use crate::baselines::GradientKind;
 use crate::data::bop::{
-    Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, ResultRow, SceneBodies,
+    Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, Origin, ResultRow, SceneBodies,
 };
-use crate::data::frame_input::FrameInput;
 use crate::data::mask_source::{MaskSource, Sought};
-use crate::data::robots::Robots;
+use crate::data::robots::{Robots, kept};
 use crate::error::{Panicked, RefineError};
+use crate::estimator::Estimator;
 use crate::method::Method;
 use crate::rig::Rig;
 use crate::scene::{Frame, Inertial, Object, StatedSize, Target, check_gravity};
@@ -86,27 +86,9 @@ impl Sensor {
     }
 }
 
-/// A dataset of one's own, or somebody else's.
-#[derive(Clone)]
-enum Shared<'a> {
-    Borrowed(&'a Dataset),
-    Owned(Arc<Dataset>),
-}
-
-impl Deref for Shared<'_> {
-    type Target = Dataset;
-
-    fn deref(&self) -> &Dataset {
-        match self {
-            Self::Borrowed(dataset) => dataset,
-            Self::Owned(dataset) => dataset,
-        }
-    }
-}
-
 /// The objects and hands of a dataset.
 pub struct Assets<'a> {
-    dataset: Shared<'a>,
+    dataset: Cow<'a, Dataset>,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
     robots: Robots,
@@ -120,15 +102,15 @@ pub struct Assets<'a> {
 impl<'a> Assets<'a> {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
     pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
-        Self::of(Shared::Borrowed(dataset), seed)
+        Self::of(Cow::Borrowed(dataset), seed)
     }
 
     /// As [`Self::new`] has it, of a dataset that is kept as long as this is.
     pub fn owning(dataset: Arc<Dataset>, seed: u64) -> Assets<'static> {
-        Assets::of(Shared::Owned(dataset), seed)
+        Assets::of(Cow::Owned(Dataset::clone(&dataset)), seed)
     }
 
-    fn of(dataset: Shared<'a>, seed: u64) -> Self {
+    fn of(dataset: Cow<'a, Dataset>, seed: u64) -> Self {
         Self {
             dataset,
             seed,
@@ -161,6 +143,7 @@ impl<'a> Assets<'a> {
                 kind: BodyKind::Object { obj_id: *obj_id },
                 t_cam_base: *t_cam_model,
                 sigmas: NEIGHBOR_SIGMAS.map(Some),
+                origin: Origin::new(self.dataset.models().dir(), format!("object {obj_id}")),
             });
         }
         self
@@ -183,7 +166,7 @@ impl<'a> Assets<'a> {
 
     /// Goes on with the same dataset as it is by now ([`Dataset::reread`]): objects and hands stay what they are.
     pub fn replace_dataset(&mut self, dataset: Arc<Dataset>) {
-        self.dataset = Shared::Owned(dataset);
+        self.dataset = Cow::Owned(Dataset::clone(&dataset));
     }
 
     /// The model of object `id`, in meters.
@@ -191,16 +174,14 @@ impl<'a> Assets<'a> {
     /// # Errors
     /// If the model is missing or broken.
     pub fn object(&mut self, id: u32) -> Result<Arc<Object>, AssetError> {
-        if let Some(object) = self.objects.get(&id) {
-            return Ok(Arc::clone(object));
-        }
-        let mut object = load_object(self.dataset.models(), id, self.seed)?;
-        if let Some(rig) = &self.rig {
-            object = rig.corrected_object(id, &object)?.unwrap_or(object);
-        }
-        let object = Arc::new(object);
-        self.objects.insert(id, Arc::clone(&object));
-        Ok(object)
+        let Self { dataset, seed, rig, objects, .. } = self;
+        kept(objects, id, || {
+            let mut object = load_object(dataset.models(), id, *seed)?;
+            if let Some(rig) = rig {
+                object = rig.corrected_object(id, &object)?.unwrap_or(object);
+            }
+            Ok(Arc::new(object))
+        })
     }
 
     /// The object of `target`, and what its image shows: see [`Assets::observation`].
@@ -234,7 +215,8 @@ impl<'a> Assets<'a> {
         let dataset = self.dataset.clone();
         let frame = dataset.frame(target.scene_id, target.im_id)?;
         let sought = Sought { target, object: &object, t_cam_object };
-        let observation = self.sensed(&frame, MaskOf::Object(&sought), required)?;
+        let observation =
+            self.corrected(&frame, sought.target.instance, Some(&sought), required)?;
         Ok(FrameInput { frame: observation, object, rig: self.rig.clone() })
     }
 
@@ -249,17 +231,18 @@ impl<'a> Assets<'a> {
         instance: usize,
         required: &[Sensor],
     ) -> Result<Frame, AssetError> {
-        self.sensed(frame, MaskOf::Number(instance), required)
+        self.corrected(frame, instance, None, required)
     }
 
-    /// The frame with a mask, corrected by the rig.
-    fn sensed(
+    /// The frame with the mask of the object that is `sought`, or else with mask `number`, corrected by the rig.
+    fn corrected(
         &mut self,
         frame: &DatasetImage<'_>,
-        mask: MaskOf<'_>,
+        number: usize,
+        sought: Option<&Sought<'_>>,
         required: &[Sensor],
     ) -> Result<Frame, AssetError> {
-        let observation = self.stated(frame, mask, required)?;
+        let observation = self.stated(frame, number, sought, required)?;
         let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
         Ok(corrected.unwrap_or(observation))
     }
@@ -268,16 +251,17 @@ impl<'a> Assets<'a> {
     fn stated(
         &mut self,
         frame: &DatasetImage<'_>,
-        mask: MaskOf<'_>,
+        number: usize,
+        sought: Option<&Sought<'_>>,
         required: &[Sensor],
     ) -> Result<Frame, AssetError> {
         let mut observation = frame.unsegmented()?;
-        let (number, segmented) = match mask {
-            MaskOf::Object(sought) => {
+        let (number, segmented) = match sought {
+            Some(sought) => {
                 let number = self.masks.number(frame, sought);
                 (number, self.masks.segment(&mut observation, frame, sought, number))
             }
-            MaskOf::Number(number) => (Some(number), frame.segment(&mut observation, number)),
+            None => (Some(number), frame.segment(&mut observation, number)),
         };
         match segmented {
             Err(
@@ -295,7 +279,7 @@ impl<'a> Assets<'a> {
         }
         let stated = present(frame.bodies(), !required.is_empty())?;
         let SceneBodies { gravity, mut bodies } = stated.unwrap_or_default();
-        if let MaskOf::Object(sought) = mask {
+        if let Some(sought) = sought {
             let image = (sought.target.scene_id, sought.target.im_id);
             bodies.extend(self.neighbors.get(&image).into_iter().flatten().cloned());
             sought.take_from(&mut bodies);
@@ -303,10 +287,11 @@ impl<'a> Assets<'a> {
         if bodies.is_empty() && gravity.is_none() {
             return Ok(observation);
         }
+        let origin = frame.bodies_entry();
         let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
-        gravity.iter().try_for_each(check_gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
+        gravity.iter().try_for_each(check_gravity).map_err(|e| origin.fault("gravity", e))?;
         if gravity.is_none() && required.contains(&Sensor::Hand) {
-            return Err(frame.bodies_fault("gravity", "is missing").into());
+            return Err(origin.fault("gravity", "is missing").into());
         }
         observation.gravity = gravity;
         for body in &bodies {
@@ -315,20 +300,14 @@ impl<'a> Assets<'a> {
             }
         }
         let tactile = tactile.unwrap_or_default();
-        observation.hand = self.robots.of(frame, &bodies, &tactile, &self.objects)?;
+        let (bodies, tactile) = ((&bodies[..], &origin), (&tactile[..], "force"));
+        observation.hand = self.robots.combined(bodies, tactile, &self.objects)?;
         if observation.hand.is_none() && !required.is_empty() {
-            return Err(frame.bodies_fault("bodies", "expected one hand, found 0").into());
+            return Err(origin.fault("bodies", "expected one hand, found 0").into());
         }
         observation.place_views();
         Ok(observation)
     }
-}
-
-/// An object whose mask a frame has, or the mask's number.
-#[derive(Clone, Copy)]
-enum MaskOf<'a> {
-    Object(&'a Sought<'a>),
-    Number(usize),
 }
 
 /// What was read; `None` where the file or its entry is absent and need not be there.
@@ -373,4 +352,22 @@ fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError
 /// If the model is missing or broken.
 pub fn load_mesh(models: &Models, id: u32) -> Result<TriMesh, AssetError> {
     Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETER))
+}
+
+/// A frame and its object, both corrected by the rig, where that is known.
+#[derive(Clone)]
+pub struct FrameInput {
+    /// Frame.
+    pub frame: Frame,
+    /// The object.
+    pub object: Arc<Object>,
+    /// The rig.
+    pub rig: Option<Arc<Rig>>,
+}
+
+impl FrameInput {
+    /// Estimator of the object by `method`.
+    pub fn estimator(&self, method: &Method) -> Estimator {
+        Estimator::new(Arc::clone(&self.object)).method(method.clone()).rig(self.rig.clone())
+    }
 }

@@ -2,29 +2,24 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use nalgebra::{Point3, Translation3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{KinematicTree, RobotError};
 use prehend_geometry::shapes::{RoundedBox, rounded_box};
 
-use crate::data::bop::{Tactile, TactileReading};
+use crate::data::bop::{Body, Tactile, TactileReading};
 use crate::scene::{
     BinaryContact, ContactPatch, Hand, HandMeasurement, ProximityReading, TouchReading,
 };
 
-/// A body of a frame.
-pub(crate) struct PlacedBody {
-    pub(crate) name: String,
+/// A body of a frame, with its shape.
+pub(crate) struct PlacedBody<'b> {
+    pub(crate) body: &'b Body,
     /// A robot's, or of one link.
     pub(crate) tree: Arc<KinematicTree>,
     /// Positions of its own joints \[rad or m\].
     pub(crate) joints: Vec<f64>,
-    pub(crate) is_hand: bool,
-    /// Its coordinates → camera coordinates \[m\].
-    pub(crate) t_cam_body: Isometry3<f64>,
-    /// Standard deviations of that in each direction and about each axis \[m, rad\], where they are said.
-    pub(crate) sigmas: [Option<f64>; 2],
 }
 
 /// Edge, thickness and largest face of the plate that stands for a plane \[m\]: faces that reach behind the camera are not drawn.
@@ -52,17 +47,17 @@ fn plate() -> TriMesh {
 
 /// Bodies of a frame, the one first that the others are placed beside: the first hand, or else the first body. The others are in the order of their
 /// names, so that frames which list them in another one have the same robot.
-pub(crate) struct Bodies(Vec<PlacedBody>);
+pub(crate) struct Bodies<'b>(Vec<PlacedBody<'b>>);
 
-impl Bodies {
+impl<'b> Bodies<'b> {
     /// `None` of none.
-    pub(crate) fn new(mut bodies: Vec<PlacedBody>) -> Option<Self> {
-        let first = bodies.iter().position(|body| body.is_hand).unwrap_or(0);
+    pub(crate) fn new(mut bodies: Vec<PlacedBody<'b>>) -> Option<Self> {
+        let first = bodies.iter().position(|placed| placed.body.as_hand().is_some()).unwrap_or(0);
         if bodies.is_empty() {
             return None;
         }
         bodies[..=first].rotate_right(1);
-        bodies[1..].sort_by(|a, b| a.name.cmp(&b.name));
+        bodies[1..].sort_by(|a, b| a.body.name.cmp(&b.body.name));
         Some(Self(bodies))
     }
 
@@ -72,58 +67,64 @@ impl Bodies {
     /// If their links cannot be told apart.
     pub(crate) fn tree(&self) -> Result<KinematicTree, RobotError> {
         let first = KinematicTree::clone(&self.0[0].tree);
-        self.0[1..].iter().try_fold(first, |all, body| all.with_floating(&body.name, &body.tree))
+        let mut others = self.0[1..].iter();
+        others.try_fold(first, |all, placed| all.with_floating(&placed.body.name, &placed.tree))
     }
 
     /// Where they are; `hand` is all of them.
     pub(crate) fn measured(&self, hand: Arc<Hand>) -> HandMeasurement {
         let first = &self.0[0];
-        let mut measured = HandMeasurement::new(hand, first.t_cam_body, first.joints.clone());
-        measured.pose_sigmas = first.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
+        let mut measured = HandMeasurement::new(hand, first.body.t_cam_base, first.joints.clone());
+        measured.pose_sigmas =
+            first.body.sigmas.map(|sigma| sigma.map(|sigma| sigma.max(EXACT_PLACE)));
         if self.0.len() == 1 {
             return measured;
         }
         measured.joint_sigmas = vec![None; first.joints.len()];
-        for body in &self.0[1..] {
-            let beside = first.t_cam_body.inverse() * body.t_cam_body;
+        for PlacedBody { body, joints, .. } in &self.0[1..] {
+            let beside = first.body.t_cam_base.inverse() * body.t_cam_base;
             measured.joints.extend(KinematicTree::floating_joints(&beside));
-            measured.joints.extend(&body.joints);
+            measured.joints.extend(joints);
             let exact = EXACT_PLACE;
             let [place, turn] = body.sigmas.map(|sigma| sigma.unwrap_or_default().max(exact));
             let said = [[place; 3], [exact; 3], [turn; 3]].concat();
             measured.joint_sigmas.extend(said.into_iter().map(Some));
-            measured.joint_sigmas.extend(body.joints.iter().map(|_| None));
+            measured.joint_sigmas.extend(joints.iter().map(|_| None));
         }
         measured
     }
 
-    /// What `link` of the body called `name` is called in [`tree`](Self::tree); `None` if there is none.
-    fn link_name(&self, name: &str, link: &str) -> Option<String> {
-        let at = self.0.iter().position(|body| body.name == name)?;
-        self.0[at].tree.link_index(link)?;
-        Some(if at == 0 { link.to_owned() } else { format!("{name}/{link}") })
+    /// What `link` of the body called `name` is called in [`tree`](Self::tree).
+    ///
+    /// # Errors
+    /// If there is none.
+    fn link_name(&self, name: &str, link: &str) -> Result<String, String> {
+        let mut named = self.0.iter().enumerate().filter(|(_, placed)| placed.body.name == name);
+        let found = named.next().filter(|(_, placed)| placed.tree.link_index(link).is_some());
+        match found.ok_or_else(|| format!("{name:?} has no link {link:?}"))? {
+            (0, _) => Ok(link.to_owned()),
+            _ => Ok(format!("{name}/{link}")),
+        }
     }
 
     /// Whether there is a body of that name.
     pub(crate) fn has(&self, name: &str) -> bool {
-        self.0.iter().any(|body| body.name == name)
+        self.0.iter().any(|placed| placed.body.name == name)
     }
 
     /// Their names, for messages.
     pub(crate) fn names(&self) -> String {
-        let quoted: Vec<String> = self.0.iter().map(|body| format!("{:?}", body.name)).collect();
-        quoted.join(", ")
+        let quoted = self.0.iter().map(|placed| format!("{:?}", placed.body.name));
+        quoted.collect::<Vec<_>>().join(", ")
     }
 
     /// `taxels` of the body called `name` as those of the whole robot.
     ///
     /// # Errors
-    /// The name of a link that does not exist.
+    /// If one is on a link that does not exist.
     pub(crate) fn skin(&self, name: &str, taxels: &[Taxel]) -> Result<Vec<Taxel>, String> {
-        let named = |taxel: &Taxel| match self.link_name(name, &taxel.link) {
-            Some(link) => Ok(Taxel { link, ..taxel.clone() }),
-            None => Err(taxel.link.clone()),
-        };
+        let named =
+            |taxel: &Taxel| Ok(Taxel { link: self.link_name(name, &taxel.link)?, ..taxel.clone() });
         taxels.iter().map(named).collect()
     }
 
@@ -138,38 +139,19 @@ impl Bodies {
         layout: &[Taxel],
     ) -> Result<Option<TouchReading>, String> {
         let link = |name: &str| {
-            let all = self.link_name(&tactile.body, name);
-            let found = all.and_then(|all| tree.link_index(&all));
-            found.ok_or_else(|| format!("{:?} has no link {name:?}", tactile.body))
-        };
-        let counted = |readings: usize| match layout.len() == readings {
-            true => Ok(()),
-            false => {
-                let taxels = layout.len();
-                Err(format!("expected {taxels} readings, one a taxel, found {readings}"))
-            }
-        };
-        let places = || {
-            let place = |taxel: &Taxel| Ok((link(&taxel.link)?, taxel.position));
-            layout.iter().map(place).collect::<Result<Vec<(usize, Point3<f64>)>, String>>()
+            let found = tree.link_index(&self.link_name(&tactile.body, name)?);
+            found.ok_or_else(|| format!("the robot has no link {name:?}"))
         };
         Ok(Some(match &tactile.reading {
             TactileReading::Force { .. } => return Ok(None),
             TactileReading::Binary { contact, .. } => {
-                counted(contact.len())?;
-                let places = places()?.into_iter().zip(contact);
-                let known = places.filter_map(|((link, position), touched)| {
-                    Some(BinaryContact { link, position, touched: (*touched)? })
-                });
-                TouchReading::Binary(known.collect())
+                let probe = |link, position, touched| BinaryContact { link, position, touched };
+                TouchReading::Binary(probes(layout, contact, link, probe)?)
             }
             TactileReading::Proximity { distance, .. } => {
-                counted(distance.len())?;
-                let places = places()?.into_iter().zip(distance);
-                let known = places.filter_map(|((link, position), distance)| {
-                    Some(ProximityReading { link, position, distance: (*distance)? })
-                });
-                TouchReading::Proximity(known.collect())
+                let probe =
+                    |link, position, distance| ProximityReading { link, position, distance };
+                TouchReading::Proximity(probes(layout, distance, link, probe)?)
             }
             TactileReading::Patch { link: name, points, normals } => {
                 let (points, normals) = (points.clone(), normals.clone());
@@ -179,18 +161,49 @@ impl Bodies {
     }
 }
 
+/// Readings of the taxels of `layout` whose `values` are known.
+///
+/// # Errors
+/// If there is not one value a taxel, or a link does not exist.
+fn probes<T: Copy, R>(
+    layout: &[Taxel],
+    values: &[Option<T>],
+    link: impl Fn(&str) -> Result<usize, String>,
+    probe: impl Fn(usize, Point3<f64>, T) -> R,
+) -> Result<Vec<R>, String> {
+    let (taxels, readings) = (layout.len(), values.len());
+    if taxels != readings {
+        return Err(format!("expected {taxels} readings, one a taxel, found {readings}"));
+    }
+    let read = layout.iter().zip(values).map(|(taxel, value)| {
+        let link = link(&taxel.link)?;
+        Ok(value.map(|value| probe(link, taxel.position, value)))
+    });
+    read.filter_map(Result::transpose).collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+
+    use nalgebra::{Isometry3, UnitQuaternion};
     use prehend_geometry::DistanceField;
     use prehend_geometry::robot::RobotShape;
 
     use super::*;
+    use crate::data::bop::{BodyKind, Origin};
 
-    fn body(name: &str, is_hand: bool, t_cam_body: Isometry3<f64>) -> PlacedBody {
-        let tree = Arc::new(KinematicTree::rigid("base", vec![plate()]));
+    fn body(name: &str, is_hand: bool, t_cam_base: Isometry3<f64>) -> Body {
+        let hand = BodyKind::Hand { urdf: PathBuf::new(), joints: BTreeMap::new() };
+        let kind = if is_hand { hand } else { BodyKind::Plane };
         let sigmas = [Some(1e-3), None];
-        PlacedBody { name: name.into(), tree, joints: Vec::new(), is_hand, t_cam_body, sigmas }
+        Body { name: name.into(), kind, t_cam_base, sigmas, origin: Origin::default() }
+    }
+
+    fn placed(body: &Body) -> PlacedBody<'_> {
+        let tree = Arc::new(KinematicTree::rigid("base", vec![plate()]));
+        PlacedBody { body, tree, joints: Vec::new() }
     }
 
     #[test]
@@ -202,7 +215,7 @@ mod tests {
             body("left", true, place(0.2)),
             body("right", true, Isometry3::translation(0.0, 0.0, 0.7)),
         ];
-        let bodies = Bodies::new(bodies).unwrap();
+        let bodies = Bodies::new(bodies.iter().map(placed).collect()).unwrap();
         assert_eq!(bodies.names(), "\"left\", \"right\", \"table\"");
         let tree = bodies.tree().unwrap();
         let hand = Arc::new(Hand::new(tree.clone(), Vec::new()).unwrap());

@@ -12,13 +12,12 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::{GridCache, TriMesh};
 use serde::Deserialize;
 
-use crate::data::assets::AssetError;
+use crate::data::assets::{AssetError, FrameInput};
 use crate::data::bop::{
-    Body, BodyEntry, BodyKind, DatasetError, DepthCamera, DepthWarning, FramePose, Intrinsics,
-    LengthUnit, Lens, NonNegative, Numbers, Optics, Positive, Real, Rotation, Stated, Tactile,
-    TactileEntry, TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
+    Body, BodyEntry, BodyKind, DatasetError, DepthCamera, FramePose, Intrinsics, LengthUnit, Lens,
+    NonNegative, Numbers, Optics, Origin, Positive, Real, Rotation, Tactile, TactileEntry,
+    TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
 };
-use crate::data::frame_input::FrameInput;
 use crate::data::robots::Robots;
 use crate::rig::Rig;
 use crate::scene::{Frame, HandMeasurement, Object, RemapCache, check_gravity};
@@ -159,11 +158,10 @@ impl CameraImages<'_> {
         if let (Some(mask), Some(other)) = (&mask, color.as_ref().or(depth.as_ref())) {
             check_size(mask, other).map_err(named)?;
         }
-        let warn = |file: &Path, warning| match warning {
-            DepthWarning::Saturated(text) => log::warn!("{}: {text}", file.display()),
-            DepthWarning::Empty => log::warn!("{}: every depth is zero", file.display()),
-        };
-        let observation = optics.observation(color.as_deref(), depth.as_deref(), &warn);
+        let observation =
+            optics.observation(color.as_deref(), depth.as_deref(), &|file, _, text| {
+                log::warn!("{}: {text}", file.display());
+            });
         let mut observation = observation.map_err(named)?;
         if depth_camera.is_some() && !observation.has_depth() {
             let problem = "nothing that depth measured is in the color image";
@@ -198,11 +196,10 @@ pub fn load_frame_file(
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
     let parts = FrameParts::read(file)?;
     let robot = parts.robot(file, cache)?;
-    let FrameParts { frame: mut observation, mesh, mesh_file, layout, .. } = parts;
+    let FrameParts { frame: mut observation, mesh, mesh_file, mass, obj_id, .. } = parts;
     let name = mesh_file.display().to_string();
-    let mass = layout.mass_kg.map(|mass| mass.0);
     let mut object = Object::with_mass(&name, mesh, mass, seed).map_err(|e| fault(&e))?;
-    if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
+    if let (Some(rig), Some(id)) = (&rig, obj_id) {
         match rig.corrected_object(id, &object).map_err(|e| fault(&e))? {
             Some(corrected) => object = corrected,
             // As of a dataset: other objects are seen by the same rig.
@@ -214,7 +211,7 @@ pub fn load_frame_file(
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
-    Ok((FrameInput { frame: observation, object: Arc::new(object), rig }, layout.pose.0))
+    Ok((FrameInput { frame: observation, object: Arc::new(object), rig }, parts.t_cam_object))
 }
 
 /// Content of a frame file as it is there: nothing is derived from it yet.
@@ -228,7 +225,14 @@ pub(crate) struct FrameParts {
     pub(crate) bodies: Vec<Body>,
     /// The robot's forces first, empty where they are not said.
     pub(crate) tactile: Vec<Tactile>,
-    layout: FrameLayout,
+    /// The initial pose, object → camera \[m\].
+    pub(crate) t_cam_object: Isometry3<f64>,
+    /// Mass of the object \[kg\], where the file says it.
+    pub(crate) mass: Option<f64>,
+    /// True if the images were taken through a lens.
+    pub(crate) has_lens: bool,
+    /// The object's number in a rig.
+    obj_id: Option<u32>,
 }
 
 impl FrameParts {
@@ -252,14 +256,22 @@ impl FrameParts {
             robot.read(file, &mut bodies, &mut tactile)?;
         }
         let entries = std::mem::take(&mut layout.bodies);
-        read_bodies(&mut bodies, entries, folder, |k, field, problem| {
-            DatasetError::field(file, &format!("bodies[{k}]{field}"), problem)
-        })?;
+        read_bodies(&mut bodies, entries, folder, |k| Origin::new(file, format!("bodies[{k}]")))?;
         for (k, camera) in layout.cameras.iter().enumerate() {
             let view = camera.images().read(file, &format!("cameras[{k}]."), false)?;
             observation = observation.with_view(view, camera.pose.0);
         }
-        Ok(Self { frame: observation, mesh, mesh_file, bodies, tactile, layout })
+        Ok(Self {
+            frame: observation,
+            mesh,
+            mesh_file,
+            bodies,
+            tactile,
+            t_cam_object: layout.pose.0,
+            mass: layout.mass_kg.map(|mass| mass.0),
+            has_lens: layout.lens.is_some(),
+            obj_id: layout.obj_id,
+        })
     }
 
     /// All bodies as one robot, and what that measures; `None` of none.
@@ -268,45 +280,13 @@ impl FrameParts {
         file: &Path,
         cache: Option<&GridCache>,
     ) -> Result<Option<HandMeasurement>, DatasetError> {
-        let Self { bodies, tactile, .. } = self;
-        let has_robot = usize::from(bodies.first().is_some_and(|body| body.name == ROBOT));
-        let is_force = |sensor: &Tactile| matches!(sensor.reading, TactileReading::Force { .. });
-        let has_force = usize::from(tactile.first().is_some_and(is_force));
-        let body = |k: usize| match k.checked_sub(has_robot) {
-            Some(k) => format!("bodies[{k}]"),
-            None => ROBOT.to_owned(),
-        };
-        let sensor = |k: usize| match k.checked_sub(has_force) {
-            Some(k) => format!("{ROBOT}.touch[{k}]"),
-            None => ROBOT.to_owned(),
-        };
-        let stated = Stated {
-            files: [file; 2],
-            all: "bodies".to_owned(),
-            bodies: (0..bodies.len()).map(body).collect(),
-            sensors: (0..tactile.len()).map(sensor).collect(),
-            force: "forces",
-        };
+        let (bodies, tactile) =
+            ((&self.bodies[..], &Origin::new(file, "")), (&self.tactile[..], "forces"));
         let mut robots = Robots::cached(cache.cloned());
-        robots.combined(&stated, bodies, tactile, &HashMap::new()).map_err(|error| match error {
+        robots.combined(bodies, tactile, &HashMap::new()).map_err(|error| match error {
             AssetError::Dataset(error) => error,
             other => DatasetError::unusable(file, other),
         })
-    }
-
-    /// The initial pose, object → camera \[m\].
-    pub(crate) fn t_cam_object(&self) -> &Isometry3<f64> {
-        &self.layout.pose.0
-    }
-
-    /// Mass of the object \[kg\], where the file says it.
-    pub(crate) fn mass(&self) -> Option<f64> {
-        self.layout.mass_kg.map(|mass| mass.0)
-    }
-
-    /// True if the images were taken through a lens.
-    pub(crate) fn has_lens(&self) -> bool {
-        self.layout.lens.is_some()
     }
 }
 
@@ -319,30 +299,30 @@ impl RobotLayout {
         tactile: &mut Vec<Tactile>,
     ) -> Result<(), DatasetError> {
         let folder = file.parent().unwrap_or(Path::new("."));
+        let origin = Origin::new(file, ROBOT);
         let urdf = folder.join(self.urdf);
         bodies.push(Body {
             name: ROBOT.to_owned(),
             kind: BodyKind::Hand { urdf, joints: self.joints.positions() },
             t_cam_base: self.base_pose.0,
             sigmas: sigmas(self.sigma_mm, self.sigma_deg),
+            origin: origin.clone(),
         });
         let force: Vec<_> = self.forces.into_iter().flatten().map(|f| Vector3::from(f.0)).collect();
         match self.taxels {
             Some(taxels) => {
                 let reading = TactileReading::Force { taxels: folder.join(taxels), force };
-                tactile.push(Tactile { body: ROBOT.to_owned(), reading });
+                tactile.push(Tactile { body: ROBOT.to_owned(), reading, origin });
             }
             None if force.is_empty() => {}
-            None => return Err(DatasetError::field(file, "robot.taxels", "is missing")),
+            None => return Err(origin.fault("taxels", "is missing")),
         }
         for (k, entry) in self.touch.into_iter().enumerate() {
-            let fault = |(field, problem): (&str, String)| {
-                DatasetError::field(file, &format!("{ROBOT}.touch[{k}].{field}"), problem)
-            };
-            let sensor = entry.read(folder, Some(ROBOT)).map_err(fault)?;
+            let origin = Origin::new(file, format!("{ROBOT}.touch[{k}]"));
+            let sensor = entry.read(folder, Some(ROBOT), origin)?;
             if let TactileReading::Force { .. } = &sensor.reading {
                 let problem = "is missing or force, which is what robot.forces are";
-                return Err(fault(("kind", problem.to_owned())));
+                return Err(sensor.origin.fault("kind", problem));
             }
             tactile.push(sensor);
         }

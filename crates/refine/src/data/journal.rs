@@ -4,11 +4,11 @@
 //! is whole: what a killed process left of its last line is cut off when the journal is opened again.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use prehend_geometry::open_plain;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -40,43 +40,41 @@ impl Journal {
         identity: &Identity,
         restart: bool,
     ) -> Result<(Self, BTreeMap<usize, E>), DatasetError> {
-        let fault = |error: io::Error| DatasetError::unusable(path, error);
+        let fault = |problem: &dyn Display| DatasetError::unusable(path, problem);
+        let foreign = || fault(&"is no journal of this program");
         let (mut file, bytes) = open_locked(path, restart)?;
-        let own = header(path, identity)?;
-        let advice = " (--restart discards the whole journal)";
-        let Parsed { header, entries, length } = parse(path, &bytes, &own, advice)?;
-        let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity));
-        if !differences.is_empty() {
-            let problem = format!(
-                "is of another run, which is not finished (there | here):\n  {}\n(--restart discards it)",
-                differences.join("\n  ")
-            );
-            return Err(DatasetError::unusable(path, problem));
+        let own = serde_json::to_string(identity).map_err(|e| unrecorded(path, 0, e))?;
+        let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
+        let first = lines.next();
+        if let Some(first) = first {
+            let header: Identity = serde_json::from_slice(first).map_err(|_| foreign())?;
+            let differences = header.differences(identity);
+            if !differences.is_empty() {
+                let problem = format!(
+                    "is of another run, which is not finished (there | here):\n  {}\n(--restart discards it)",
+                    differences.join("\n  ")
+                );
+                return Err(fault(&problem));
+            }
+        } else if !own.as_bytes().starts_with(&bytes) {
+            // What may be overwritten without a whole line is a part of the first one.
+            return Err(foreign());
         }
-        file.set_len(length as u64).map_err(fault)?;
-        file.seek(SeekFrom::End(0)).map_err(fault)?;
+        let (mut entries, mut length) = (BTreeMap::new(), first.map_or(0, <[u8]>::len));
+        for (number, line) in (2..).zip(lines) {
+            let JournalLine { index, entry } = serde_json::from_slice(line).map_err(|_| {
+                fault(&format!("line {number} is damaged (--restart discards the whole journal)"))
+            })?;
+            entries.insert(index, entry);
+            length += line.len();
+        }
+        file.set_len(length as u64).map_err(|e| fault(&e))?;
+        file.seek(SeekFrom::End(0)).map_err(|e| fault(&e))?;
         let mut journal = Self { path: path.into(), file };
-        if header.is_none() {
+        if first.is_none() {
             journal.write_line(&own)?;
         }
         Ok((journal, entries))
-    }
-
-    /// What a journal says of its run, and its entries; for reading alone.
-    ///
-    /// # Errors
-    /// If it cannot be read, is no journal, or is damaged.
-    pub fn read<E: DeserializeOwned>(
-        path: &Path,
-    ) -> Result<(Identity, BTreeMap<usize, E>), DatasetError> {
-        let bytes = open_plain(path).and_then(|mut file| {
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map(|_| bytes)
-        });
-        let bytes = bytes.map_err(|e| DatasetError::unusable(path, e))?;
-        let advice = ": the run that wrote it must be repeated";
-        let Parsed { header, entries, .. } = parse(path, &bytes, "", advice)?;
-        Ok((header.ok_or_else(|| foreign(path))?, entries))
     }
 
     /// Records a finished frame on disk and returns it as a resumed run would read it.
@@ -88,9 +86,9 @@ impl Journal {
         index: usize,
         entry: &E,
     ) -> Result<E, DatasetError> {
-        let text = line(&self.path, index, entry)?;
-        let back: JournalLine<E> =
-            serde_json::from_str(&text).map_err(|e| unrecorded(&self.path, index, e))?;
+        let fault = |error| unrecorded(&self.path, index, error);
+        let text = serde_json::to_string(&JournalLine { index, entry }).map_err(fault)?;
+        let back: JournalLine<E> = serde_json::from_str(&text).map_err(fault)?;
         self.write_line(&text)?;
         Ok(back.entry)
     }
@@ -113,58 +111,6 @@ impl Journal {
     }
 }
 
-/// The first line of a run's journal.
-fn header(path: &Path, identity: &Identity) -> Result<String, DatasetError> {
-    serde_json::to_string(identity).map_err(|e| unrecorded(path, 0, e))
-}
-
-/// The line of a frame.
-fn line<E: Serialize>(path: &Path, index: usize, entry: &E) -> Result<String, DatasetError> {
-    serde_json::to_string(&JournalLine { index, entry }).map_err(|e| unrecorded(path, index, e))
-}
-
 fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetError {
     DatasetError::unusable(path, format!("frame {index} cannot be recorded: {error}"))
-}
-
-fn foreign(path: &Path) -> DatasetError {
-    DatasetError::unusable(path, "is no journal of this program")
-}
-
-/// What is whole in a journal.
-struct Parsed<E> {
-    /// `None` if not even the first line is whole.
-    header: Option<Identity>,
-    entries: BTreeMap<usize, E>,
-    /// How many bytes are whole lines.
-    length: usize,
-}
-
-/// `own` is the first line that this run would write: of a file without a whole line, what may be overwritten is a part of it.
-/// `advice` is what to do about damage.
-fn parse<E: DeserializeOwned>(
-    path: &Path,
-    bytes: &[u8],
-    own: &str,
-    advice: &str,
-) -> Result<Parsed<E>, DatasetError> {
-    let mut entries = BTreeMap::new();
-    let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
-    let Some(first) = lines.next() else {
-        return if own.as_bytes().starts_with(bytes) {
-            Ok(Parsed { header: None, entries, length: 0 })
-        } else {
-            Err(foreign(path))
-        };
-    };
-    let header = serde_json::from_slice(first).map_err(|_| foreign(path))?;
-    let mut length = first.len();
-    for (number, line) in (2..).zip(lines) {
-        let JournalLine { index, entry } = serde_json::from_slice(line).map_err(|_| {
-            DatasetError::unusable(path, format!("line {number} is damaged{advice}"))
-        })?;
-        entries.insert(index, entry);
-        length += line.len();
-    }
-    Ok(Parsed { header: Some(header), entries, length })
 }

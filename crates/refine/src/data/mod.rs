@@ -10,7 +10,6 @@ mod calibration;
 mod contact;
 pub mod details;
 mod frame_file;
-mod frame_input;
 pub mod identity;
 mod journal;
 mod mask_source;
@@ -22,7 +21,7 @@ mod robots;
 mod targets;
 mod times;
 
-pub use assets::{AssetError, Assets, Sensor, load_mesh};
+pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
 pub use bop::pose_from_matrix;
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
@@ -30,7 +29,6 @@ pub use calibration::{Calibrated, CalibrationFrames};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
-pub use frame_input::FrameInput;
 pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;

@@ -1,6 +1,8 @@
 //! Hands and other bodies of a dataset, and what is felt, each prepared once.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::hash::Hash;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,7 +12,7 @@ use prehend_geometry::{GridCache, TriMesh};
 
 use crate::data::assets::AssetError;
 use crate::data::bodies::{Bodies, PlacedBody, plane, solid};
-use crate::data::bop::{Body, BodyKind, DatasetImage, Stated, Tactile, TactileReading};
+use crate::data::bop::{Body, BodyKind, Origin, Tactile, TactileReading};
 use crate::scene::{Hand, HandMeasurement, Object};
 
 /// Of what shape a body is.
@@ -44,151 +46,123 @@ impl Robots {
         Self { cache, ..Self::default() }
     }
 
-    /// All `bodies` of `frame` as one robot, and what that measures; `None` of none. Objects among them are some of `objects`.
+    /// All `bodies` of a frame as one robot, and what that and its sensors measure; `None` of none. Objects among them are some of `objects`, their list is at
+    /// `origin`, and a sensor's forces are called `forces` in its file.
     ///
     /// # Errors
-    /// Those of [`combined`](Self::combined).
-    pub(super) fn of(
-        &mut self,
-        frame: &DatasetImage<'_>,
-        bodies: &[Body],
-        tactile: &[Tactile],
-        objects: &HashMap<u32, Arc<Object>>,
-    ) -> Result<Option<HandMeasurement>, AssetError> {
-        let stated = frame.stated(bodies.len(), tactile.len());
-        self.combined(&stated, bodies, tactile, objects)
-    }
-
-    /// All `bodies` as one robot, and what that and its sensors measure; `None` of none.
-    ///
-    /// # Errors
-    /// If a file that is named is missing or broken, or what is `stated` does not fit it.
+    /// If a file that is named is missing or broken, or what the frame has does not fit it.
     pub(super) fn combined(
         &mut self,
-        stated: &Stated<'_>,
-        bodies: &[Body],
-        tactile: &[Tactile],
+        (bodies, origin): (&[Body], &Origin),
+        (tactile, forces): (&[Tactile], &str),
         objects: &HashMap<u32, Arc<Object>>,
     ) -> Result<Option<HandMeasurement>, AssetError> {
         let mut placed = Vec::with_capacity(bodies.len());
-        for (k, body) in bodies.iter().enumerate() {
-            placed.push(self.placed(stated, k, body, objects)?);
+        for body in bodies {
+            placed.push(self.placed(body, objects)?);
         }
         let Some(all) = Bodies::new(placed) else { return Ok(None) };
         let shapes = bodies.iter().map(|body| (body.name.clone(), BodyShape::of(body))).collect();
-        self.felt(stated, &all, shapes, tactile).map(Some)
+        self.felt(&all, origin, shapes, (tactile, forces)).map(Some)
     }
 
-    /// Body `k` with its shape.
-    fn placed(
+    /// A body with its shape.
+    fn placed<'b>(
         &mut self,
-        stated: &Stated<'_>,
-        k: usize,
-        body: &Body,
+        body: &'b Body,
         objects: &HashMap<u32, Arc<Object>>,
-    ) -> Result<PlacedBody, AssetError> {
-        let shape = BodyShape::of(body);
-        let tree = match self.trees.get(&shape) {
-            Some(tree) => Arc::clone(tree),
-            None => {
-                let tree = Arc::new(match &body.kind {
-                    BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
-                    BodyKind::Plane => plane(),
-                    BodyKind::Object { obj_id } => match objects.get(obj_id) {
-                        Some(object) => solid(&object.mesh),
-                        None => return Err(stated.body(k, "obj_id", "has no model here").into()),
-                    },
-                    BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
-                });
-                self.trees.insert(shape, Arc::clone(&tree));
-                tree
-            }
-        };
+    ) -> Result<PlacedBody<'b>, AssetError> {
+        let tree = kept(&mut self.trees, BodyShape::of(body), || -> Result<_, AssetError> {
+            Ok(Arc::new(match &body.kind {
+                BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
+                BodyKind::Plane => plane(),
+                BodyKind::Object { obj_id } => match objects.get(obj_id) {
+                    Some(object) => solid(&object.mesh),
+                    None => return Err(body.origin.fault("obj_id", "has no model here").into()),
+                },
+                BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
+            }))
+        })?;
         let joints = match body.as_hand() {
             None => Vec::new(),
             Some((_, joints)) => {
-                tree.joint_vector(joints).map_err(|e| stated.body(k, "joints", e))?
+                tree.joint_vector(joints).map_err(|e| body.origin.fault("joints", e))?
             }
         };
-        Ok(PlacedBody {
-            name: body.name.clone(),
-            joints,
-            is_hand: body.as_hand().is_some(),
-            t_cam_body: body.t_cam_base,
-            sigmas: body.sigmas,
-            tree,
-        })
+        Ok(PlacedBody { body, joints, tree })
     }
 
     /// All bodies as one robot with its skin, and what that measures.
     fn felt(
         &mut self,
-        stated: &Stated<'_>,
-        all: &Bodies,
+        all: &Bodies<'_>,
+        origin: &Origin,
         shapes: Vec<(String, BodyShape)>,
-        tactile: &[Tactile],
+        (tactile, forces): (&[Tactile], &str),
     ) -> Result<HandMeasurement, AssetError> {
-        for (k, Tactile { body, .. }) in tactile.iter().enumerate() {
+        for Tactile { body, origin, .. } in tactile {
             if !all.has(body) {
                 let problem = format!("names {body:?}, the bodies are {}", all.names());
-                return Err(stated.sensor(k, "body", problem).into());
+                return Err(origin.fault("body", problem).into());
             }
         }
-        let force = tactile.iter().enumerate().find_map(|(k, sensor)| match &sensor.reading {
-            TactileReading::Force { taxels, force } => Some((k, &sensor.body, taxels, force)),
+        let force = tactile.iter().find_map(|sensor| match &sensor.reading {
+            TactileReading::Force { taxels, force } => Some((sensor, taxels, force)),
             _ => None,
         });
-        let key = (shapes, force.map(|(_, body, taxels, _)| (body.clone(), taxels.clone())));
-        let known = self.hands.get(&key).cloned();
-        let mut skin = Vec::new();
-        if let Some((k, body, taxels, force)) = force {
-            let (layout, file) = (self.layout(taxels)?, taxels.display());
-            if known.is_none() {
-                skin = all.skin(body, &layout).map_err(|link| {
-                    let problem = format!("{file}: {body:?} has no link {link:?}");
-                    stated.sensor(k, "taxels", problem)
-                })?;
+        let key = (shapes, force.map(|(sensor, taxels, _)| (sensor.body.clone(), taxels.clone())));
+        let layout = force.map(|(_, taxels, _)| self.layout(taxels)).transpose()?;
+        let hand = kept(&mut self.hands, key, || -> Result<_, AssetError> {
+            let mut skin = Vec::new();
+            if let (Some((sensor, taxels, _)), Some(layout)) = (force, &layout) {
+                let named = |e| format!("{}: {e}", taxels.display());
+                let made = all.skin(&sensor.body, layout).map_err(named);
+                skin = made.map_err(|problem| sensor.origin.fault("taxels", problem))?;
             }
-            if !force.is_empty() && force.len() != layout.len() {
-                let (expected, found) = (layout.len(), force.len());
+            let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
+            Ok(Arc::new(made.map_err(|e| origin.fault("bodies", e))?))
+        })?;
+        let mut measured = all.measured(Arc::clone(&hand));
+        if let (Some((sensor, taxels, force)), Some(layout)) = (force, layout) {
+            let (expected, found) = (layout.len(), force.len());
+            if found != 0 && found != expected {
+                let file = taxels.display();
                 let problem =
                     format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                return Err(stated.sensor(k, stated.force, problem).into());
+                return Err(sensor.origin.fault(forces, problem).into());
             }
-        }
-        let hand = match known {
-            Some(hand) => hand,
-            None => {
-                let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
-                let hand = Arc::new(made.map_err(|e| stated.all(e))?);
-                self.hands.insert(key, Arc::clone(&hand));
-                hand
-            }
-        };
-        let mut measured = all.measured(Arc::clone(&hand));
-        if let Some((.., force)) = force {
             measured.forces.clone_from(force);
         }
-        for (k, sensor) in tactile.iter().enumerate() {
+        for sensor in tactile {
             if let TactileReading::Force { .. } = sensor.reading {
                 continue;
             }
             let layout = sensor.reading.taxels().map(|taxels| self.layout(taxels)).transpose()?;
             let reading = all.reading(&hand.tree, sensor, layout.as_deref().unwrap_or_default());
-            measured.touch.extend(reading.map_err(|e| stated.sensor(k, "", e))?);
+            measured.touch.extend(reading.map_err(|e| sensor.origin.fault("", e))?);
         }
         Ok(measured)
     }
 
     /// A layout of taxels.
     fn layout(&mut self, file: &Path) -> Result<Arc<[Taxel]>, AssetError> {
-        if let Some(known) = self.layouts.get(file) {
-            return Ok(Arc::clone(known));
-        }
-        let layout: Arc<[Taxel]> = load_taxels(file)?.into();
-        self.layouts.insert(file.to_owned(), Arc::clone(&layout));
-        Ok(layout)
+        kept(&mut self.layouts, file.to_owned(), || Ok(load_taxels(file)?.into()))
     }
+}
+
+/// Value of `key`, made and kept if it is not there yet.
+///
+/// # Errors
+/// Those of `make`.
+pub(super) fn kept<K: Hash + Eq, V: ?Sized, E>(
+    values: &mut HashMap<K, Arc<V>>,
+    key: K,
+    make: impl FnOnce() -> Result<Arc<V>, E>,
+) -> Result<Arc<V>, E> {
+    Ok(Arc::clone(match values.entry(key) {
+        Entry::Occupied(known) => known.into_mut(),
+        Entry::Vacant(unknown) => unknown.insert(make()?),
+    }))
 }
 
 impl BodyShape {

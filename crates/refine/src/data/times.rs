@@ -29,7 +29,9 @@ impl Times {
     pub fn open(path: &Path, keep: bool) -> Result<Self, DatasetError> {
         let rows = if keep { rows(path)? } else { Vec::new() };
         if !rows.is_empty() {
-            write(path, &rows)?;
+            let lines =
+                rows.iter().map(|(index, frame, name, time)| line(*index, frame, name, *time));
+            write_atomically(path, (HEADER.to_owned() + &lines.collect::<String>()).as_bytes())?;
         } else if path.exists() {
             fs::remove_file(path).map_err(|e| DatasetError::writing(path, e))?;
         }
@@ -55,7 +57,7 @@ impl Times {
     ) -> Result<(), DatasetError> {
         self.seconds.insert((index, method.into()), seconds);
         let header = if self.path.exists() { "" } else { HEADER };
-        let text = format!("{header}{index},{frame},{method},{seconds:.4}\n");
+        let text = format!("{header}{}", line(index, frame, method, seconds));
         let file = OpenOptions::new().append(true).create(true).open(&self.path);
         file.and_then(|mut file| file.write_all(text.as_bytes()))
             .map_err(|e| DatasetError::writing(&self.path, e))
@@ -91,12 +93,8 @@ fn rows(path: &Path) -> Result<Vec<TimeRow>, DatasetError> {
     Ok(rows.filter(|(.., seconds): &TimeRow| (0.0..=MAX_NUMBER).contains(seconds)).collect())
 }
 
-fn write(path: &Path, rows: &[TimeRow]) -> Result<(), DatasetError> {
-    let line = |(index, frame, method, seconds): &TimeRow| {
-        format!("{index},{frame},{method},{seconds:.4}\n")
-    };
-    let body: String = rows.iter().map(line).collect();
-    write_atomically(path, format!("{HEADER}{body}").as_bytes())
+fn line(index: usize, frame: &str, method: &str, seconds: f64) -> String {
+    format!("{index},{frame},{method},{seconds:.4}\n")
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ const TOUCH: f64 = 0.1;
 /// frame \[m\]. Gravity there \[m/s²\]. The hand: name, joints, taxels, and how many of those feel more than 0.1 N, null without forces.
 pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, AssetError> {
     let parts = FrameParts::read(path)?;
-    let mass_kg = parts.mass();
+    let mass_kg = parts.mass;
     if mass_kg.is_none() {
         warnings.push("no mass_kg: 500 kg/m³ are assumed".to_owned());
     }
@@ -42,13 +42,13 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Ass
     Ok(json!({
         "image_size": [camera.width, camera.height],
         "focal_px": [camera.fx, camera.fy],
-        "lens": parts.has_lens(),
+        "lens": parts.has_lens,
         "depth_share": depth.iter().filter(|z| **z > 0.0).count() as f64 / depth.len() as f64,
         "mask_pixels": observation.mask.count(),
         "mesh_file": mesh_file,
         "mesh": mesh::of(mesh, warnings),
         "mass_kg": mass_kg,
-        "translation_m": parts.t_cam_object().translation.vector.as_slice(),
+        "translation_m": parts.t_cam_object.translation.vector.as_slice(),
         "gravity": observation.gravity.map(<[f64; 3]>::from),
         "hand": hand,
     }))

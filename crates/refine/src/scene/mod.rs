@@ -23,7 +23,9 @@ pub use object::{Inertial, Object, StatedSize};
 pub use prepared_frame::{CameraView, Occluders, PreparedFrame};
 pub(crate) use prepared_frame::{MASK_MARGIN, draw_hand_depth, eroded, hand_depth};
 pub use region::ForegroundSettings;
-pub(crate) use region::{ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index};
+pub(crate) use region::{
+    ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index, pixel_distances,
+};
 pub(crate) use remap_cache::RemapCache;
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
 pub use target::Target;

@@ -8,7 +8,7 @@ use prehend_render::{Camera, DepthImage};
 
 use super::SearchSettings;
 use crate::error::RefineError;
-use crate::scene::{Frame, HandMeasurement, PreparedFrame};
+use crate::scene::{Frame, HandMeasurement, PreparedFrame, pixel_distances};
 
 /// Everything in the camera frame \[m\].
 pub(super) struct Evidence {
@@ -78,7 +78,6 @@ pub(super) struct SightMap {
     pixels: Vec<Sight>,
 }
 
-#[derive(Clone, Copy)]
 struct Sight {
     /// Whether the object is seen here.
     object: bool,
@@ -103,11 +102,13 @@ impl SightMap {
                 (true, false) => measured,
                 _ => known,
             };
-            Sight { object, depth, away: if object { 0.0 } else { f32::MAX } }
+            (object, depth)
         };
-        let mut pixels: Vec<Sight> =
-            (0..width * height).map(|i| at(i % width, i / width)).collect();
-        measure_away(&mut pixels, width);
+        let (object, depths): (Vec<bool>, Vec<f32>) =
+            (0..width * height).map(|i| at(i % width, i / width)).unzip();
+        let away = pixel_distances(&object, width, true);
+        let seen = object.into_iter().zip(depths).zip(away);
+        let pixels = seen.map(|((object, depth), away)| Sight { object, depth, away }).collect();
         // Pixel (x, y) of the map is pixel (x factor + factor/2, …) of the image.
         let (scale, middle) = (1.0 / factor as f64, (factor / 2) as f64);
         let camera = Camera {
@@ -149,31 +150,6 @@ impl SightMap {
     }
 }
 
-/// Fills in the distances to the object in two sweeps, by steps to the eight neighbors.
-fn measure_away(pixels: &mut [Sight], width: usize) {
-    let height = pixels.len() / width;
-    let mut relax = |x: usize, y: usize, forwards: bool| {
-        let sign = if forwards { -1_isize } else { 1 };
-        let steps = [(sign, 0), (-1, sign), (0, sign), (1, sign)];
-        for (dx, dy) in steps {
-            let (nx, ny) = (x as isize + dx, y as isize + dy);
-            if nx < 0 || ny < 0 || nx >= width as isize || ny >= height as isize {
-                continue;
-            }
-            let length = if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
-            let through = pixels[ny as usize * width + nx as usize].away + length;
-            let own = &mut pixels[y * width + x].away;
-            *own = own.min(through);
-        }
-    };
-    for y in 0..height {
-        (0..width).for_each(|x| relax(x, y, true));
-    }
-    for y in (0..height).rev() {
-        (0..width).rev().for_each(|x| relax(x, y, false));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,15 +187,5 @@ mod tests {
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();
         assert_eq!((unfelt.outside.len(), unfelt.touched.len()), (all - taxels, 0));
-    }
-
-    #[test]
-    fn distances_away_are_those_of_straight_and_diagonal_steps() {
-        let far = Sight { object: false, depth: 0.0, away: f32::MAX };
-        let mut pixels = vec![far; 5 * 4];
-        pixels[5 + 1].away = 0.0;
-        measure_away(&mut pixels, 5);
-        assert_eq!((pixels[0].away, pixels[9].away), (std::f32::consts::SQRT_2, 3.0));
-        assert_eq!(pixels[19].away, 2.0 * std::f32::consts::SQRT_2 + 1.0);
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
             remove_temporary(&file)?;
         } else if name.starts_with('.') && name.ends_with(".tmp") {
             let removed = fs::remove_file(&file);
-            removed.map_err(|e| DatasetError::Write { file, problem: e.to_string() })?;
+            removed.map_err(|e| DatasetError::writing(&file, e))?;
         }
     }
     Ok(())

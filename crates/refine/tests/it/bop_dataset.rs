@@ -242,9 +242,9 @@ fn an_absent_or_broken_file_spoils_only_what_needs_it() {
     let frame = dataset.frame(4, 0).unwrap();
     assert_eq!(frame.bodies(), Err(DatasetError::Missing { file: bodies }));
     assert!(matches!(frame.tactile(), Err(DatasetError::Unusable { file, .. }) if file == tactile));
-    assert_eq!(frame.rgb(), Err(DatasetError::Missing { file: rgb }));
+    assert_eq!(frame.rgb_path(), Err(DatasetError::Missing { file: rgb }));
     assert!(frame.depth().is_ok() && frame.mask(0).is_ok());
-    assert!(dataset.frame(4, 3).unwrap().rgb().is_ok());
+    assert!(dataset.frame(4, 3).unwrap().rgb_path().is_ok());
 }
 
 #[test]

@@ -12,7 +12,7 @@ use prehend_refine::data::bop::{
     Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
     read_results, share_image_times, write_results,
 };
-use prehend_refine::data::details::DetailsFormat;
+use prehend_refine::data::details::check_format;
 use prehend_refine::data::identity::file_fingerprint;
 use prehend_refine::data::{MaskSource, Target, find_targets};
 use prehend_refine::rig::Rig;
@@ -268,7 +268,7 @@ pub(crate) fn write_poses(
 
 /// Refuses a table that could not be written: where there is no such folder, or of a format that this build does not write.
 pub(crate) fn check_details(file: &Path) -> anyhow::Result<()> {
-    DetailsFormat::of(file).map_err(|error| anyhow!("--details {error}"))?;
+    check_format(file).map_err(|error| anyhow!("--details {error}"))?;
     Ok(check_writable(file)?)
 }
 

@@ -41,7 +41,8 @@ impl Dataset {
         let color = !frame.has_color() || frame.rgb_path().is_ok_and(|file| is_whole(&file));
         let depth = !frame.has_depth() || is_whole(&frame.depth_path());
         let any = frame.has_color() || frame.has_depth();
-        any && color && depth && masks_are_whole(scene, im_id)
+        // Masks may still be missing.
+        any && color && depth && frame.mask_listing().all(|file| is_whole(&file))
     }
 
     /// Whether any of the image is there.
@@ -60,15 +61,6 @@ impl DatasetScene {
             Some((about.len(), about.modified().ok()?))
         })
     }
-}
-
-/// Whether all masks of the image end as they should; there need not be any.
-fn masks_are_whole(scene: &DatasetScene, im_id: u32) -> bool {
-    let prefix = format!("{im_id:06}_");
-    let Ok(files) = fs::read_dir(scene.dir().join("mask_visib")) else { return true };
-    let of_image = |name: &OsStr| name.to_str().is_some_and(|name| name.starts_with(&prefix));
-    let mut masks = files.flatten().filter(|file| of_image(&file.file_name()));
-    masks.all(|file| is_whole(&file.path()))
 }
 
 /// Whether a PNG or JPEG file has its end: decoders fill up what lacks of some pictures without complaint.

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
-use super::error::DatasetError;
-use super::frame_pose::{FramePose, LengthUnit};
+use super::error::{DatasetError, Origin};
 use super::json::{JsonFile, UniqueMap};
-use super::numbers::{NonNegative, Numbers, Real, Rotation, pose};
+use super::numbers::{FramePose, LengthUnit, NonNegative, Numbers, Real, Rotation, pose};
 
 /// A body whose shape is known, and its pose as well as is said.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +21,7 @@ pub struct Body {
     pub t_cam_base: Isometry3<f64>,
     /// Standard deviations of that, in each direction and about each axis \[m, rad\], where they are said.
     pub sigmas: [Option<f64>; 2],
+    pub(crate) origin: Origin,
 }
 
 /// Shape of a body.
@@ -123,35 +123,36 @@ impl BodyEntry {
     /// The body; files are in `folder`.
     ///
     /// # Errors
-    /// The field that is missing.
-    fn read(self, folder: &Path) -> Result<Body, &'static str> {
+    /// If a field is missing.
+    fn read(self, folder: &Path, origin: Origin) -> Result<Body, DatasetError> {
+        let missing = |field| origin.fault(field, "is missing");
         let kind = match (self.kind, self.obj_id, self.mesh) {
             (BodyKindName::Hand, ..) => BodyKind::Hand {
-                urdf: folder.join(self.urdf.ok_or("urdf")?),
-                joints: self.joints.ok_or("joints")?.positions(),
+                urdf: folder.join(self.urdf.ok_or_else(|| missing("urdf"))?),
+                joints: self.joints.ok_or_else(|| missing("joints"))?.positions(),
             },
             (BodyKindName::Plane, ..) => BodyKind::Plane,
             (BodyKindName::Object, Some(obj_id), _) => BodyKind::Object { obj_id },
             (BodyKindName::Object, None, Some(mesh)) => BodyKind::Mesh {
                 file: folder.join(mesh),
-                unit: self.mesh_unit.ok_or("mesh_unit")?.meters(),
+                unit: self.mesh_unit.ok_or_else(|| missing("mesh_unit"))?.meters(),
             },
             (BodyKindName::Object, None, None) => {
-                return Err(if self.pose.is_some() { "mesh" } else { "obj_id" });
+                return Err(missing(if self.pose.is_some() { "mesh" } else { "obj_id" }));
             }
         };
         let t_cam_base = match (self.pose, self.rotation, self.translation) {
             (Some(pose), ..) => pose.0,
             (None, Some(rotation), Some(mm)) => pose(&rotation, &mm),
-            (None, None, _) => return Err("cam_R_b2c"),
-            (None, Some(_), None) => return Err("cam_t_b2c"),
+            (None, None, _) => return Err(missing("cam_R_b2c")),
+            (None, Some(_), None) => return Err(missing("cam_t_b2c")),
         };
         let sigmas = sigmas(self.sigma_mm, self.sigma_deg);
-        Ok(Body { name: self.name, kind, t_cam_base, sigmas })
+        Ok(Body { name: self.name, kind, t_cam_base, sigmas, origin })
     }
 }
 
-/// The bodies of `entries`, beside those that there are; files are in `folder`, and `fault` makes an error of the entry's index, the field in it and the problem.
+/// The bodies of `entries`, beside those that there are; files are in `folder`, and entries at `origin` by their indices.
 ///
 /// # Errors
 /// If a field is missing, and of a name that is there twice or would be mixed up with those of links.
@@ -159,18 +160,17 @@ pub(crate) fn read_bodies(
     bodies: &mut Vec<Body>,
     entries: Vec<BodyEntry>,
     folder: &Path,
-    fault: impl Fn(usize, &str, String) -> DatasetError,
+    origin: impl Fn(usize) -> Origin,
 ) -> Result<(), DatasetError> {
     for (k, entry) in entries.into_iter().enumerate() {
-        let name = entry.name.clone();
+        let (name, origin) = (&entry.name, origin(k));
         if name.is_empty() || name.contains('/') {
-            return Err(fault(k, ".name", format!("{name:?} is empty or has a slash")));
+            return Err(origin.fault("name", format!("{name:?} is empty or has a slash")));
         }
-        if bodies.iter().any(|other| other.name == name) {
-            return Err(fault(k, ".name", format!("there are two bodies called {name:?}")));
+        if bodies.iter().any(|other| other.name == *name) {
+            return Err(origin.fault("name", format!("there are two bodies called {name:?}")));
         }
-        let missing = |field| fault(k, &format!(".{field}"), "is missing".to_owned());
-        bodies.push(entry.read(folder).map_err(missing)?);
+        bodies.push(entry.read(folder, origin)?);
     }
     Ok(())
 }
@@ -180,9 +180,8 @@ impl SceneBodies {
     pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
         let entry: BodiesEntry = file.entry(im_id)?;
         let mut bodies = Vec::with_capacity(entry.bodies.len());
-        read_bodies(&mut bodies, entry.bodies, root, |k, field, problem| {
-            file.fault(&format!("{im_id}.bodies[{k}]{field}"), problem)
-        })?;
+        let origin = |k| Origin::new(file.path(), format!("{im_id}.bodies[{k}]"));
+        read_bodies(&mut bodies, entry.bodies, root, origin)?;
         Ok(Self { gravity: entry.gravity.map(|g| g.0.into()), bodies })
     }
 

@@ -7,24 +7,26 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
+use serde_json::json;
+use serde_json::value::to_raw_value;
 
 use super::error::DatasetError;
-use super::json::JsonFile;
+use super::json::{JsonFile, UniqueMap, read_json};
 use super::models::Models;
-use super::one_camera::scene_camera;
+use super::numbers::{Positive, Real};
 use crate::scene::RemapCache;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
 /// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.
 /// Those belong to [`super::GroundTruth`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Dataset {
     root: PathBuf,
     split_dir: PathBuf,
-    scenes: BTreeMap<u32, DatasetScene>,
-    models: Models,
+    scenes: Arc<BTreeMap<u32, DatasetScene>>,
+    models: Arc<Models>,
     /// What all cameras have in common.
-    pub(super) camera: JsonFile,
+    pub(super) camera: Arc<JsonFile>,
 }
 
 /// One scene of a split; its files are read when first needed.
@@ -38,6 +40,9 @@ pub struct DatasetScene {
     pub(super) tactile: JsonFile,
     /// `scene_gt.json`; estimators may read the masks' objects alone.
     pub(super) objects: JsonFile,
+    /// `scene_gt_info.json` and `scene_bodies_gt.json`, for [`super::GroundTruth`] alone.
+    pub(super) visibility: JsonFile,
+    pub(super) true_bodies: JsonFile,
     pub(super) shared: Arc<SceneCaches>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
@@ -109,13 +114,29 @@ impl Dataset {
         shared: &Arc<SceneCaches>,
     ) -> Self {
         let camera = JsonFile::new(root.join("camera.json"));
-        let scene = |(id, dir)| (id, DatasetScene::new(id, dir, root, &camera, shared));
+        let scene = |(id, dir): (u32, PathBuf)| {
+            let file = |name: &str| JsonFile::new(dir.join(name));
+            let scene = DatasetScene {
+                id,
+                root: root.to_owned(),
+                camera: scene_camera(&dir, &camera),
+                bodies: file("scene_bodies.json"),
+                tactile: file("scene_tactile.json"),
+                objects: file("scene_gt.json"),
+                visibility: file("scene_gt_info.json"),
+                true_bodies: file("scene_bodies_gt.json"),
+                shared: Arc::clone(shared),
+                rigs: OnceLock::new(),
+                dir,
+            };
+            (id, scene)
+        };
         Self {
             root: root.to_owned(),
             split_dir: split_dir.to_owned(),
-            scenes: scenes.into_iter().map(scene).collect(),
-            models: Models::new(root.join("models")),
-            camera,
+            scenes: Arc::new(scenes.into_iter().map(scene).collect()),
+            models: Arc::new(Models::new(root.join("models"))),
+            camera: Arc::new(camera),
         }
     }
 
@@ -158,26 +179,6 @@ impl Dataset {
 }
 
 impl DatasetScene {
-    fn new(
-        id: u32,
-        dir: PathBuf,
-        root: &Path,
-        camera: &JsonFile,
-        shared: &Arc<SceneCaches>,
-    ) -> Self {
-        Self {
-            id,
-            root: root.to_path_buf(),
-            camera: scene_camera(&dir, camera),
-            bodies: JsonFile::new(dir.join("scene_bodies.json")),
-            tactile: JsonFile::new(dir.join("scene_tactile.json")),
-            objects: JsonFile::new(dir.join("scene_gt.json")),
-            shared: Arc::clone(shared),
-            rigs: OnceLock::new(),
-            dir,
-        }
-    }
-
     /// The scene's id.
     pub fn id(&self) -> u32 {
         self.id
@@ -265,4 +266,73 @@ fn subfolders(dir: &Path) -> Result<Vec<String>, DatasetError> {
         .collect();
     names.sort_unstable();
     Ok(names)
+}
+
+/// The camera of BOP's `camera.json`.
+#[derive(Deserialize)]
+struct CameraFile {
+    fx: Positive,
+    fy: Positive,
+    cx: Real,
+    cy: Real,
+    depth_scale: Option<Positive>,
+}
+
+/// The file `scene_camera.json` of the scene in `dir`; where there is none but the dataset's `camera` gives intrinsics, with an entry of those for each image
+/// in `rgb/`, or else in `depth/`.
+pub(super) fn scene_camera(dir: &Path, camera: &JsonFile) -> JsonFile {
+    let path = dir.join("scene_camera.json");
+    if path.exists() {
+        return JsonFile::new(path);
+    }
+    let Ok(CameraFile { fx, fy, cx, cy, depth_scale }) = read_json(camera.path()) else {
+        // What is missing then is scene_camera.json.
+        return JsonFile::new(path);
+    };
+    let k = [fx.0, 0.0, cx.0, 0.0, fy.0, cy.0, 0.0, 0.0, 1.0];
+    let entry = json!({ "cam_K": k, "depth_scale": depth_scale.map_or(1.0, |scale| scale.0) });
+    let images = ["rgb", "depth"].map(|folder| image_ids(&dir.join(folder)));
+    let images = images.into_iter().find(|ids| !ids.is_empty()).unwrap_or_default();
+    let named = |id: u32| Some((id.to_string(), to_raw_value(&entry).ok()?));
+    JsonFile::with_entries(path, UniqueMap(images.into_iter().filter_map(named).collect()))
+}
+
+/// Numbers that are names of files in `folder`.
+fn image_ids(folder: &Path) -> BTreeSet<u32> {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten();
+    files.filter_map(|file| file.path().file_stem()?.to_str()?.parse().ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use crate::data::bop::Dataset;
+
+    #[test]
+    fn one_camera_serves_all_images() {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = dir.path().join("test/000002");
+        fs::create_dir_all(scene.join("rgb")).unwrap();
+        for name in ["000003.jpg", "000010.jpg", "notes.txt"] {
+            fs::write(scene.join("rgb").join(name), "").unwrap();
+        }
+        let camera = dir.path().join("camera.json");
+        let open = || Dataset::open(dir.path()).unwrap();
+        let missing = |dataset: &Dataset| dataset.frame(2, 3).unwrap_err().to_string();
+        assert!(missing(&open()).contains("scene_camera.json: no such file"));
+        fs::write(&camera, r#"{"cx": 325.3, "cy": 242.0, "depth_scale": 0.5, "fx": 572.4, "fy": 573.6, "height": 480, "width": 640}"#).unwrap();
+        let dataset = open();
+        assert_eq!(dataset.scene(2).unwrap().images().unwrap(), [3, 10]);
+        let frame = dataset.frame(2, 10).unwrap();
+        let camera_of = frame.camera(640, 480);
+        assert_eq!((camera_of.fx, camera_of.cy, frame.depth_scale), (572.4, 242.0, 0.5));
+        assert!(
+            missing(&{
+                fs::write(&camera, "{\"fx\": 1}").unwrap();
+                open()
+            })
+            .contains("scene_camera.json")
+        );
+    }
 }

@@ -76,43 +76,18 @@ impl Detections {
     /// Reads a file of detections.
     ///
     /// # Errors
-    /// When the file is absent or broken, and [`DatasetError::Field`] for an entry without a box or a mask, or with run lengths that do not fill its mask.
+    /// When the file is absent or broken, and [`DatasetError::Unusable`] for an entry without a box or a mask, or with run lengths that do not fill its mask.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
         let entries: Vec<Entry> = read_json(file)?;
         let mut by_image: BTreeMap<_, Vec<Detection>> = BTreeMap::new();
         for (k, entry) in entries.into_iter().enumerate() {
-            let fault = |name: &str, problem: &str| {
+            let fault = |(name, problem): (&str, String)| {
                 DatasetError::field(file, &format!("[{k}].{name}"), problem)
             };
-            let shape = match (entry.segmentation, entry.bbox) {
-                (Some(Segmentation::Polygons(polygons)), _) => {
-                    let count = polygons.len();
-                    let problem =
-                        format!("{count} polygons: convert to run lengths (counts, size)");
-                    return Err(fault("segmentation", &problem));
-                }
-                (Some(Segmentation::RunLengths(runs)), _) => {
-                    let size = runs.size;
-                    let lengths = runs.lengths();
-                    DetectionShape::Mask(
-                        size,
-                        lengths.map_err(|problem| fault("segmentation", &problem))?,
-                    )
-                }
-                (None, Some(bbox)) if bbox.0[2] > 0.0 && bbox.0[3] > 0.0 => {
-                    DetectionShape::Box(bbox.0)
-                }
-                (None, Some(_)) => {
-                    return Err(fault(
-                        "bbox",
-                        "is [left, top, width, height], width and height above zero",
-                    ));
-                }
-                (None, None) => return Err(fault("bbox", "is missing, and so is segmentation")),
-            };
             let score = entry.score.map_or(1.0, |score| score.0);
-            let detection = Detection { obj_id: entry.category_id, score, shape };
-            by_image.entry((entry.scene_id, entry.image_id)).or_default().push(detection);
+            let (obj_id, image) = (entry.category_id, (entry.scene_id, entry.image_id));
+            let shape = entry.shape().map_err(fault)?;
+            by_image.entry(image).or_default().push(Detection { obj_id, score, shape });
         }
         Ok(Self { file: file.to_owned(), by_image })
     }
@@ -128,6 +103,32 @@ impl Detections {
         let mut found: Vec<&Detection> = all.filter(|found| found.obj_id == obj_id).collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         found
+    }
+}
+
+impl Entry {
+    /// Pixels of the entry.
+    ///
+    /// # Errors
+    /// The field at fault, and what is wrong with it.
+    fn shape(self) -> Result<DetectionShape, (&'static str, String)> {
+        let wrong = |problem| ("segmentation", problem);
+        match (self.segmentation, self.bbox) {
+            (Some(Segmentation::Polygons(polygons)), _) => {
+                let count = polygons.len();
+                Err(wrong(format!("{count} polygons: convert to run lengths (counts, size)")))
+            }
+            (Some(Segmentation::RunLengths(runs)), _) => {
+                Ok(DetectionShape::Mask(runs.size, runs.lengths().map_err(wrong)?))
+            }
+            (None, Some(Numbers(bbox))) if bbox[2] > 0.0 && bbox[3] > 0.0 => {
+                Ok(DetectionShape::Box(bbox))
+            }
+            (None, Some(_)) => {
+                Err(("bbox", "is [left, top, width, height], width and height above zero".into()))
+            }
+            (None, None) => Err(("bbox", "is missing, and so is segmentation".into())),
+        }
     }
 }
 

@@ -14,13 +14,13 @@ pub enum DatasetError {
         /// The path looked for.
         file: PathBuf,
     },
-    /// It is not what it has to be: broken JSON, a truncated image, a dataset without scenes, a journal of
-    /// another run.
+    /// It is not what it has to be: broken JSON, a field that is absent, of another type or impossible, a dataset without
+    /// scenes, a journal of another run; or it cannot be written, and nothing of it is left behind.
     #[error("{}: {problem}", file.display())]
     Unusable {
         /// The file or folder.
         file: PathBuf,
-        /// What is wrong, and where the decoder knows it.
+        /// What is wrong, after the field's path inside the file, such as `3.bodies[0].cam_R_b2c`, or the place, where it is known.
         problem: String,
     },
     /// An image that does not decode; the message names the file.
@@ -52,16 +52,6 @@ pub enum DatasetError {
         /// The absent key, an image or object id as BOP spells it.
         key: String,
     },
-    /// A field is absent, has the wrong type or an impossible value.
-    #[error("{}: {field}: {problem}", file.display())]
-    Field {
-        /// The path read.
-        file: PathBuf,
-        /// The field's path inside the file, such as `3.bodies[0].cam_R_b2c`.
-        field: String,
-        /// What is wrong with it.
-        problem: String,
-    },
     /// No pixel of the depth image holds a measurement.
     #[error("{}: every depth is zero", file.display())]
     NoDepth {
@@ -76,14 +66,6 @@ pub enum DatasetError {
         /// The id asked for.
         obj_id: u32,
     },
-    /// A file could not be written; nothing of it was left behind.
-    #[error("{}: cannot be written: {problem}", file.display())]
-    Write {
-        /// The path to be written.
-        file: PathBuf,
-        /// What the system says.
-        problem: String,
-    },
 }
 
 impl DatasetError {
@@ -95,9 +77,9 @@ impl DatasetError {
         }
     }
 
-    /// A [`DatasetError::Write`] from anything that can be printed.
+    /// The error of writing `file`, from anything that can be printed.
     pub(crate) fn writing(file: &Path, problem: impl ToString) -> Self {
-        Self::Write { file: file.into(), problem: problem.to_string() }
+        Self::unusable(file, format!("cannot be written: {}", problem.to_string()))
     }
 
     /// A [`DatasetError::Unusable`] from anything that can be printed.
@@ -105,9 +87,9 @@ impl DatasetError {
         Self::Unusable { file: file.into(), problem: problem.to_string() }
     }
 
-    /// A [`DatasetError::Field`] from anything that can be printed.
+    /// An error about a field of `file`, from anything that can be printed.
     pub(crate) fn field(file: &Path, field: &str, problem: impl ToString) -> Self {
-        Self::Field { file: file.into(), field: field.into(), problem: problem.to_string() }
+        Self::unusable(file, format!("{field}: {}", problem.to_string()))
     }
 }
 
@@ -117,5 +99,24 @@ impl From<ImageError> for DatasetError {
             ImageError::Io { path, source } => Self::reading(path, source),
             other => Self::Image(other.to_string()),
         }
+    }
+}
+
+/// Field of a file that something was read from, for errors about it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Origin {
+    file: PathBuf,
+    field: String,
+}
+
+impl Origin {
+    pub(crate) fn new(file: &Path, field: impl Into<String>) -> Self {
+        Self { file: file.to_owned(), field: field.into() }
+    }
+
+    /// An error about a field of it, or about all of it if `field` is empty.
+    pub(crate) fn fault(&self, field: &str, problem: impl ToString) -> DatasetError {
+        let field = format!("{}.{field}", self.field);
+        DatasetError::field(&self.file, field.trim_matches('.'), problem)
     }
 }

@@ -29,7 +29,7 @@ pub(crate) fn read_text(file: &Path) -> Result<String, DatasetError> {
 /// Writes `contents` to a new file beside `path` and renames it to `path`, replacing what was there.
 ///
 /// # Errors
-/// [`DatasetError::Write`] naming `path`; a file that was there before is then unchanged.
+/// [`DatasetError::Unusable`] naming `path`; a file that was there before is then unchanged.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError> {
     prehend_geometry::write_atomic(path, contents).map_err(|e| DatasetError::writing(path, e))
 }
@@ -37,7 +37,7 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError
 /// Whether [`write_atomically`] could write `path` now, to know before long work; leaves nothing behind.
 ///
 /// # Errors
-/// [`DatasetError::Write`] naming `path`.
+/// [`DatasetError::Unusable`] naming `path`.
 pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
     let fault = |problem: &dyn std::fmt::Display| DatasetError::writing(path, problem);
     if path.is_dir() {
@@ -53,7 +53,7 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
 /// Makes the folder and those above it, where they are absent.
 ///
 /// # Errors
-/// [`DatasetError::Write`] naming `folder`.
+/// [`DatasetError::Unusable`] naming `folder`.
 pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
     fs::create_dir_all(folder).map_err(|e| DatasetError::writing(folder, e))
 }
@@ -101,9 +101,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("absent").join("out.csv");
         assert!(
-            matches!(write_atomically(&path, b"x"), Err(DatasetError::Write { file, .. }) if file == path)
+            matches!(write_atomically(&path, b"x"), Err(DatasetError::Unusable { file, .. }) if file == path)
         );
-        assert!(matches!(write_atomically(dir.path(), b"x"), Err(DatasetError::Write { .. })));
+        assert!(matches!(write_atomically(dir.path(), b"x"), Err(DatasetError::Unusable { .. })));
         assert!(check_writable(&path).is_err() && check_writable(dir.path()).is_err());
         assert_eq!(check_writable(&dir.path().join("new.csv")), Ok(()));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);

@@ -5,17 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use nalgebra::Isometry3;
-use prehend_render::{Camera, CameraError, DepthImage, Mask, Remap, RgbImage, image_size};
+use prehend_render::{Camera, CameraError, DepthImage, Mask, Remap, image_size};
 use serde::Deserialize;
 
 use super::bodies::SceneBodies;
 use super::dataset::{Dataset, DatasetScene};
-use super::depth_camera::DepthCamera;
-use super::error::DatasetError;
+use super::error::{DatasetError, Origin};
 use super::json::JsonFile;
 use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
-use super::optics::{DepthWarning, Optics, check_size};
-use super::stated::Stated;
+use super::optics::{DepthCamera, DepthWarning, Optics, check_size};
 use super::touch::Tactile;
 use crate::scene::Frame;
 
@@ -144,22 +142,20 @@ impl DatasetImage<'_> {
 
     /// The files of the image's masks, in any order.
     fn mask_files(&self) -> impl Iterator<Item = PathBuf> + use<> {
-        let files = fs::read_dir(self.scene.dir().join("mask_visib"));
-        let prefix = format!("{:06}_", self.im_id);
-        files.into_iter().flatten().flatten().map(|file| file.path()).filter(move |path| {
-            path.file_name()
-                .and_then(|name| name.to_str())
-                .and_then(|name| name.strip_prefix(&prefix)?.split_once('.'))
-                .is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
+        self.mask_listing().filter(|path| {
+            let name = path.file_name().and_then(|name| name.to_str()?.split_once('.'));
+            name.is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
         })
     }
 
-    /// Reads the color image.
-    ///
-    /// # Errors
-    /// When it is absent or does not decode.
-    pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
-        self.optics.color(&self.rgb_path()?)
+    /// All files in the folder of masks that begin as the image's do.
+    pub(super) fn mask_listing(&self) -> impl Iterator<Item = PathBuf> + use<> {
+        let files = fs::read_dir(self.scene.dir().join("mask_visib")).into_iter().flatten();
+        let prefix = format!("{:06}_", self.im_id);
+        let is_of_image = move |path: &PathBuf| {
+            path.file_name().and_then(|name| name.to_str()).is_some_and(|n| n.starts_with(&prefix))
+        };
+        files.flatten().map(|file| file.path()).filter(is_of_image)
     }
 
     /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.
@@ -169,16 +165,13 @@ impl DatasetImage<'_> {
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
         let beside = self.optics.depth_camera.is_some() && self.has_color();
         let color = if beside { Some(image_size(&self.rgb_path()?)?) } else { None };
-        self.optics.depth(&self.depth_path(), color, &|file, warning| self.warn_once(file, warning))
+        let warn = |file: &Path, kind, text: &str| self.warn_once(file, kind, text);
+        self.optics.depth(&self.depth_path(), color, &warn)
     }
 
     /// Warns of the depth image in `file`, once a dataset of each kind.
-    fn warn_once(&self, file: &Path, warning: DepthWarning) {
-        let (kind, text) = match warning {
-            DepthWarning::Saturated(text) => (0, text),
-            DepthWarning::Empty => (1, "every depth is zero: color alone is used".to_owned()),
-        };
-        if !self.scene.shared.told_of_depth[kind].swap(true, Ordering::Relaxed) {
+    fn warn_once(&self, file: &Path, kind: DepthWarning, text: &str) {
+        if !self.scene.shared.told_of_depth[kind as usize].swap(true, Ordering::Relaxed) {
             log::warn!("{}: {text} (other images are not named)", file.display());
         }
     }
@@ -219,8 +212,7 @@ impl DatasetImage<'_> {
     /// The image as a [`Frame`] of camera, color, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
-    /// The first of those of [`DatasetImage::rgb`], [`DatasetImage::depth`] and [`DatasetImage::mask`], and
-    /// images that differ in size.
+    /// If an image is absent, does not decode, measures nothing or differs in size, and those of [`DatasetImage::mask`].
     pub fn observation(&self, instance: usize) -> Result<Frame, DatasetError> {
         let mut observation = self.unsegmented()?;
         self.segment(&mut observation, instance)?;
@@ -285,7 +277,7 @@ impl DatasetImage<'_> {
     /// color, of which is warned once a dataset.
     ///
     /// # Errors
-    /// Those of [`DatasetImage::rgb`] and [`DatasetImage::depth`], and if the images differ in size.
+    /// If an image is absent or does not decode, or they differ in size.
     pub(crate) fn unsegmented(&self) -> Result<Frame, DatasetError> {
         let has_color = self.has_color() || !self.has_depth();
         if self.optics.depth_camera.is_some() && !has_color {
@@ -294,8 +286,9 @@ impl DatasetImage<'_> {
         }
         let color = if has_color { Some(self.rgb_path()?) } else { None };
         let depth = self.has_depth().then(|| self.depth_path());
-        let warn = |file: &Path, warning| self.warn_once(file, warning);
-        self.optics.observation(color.as_deref(), depth.as_deref(), &warn)
+        self.optics.observation(color.as_deref(), depth.as_deref(), &|file, kind, text| {
+            self.warn_once(file, kind, text);
+        })
     }
 
     /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
@@ -371,23 +364,9 @@ impl DatasetImage<'_> {
         Tactile::read(&self.scene.tactile, self.im_id, self.scene.root())
     }
 
-    /// An error about `field` of this image's entry of `scene_bodies.json`.
-    pub(crate) fn bodies_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
-        self.scene.bodies.fault(&format!("{}.{field}", self.im_id), problem)
-    }
-
-    /// Names of this image's bodies and of as many `sensors` in their files.
-    pub(crate) fn stated(&self, bodies: usize, sensors: usize) -> Stated<'_> {
-        let id = self.im_id;
-        // One of several is called by its number.
-        let sensor = |k| if sensors > 1 { format!("{id}[{k}]") } else { id.to_string() };
-        Stated {
-            files: [self.scene.bodies.path(), self.scene.tactile.path()],
-            all: format!("{id}.bodies"),
-            bodies: (0..bodies).map(|k| format!("{id}.bodies[{k}]")).collect(),
-            sensors: (0..sensors).map(sensor).collect(),
-            force: "force",
-        }
+    /// This image's entry of `scene_bodies.json`.
+    pub(crate) fn bodies_entry(&self) -> Origin {
+        Origin::new(self.scene.bodies.path(), self.im_id.to_string())
     }
 }
 

@@ -1,7 +1,5 @@
 //! The truth about a dataset, for scoring only.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
@@ -17,15 +15,7 @@ use super::numbers::{Numbers, Rotation, pose};
 #[derive(Debug)]
 pub struct GroundTruth<'a> {
     dataset: &'a Dataset,
-    scenes: BTreeMap<u32, TrueScene>,
     models: Models,
-}
-
-/// The files of one scene.
-#[derive(Debug)]
-pub(super) struct TrueScene {
-    pub(super) visibility: JsonFile,
-    bodies: JsonFile,
 }
 
 /// An object where it truly is.
@@ -46,20 +36,17 @@ struct ObjectEntry {
     translation: Numbers<3>,
 }
 
+#[derive(Deserialize)]
+struct VisibilityEntry {
+    visib_fract: f64,
+}
+
 impl<'a> GroundTruth<'a> {
     /// The truth about the split that `dataset` shows; nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
-        let scene = |dir: &std::path::Path| TrueScene {
-            visibility: JsonFile::new(dir.join("scene_gt_info.json")),
-            bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
-        };
         let eval = dataset.root().join("models_eval");
         let models = if eval.is_dir() { eval } else { dataset.models().dir().to_path_buf() };
-        Self {
-            dataset,
-            scenes: dataset.scenes().map(|s| (s.id(), scene(s.dir()))).collect(),
-            models: Models::new(models),
-        }
+        Self { dataset, models: Models::new(models) }
     }
 
     /// The models to score with: `models_eval/` where the dataset has it, else `models/`.
@@ -124,16 +111,61 @@ impl<'a> GroundTruth<'a> {
     }
 
     /// `scene_gt.json`.
-    pub(super) fn objects_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
+    fn objects_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
         self.dataset.scene(scene_id).map(|scene| &scene.objects)
     }
 
     fn bodies_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
-        let own = &self.scene(scene_id)?.bodies;
-        Ok(if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies })
+        let scene = self.dataset.scene(scene_id)?;
+        Ok(if scene.true_bodies.exists() { &scene.true_bodies } else { &scene.bodies })
     }
 
-    pub(super) fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
-        self.dataset.scene(scene_id).map(|scene| &self.scenes[&scene.id()])
+    /// The visible fraction of the silhouette (0..=1) of each of an image's `count` objects, in the order of
+    /// [`GroundTruth::objects`].
+    ///
+    /// # Errors
+    /// When `scene_gt_info.json` is absent or broken, lacks the image, or has another number of objects.
+    pub(crate) fn visible_fractions(
+        &self,
+        scene_id: u32,
+        im_id: u32,
+        count: usize,
+    ) -> Result<Vec<f64>, DatasetError> {
+        let file = &self.dataset.scene(scene_id)?.visibility;
+        let entries: Vec<VisibilityEntry> = file.entry(im_id)?;
+        if entries.len() != count {
+            let problem = format!("has {} objects but scene_gt.json {count}", entries.len());
+            return Err(DatasetError::field(file.path(), &im_id.to_string(), problem));
+        }
+        Ok(entries.into_iter().map(|entry| entry.visib_fract).collect())
+    }
+
+    /// The true poses of `count` instances of an object, the most visible ones if the image shows more.
+    ///
+    /// # Errors
+    /// Those of [`GroundTruth::objects`], [`DatasetError::Unusable`] if the image shows fewer, and those of
+    /// [`GroundTruth::visible_fractions`] if it shows more.
+    pub(crate) fn most_visible(
+        &self,
+        scene_id: u32,
+        im_id: u32,
+        obj_id: u32,
+        count: usize,
+    ) -> Result<Vec<Isometry3<f64>>, DatasetError> {
+        let objects = self.objects(scene_id, im_id)?;
+        let mut shown: Vec<usize> =
+            (0..objects.len()).filter(|&k| objects[k].obj_id == obj_id).collect();
+        if shown.len() < count {
+            let file = self.objects_file(scene_id)?.path();
+            let problem =
+                format!("instances of object {obj_id}: {} but targets {count}", shown.len());
+            return Err(DatasetError::field(file, &im_id.to_string(), problem));
+        }
+        if shown.len() > count {
+            let visible = self.visible_fractions(scene_id, im_id, objects.len())?;
+            shown.sort_by(|&a, &b| visible[b].total_cmp(&visible[a]));
+            shown.truncate(count);
+        }
+        Ok(shown.into_iter().map(|k| objects[k].t_cam_model).collect())
     }
 }

@@ -98,7 +98,7 @@ impl JsonFile {
     /// A field of the top level, if it is there.
     ///
     /// # Errors
-    /// Those of [`JsonFile::root`], and [`DatasetError::Field`] if it is not of its type.
+    /// Those of [`JsonFile::root`], and [`DatasetError::Unusable`] if it is not of its type.
     pub(super) fn field<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, DatasetError> {
         let text = self.root()?.get(name);
         text.map(|text| self.convert(name, text)).transpose()
@@ -107,7 +107,7 @@ impl JsonFile {
     /// The entry of an image or object id.
     ///
     /// # Errors
-    /// Those of [`JsonFile::root`], [`DatasetError::NoEntry`], and [`DatasetError::Field`] for the first field that is
+    /// Those of [`JsonFile::root`], [`DatasetError::NoEntry`], and [`DatasetError::Unusable`] for the first field that is
     /// absent or not of its type.
     pub(super) fn entry<T: DeserializeOwned>(&self, id: u32) -> Result<T, DatasetError> {
         let key = id.to_string();
@@ -163,7 +163,7 @@ impl JsonFile {
 /// Content of a file of one layout.
 ///
 /// # Errors
-/// When the file is absent, cannot be read or is not JSON, and [`DatasetError::Field`] for the first field that is absent or
+/// When the file is absent, cannot be read or is not JSON, and [`DatasetError::Unusable`] for the first field that is absent or
 /// not of its type, with line and column.
 pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
     from_text(file, &read_bytes(file)?)
@@ -231,7 +231,7 @@ mod tests {
     /// What is wrong with entry `id` as a `T`.
     fn fault<T: DeserializeOwned>(file: &JsonFile, id: u32) -> String {
         match file.entry::<T>(id).map(|_| ()).unwrap_err() {
-            DatasetError::Field { field, problem, .. } => format!("{field}: {problem}"),
+            DatasetError::Unusable { problem, .. } => problem,
             other => other.to_string(),
         }
     }

@@ -1,15 +1,19 @@
-//! The folder of object models: meshes and `models_info.json`.
+//! The folder of object models: meshes, and `models_info.json`, which is read and written.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+use prehend_geometry::cloud::diameter;
 use serde::Deserialize;
+use serde_json::{Map, Value, json};
 
 use super::error::DatasetError;
-use super::json::JsonFile;
+use super::files::write_atomically;
+use super::json::{JsonFile, UniqueMap, read_json};
 use super::numbers::{Numbers, Positive, Real};
-use super::pose::pose_from_bop;
+use super::pose::{pose_from_matrix, rotation_to_row_major, translation_to_mm};
+use crate::MM_PER_M;
 use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
@@ -172,19 +176,84 @@ impl TryFrom<Numbers<16>> for SymmetryMotion {
     type Error = String;
 
     fn try_from(numbers: Numbers<16>) -> Result<Self, String> {
-        let m = numbers.0;
-        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err("the last row must be 0 0 0 1".into());
+        let mut motion = pose_from_matrix(&numbers.0)?;
+        motion.translation.vector /= 1000.0;
+        Ok(Self(motion))
+    }
+}
+
+/// Diameter and bounds of a model of these `vertices` \[m\], as `models_info.json` has them, in millimeters.
+pub(crate) fn extent_to_bop(vertices: &[Point3<f64>]) -> Map<String, Value> {
+    let first = vertices.first().copied().unwrap_or_default();
+    let (low, high) =
+        vertices.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v)));
+    let mut fields = Map::new();
+    fields.insert("diameter".into(), json!(diameter(vertices) * MM_PER_M));
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        fields.insert(format!("min_{name}"), json!(low[axis] * MM_PER_M));
+        fields.insert(format!("size_{name}"), json!((high[axis] - low[axis]) * MM_PER_M));
+    }
+    fields
+}
+
+/// Writes the symmetries of object `obj_id`, of these `vertices` \[m\], into the folder's `models_info.json`, in place of
+/// those that were there. Everything else in the file stays; an object that it lacks, and a file that is absent, begin with
+/// diameter and bounds.
+///
+/// # Errors
+/// When the file is broken or cannot be written; it is then as it was.
+pub fn write_symmetries(
+    models: &Models,
+    obj_id: u32,
+    vertices: &[Point3<f64>],
+    symmetries: &Symmetries,
+) -> Result<(), DatasetError> {
+    let file = models.dir().join("models_info.json");
+    // Strictly: numbers that JSON does not know could not be written back.
+    let mut list: UniqueMap<Map<String, Value>> = match read_json(&file) {
+        Err(DatasetError::Missing { .. }) => UniqueMap::default(),
+        read => read?,
+    };
+    let fields = list.0.entry(obj_id.to_string()).or_insert_with(|| extent_to_bop(vertices));
+    for name in ["symmetries_discrete", "symmetries_continuous"] {
+        fields.remove(name);
+    }
+    fields.extend(symmetries.to_bop());
+    write_atomically(&file, format!("{:#}\n", json!(list.0)).as_bytes())
+}
+
+impl Symmetries {
+    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimeters; what there is
+    /// none of is left out.
+    pub(super) fn to_bop(&self) -> Map<String, Value> {
+        let motion = |m: &Isometry3<f64>| {
+            let [r, t] = [
+                rotation_to_row_major(&m.rotation).to_vec(),
+                translation_to_mm(&m.translation).to_vec(),
+            ];
+            let rows = r.chunks(3).zip(&t).flat_map(|(row, t)| [row[0], row[1], row[2], *t]);
+            rows.chain([0.0, 0.0, 0.0, 1.0]).collect::<Vec<f64>>()
+        };
+        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * MM_PER_M).as_slice() });
+        let mut fields = Map::new();
+        if !self.discrete.is_empty() {
+            fields.insert("symmetries_discrete".into(), self.discrete.iter().map(motion).collect());
         }
-        let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-        pose_from_bop(&r, &[m[3], m[7], m[11]]).map(Self)
+        if !self.continuous.is_empty() {
+            let axes: Vec<Value> = self.continuous.iter().map(axis).collect();
+            fields.insert("symmetries_continuous".into(), axes.into());
+        }
+        fields
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
+
     use serde_json::json;
+
+    use super::*;
 
     fn models(info: &str) -> (tempfile::TempDir, Models) {
         let dir = tempfile::tempdir().unwrap();
@@ -260,7 +329,7 @@ mod tests {
             (4, "4.inertia_kg_m2: is not symmetric"),
             (5, "5.symmetries_continuous[0].axis: has no direction"),
             (6, "6.symmetries_discrete[0]: not orthonormal"),
-            (7, "7.symmetries_discrete[0]: the last row must be 0 0 0 1"),
+            (7, "7.symmetries_discrete[0]: the matrix's last row must be 0 0 0 1"),
         ] {
             let error = models.info(id).unwrap_err().to_string();
             assert!(error.contains(problem), "{error}");
@@ -269,5 +338,30 @@ mod tests {
         let none = Models::new(dir.path().join("none"));
         assert!(matches!(none.info(12), Err(DatasetError::Missing { .. })));
         assert!(matches!(none.object_ids(), Err(DatasetError::Missing { .. })));
+    }
+
+    #[test]
+    fn other_objects_and_fields_stay_and_absent_ones_begin() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("models_info.json");
+        let flip = Isometry3::rotation(nalgebra::Vector3::z() * std::f64::consts::PI);
+        let symmetries = Symmetries { discrete: vec![flip], ..Symmetries::default() };
+        let vertices = [[0.0, 0.0, 0.0], [0.03, 0.04, 0.0]].map(Point3::from);
+        let models = || Models::new(dir.path().to_path_buf());
+        fs::write(&file, r#"{"1": {"diameter": 7.5, "mass_kg": 2, "symmetries_continuous": [1]}}"#)
+            .unwrap();
+        for id in [1, 2] {
+            write_symmetries(&models(), id, &vertices, &symmetries).unwrap();
+        }
+        let (kept, begun) = (models().info(1).unwrap(), models().info(2).unwrap());
+        assert_eq!((kept.diameter, kept.mass), (0.0075, Some(2.0)));
+        assert_eq!(begun.diameter, 0.05);
+        for info in [kept, begun] {
+            assert_eq!((info.symmetries.discrete.len(), info.symmetries.continuous.len()), (1, 0));
+        }
+        fs::write(&file, r#"{"1": {"diameter": NaN}}"#).unwrap();
+        let error = write_symmetries(&models(), 1, &vertices, &symmetries).unwrap_err();
+        assert!(error.to_string().contains("models_info.json: not valid JSON"), "{error}");
+        assert_eq!(fs::read(&file).unwrap(), br#"{"1": {"diameter": NaN}}"#);
     }
 }

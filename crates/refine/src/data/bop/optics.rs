@@ -1,14 +1,16 @@
-//! Images of one camera, read as a pinhole camera of the same matrix and size sees them.
+//! Images of one camera, read as a pinhole camera of the same matrix and size sees them, with depth of it or of a camera beside it.
 
 use std::path::Path;
 
+use nalgebra::Isometry3;
 use prehend_render::{
     Camera, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage, image_size,
+    register_depth,
 };
 
-use super::depth_camera::DepthCamera;
-use super::depth_values::drop_saturated;
 use super::error::DatasetError;
+use super::frame::Intrinsics;
+use super::numbers::{Lens, Numbers, Rotation, pose};
 use crate::scene::{Frame, RemapCache};
 
 /// Optics of a camera: intrinsics, lens, depth.
@@ -25,11 +27,15 @@ pub(crate) struct Optics<'a> {
     pub(crate) depth_remaps: &'a RemapCache,
 }
 
-/// A warning about the depth image in a file: of values that are none, or of one that measures nothing.
+/// Kind of a warning about a depth image: values that are none, or nothing measured.
+#[derive(Clone, Copy)]
 pub(crate) enum DepthWarning {
-    Saturated(String),
+    Saturated,
     Empty,
 }
+
+/// Hears of a warning about the depth image in a file.
+pub(crate) type Warn<'a> = &'a dyn Fn(&Path, DepthWarning, &str);
 
 impl Optics<'_> {
     /// The camera of an image of `width` by `height` pixels.
@@ -52,11 +58,11 @@ impl Optics<'_> {
         &self,
         file: &Path,
         color: Option<(usize, usize)>,
-        warn: &dyn Fn(&Path, DepthWarning),
+        warn: Warn<'_>,
     ) -> Result<DepthImage, DatasetError> {
         let mut stored = DepthImage::load(file, self.depth_unit)?;
         if let Some(warning) = drop_saturated(&mut stored, self.depth_unit) {
-            warn(file, DepthWarning::Saturated(warning));
+            warn(file, DepthWarning::Saturated, &warning);
         }
         let size = (stored.width(), stored.height());
         let depth = match &self.depth_camera {
@@ -110,7 +116,7 @@ impl Optics<'_> {
         &self,
         color: Option<&Path>,
         depth: Option<&Path>,
-        warn: &dyn Fn(&Path, DepthWarning),
+        warn: Warn<'_>,
     ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
@@ -121,7 +127,7 @@ impl Optics<'_> {
         let depth = depth.map(|file| self.depth(file, size, warn)).transpose();
         let depth = match depth {
             Err(DatasetError::NoDepth { file }) if color.is_some() => {
-                warn(&file, DepthWarning::Empty);
+                warn(&file, DepthWarning::Empty, "every depth is zero: color alone is used");
                 None
             }
             read => read?,
@@ -143,4 +149,126 @@ pub(crate) fn check_size(file: &Path, other: &Path) -> Result<(), DatasetError> 
     }
     let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
     Err(DatasetError::unusable(file, problem))
+}
+
+/// Share of an image's pixels from which on it is said that they count as not measured.
+const TOLD: f64 = 1e-3;
+
+/// Makes pixels with the largest value of 16 bits, one unit being `unit` meters, not measured: writers put it where they have nothing, and larger values are
+/// cut to it. What is to be said of it where there are many.
+pub(crate) fn drop_saturated(depth: &mut DepthImage, unit: f64) -> Option<String> {
+    let largest = (f64::from(u16::MAX) * unit) as f32;
+    let mut count = 0;
+    for pixel in depth.pixels_mut().iter_mut().filter(|z| **z >= largest) {
+        *pixel = 0.0;
+        count += 1;
+    }
+    let share = f64::from(count) / depth.pixels().len().max(1) as f64;
+    (share >= TOLD).then(|| {
+        let percent = 1e2 * share;
+        format!(
+            "{percent:.1} % of the pixels are {}, which counts as not measured, as 0 does",
+            u16::MAX
+        )
+    })
+}
+
+/// A camera of its own, that measured depth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthCamera {
+    /// Of unknown size.
+    camera: Camera,
+    lens: Option<Distortion>,
+    /// Its coordinates → those of the color camera \[m\].
+    t_color_depth: Isometry3<f64>,
+}
+
+impl DepthCamera {
+    /// Depth camera of intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
+    ///
+    /// # Errors
+    /// The name of what is missing beside what is there.
+    pub(crate) fn new(
+        camera: Option<Intrinsics>,
+        lens: Option<Lens>,
+        place: (Option<Rotation>, Option<Numbers<3>>),
+    ) -> Result<Option<Self>, &'static str> {
+        let t_color_depth = match place {
+            (None, None) => None,
+            (Some(rotation), Some(mm)) => Some(pose(&rotation, &mm)),
+            (None, Some(_)) => return Err("cam_R_d2c"),
+            (Some(_), None) => return Err("cam_t_d2c"),
+        };
+        let Some(Intrinsics(camera)) = camera else {
+            let nothing = lens.is_none() && t_color_depth.is_none();
+            return if nothing { Ok(None) } else { Err("depth_K") };
+        };
+        let t_color_depth = t_color_depth.unwrap_or_else(Isometry3::identity);
+        Ok(Some(Self::beside(camera, lens.map(|lens| lens.0), t_color_depth)))
+    }
+
+    /// Behind `lens`, in that place beside the color camera \[m\].
+    pub(crate) fn beside(
+        camera: Camera,
+        lens: Option<Distortion>,
+        t_color_depth: Isometry3<f64>,
+    ) -> Self {
+        Self { camera, lens, t_color_depth }
+    }
+
+    /// `depth`, which it measured \[m\], as the pinhole camera `camera` would have.
+    ///
+    /// # Errors
+    /// Those of a lens.
+    pub(crate) fn register(
+        &self,
+        mut depth: DepthImage,
+        camera: &Camera,
+        remaps: &RemapCache,
+    ) -> Result<DepthImage, DistortionError> {
+        let (width, height) = (depth.width(), depth.height());
+        let own = Camera { width, height, ..self.camera };
+        if let Some(lens) = self.lens {
+            depth = remaps.get(own, lens).depth(&depth)?;
+        }
+        Ok(register_depth(&depth, &own, &self.t_color_depth, camera))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    #[test]
+    fn the_largest_value_is_no_measurement() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("depth.png");
+        for unit in [1e-3, 1e-4, 2.5e-4] {
+            let stored = DepthImage::new(2, 2, vec![0.0, 0.5, 1e3, 1.0]).unwrap();
+            stored.save(&path, unit).unwrap();
+            let mut depth = DepthImage::load(&path, unit).unwrap();
+            let said = drop_saturated(&mut depth, unit).unwrap();
+            assert!(said.starts_with("25.0 % of the pixels are 65535"), "{said}");
+            assert_eq!(depth.pixels()[2], 0.0);
+            assert_eq!(depth.pixels().iter().filter(|z| **z > 0.0).count(), 2);
+            assert_eq!(drop_saturated(&mut depth, unit), None);
+        }
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let camera = Camera::from_k([400.0, 0.0, 20.0, 0.0, 400.0, 15.0, 0.0, 0.0, 1.0], 1, 1);
+        let camera = camera.ok().map(Intrinsics);
+        let place =
+            (Some(Rotation(UnitQuaternion::identity(), None)), Some(Numbers([10.0, 0.0, 0.0])));
+        let missing = |camera, place| DepthCamera::new(camera, None, place).err();
+        assert_eq!(missing(camera, (None, place.1)), Some("cam_R_d2c"));
+        assert_eq!(missing(camera, (place.0, None)), Some("cam_t_d2c"));
+        assert_eq!(missing(None, place), Some("depth_K"));
+        assert!(DepthCamera::new(None, None, (None, None)).unwrap().is_none());
+        let known = DepthCamera::new(camera, None, place).unwrap().unwrap();
+        assert_eq!(known.t_color_depth.translation.x, 0.01);
+    }
 }

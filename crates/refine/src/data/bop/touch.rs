@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::error::DatasetError;
+use super::error::{DatasetError, Origin};
 use super::json::JsonFile;
 use super::numbers::{NonNegative, Numbers};
 
@@ -20,6 +20,7 @@ pub struct Tactile {
     pub body: String,
     /// What it says.
     pub reading: TactileReading,
+    pub(crate) origin: Origin,
 }
 
 /// What a sensor of touch says. Layouts are tables of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of the readings.
@@ -113,13 +114,15 @@ impl TactileEntry {
     /// The sensor, of the body `default` if it does not say which carries it. Layouts are in `folder`.
     ///
     /// # Errors
-    /// The field that is missing or has an impossible value, and the problem.
+    /// If a field is missing or has an impossible value.
     pub(crate) fn read(
         self,
         folder: &Path,
         default: Option<&str>,
-    ) -> Result<Tactile, (&'static str, String)> {
-        let missing = |name| move || (name, "is missing".to_owned());
+        origin: Origin,
+    ) -> Result<Tactile, DatasetError> {
+        let at = &origin;
+        let missing = |name| move || at.fault(name, "is missing");
         let taxels = || self.taxels.map(|taxels| folder.join(taxels)).ok_or_else(missing("taxels"));
         let reading = match self.kind {
             SensorKindName::Force => {
@@ -141,14 +144,14 @@ impl TactileEntry {
             SensorKindName::Patch => {
                 let points = self.points.ok_or_else(missing("points"))?;
                 let normals = self.normals.ok_or_else(missing("normals"))?;
-                let fault = |problem| ("normals", problem);
                 if points.len() != normals.len() {
                     let (points, normals) = (points.len(), normals.len());
-                    return Err(fault(format!("{normals}, but there are {points} points")));
+                    let problem = format!("{normals}, but there are {points} points");
+                    return Err(origin.fault("normals", problem));
                 }
                 let unit = |normal: Numbers<3>| {
                     let normal = Vector3::from(normal.0).try_normalize(1e-6);
-                    normal.ok_or_else(|| fault("one is zero".to_owned()))
+                    normal.ok_or_else(|| origin.fault("normals", "one is zero"))
                 };
                 TactileReading::Patch {
                     link: self.link.ok_or_else(missing("link"))?,
@@ -158,7 +161,7 @@ impl TactileEntry {
             }
         };
         let body = self.body.or_else(|| default.map(str::to_owned)).ok_or_else(missing("body"))?;
-        Ok(Tactile { body, reading })
+        Ok(Tactile { body, reading, origin })
     }
 }
 
@@ -171,8 +174,7 @@ impl Tactile {
     ) -> Result<Vec<Self>, DatasetError> {
         let mut read: Vec<Self> = Vec::new();
         for (name, entry) in file.entries::<TactileEntry>(im_id)? {
-            let fault = |(field, problem)| file.fault(&format!("{name}.{field}"), problem);
-            let sensor = entry.read(root, None).map_err(fault)?;
+            let sensor = entry.read(root, None, Origin::new(file.path(), &name))?;
             let is_force = |sensor: &Self| matches!(sensor.reading, TactileReading::Force { .. });
             if is_force(&sensor) && read.iter().any(is_force) {
                 return Err(file.fault(&name, "there are two sensors of kind force"));

@@ -2,7 +2,7 @@
 
 /// What a column holds, all rows one after the other, each row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Values {
+pub(super) enum Values {
     /// Whole numbers.
     Integers(Vec<i64>),
     /// Numbers, NaN where one is not known.
@@ -24,18 +24,18 @@ impl Values {
 
 /// A named column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TableColumn {
+pub(super) struct TableColumn {
     /// Its name.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// Shape of what it has in a row: empty for a single value.
-    pub shape: Vec<usize>,
+    pub(super) shape: Vec<usize>,
     /// What it has.
-    pub values: Values,
+    pub(super) values: Values,
 }
 
 impl TableColumn {
     /// How many values it has in a row.
-    pub fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.shape.iter().product()
     }
 

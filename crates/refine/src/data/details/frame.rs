@@ -43,7 +43,7 @@ pub struct TrackDetails {
 /// The columns of `frames`, in their order.
 ///
 /// Those of what no frame has, initial poses or how it was followed, are left out; `docs/EXPORT.md` lists them all.
-pub fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
+pub(super) fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter();
     let id = |name, of: fn(&Target) -> i64| {
         TableColumn::new(name, rows().map(|frame| of(&frame.target)), Values::Integers)

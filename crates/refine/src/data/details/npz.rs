@@ -1,15 +1,15 @@
 //! Columns as a NumPy archive: a ZIP file of arrays (`.npy` 1.0, NumPy Enhancement Proposal 1), stored as they are.
 
+use std::error::Error;
 use std::io::{Cursor, Write};
 
-use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::column::{TableColumn, Values};
 
 /// The content of the file. Entries have no time, so that the same columns are the same bytes.
-pub(super) fn archive(columns: &[TableColumn]) -> Result<Vec<u8>, ZipError> {
+pub(super) fn archive(columns: &[TableColumn]) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)

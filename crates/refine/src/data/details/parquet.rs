@@ -1,5 +1,6 @@
 //! Columns as a Parquet file, uncompressed, in one group of rows.
 
+use std::error::Error;
 use std::sync::Arc;
 
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
@@ -11,7 +12,7 @@ use parquet::schema::parser::parse_message_type;
 use super::column::{TableColumn, Values};
 
 /// The content of the file. Arrays of a row are lists, row-major: their lengths are the same in all rows, their shapes are not kept.
-pub(super) fn file(columns: &[TableColumn]) -> Result<Vec<u8>, ParquetError> {
+pub(super) fn file(columns: &[TableColumn]) -> Result<Vec<u8>, Box<dyn Error>> {
     let columns: Vec<&TableColumn> = columns.iter().filter(|column| column.width() > 0).collect();
     let fields: String = columns.iter().map(|column| field(column)).collect();
     let schema = Arc::new(parse_message_type(&format!("message frames {{ {fields} }}"))?);
@@ -25,7 +26,7 @@ pub(super) fn file(columns: &[TableColumn]) -> Result<Vec<u8>, ParquetError> {
         }
     }
     group.close()?;
-    writer.into_inner()
+    Ok(writer.into_inner()?)
 }
 
 /// A column in the words of a schema.

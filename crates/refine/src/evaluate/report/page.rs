@@ -175,10 +175,7 @@ impl Report {
         let figures = || frames.iter().flat_map(|frame| &frame.figures);
         columns.retain(|column| figures().any(|(own, value)| own == column && value.is_some()));
         let file = self.folder.join("index.html");
-        let fail = |e: serde_json::Error| DatasetError::Write {
-            file: file.clone(),
-            problem: e.to_string(),
-        };
+        let fail = |e: serde_json::Error| DatasetError::writing(&file, e);
         // Nothing in it may end the element that it is in, or begin a comment there.
         let data = serde_json::to_string(&self.document).map_err(fail)?.replace('<', "\\u003c");
         let mut page = String::with_capacity(data.len() + 100_000);

@@ -42,8 +42,8 @@ impl MaskBorder {
     pub(crate) fn within(width: usize, window: [Range<usize>; 2], set: &[bool]) -> Self {
         let [Range { start: left, end: right }, Range { start: top, .. }] = window;
         let columns = right - left;
-        let outside = chamfer(set, columns, true);
-        let inside = chamfer(set, columns, false);
+        let outside = pixel_distances(set, columns, true);
+        let inside = pixel_distances(set, columns, false);
         let signed = |(out, into): (&f32, &f32)| if *into > 0.0 { into - 0.5 } else { 0.5 - out };
         let distances = outside.iter().zip(&inside).map(signed).collect();
         Self { width, left, top, columns, distances }
@@ -96,7 +96,7 @@ impl MaskBorder {
 }
 
 /// Distance of each pixel of an image of `columns` columns to the nearest one that is `to` \[px\].
-fn chamfer(set: &[bool], columns: usize, to: bool) -> Vec<f32> {
+pub(crate) fn pixel_distances(set: &[bool], columns: usize, to: bool) -> Vec<f32> {
     let rows = set.len() / columns;
     let mut distances: Vec<f32> =
         set.iter().map(|set| if *set == to { 0.0 } else { f32::MAX }).collect();

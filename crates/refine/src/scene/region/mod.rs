@@ -10,7 +10,7 @@ use nalgebra::Vector2;
 use prehend_render::{Mask, RgbImage};
 
 use self::border::MOST_GROWTH;
-pub(crate) use self::border::MaskBorder;
+pub(crate) use self::border::{MaskBorder, pixel_distances};
 pub(crate) use self::colors::{ColorRatios, RegionColors, color_index};
 pub use self::settings::ForegroundSettings;
 use super::MASK_MARGIN;
