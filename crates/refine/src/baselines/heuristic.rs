@@ -212,7 +212,7 @@ impl Strategy for Heuristic {
             return Ok(estimate);
         }
         // Of all evidence that there is. A frame that lacks what the fused estimator needs has none.
-        let fused = self.factors.iter().cloned().fold(Fused::default(), Fused::with);
+        let fused = Fused { factors: self.factors.clone(), ..Fused::default() };
         let posterior = fused.posterior_at(frame, initial, &estimate.state);
         estimate.posterior = posterior.unwrap_or_else(|error| {
             log::info!("no posterior: {error}");
@@ -261,7 +261,7 @@ impl CandidateStep {
 mod tests {
     use std::ops::ControlFlow;
 
-    use nalgebra::{Isometry3, Point3, Vector3};
+    use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 
     use super::*;
     use crate::problem::{NoiseModel, Rows};
@@ -283,7 +283,7 @@ mod tests {
             let offset = state.center() - self.place;
             for k in 0..3 {
                 rows.add(offset[k], &self.noise.weighting(1), |row| {
-                    row.parameter(Block::ObjectPose, k, 1.0);
+                    row.block(Block::ObjectPose, Vector6::ith(k, 1.0).as_slice());
                 });
             }
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, Vector2, Vector3};
 
 use super::auxiliary::Auxiliary;
 use super::triangular::{cholesky, solve_lower};
@@ -221,14 +221,6 @@ impl NormalEquations {
         }
     }
 
-    /// The same by one parameter of `block`.
-    #[inline]
-    pub(super) fn push_entry(&mut self, block: Block, index: usize, derivative: f64) {
-        if let Some(offset) = self.offset(block) {
-            self.entries.push((offset + index, derivative));
-        }
-    }
-
     /// The derivatives by what the image is off by at `pixel`, seen along `ray`; dropped if nobody asks for them.
     #[inline]
     pub(super) fn push_warp(
@@ -263,26 +255,25 @@ impl NormalEquations {
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.
-    pub fn add<const N: usize>(
-        &mut self,
-        blocks: &[Block],
-        gradient: &SVector<f64, N>,
-        hessian: &SMatrix<f64, N, N>,
-    ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
-    }
-
-    /// The same of blocks whose size is not known beforehand.
     ///
     /// # Panics
     /// If there are fewer numbers than the blocks have.
-    pub fn add_dynamic(
+    pub fn add<'a>(
         &mut self,
         blocks: &[Block],
-        gradient: &DVector<f64>,
-        hessian: &DMatrix<f64>,
+        gradient: impl Into<DVectorView<'a, f64>>,
+        hessian: impl Into<DMatrixView<'a, f64>>,
     ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+        let (gradient, hessian) = (gradient.into(), hessian.into());
+        for row in places(&self.blocks, blocks) {
+            let mut part = self.gradient.rows_mut(row.to, row.size);
+            part += gradient.rows(row.from, row.size);
+            for column in places(&self.blocks, blocks) {
+                let size = (row.size, column.size);
+                let mut part = self.hessian.view_mut((row.to, column.to), size);
+                part += hessian.view((row.from, column.from), size);
+            }
+        }
     }
 
     /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements and, if asked for, by the coefficients of
@@ -293,7 +284,7 @@ impl NormalEquations {
         gradient: &DVector<f64>,
         hessian: &DMatrix<f64>,
     ) {
-        self.add_dynamic(blocks, gradient, hessian);
+        self.add(blocks, gradient, hessian);
         let own = blocks.iter().map(|b| b.dimension()).sum();
         let count = gradient.len() - own;
         let (known, auxiliary) = self.blocks_and_auxiliary();
@@ -333,23 +324,6 @@ impl NormalEquations {
         let (patches, n) = (self.patches, self.dimension());
         let auxiliary = self.by_auxiliary.get_or_insert_with(|| Auxiliary::new(patches, 0, n));
         (&self.blocks, auxiliary)
-    }
-
-    fn add_views(
-        &mut self,
-        blocks: &[Block],
-        gradient: &DVectorView<f64>,
-        hessian: &DMatrixView<f64>,
-    ) {
-        for row in places(&self.blocks, blocks) {
-            let mut part = self.gradient.rows_mut(row.to, row.size);
-            part += gradient.rows(row.from, row.size);
-            for column in places(&self.blocks, blocks) {
-                let size = (row.size, column.size);
-                let mut part = self.hessian.view_mut((row.to, column.to), size);
-                part += hessian.view((row.from, column.from), size);
-            }
-        }
     }
 }
 

@@ -68,12 +68,6 @@ impl Row<'_> {
         self.equations.push_entries(block, derivatives);
     }
 
-    /// Writes the derivative by one parameter of `block`, the only one of the block that counts.
-    #[inline]
-    pub fn parameter(&mut self, block: Block, index: usize, derivative: f64) {
-        self.equations.push_entry(block, index, derivative);
-    }
-
     /// Writes the derivatives by the camera, of a residual about what is seen at `pixel` along `ray` (x/z, y/z).
     #[inline]
     pub fn camera(&mut self, pixel: &Vector2<f64>, ray: &Vector2<f64>, derivatives: &[f64]) {

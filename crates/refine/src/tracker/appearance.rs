@@ -5,51 +5,35 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use prehend_render::{DepthImage, draw_depth};
-use serde::{Deserialize, Serialize};
 
 use super::settings::TrackerSettings;
 use super::sight::Sight;
-use super::sums::Sums;
+use crate::defaults::settings;
 use crate::scene::{
-    ColorRatios, ForegroundSettings, Frame, MaskBorder, Object, RegionColors, RegionEvidence,
+    ColorRatios, ForegroundSettings, Frame, MaskBorder, Object, RegionColors, RegionEvidence, Sums,
     color_index,
 };
 
-/// Settings of the object by its colors, where no depth is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct AppearanceSettings {
-    /// Distance around the object in which colors are learnt and compared, in radii of it.
-    pub around: f64,
-    /// Distance from the outline within which colors are mixed \[px\].
-    pub mixed: f64,
-    /// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
-    pub agreement: f64,
-    /// Area with its colors where an object is found, as a share of that seen before.
-    pub least_found: f64,
-    /// Number of places that are compared where an object is looked for.
-    pub places: usize,
-    /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
-    pub stated_sigma: f64,
-    /// Standard deviation of the sides of a box that is given for a mask \[px\].
-    pub box_sigma: f64,
-    /// Number of times that colors and pose are found in turns where no mask tells the object.
-    pub rounds: usize,
-}
-
-impl Default for AppearanceSettings {
-    fn default() -> Self {
-        Self {
-            around: 0.5,
-            mixed: 2.0,
-            agreement: 0.5,
-            least_found: 0.2,
-            places: 4,
-            stated_sigma: 5e-3,
-            box_sigma: 5.0,
-            rounds: 3,
-        }
+settings! {
+    /// Settings of the object by its colors, where no depth is measured.
+    #[derive(Copy)]
+    pub struct AppearanceSettings {
+        /// Distance around the object in which colors are learnt and compared, in radii of it.
+        pub around: f64 = 0.5,
+        /// Distance from the outline within which colors are mixed \[px\].
+        pub mixed: f64 = 2.0,
+        /// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
+        pub agreement: f64 = 0.5,
+        /// Area with its colors where an object is found, as a share of that seen before.
+        pub least_found: f64 = 0.2,
+        /// Number of places that are compared where an object is looked for.
+        pub places: usize = 4,
+        /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
+        pub stated_sigma: f64 = 5e-3,
+        /// Standard deviation of the sides of a box that is given for a mask \[px\].
+        pub box_sigma: f64 = 5.0,
+        /// Number of times that colors and pose are found in turns where no mask tells the object.
+        pub rounds: usize = 3,
     }
 }
 

@@ -7,10 +7,9 @@ use nalgebra::Point3;
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
-    BinaryTouchFactor, ContactPatchFactor, FreeSpaceFactor, HandDepthFactor, NoiseEstimate,
-    PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
-    ProximityFactor, RegionFactor, RenderingFactor, SupportFactor, TactileFactor, TouchModel,
-    ViewFactor,
+    FreeSpaceFactor, HandDepthFactor, NoiseEstimate, PenetrationFactor, PenetrationSettings,
+    PointToPlaneFactor, PointToPlaneSettings, RegionFactor, RenderingFactor, SupportFactor,
+    TactileFactor, TouchModel, ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
 use crate::scene::{CameraView, Occluders, PreparedFrame, TouchReading};
@@ -194,18 +193,22 @@ fn other_factors(
     }
     let is_uncertain = patches.is_some() && settings.blurred_contact;
     let surface = if is_uncertain { settings.patches.sigma } else { 0.0 };
-    let blurred = |noise: NoiseModel| noise.with_sigma(noise.sigma.hypot(surface));
+    let wide = |noise: NoiseModel| noise.widened(stage.kernel_scale);
+    let contact = |noise: NoiseModel| {
+        let noise = wide(noise);
+        noise.with_sigma(noise.sigma.hypot(surface))
+    };
     let touch = wanted(Modality::Touch);
     let inactive = stage.contact && wanted(Modality::Quiet);
     if (touch || inactive) && !hand.forces.is_empty() {
-        let mut tactile = settings.tactile.clone().widened(stage.kernel_scale);
-        match &mut tactile.touch {
-            _ if !touch => tactile.touch = TouchModel::Nothing,
-            TouchModel::Nothing => {}
-            TouchModel::Taxels(noise) => *noise = blurred(*noise),
-            TouchModel::Contacts(contacts) => contacts.noise = blurred(contacts.noise),
+        let mut tactile = settings.tactile.clone();
+        if !touch {
+            tactile.touch = TouchModel::Nothing;
         }
-        tactile.no_contact = blurred(tactile.no_contact);
+        if let Some(noise) = tactile.touch.noise_mut() {
+            *noise = contact(*noise);
+        }
+        tactile.no_contact = contact(tactile.no_contact);
         if !inactive {
             tactile.no_contact.sigma = f64::INFINITY;
         }
@@ -213,20 +216,21 @@ fn other_factors(
     }
     let has = |kind: fn(&TouchReading) -> bool| hand.touch.iter().any(kind);
     if (touch || inactive) && has(|reading| matches!(reading, TouchReading::Binary(_))) {
-        let mut binary = settings.binary_touch.clone().widened(stage.kernel_scale);
-        binary.contact = blurred(binary.contact);
-        binary.no_contact = blurred(binary.no_contact);
-        factors.push(Arc::new(BinaryTouchFactor::new(frame, &binary, [touch, inactive])?));
+        let mut binary = settings.binary_touch.clone();
+        binary.contact = contact(binary.contact);
+        binary.no_contact = contact(binary.no_contact);
+        factors.push(Arc::new(TactileFactor::binary(frame, &binary, [touch, inactive])?));
     }
     if touch && has(|reading| matches!(reading, TouchReading::Proximity(_))) {
-        let mut proximity = settings.proximity.clone().widened(stage.kernel_scale);
-        proximity.noise = blurred(proximity.noise);
-        factors.push(Arc::new(ProximityFactor::new(frame, &proximity)?));
+        let mut proximity = settings.proximity.clone();
+        proximity.noise = contact(proximity.noise);
+        factors.push(Arc::new(TactileFactor::proximity(frame, &proximity)?));
     }
     if touch && has(|reading| matches!(reading, TouchReading::Patch(_))) {
-        let mut patch = settings.contact_patch.clone().widened(stage.kernel_scale);
-        patch.position = blurred(patch.position);
-        factors.push(Arc::new(ContactPatchFactor::new(frame, &patch)?));
+        let mut patch = settings.contact_patch.clone();
+        patch.position = contact(patch.position);
+        patch.normal = wide(patch.normal);
+        factors.push(Arc::new(TactileFactor::patches(frame, &patch)?));
     }
     if stage.contact && wanted(Modality::Penetration) {
         let sigma = settings.penetration.sigma.hypot(surface);

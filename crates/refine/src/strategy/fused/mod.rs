@@ -35,7 +35,7 @@ pub use self::settings::{FusedSettings, HypothesisSettings, Modality, Nuisance, 
 pub use self::summary::PosteriorSummary;
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::{GaussianPrior, Layout, NoiseEstimate, PriorSettings, Scales};
+use crate::factor::{GaussianPrior, NoiseEstimate, PriorSettings, Scales};
 use crate::problem::{
     Block, Factor, ImageWarp, NormalEquations, Problem, Solution, State, SurfacePatches,
     Termination,
@@ -102,16 +102,15 @@ impl Fused {
         };
         let object = settings.sigmas(Block::ObjectPose);
         let by_rig = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
-        let layout = Layout::of(initial);
         // A rig is of one camera.
-        let variances = settings.all_sigmas(layout).map(|sigma| sigma * sigma);
+        let variances = settings.all_sigmas(initial).map(|sigma| sigma * sigma);
         let mut covariance = DMatrix::from_diagonal(&variances);
         covariance.view_mut((0, 0), by_rig.shape()).copy_from(&by_rig);
-        let scale = PriorSettings::scales(layout, scales);
+        let scale = PriorSettings::scales(initial, scales);
         let covariance = DMatrix::from_fn(scale.len(), scale.len(), |r, c| {
             scale[r] * scale[c] * covariance[(r, c)]
         });
-        let prior = GaussianPrior::correlated(initial.clone(), layout, &covariance);
+        let prior = GaussianPrior::correlated(initial.clone(), &covariance);
         let prior = prior.ok_or_else(|| {
             let problem = "the covariance is not positive definite".into();
             RefineError::Setting { name: "rig", problem }
