@@ -200,7 +200,8 @@ impl Strategy for Heuristic {
     ) -> Result<Estimate, RefineError> {
         let factors = self.factors(frame, initial)?;
         let judged = self.judged();
-        let judge = Recorder::judge(frame, self.checkpoint && judged.is_none(), &self.rendering)?;
+        let checkpoint = self.checkpoint && judged.is_none();
+        let judge = checkpoint.then(|| RenderingFactor::new(frame, &self.rendering)).transpose()?;
         // The gradients' names rather than the factors', as options and files have them.
         let gradients = self.gradients.iter().map(|gradient| gradient.name());
         let names = gradients.chain(self.factors.iter().map(|factor| factor.name()));

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::rendering_settings;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
+use crate::factor::RenderingFactor;
 use crate::problem::State;
 use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
@@ -49,7 +50,8 @@ impl Strategy for Icp {
         let object = frame.object();
         let cloud = KdTree::new(&frame.masked_points(self.points)?);
         let cloud = cloud.map_err(|_| RefineError::NoDepth)?;
-        let judge = Recorder::judge(frame, self.checkpoint, &rendering_settings())?;
+        let judge = || RenderingFactor::new(frame, &rendering_settings());
+        let judge = self.checkpoint.then(judge).transpose()?;
         let names = std::iter::once("icp");
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         let rule =

@@ -58,19 +58,12 @@ settings! {
     }
 }
 
-/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace).
-#[derive(Clone, Debug, PartialEq)]
+/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace). The default is nominal.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scales {
     pub(crate) groups: Vec<ErrorGroup>,
     pub(crate) log: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,
-}
-
-impl Default for Scales {
-    /// Nominal.
-    fn default() -> Self {
-        Self { groups: Vec::new(), log: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }
-    }
 }
 
 impl Scales {

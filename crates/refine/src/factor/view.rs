@@ -91,7 +91,7 @@ impl Factor for ViewFactor {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DVector, Point3, Vector3};
+    use nalgebra::{Point3, Vector3};
     use prehend_autodiff::lie::twist_row;
 
     use super::super::gradient_check::{assert_gradient, fixture, scene};
@@ -126,13 +126,14 @@ mod tests {
                     row.block(Block::HandPose, by_hand.as_slice());
                 });
             }
-            let unit_row = |size: usize, at: usize| DVector::ith(size, at, 1.0);
+            let unit_row =
+                |size: usize, at| (0..size).map(|k| f64::from(k == at)).collect::<Vec<_>>();
             rows.add(state.joints[5], &unit, |row| {
-                row.block(Block::Joints(16), unit_row(16, 5).as_slice());
+                row.block(Block::Joints(16), &unit_row(16, 5));
             });
             let bias = CameraCalibrationError::DEPTH_BIAS;
             let change = state.camera.parameters()[bias] - 0.01;
-            rows.add(change, &unit, |row| row.block(Block::Camera, unit_row(6, bias).as_slice()));
+            rows.add(change, &unit, |row| row.block(Block::Camera, &unit_row(6, bias)));
         }
     }
 

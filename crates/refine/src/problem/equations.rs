@@ -2,27 +2,27 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, Vector3};
 
 use super::auxiliary::Auxiliary;
 use super::triangular::{cholesky, solve_lower};
-use super::{Block, ImageWarp, Row};
+use super::{Block, ImageWarp};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
     blocks: Vec<Block>,
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) hessian: DMatrix<f64>,
     /// Number of surface patches, whose displacements no state holds: three auxiliary parameters each.
     patches: usize,
     /// By which the image may be off: its coefficients are auxiliary parameters, too, after the displacements.
-    image_warp: Option<Arc<ImageWarp>>,
+    pub(super) image_warp: Option<Arc<ImageWarp>>,
     /// Derivatives by auxiliary parameters, once something depends on them.
-    by_auxiliary: Option<Auxiliary>,
+    pub(super) by_auxiliary: Option<Auxiliary>,
     /// Place and derivative of each parameter of the row begun last, and of each auxiliary one.
-    entries: Vec<(usize, f64)>,
-    auxiliary_entries: Vec<(usize, f64)>,
+    pub(super) entries: Vec<(usize, f64)>,
+    pub(super) auxiliary_entries: Vec<(usize, f64)>,
     /// How many independent measurements the residuals amount to.
     degrees: f64,
 }
@@ -204,54 +204,6 @@ impl NormalEquations {
         &self.blocks
     }
 
-    /// Begins a row, the derivatives of a residual.
-    #[inline]
-    pub(super) fn begin_row(&mut self) -> Row<'_> {
-        self.entries.clear();
-        self.auxiliary_entries.clear();
-        Row { equations: self }
-    }
-
-    /// Derivatives of the row begun last by the parameters of `block`; dropped if nobody requested it.
-    #[inline]
-    pub(super) fn push_entries(&mut self, block: Block, derivatives: &[f64]) {
-        assert_eq!(derivatives.len(), block.dimension(), "derivatives by {block:?}");
-        if let Some(offset) = self.offset(block) {
-            self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
-        }
-    }
-
-    /// The derivatives by what the image is off by at `pixel`, seen along `ray`; dropped if nobody asks for them.
-    #[inline]
-    pub(super) fn push_warp(
-        &mut self,
-        pixel: &Vector2<f64>,
-        ray: &Vector2<f64>,
-        by_camera: &[f64],
-    ) {
-        let Some(warp) = &self.image_warp else { return };
-        let first = self.displacements();
-        let derivatives = warp.derivatives(pixel, ray, by_camera);
-        self.auxiliary_entries.extend(derivatives.map(|(k, derivative)| (first + k, derivative)));
-    }
-
-    /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
-    #[inline]
-    pub(super) fn finish_row(&mut self, residual: f64, weight: f64) {
-        for &(i, d) in &self.entries {
-            self.gradient[i] += weight * residual * d;
-            let column = &mut self.hessian.column_mut(i);
-            for &(j, e) in &self.entries {
-                column[j] += weight * d * e;
-            }
-        }
-        if let Some(auxiliary) =
-            self.by_auxiliary.as_mut().filter(|_| !self.auxiliary_entries.is_empty())
-        {
-            auxiliary.add_row(&self.auxiliary_entries, &self.entries, residual, weight);
-        }
-    }
-
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.
@@ -377,6 +329,7 @@ fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = Place> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::SVector;
     use prehend_geometry::SplitMix64;
 
     use super::*;

@@ -25,7 +25,7 @@ pub struct Problem {
     factors: Vec<Arc<dyn Factor>>,
     blocks: Vec<Block>,
     /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
-    patches: Option<Arc<SurfacePatches>>,
+    pub(crate) patches: Option<Arc<SurfacePatches>>,
     noise: NoiseScales,
 }
 

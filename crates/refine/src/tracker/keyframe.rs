@@ -157,7 +157,7 @@ impl Keyframe {
                     Normal::new(self, intensities, level, &pose, object, &brightness, variance);
                 variance = system.variance;
                 let share = (settings.effective_samples / system.samples).min(1.0);
-                let off = deviation(&pose, &expected, object);
+                let off = deviation(&pose, &expected, &object.center);
                 let mut hessian = system.hessian * share;
                 let mut gradient = system.gradient * share;
                 let mut block = hessian.fixed_view_mut::<6, 6>(0, 0);
@@ -212,9 +212,13 @@ impl Tracker {
     }
 }
 
-/// Twist about the object's center that takes `from` to `pose`.
-fn deviation(pose: &Isometry3<f64>, from: &Isometry3<f64>, object: &Object) -> Vector6<f64> {
-    let off = pose * object.center - from * object.center;
+/// Twist about the object's `center` that takes `from` to `pose`.
+pub(super) fn deviation(
+    pose: &Isometry3<f64>,
+    from: &Isometry3<f64>,
+    center: &Point3<f64>,
+) -> Vector6<f64> {
+    let off = pose * center - from * center;
     let turn = so3_log(&(pose.rotation * from.rotation.inverse()));
     Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z)
 }
@@ -332,7 +336,7 @@ mod tests {
             * before.inverse();
         let covariance = Matrix6::from_diagonal(&[9e-6, 9e-6, 9e-6, 9e-4, 9e-4, 9e-4].into());
         let aligned = keyframe.align(&second, object, &expected, &covariance).unwrap();
-        let off = deviation(&aligned.pose, &(truth * before), object);
+        let off = deviation(&aligned.pose, &(truth * before), &object.center);
         let squared = off.dot(&(aligned.covariance.try_inverse().unwrap() * off));
         assert!(squared < 20.0, "χ² of six degrees of freedom: {squared}");
         for (k, error) in [(0, 3e-3), (3, 0.03)] {

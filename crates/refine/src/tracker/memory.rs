@@ -5,7 +5,7 @@ use std::time::Duration;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
-use super::keyframe::Keyframe;
+use super::keyframe::{Keyframe, deviation};
 use super::modes::Modes;
 use super::settings::{ProcessNoise, TrackerSettings};
 use crate::factor::PriorSettings;
@@ -149,12 +149,9 @@ impl TrackState {
         next.followed = self.followed.wrapping_add(1);
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
-            let moved = next.state.t_cam_object * prediction.zero_velocity_pose.inverse();
-            let rest = prediction.zero_velocity_pose * next.state.object_center;
-            let off = next.state.center() - rest.coords;
-            let turn = so3_log(&moved.rotation);
-            let measured =
-                Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z) / prediction.seconds;
+            let State { t_cam_object, object_center, .. } = &next.state;
+            let moved = deviation(t_cam_object, &prediction.zero_velocity_pose, object_center);
+            let measured = moved / prediction.seconds;
             next.velocity += motion.gain * (measured - next.velocity);
         }
         next

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use super::{Fused, Stage, StageProblem};
+use super::{Fused, Stage};
 use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, Scales};
@@ -96,8 +96,7 @@ impl Fused {
         };
         let state = State { t_cam_object: *t_cam_object, ..initial.clone() };
         let mut settings = self.settings_for(&frame);
-        let StageProblem { problem, .. } =
-            self.stage_problem(&frame, &state, &state, &geometry, &mut settings)?;
+        let problem = self.stage_problem(&frame, &state, &state, &geometry, &mut settings)?;
         let prior: GaussianPrior = self.prior(&frame, initial, &Scales::default())?;
         let problem = problem.with_prior(Arc::new(prior));
         let solved = problem.solve_all(std::slice::from_ref(&state), &geometry.solver);
