@@ -39,6 +39,7 @@ pub mod baselines;
 pub mod calibration;
 pub mod check;
 pub mod data;
+mod defaults;
 mod error;
 mod estimator;
 pub mod evaluate;

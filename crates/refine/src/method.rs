@@ -1,11 +1,8 @@
 //! Ways to refine a pose, and their names: what `--method` picks and what studies compare.
 
-use std::sync::Arc;
-
 use crate::baselines::{GradientKind, Heuristic, Icp, RobustIcp};
 use crate::error::RefineError;
 use crate::problem::State;
-use crate::rig::Rig;
 use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Fused, FusedSettings, Modality, Nuisance, Observer, Strategy};
 
@@ -57,14 +54,6 @@ impl Method {
             Self::Heuristic(heuristic) => heuristic.exhaustive = true,
             Self::Icp(icp) => icp.step_tolerance = f64::NEG_INFINITY,
             Self::RobustIcp(_) => {}
-        }
-    }
-
-    /// The method for frames and objects that are corrected by `rig`, if there is one: the fused estimator takes that for known, others do not ask.
-    pub fn with_rig(&self, rig: Option<&Arc<Rig>>) -> Self {
-        match (self, rig) {
-            (Self::Fused(fused), Some(rig)) => Fused::clone(fused).with_rig(Arc::clone(rig)).into(),
-            _ => self.clone(),
         }
     }
 
@@ -148,21 +137,20 @@ impl Method {
     #[cfg(any(feature = "cli", test))]
     pub(crate) fn ablations() -> Vec<String> {
         let of = |kind: &'static str| move |m: Modality| format!("fused-{kind}-{}", m.name());
-        let without = Modality::ALL.into_iter().map(of("without"));
-        let only = Modality::ALL.into_iter().map(of("only"));
-        let fixed = Nuisance::ALL.into_iter().map(|group| format!("fused-fixed-{}", group.name()));
+        let without = Modality::ALL.iter().copied().map(of("without"));
+        let only = Modality::ALL.iter().copied().map(of("only"));
+        let fixed = Nuisance::ALL.iter().map(|group| format!("fused-fixed-{}", group.name()));
         without.chain(only).chain(fixed).chain(["fused-fixed-all".to_owned()]).collect()
     }
 
     /// The method called `name`, of default settings: one of [`all`](Self::all), or `fused-without-M` and `fused-only-M` of a [`Modality`],
-    /// `fused-fixed-N` of a [`Nuisance`] and `fused-fixed-all`. `colour` stands for `color`, as it was spelled before.
+    /// `fused-fixed-N` of a [`Nuisance`] and `fused-fixed-all`.
     pub fn named(name: &str) -> Option<Self> {
         Self::with_settings(name, &FusedSettings::default())
     }
 
     /// The method called `name`, as [`named`](Self::named) has it; one of the fused estimator changes `settings`.
     pub fn with_settings(name: &str, settings: &FusedSettings) -> Option<Self> {
-        let name = &name.replace("colour", "color")[..];
         if let Some(ablation) = name.strip_prefix("fused") {
             return ablated(settings.clone(), ablation).map(|settings| Fused::new(settings).into());
         }
@@ -185,7 +173,7 @@ impl Method {
 
 /// `settings` with less evidence or fewer quantities estimated: those of the name's part after `fused`.
 fn ablated(mut settings: FusedSettings, ablation: &str) -> Option<FusedSettings> {
-    let modality = |name: &str| Modality::ALL.into_iter().find(|m| m.name() == name);
+    let modality = |name: &str| Modality::ALL.iter().copied().find(|m| m.name() == name);
     if let Some(without) = ablation.strip_prefix("-without-") {
         let without = modality(without)?;
         settings.modalities.retain(|m| *m != without);
@@ -194,8 +182,8 @@ fn ablated(mut settings: FusedSettings, ablation: &str) -> Option<FusedSettings>
     } else if ablation == "-fixed-all" {
         settings.nuisances.clear();
     } else if let Some(fixed) = ablation.strip_prefix("-fixed-") {
-        let fixed = Nuisance::ALL.into_iter().find(|group| group.name() == fixed)?;
-        settings.nuisances.retain(|group| *group != fixed);
+        let fixed = Nuisance::ALL.iter().find(|group| group.name() == fixed)?;
+        settings.nuisances.retain(|group| group != fixed);
     } else if !ablation.is_empty() {
         return None;
     }
@@ -223,7 +211,6 @@ mod tests {
             assert!(Method::named(name).is_none(), "{name}");
         }
         let debug = |name: &str| format!("{:?}", Method::named(name));
-        assert_eq!(debug("fused-without-colour"), debug("fused-without-color"));
         assert_eq!(debug("combined"), format!("{:?}", Some(Method::combined())));
     }
 
@@ -234,14 +221,14 @@ mod tests {
             _ => panic!("{name}"),
         };
         let all = settings("fused");
-        for modality in Modality::ALL {
+        for modality in Modality::ALL.iter().copied() {
             let without = settings(&format!("fused-without-{}", modality.name()));
             assert_eq!(without.modalities.len(), all.modalities.len() - 1);
             assert!(!without.modalities.contains(&modality));
             let only = settings(&format!("fused-only-{}", modality.name()));
             assert_eq!(only.modalities, [modality]);
         }
-        for group in Nuisance::ALL {
+        for group in Nuisance::ALL.iter().copied() {
             let fixed = settings(&format!("fused-fixed-{}", group.name()));
             assert_eq!(fixed.nuisances.len(), all.nuisances.len() - 1);
             assert!(!fixed.nuisances.contains(&group) && fixed.modalities == all.modalities);

@@ -200,7 +200,8 @@ impl Strategy for Heuristic {
     ) -> Result<Estimate, RefineError> {
         let factors = self.factors(frame, initial)?;
         let judged = self.judged();
-        let judge = Recorder::judge(frame, self.checkpoint && judged.is_none(), &self.rendering)?;
+        let checkpoint = self.checkpoint && judged.is_none();
+        let judge = checkpoint.then(|| RenderingFactor::new(frame, &self.rendering)).transpose()?;
         // The gradients' names rather than the factors', as options and files have them.
         let gradients = self.gradients.iter().map(|gradient| gradient.name());
         let names = gradients.chain(self.factors.iter().map(|factor| factor.name()));
@@ -212,7 +213,7 @@ impl Strategy for Heuristic {
             return Ok(estimate);
         }
         // Of all evidence that there is. A frame that lacks what the fused estimator needs has none.
-        let fused = self.factors.iter().cloned().fold(Fused::default(), Fused::with);
+        let fused = Fused { factors: self.factors.clone(), ..Fused::default() };
         let posterior = fused.posterior_at(frame, initial, &estimate.state);
         estimate.posterior = posterior.unwrap_or_else(|error| {
             log::info!("no posterior: {error}");
@@ -257,7 +258,7 @@ impl CandidateStep {
 mod tests {
     use std::ops::ControlFlow;
 
-    use nalgebra::{Isometry3, Point3, Vector3};
+    use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 
     use super::*;
     use crate::problem::{NoiseModel, Rows};
@@ -279,7 +280,7 @@ mod tests {
             let offset = state.center() - self.place;
             for k in 0..3 {
                 rows.add(offset[k], &self.noise.weighting(1), |row| {
-                    row.parameter(Block::ObjectPose, k, 1.0);
+                    row.block(Block::ObjectPose, Vector6::ith(k, 1.0).as_slice());
                 });
             }
         }

@@ -8,6 +8,7 @@ use super::matcher::{Matcher, PointPair};
 use super::rendering_settings;
 use super::step::{StepRule, walk};
 use crate::error::RefineError;
+use crate::factor::RenderingFactor;
 use crate::problem::State;
 use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Observer, Recorder, Strategy};
@@ -47,7 +48,8 @@ impl Strategy for Icp {
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
         let matcher = Matcher::new(frame, self.points)?;
-        let judge = Recorder::judge(frame, self.checkpoint, &rendering_settings())?;
+        let judge = || RenderingFactor::new(frame, &rendering_settings());
+        let judge = self.checkpoint.then(judge).transpose()?;
         let names = std::iter::once("icp");
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         let rule =

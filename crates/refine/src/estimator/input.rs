@@ -68,9 +68,7 @@ impl<'a> EstimatorInput<'a> {
         backend: Option<&Arc<dyn Backend>>,
     ) -> Result<PreparedFrame<'_>, RefineError> {
         let mut prepared = PreparedFrame::new(&self.frame, &self.object)?;
-        if let Some(regions) = &self.regions {
-            prepared = prepared.with_regions(regions);
-        }
+        prepared.given_regions.clone_from(&self.regions);
         if let Some(backend) = backend {
             prepared = prepared.with_backend(Arc::clone(backend));
         }

@@ -144,7 +144,7 @@ impl Estimator {
         let Method::Fused(fused) = self.method_of(hypotheses)? else { return Ok(Vec::new()) };
         let prepared = refined.input.prepared(self.backend.as_ref())?;
         let initial = State::new(&prepared, &hypotheses.best)?;
-        fused.diagnose_estimate(&prepared, &initial, refined.estimate.clone())
+        fused.diagnose(&prepared, &initial, refined.estimate.clone())
     }
 
     /// A tracker; it searches in its first frame, unless [`start_from`](Tracker::start_from) gives a pose.
@@ -156,7 +156,7 @@ impl Estimator {
         if let Some(rig) = &self.rig {
             tracker = tracker.with_rig(Arc::clone(rig));
         }
-        tracker = self.factors.iter().cloned().fold(tracker, Tracker::with);
+        tracker.factors.clone_from(&self.factors);
         Ok(match &self.backend {
             Some(backend) => tracker.with_backend(Arc::clone(backend)),
             None => tracker,

@@ -4,32 +4,24 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
-use serde::{Deserialize, Serialize};
 
 use super::PointToPlaneSettings;
 use super::facing::facing;
+use crate::defaults::settings;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Object, PreparedFrame};
 
-/// Settings of [`FreeSpaceFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct FreeSpaceSettings {
-    /// Number of samples of the object's surface at most.
-    pub samples: usize,
-    /// Distance in front of measured depth up to which a sample costs nothing \[m\].
-    pub margin: f64,
-    /// Noise of distances beyond that \[m\]. EXPERIMENTS: Weight of free space.
-    pub noise: NoiseModel,
-    /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
-    pub grazing: f64,
-}
-
-impl Default for FreeSpaceSettings {
-    fn default() -> Self {
-        let PointToPlaneSettings { grazing, .. } = PointToPlaneSettings::default();
-        Self { samples: 400, margin: 3e-3, noise: NoiseModel::cauchy(2e-3, 10.0), grazing }
+settings! {
+    /// Settings of [`FreeSpaceFactor`].
+    pub struct FreeSpaceSettings {
+        /// Number of samples of the object's surface at most.
+        pub samples: usize = 400,
+        /// Distance in front of measured depth up to which a sample costs nothing \[m\].
+        pub margin: f64 = 3e-3,
+        /// Noise of distances beyond that \[m\]. EXPERIMENTS: Weight of free space.
+        pub noise: NoiseModel = NoiseModel::cauchy(2e-3, 10.0),
+        /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
+        pub grazing: f64 = PointToPlaneSettings::default().grazing,
     }
 }
 
@@ -100,11 +92,6 @@ impl FreeSpaceFactor {
             })
         })
     }
-
-    /// One of so many samples is taken.
-    fn stride(&self) -> usize {
-        self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
-    }
 }
 
 impl Factor for FreeSpaceFactor {
@@ -114,7 +101,8 @@ impl Factor for FreeSpaceFactor {
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
         let reprojected = state.camera.reprojected(&state.t_cam_object, &state.center());
-        let samples = self.object.samples.iter().step_by(self.stride());
+        let stride = self.object.sample_stride(self.settings.samples);
+        let samples = self.object.samples.iter().step_by(stride);
         let weighting = self.settings.noise.weighting(samples.len());
         for sample in samples {
             let place = state.t_cam_object * sample.point;

@@ -6,32 +6,24 @@ use nalgebra::{Point3, Vector2};
 use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::RobotSample;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State};
 use crate::scene::{Hand, PreparedFrame};
 
-/// Settings of [`HandDepthFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct HandDepthSettings {
-    /// Noise of distances of depth points from the hand \[m\]. EXPERIMENTS: Depth points of the hand near edges left out.
-    pub noise: NoiseModel,
-    /// Distance from where the hand is measured to be up to which a depth point is of it \[m\]: beyond, it is of something else.
-    pub reach: f64,
-    /// Margin around the object's mask, and beside other edges, in which pixels are not taken for the hand \[px\]: there depth is of both.
-    pub margin: usize,
-    /// Number of depth points looked at for one that is used, of robots of several bodies: a table may fill the image, and would leave hardly a point to
-    /// the hand.
-    pub candidates: usize,
-}
-
-impl Default for HandDepthSettings {
-    fn default() -> Self {
-        let noise = NoiseModel::cauchy(1e-3, 60.0);
-        Self { noise, reach: 15e-3, margin: 3, candidates: 8 }
+settings! {
+    /// Settings of [`HandDepthFactor`].
+    pub struct HandDepthSettings {
+        /// Noise of distances of depth points from the hand \[m\]. EXPERIMENTS: Depth points of the hand near edges left out.
+        pub noise: NoiseModel = NoiseModel::cauchy(1e-3, 60.0),
+        /// Distance from where the hand is measured to be up to which a depth point is of it \[m\]: beyond, it is of something else.
+        pub reach: f64 = 15e-3,
+        /// Margin around the object's mask, and beside other edges, in which pixels are not taken for the hand \[px\]: there depth is of both.
+        pub margin: usize = 3,
+        /// Number of depth points looked at for one that is used, of robots of several bodies: a table may fill the image, and would leave hardly a point to
+        /// the hand.
+        pub candidates: usize = 8,
     }
 }
 

@@ -20,16 +20,14 @@ pub use hand_depth::{HandDepthFactor, HandDepthSettings};
 pub use penetration::{PenetrationFactor, PenetrationSettings};
 pub(crate) use point_to_plane::NoiseEstimate;
 pub use point_to_plane::{PointToPlaneFactor, PointToPlaneSettings};
-pub(crate) use prior::Layout;
 pub use prior::{GaussianPrior, PriorSettings};
 pub use region::{RegionFactor, RegionSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
 pub use scales::{ErrorGroup, ScaleSettings, Scales};
 pub use support::{SupportFactor, SupportSettings};
 pub use tactile::{
-    BinaryTouchFactor, BinaryTouchSettings, ContactPatchFactor, ContactPatchSettings,
-    ContactSettings, ProximityFactor, ProximitySettings, TactileFactor, TactileSettings,
-    TouchModel,
+    BinaryTouchSettings, ContactPatchSettings, ContactSettings, ProximitySettings, TactileFactor,
+    TactileSettings, TouchModel,
 };
 pub use view::ViewFactor;
 

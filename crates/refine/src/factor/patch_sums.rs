@@ -114,7 +114,7 @@ pub(super) fn add_to(
     if gradient.len() > rigid {
         equations.add_with_auxiliary(&blocks, gradient, hessian);
     } else {
-        equations.add_dynamic(&blocks, gradient, hessian);
+        equations.add(&blocks, gradient, hessian);
     }
 }
 

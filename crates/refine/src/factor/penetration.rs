@@ -5,27 +5,20 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
 use crate::scene::{Hand, Object, PreparedFrame};
 
-/// Settings of [`PenetrationFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct PenetrationSettings {
-    /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of
-    /// skin and pads, and the errors of the models.
-    pub sigma: f64,
-    /// Area of a patch whose depth is independent of its neighbors' \[m²\].
-    pub area: f64,
-}
-
-impl Default for PenetrationSettings {
-    fn default() -> Self {
-        Self { sigma: 5e-4, area: 1e-4 }
+settings! {
+    /// Settings of [`PenetrationFactor`].
+    pub struct PenetrationSettings {
+        /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of
+        /// skin and pads, and the errors of the models.
+        pub sigma: f64 = 5e-4,
+        /// Area of a patch whose depth is independent of its neighbors' \[m²\].
+        pub area: f64 = 1e-4,
     }
 }
 

@@ -3,50 +3,50 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 use prehend_geometry::RobustKernel;
-use serde::{Deserialize, Serialize};
 
 use super::{ErrorGroup, Scales};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, CAUCHY_WIDTH, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
-use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError};
+use crate::scene::HandMeasurement;
 
-/// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
-/// tiny one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct PriorSettings {
-    /// Standard deviation of the object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
-    pub object_translation: f64,
-    /// Standard deviation of the object's rotation about each axis \[rad\].
-    pub object_rotation: f64,
-    /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
-    /// EXPERIMENTS: Probability of another rotation convention.
-    pub object_turned: f64,
-    /// Standard deviation of the hand's translation at the object's place, in each direction \[m\].
-    pub hand_translation: f64,
-    /// Standard deviation of the hand's rotation about each axis \[rad\].
-    pub hand_rotation: f64,
-    /// Standard deviation of each joint position \[rad or m\].
-    pub joints: f64,
-    /// Standard deviations of joints of which they are known, in the order of the joints: beyond the end of the list and where there is none, as all
-    /// others.
-    #[serde(skip)]
-    pub known_joints: Vec<Option<f64>>,
-    /// Standard deviation of the depth scale, as a part of depth.
-    pub depth_scale: f64,
-    /// Standard deviation of the depth bias \[m\].
-    pub depth_bias: f64,
-    /// Standard deviation of the principal point, across and down \[focal lengths\].
-    pub principal_point: f64,
-    /// Standard deviation of the focal length, as a part of it: also that of the model's size, which images tell no better.
-    pub focal_scale: f64,
-    /// Standard deviation of half of what the two focal lengths differ by, as a part of them.
-    pub aspect: f64,
-    /// Standard deviation of another camera's place beside the first, at the object's place, in each direction \[m\].
-    pub view_translation: f64,
-    /// Standard deviation of its rotation about each axis \[rad\].
-    pub view_rotation: f64,
+settings! {
+    /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
+    /// tiny one.
+    pub struct PriorSettings {
+        // An initial pose that is good to some centimeters and some tens of degrees, and a robot of common accuracy.
+        /// Standard deviation of the object's center in each direction \[m\]. Errors of the initial pose may be outliers (Cauchy's kernel).
+        pub object_translation: f64 = 0.03,
+        /// Standard deviation of the object's rotation about each axis \[rad\].
+        pub object_rotation: f64 = 0.4,
+        /// Probability that the initial rotation is off by half a turn about an axis of the model, or transposed, as where files differ in their conventions.
+        /// EXPERIMENTS: Probability of another rotation convention.
+        pub object_turned: f64 = 0.02,
+        /// Standard deviation of the hand's translation at the object's place, in each direction \[m\].
+        pub hand_translation: f64 = 2.1e-3,
+        /// Standard deviation of the hand's rotation about each axis \[rad\].
+        pub hand_rotation: f64 = 7e-3,
+        /// Standard deviation of each joint position \[rad or m\].
+        pub joints: f64 = 0.014,
+        /// Standard deviations of joints of which they are known, in the order of the joints: beyond the end of the list and where there is none, as all
+        /// others.
+        #[serde(skip)]
+        pub known_joints: Vec<Option<f64>> = Vec::new(),
+        /// Standard deviation of the depth scale, as a part of depth.
+        pub depth_scale: f64 = 4e-3,
+        /// Standard deviation of the depth bias \[m\].
+        pub depth_bias: f64 = 1e-3,
+        /// Standard deviation of the principal point, across and down \[focal lengths\].
+        pub principal_point: f64 = 1.7e-3,
+        /// Standard deviation of the focal length, as a part of it: also that of the model's size, which images tell no better.
+        pub focal_scale: f64 = 4e-3,
+        /// Standard deviation of half of what the two focal lengths differ by, as a part of them.
+        pub aspect: f64 = 2e-3,
+        /// Standard deviation of another camera's place beside the first, at the object's place, in each direction \[m\].
+        pub view_translation: f64 = 2e-3,
+        /// Standard deviation of its rotation about each axis \[rad\].
+        pub view_rotation: f64 = 4e-3,
+    }
 }
 
 impl PriorSettings {
@@ -73,13 +73,13 @@ impl PriorSettings {
         }
     }
 
-    /// The scale of each parameter of a state with `layout`.
-    pub(crate) fn scales(layout: Layout, scales: &Scales) -> Vec<f64> {
+    /// The scale of each parameter of `state`.
+    pub(crate) fn scales(state: &State, scales: &Scales) -> Vec<f64> {
         let of = |block: Block| {
             let scale = ErrorGroup::of(block).map_or(1.0, |group| scales.get(group));
             std::iter::repeat_n(scale, block.dimension())
         };
-        layout.blocks().into_iter().flat_map(of).collect()
+        state.blocks().into_iter().flat_map(of).collect()
     }
 
     /// The same with what is known of the pose and the joints of `hand`.
@@ -95,73 +95,9 @@ impl PriorSettings {
         prior
     }
 
-    /// The same of all that a state with `layout` holds.
-    pub(crate) fn all_sigmas(&self, layout: Layout) -> DVector<f64> {
-        DVector::from_vec(layout.blocks().iter().flat_map(|block| self.sigmas(*block)).collect())
-    }
-}
-
-impl Default for PriorSettings {
-    /// An initial pose that is good to some centimeters and some tens of degrees, and a robot of common accuracy.
-    fn default() -> Self {
-        Self {
-            object_translation: 0.03,
-            object_rotation: 0.4,
-            object_turned: 0.02,
-            hand_translation: 2.1e-3,
-            hand_rotation: 7e-3,
-            joints: 0.014,
-            known_joints: Vec::new(),
-            depth_scale: 4e-3,
-            depth_bias: 1e-3,
-            principal_point: 1.7e-3,
-            focal_scale: 4e-3,
-            aspect: 2e-3,
-            view_translation: 2e-3,
-            view_rotation: 4e-3,
-        }
-    }
-}
-
-/// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera, other cameras.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Layout {
-    joints: usize,
-    views: usize,
-}
-
-impl Layout {
-    pub(crate) fn new(joints: usize, views: usize) -> Self {
-        Self { joints, views }
-    }
-
-    /// Of `state`.
-    pub(crate) fn of(state: &State) -> Self {
-        Self::new(state.joints.len(), state.views.len())
-    }
-
-    pub(crate) fn len(self) -> usize {
-        self.offset(Block::View(self.views))
-    }
-
-    /// Its blocks, in order.
-    pub(crate) fn blocks(self) -> Vec<Block> {
-        let first = [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints), Block::Camera];
-        first.into_iter().chain((0..self.views).map(Block::View)).collect()
-    }
-
-    /// Where `block` begins.
-    pub(crate) fn offset(self, block: Block) -> usize {
-        match block {
-            Block::ObjectPose => 0,
-            Block::HandPose => Block::ObjectPose.dimension(),
-            Block::Joints(_) => self.offset(Block::HandPose) + Block::HandPose.dimension(),
-            Block::Camera => self.offset(Block::Joints(0)) + self.joints,
-            Block::View(k) => {
-                let first = self.offset(Block::Camera) + CameraCalibrationError::DIMENSION;
-                first + k * ViewCalibrationError::DIMENSION
-            }
-        }
+    /// Standard deviations of all parameters of `state`.
+    pub(crate) fn all_sigmas(&self, state: &State) -> DVector<f64> {
+        DVector::from_vec(state.blocks().into_iter().flat_map(|of| self.sigmas(of)).collect())
     }
 }
 
@@ -170,8 +106,8 @@ impl Layout {
 pub struct GaussianPrior {
     mean: State,
     center: Vector3<f64>,
-    layout: Layout,
-    whitener: Whitener,
+    /// Square root W of the information, lower triangular.
+    whitener: DMatrix<f64>,
     /// Inverse of the covariance of the object's deviation.
     object_information: Matrix6<f64>,
     /// Whether the object's displacement and rotation may be outliers (Cauchy's kernel).
@@ -179,14 +115,6 @@ pub struct GaussianPrior {
     /// Other rotations that the object may have in place of that of the mean, and what each costs \[nat\].
     others: Vec<UnitQuaternion<f64>>,
     cost_of_others: f64,
-}
-
-/// The square root of the information.
-enum Whitener {
-    /// Of independent deviations.
-    Diagonal(DVector<f64>),
-    /// Lower triangular.
-    Full(DMatrix<f64>),
 }
 
 impl GaussianPrior {
@@ -207,46 +135,35 @@ impl GaussianPrior {
         settings: &PriorSettings,
         scales: &Scales,
     ) -> Result<Self, RefineError> {
-        let layout = Layout::of(&mean);
-        let scale = DVector::from_vec(PriorSettings::scales(layout, scales));
-        let sigmas = settings.all_sigmas(layout).component_mul(&scale);
+        let scale = DVector::from_vec(PriorSettings::scales(&mean, scales));
+        let sigmas = settings.all_sigmas(&mean).component_mul(&scale);
         if let Some(wrong) = sigmas.iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
         }
         let information = sigmas.fixed_rows::<6>(0).map(|sigma| sigma.powi(-2));
-        Ok(Self {
-            center: mean.center(),
-            mean,
-            layout,
-            whitener: Whitener::Diagonal(sigmas.map(f64::recip)),
-            object_information: Matrix6::from_diagonal(&information),
-            has_outliers: true,
-            others: Vec::new(),
-            cost_of_others: 0.0,
-        })
+        let whitener = DMatrix::from_diagonal(&sigmas.map(f64::recip));
+        let prior = Self::new(mean, whitener, Matrix6::from_diagonal(&information));
+        Ok(prior.with_outliers())
     }
 
-    /// Correlated deviations from `mean`, whose parts are those of `layout`, of this covariance \[m, rad\]; `None` if it is not
-    /// positive definite.
-    pub(crate) fn correlated(
-        mean: State,
-        layout: Layout,
-        covariance: &DMatrix<f64>,
-    ) -> Option<Self> {
-        let whitener = Whitener::Full(ScaledCholesky::new(covariance, RIDGE)?.whitener()?);
-        let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
-        let object_information = object;
-        Some(Self {
+    /// Correlated deviations from `mean`, in the order of its [`blocks`](State::blocks), of this covariance \[m, rad\]; `None` if it is not positive definite.
+    pub(crate) fn correlated(mean: State, covariance: &DMatrix<f64>) -> Option<Self> {
+        let whitener = ScaledCholesky::new(covariance, RIDGE)?.whitener()?;
+        let information = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
+        Some(Self::new(mean, whitener, information))
+    }
+
+    fn new(mean: State, whitener: DMatrix<f64>, object_information: Matrix6<f64>) -> Self {
+        Self {
             center: mean.center(),
             mean,
-            layout,
             whitener,
             object_information,
             has_outliers: false,
             others: Vec::new(),
             cost_of_others: 0.0,
-        })
+        }
     }
 
     /// A mixture: with this `probability`, the object has one of the rotations `others` in place of that of the mean. Where components overlap, the nearest
@@ -326,61 +243,33 @@ impl Factor for GaussianPrior {
         let (expected, cost) = self.component(state);
         rows.add_constant(cost);
         let (object, by_object) = self.deviation(&state.t_cam_object, &expected, state);
-        let (hand, by_hand) = self.deviation(&state.t_cam_hand, &self.mean.t_cam_hand, state);
-        let joints = state.joints.iter().zip(&self.mean.joints).take(self.layout.joints);
-        let camera = state.camera.parameters().into_iter().zip(self.mean.camera.parameters());
-        let views = state.views.iter().zip(&self.mean.views).take(self.layout.views);
-        let views =
-            views.flat_map(|(now, then)| now.parameters().into_iter().zip(then.parameters()));
-        let cameras = camera.chain(views).map(|(now, then)| now - then);
-        let numbers = joints.map(|(now, then)| now - then).chain(cameras);
-        let all = object.iter().chain(&hand).copied().chain(numbers);
-        let deviations = DVector::from_iterator(self.layout.len(), all);
+        let (_, by_hand) = self.deviation(&state.t_cam_hand, &self.mean.t_cam_hand, state);
+        let calibrations = state.calibration_deviation(&self.mean);
+        let all = object.iter().chain(&calibrations).copied();
+        let whitened = &self.whitener * DVector::from_iterator(self.whitener.ncols(), all);
         let unit = NoiseModel::gaussian(1.0).weighting(1);
-        let whitened = match &self.whitener {
-            Whitener::Diagonal(roots) => roots.component_mul(&deviations),
-            Whitener::Full(whitener) => whitener * &deviations,
-        };
         let (weights, beyond) = self.object_weights(std::array::from_fn(|k| whitened[k]));
         rows.add_constant(beyond);
-        let weighting = |at: usize| weights.get(at).map_or(unit, |weight| unit.shared(*weight));
-        match &self.whitener {
-            Whitener::Diagonal(roots) => {
-                for block in self.layout.blocks() {
-                    let from = self.layout.offset(block);
-                    for at in 0..block.dimension() {
-                        let root = roots[from + at];
-                        let weighting = weighting(from + at);
-                        rows.add(whitened[from + at], &weighting, |row| match block {
-                            Block::ObjectPose => {
-                                row.block(block, (by_object.row(at).transpose() * root).as_slice());
-                            }
-                            Block::HandPose => {
-                                row.block(block, (by_hand.row(at).transpose() * root).as_slice());
-                            }
-                            Block::Joints(_) | Block::Camera | Block::View(_) => {
-                                row.parameter(block, at, root);
-                            }
-                        });
-                    }
-                }
-            }
-            Whitener::Full(whitener) => {
-                let blocks = self.layout.blocks();
-                for (k, residual) in whitened.iter().enumerate() {
-                    rows.add(*residual, &weighting(k), |row| {
-                        let all: Vec<f64> = whitener.row(k).iter().copied().collect();
-                        let object = by_object.tr_mul(&Vector6::from_column_slice(&all[..6]));
-                        let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..12]));
-                        row.block(Block::ObjectPose, object.as_slice());
-                        row.block(Block::HandPose, hand.as_slice());
-                        for &block in &blocks[2..] {
-                            let from = self.layout.offset(block);
-                            row.block(block, &all[from..from + block.dimension()]);
+        let blocks = self.mean.blocks();
+        for (k, residual) in whitened.iter().enumerate() {
+            let weighting = weights.get(k).map_or(unit, |weight| unit.shared(*weight));
+            rows.add(*residual, &weighting, |row| {
+                let all: Vec<f64> = self.whitener.row(k).iter().copied().collect();
+                let mut rest = &all[..];
+                for &block in &blocks {
+                    let (own, others) = rest.split_at(block.dimension());
+                    rest = others;
+                    let by_pose = match block {
+                        Block::ObjectPose => &by_object,
+                        Block::HandPose => &by_hand,
+                        Block::Joints(_) | Block::Camera | Block::View(_) => {
+                            row.block(block, own);
+                            continue;
                         }
-                    });
+                    };
+                    row.block(block, by_pose.tr_mul(&Vector6::from_column_slice(own)).as_slice());
                 }
-            }
+            });
         }
     }
 }
@@ -457,15 +346,14 @@ mod tests {
     #[test]
     fn independent_deviations_are_those_of_a_diagonal_covariance() {
         let (_, start) = fixture(0);
-        let layout = Layout::new(16, 0);
-        let variances = settings().all_sigmas(layout).map(|sigma| sigma.powi(2));
+        let variances = settings().all_sigmas(&start).map(|sigma| sigma.powi(2));
         let covariance = DMatrix::from_diagonal(&variances);
-        let full = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
+        let full = GaussianPrior::correlated(start.clone(), &covariance).unwrap();
         let full = full.with_outliers();
         let diagonal = GaussianPrior::independent(start.clone(), &settings()).unwrap();
-        let off: Vec<f64> = (0..layout.len()).map(|k| 0.01 * (k as f64 * 1.3).cos()).collect();
-        let state = start.retract(&layout.blocks(), &off);
-        let mut equations = [0, 1].map(|_| NormalEquations::new(&layout.blocks()));
+        let off: Vec<f64> = (0..variances.len()).map(|k| 0.01 * (k as f64 * 1.3).cos()).collect();
+        let state = start.retract(&start.blocks(), &off);
+        let mut equations = [0, 1].map(|_| NormalEquations::new(&start.blocks()));
         let costs = [
             full.linearize(&state, &mut equations[0]),
             diagonal.linearize(&state, &mut equations[1]),
@@ -479,13 +367,12 @@ mod tests {
     #[test]
     fn correlated_deviations_have_their_covariance_and_derivatives() {
         let (_, start) = fixture(0);
-        let layout = Layout::new(16, 0);
-        let n = layout.len();
+        let n = settings().all_sigmas(&start).len();
         let mixed = DMatrix::from_fn(n, n, |r, c| ((r * 7 + c * 3) as f64).sin());
         let covariance = (&mixed * mixed.transpose() + DMatrix::identity(n, n)) * 1e-4;
-        let prior = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
+        let prior = GaussianPrior::correlated(start.clone(), &covariance).unwrap();
         assert!(prior.cost(&start) < 1e-20 && prior.innovation(&start) < 1e-9);
-        let blocks = layout.blocks();
+        let blocks = start.blocks();
         let off: Vec<f64> = (0..n).map(|k| 0.02 * (k as f64 * 1.3).cos()).collect();
         // Small deviations are the parameters of the blocks themselves.
         let little: Vec<f64> = off.iter().map(|v| v * 1e-4).collect();

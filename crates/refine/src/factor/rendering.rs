@@ -9,56 +9,38 @@ use prehend_render::{
     PoseProblem, Session, Tile, light_samples,
 };
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::patch_sums::PatchSums;
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{CAUCHY_WIDTH, Factor, NormalEquations, State, SurfacePatches};
 use crate::scene::{Object, Occluders, PreparedFrame};
 
-/// Settings of [`RenderingFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct RenderingSettings {
-    /// Factor by which the image is made smaller.
-    pub downsample: usize,
-    /// True if colors are compared.
-    pub color: bool,
-    /// Occluders: what may hide the object.
-    pub occluders: Occluders,
-    /// Standard deviation of a color, relative to the object's brightness in the image: exposure is unknown, and a dark image is no better evidence than
-    /// a bright one. EXPERIMENTS: Weight of color.
-    pub sigma: f64,
-    /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
-    pub mask_sigma: f64,
-    /// Width of Cauchy's kernel of a color in units of [`CAUCHY_WIDTH`] standard deviations.
-    pub kernel_scale: f64,
-    /// Effective sample size of the pixels: the errors of shading, texture and segmentation reach over whole patches.
-    pub effective_pixels: f64,
-    /// Ridge of the estimated light, which pulls it towards the same from everywhere; see [`Light::fit`].
-    pub light_ridge: f64,
-    /// Number of pixels that the light is solved from at most, none of them beside one where the object is not seen. EXPERIMENTS: Light from pixels away
-    /// from outlines.
-    pub light_samples: usize,
-    /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
-    pub contour_half_width: f64,
-}
-
-impl Default for RenderingSettings {
-    fn default() -> Self {
-        Self {
-            downsample: 1,
-            color: true,
-            occluders: Occluders::Measured,
-            sigma: 0.15,
-            mask_sigma: 0.6,
-            kernel_scale: 1.0,
-            effective_pixels: 80.0,
-            light_ridge: 1e-2,
-            light_samples: 1000,
-            contour_half_width: 0.645,
-        }
+settings! {
+    /// Settings of [`RenderingFactor`].
+    pub struct RenderingSettings {
+        /// Factor by which the image is made smaller.
+        pub downsample: usize = 1,
+        /// True if colors are compared.
+        pub color: bool = true,
+        /// Occluders: what may hide the object.
+        pub occluders: Occluders = Occluders::Measured,
+        /// Standard deviation of a color, relative to the object's brightness in the image: exposure is unknown, and a dark image is no better evidence than
+        /// a bright one. EXPERIMENTS: Weight of color.
+        pub sigma: f64 = 0.15,
+        /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
+        pub mask_sigma: f64 = 0.6,
+        /// Width of Cauchy's kernel of a color in units of [`CAUCHY_WIDTH`] standard deviations.
+        pub kernel_scale: f64 = 1.0,
+        /// Effective sample size of the pixels: the errors of shading, texture and segmentation reach over whole patches.
+        pub effective_pixels: f64 = 80.0,
+        /// Ridge of the estimated light, which pulls it towards the same from everywhere; see [`Light::fit`].
+        pub light_ridge: f64 = 1e-2,
+        /// Number of pixels that the light is solved from at most, none of them beside one where the object is not seen. EXPERIMENTS: Light from pixels away
+        /// from outlines.
+        pub light_samples: usize = 1000,
+        /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
+        pub contour_half_width: f64 = 0.645,
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
+use crate::defaults::settings;
 use crate::problem::Block;
 
 /// A group of errors that share a scale.
@@ -42,40 +43,27 @@ impl ErrorGroup {
     }
 }
 
-/// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct ScaleSettings {
-    /// Standard deviation of the common logarithm c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are
-    /// known. EXPERIMENTS: Prior of scales.
-    pub common: f64,
-    /// Standard deviation of each group's own logarithm d. EXPERIMENTS: Prior of scales.
-    pub own: f64,
-    /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
-    pub noise: f64,
-}
-
-impl Default for ScaleSettings {
-    /// Errors within a factor of 2.5 of what is usual, groups alike within a factor of 1.6.
-    fn default() -> Self {
-        Self { common: 0.9, own: 0.3, noise: 0.35 }
+settings! {
+    /// Prior of the scales s of all groups: ln s = c + d, normal with mean zero, c common to all groups and d of each by itself.
+    #[derive(Copy)]
+    pub struct ScaleSettings {
+        // Errors within a factor of 2.5 of what is usual, groups alike within a factor of 1.6.
+        /// Standard deviation of the common logarithm c: whoever calibrates one thing with care does so with others. Zero, with `own`, for sizes that are
+        /// known. EXPERIMENTS: Prior of scales.
+        pub common: f64 = 0.9,
+        /// Standard deviation of each group's own logarithm d. EXPERIMENTS: Prior of scales.
+        pub own: f64 = 0.3,
+        /// Standard deviation of the logarithm of the scale of a factor's noise, each by itself.
+        pub noise: f64 = 0.35,
     }
 }
 
-/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace).
-#[derive(Clone, Debug, PartialEq)]
+/// Logarithms of scales, by the groups that a frame tells of: posterior mean and covariance (Laplace). The default is nominal.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scales {
     pub(crate) groups: Vec<ErrorGroup>,
     pub(crate) log: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,
-}
-
-impl Default for Scales {
-    /// Nominal.
-    fn default() -> Self {
-        Self { groups: Vec::new(), log: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }
-    }
 }
 
 impl Scales {

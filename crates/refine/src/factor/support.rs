@@ -5,45 +5,30 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3, Vector6};
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::compliant_balance::{CompliantBalance, Support};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{Hand, Object, PreparedFrame};
 
-/// Settings of [`SupportFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct SupportSettings {
-    /// Standard deviation of what is left unbalanced, as a share of all that acts on the object. EXPERIMENTS: Support factor.
-    pub sigma: f64,
-    /// Coefficient of friction: a generous one, since only what no forces could hold is evidence.
-    pub friction: f64,
-    /// Distance from the hand up to which the surface may yet touch it, the less the farther \[m\]: errors of models and joints.
-    pub reach: f64,
-    /// Number of samples of the object's surface at most.
-    pub samples: usize,
-    /// Contact area that bears half of what it would if it did not yield \[m²\].
-    pub area: f64,
-    /// Share of the felt forces that certainly acts: taxels' gains are off, and the rest may be more, never less.
-    pub felt: f64,
-    /// Force of a taxel at which it is believed half \[N\]: those that ring false feel less.
-    pub felt_force: f64,
-}
-
-impl Default for SupportSettings {
-    fn default() -> Self {
-        Self {
-            sigma: 0.2,
-            friction: 1.0,
-            reach: 5e-3,
-            samples: 500,
-            area: 1e-5,
-            felt: 0.5,
-            felt_force: 0.5,
-        }
+settings! {
+    /// Settings of [`SupportFactor`].
+    pub struct SupportSettings {
+        /// Standard deviation of what is left unbalanced, as a share of all that acts on the object. EXPERIMENTS: Support factor.
+        pub sigma: f64 = 0.2,
+        /// Coefficient of friction: a generous one, since only what no forces could hold is evidence.
+        pub friction: f64 = 1.0,
+        /// Distance from the hand up to which the surface may yet touch it, the less the farther \[m\]: errors of models and joints.
+        pub reach: f64 = 5e-3,
+        /// Number of samples of the object's surface at most.
+        pub samples: usize = 500,
+        /// Contact area that bears half of what it would if it did not yield \[m²\].
+        pub area: f64 = 1e-5,
+        /// Share of the felt forces that certainly acts: taxels' gains are off, and the rest may be more, never less.
+        pub felt: f64 = 0.5,
+        /// Force of a taxel at which it is believed half \[N\]: those that ring false feel less.
+        pub felt_force: f64 = 0.5,
     }
 }
 
@@ -137,7 +122,9 @@ impl SupportFactor {
     fn held(&self, state: &State) -> Option<Held> {
         let hand = self.robot.articulated(&state.t_cam_hand, &state.joints).ok()?;
         let mass_center = state.t_cam_object * self.object.inertial.center_of_mass;
-        let samples = self.object.samples.par_iter().step_by(self.stride()).with_min_len(128);
+        // Samples follow each other over the surface.
+        let stride = self.object.sample_stride(self.settings.samples);
+        let samples = self.object.samples.par_iter().step_by(stride).with_min_len(128);
         let near: Vec<Near> = samples
             .filter_map(|sample| {
                 let point = state.t_cam_object * sample.point;
@@ -157,11 +144,6 @@ impl SupportFactor {
         Some(Held { hand, mass_center, near, balance })
     }
 
-    /// One sample in so many is looked at: they follow each other over the surface.
-    fn stride(&self) -> usize {
-        self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
-    }
-
     /// A sample at `point` whose surface is pushed along `inward`, if it is near the hand and faces it.
     fn near(
         &self,
@@ -178,7 +160,8 @@ impl SupportFactor {
         }
         let normal = Unit::try_new(inward, 0.0)?;
         let friction = self.settings.friction;
-        let area = self.object.area * self.stride() as f64 / self.object.samples.len() as f64;
+        let stride = self.object.sample_stride(self.settings.samples);
+        let area = self.object.area * stride as f64 / self.object.samples.len() as f64;
         let compliance = self.settings.area / (area * left * left);
         let stiffening = 4.0 * apart / (left * reach);
         let support = Support { position: point, normal, friction, compliance };
@@ -232,7 +215,7 @@ impl Factor for SupportFactor {
         let (balance, nats) = (held.balance, self.nats());
         let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * nats;
         let hessian = jacobian.tr_mul(&(balance.residual_jacobian * &jacobian)) * nats;
-        equations.add_dynamic(&blocks, &gradient, &hessian);
+        equations.add(&blocks, &gradient, &hessian);
         nats * balance.value
     }
 }

@@ -84,7 +84,7 @@ impl Factor for ViewFactor {
         let gradient = chain.tr_mul(inner.gradient());
         let hessian = chain.tr_mul(&(inner.hessian() * &chain));
         let blocks = [Block::ObjectPose, Block::HandPose, joints, Block::View(self.index)];
-        equations.add_dynamic(&blocks, &gradient, &hessian);
+        equations.add(&blocks, &gradient, &hessian);
         cost
     }
 }
@@ -126,10 +126,14 @@ mod tests {
                     row.block(Block::HandPose, by_hand.as_slice());
                 });
             }
-            rows.add(state.joints[5], &unit, |row| row.parameter(Block::Joints(16), 5, 1.0));
+            let unit_row =
+                |size: usize, at| (0..size).map(|k| f64::from(k == at)).collect::<Vec<_>>();
+            rows.add(state.joints[5], &unit, |row| {
+                row.block(Block::Joints(16), &unit_row(16, 5));
+            });
             let bias = CameraCalibrationError::DEPTH_BIAS;
             let change = state.camera.parameters()[bias] - 0.01;
-            rows.add(change, &unit, |row| row.parameter(Block::Camera, bias, 1.0));
+            rows.add(change, &unit, |row| row.block(Block::Camera, &unit_row(6, bias)));
         }
     }
 

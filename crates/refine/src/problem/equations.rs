@@ -2,27 +2,27 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, Vector3};
 
 use super::auxiliary::Auxiliary;
 use super::triangular::{cholesky, solve_lower};
-use super::{Block, ImageWarp, Row};
+use super::{Block, ImageWarp};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
     blocks: Vec<Block>,
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) hessian: DMatrix<f64>,
     /// Number of surface patches, whose displacements no state holds: three auxiliary parameters each.
     patches: usize,
     /// By which the image may be off: its coefficients are auxiliary parameters, too, after the displacements.
-    image_warp: Option<Arc<ImageWarp>>,
+    pub(super) image_warp: Option<Arc<ImageWarp>>,
     /// Derivatives by auxiliary parameters, once something depends on them.
-    by_auxiliary: Option<Auxiliary>,
+    pub(super) by_auxiliary: Option<Auxiliary>,
     /// Place and derivative of each parameter of the row begun last, and of each auxiliary one.
-    entries: Vec<(usize, f64)>,
-    auxiliary_entries: Vec<(usize, f64)>,
+    pub(super) entries: Vec<(usize, f64)>,
+    pub(super) auxiliary_entries: Vec<(usize, f64)>,
     /// How many independent measurements the residuals amount to.
     degrees: f64,
 }
@@ -204,85 +204,28 @@ impl NormalEquations {
         &self.blocks
     }
 
-    /// Begins a row, the derivatives of a residual.
-    #[inline]
-    pub(super) fn begin_row(&mut self) -> Row<'_> {
-        self.entries.clear();
-        self.auxiliary_entries.clear();
-        Row { equations: self }
-    }
-
-    /// Derivatives of the row begun last by the parameters of `block`; dropped if nobody requested it.
-    #[inline]
-    pub(super) fn push_entries(&mut self, block: Block, derivatives: &[f64]) {
-        assert_eq!(derivatives.len(), block.dimension(), "derivatives by {block:?}");
-        if let Some(offset) = self.offset(block) {
-            self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
-        }
-    }
-
-    /// The same by one parameter of `block`.
-    #[inline]
-    pub(super) fn push_entry(&mut self, block: Block, index: usize, derivative: f64) {
-        if let Some(offset) = self.offset(block) {
-            self.entries.push((offset + index, derivative));
-        }
-    }
-
-    /// The derivatives by what the image is off by at `pixel`, seen along `ray`; dropped if nobody asks for them.
-    #[inline]
-    pub(super) fn push_warp(
-        &mut self,
-        pixel: &Vector2<f64>,
-        ray: &Vector2<f64>,
-        by_camera: &[f64],
-    ) {
-        let Some(warp) = &self.image_warp else { return };
-        let first = self.displacements();
-        let derivatives = warp.derivatives(pixel, ray, by_camera);
-        self.auxiliary_entries.extend(derivatives.map(|(k, derivative)| (first + k, derivative)));
-    }
-
-    /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
-    #[inline]
-    pub(super) fn finish_row(&mut self, residual: f64, weight: f64) {
-        for &(i, d) in &self.entries {
-            self.gradient[i] += weight * residual * d;
-            let column = &mut self.hessian.column_mut(i);
-            for &(j, e) in &self.entries {
-                column[j] += weight * d * e;
-            }
-        }
-        if let Some(auxiliary) =
-            self.by_auxiliary.as_mut().filter(|_| !self.auxiliary_entries.is_empty())
-        {
-            auxiliary.add_row(&self.auxiliary_entries, &self.entries, residual, weight);
-        }
-    }
-
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.
-    pub fn add<const N: usize>(
-        &mut self,
-        blocks: &[Block],
-        gradient: &SVector<f64, N>,
-        hessian: &SMatrix<f64, N, N>,
-    ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
-    }
-
-    /// The same of blocks whose size is not known beforehand.
     ///
     /// # Panics
     /// If there are fewer numbers than the blocks have.
-    pub fn add_dynamic(
+    pub fn add<'a>(
         &mut self,
         blocks: &[Block],
-        gradient: &DVector<f64>,
-        hessian: &DMatrix<f64>,
+        gradient: impl Into<DVectorView<'a, f64>>,
+        hessian: impl Into<DMatrixView<'a, f64>>,
     ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+        let (gradient, hessian) = (gradient.into(), hessian.into());
+        for row in places(&self.blocks, blocks) {
+            let mut part = self.gradient.rows_mut(row.to, row.size);
+            part += gradient.rows(row.from, row.size);
+            for column in places(&self.blocks, blocks) {
+                let size = (row.size, column.size);
+                let mut part = self.hessian.view_mut((row.to, column.to), size);
+                part += hessian.view((row.from, column.from), size);
+            }
+        }
     }
 
     /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements and, if asked for, by the coefficients of
@@ -293,7 +236,7 @@ impl NormalEquations {
         gradient: &DVector<f64>,
         hessian: &DMatrix<f64>,
     ) {
-        self.add_dynamic(blocks, gradient, hessian);
+        self.add(blocks, gradient, hessian);
         let own = blocks.iter().map(|b| b.dimension()).sum();
         let count = gradient.len() - own;
         let (known, auxiliary) = self.blocks_and_auxiliary();
@@ -333,23 +276,6 @@ impl NormalEquations {
         let (patches, n) = (self.patches, self.dimension());
         let auxiliary = self.by_auxiliary.get_or_insert_with(|| Auxiliary::new(patches, 0, n));
         (&self.blocks, auxiliary)
-    }
-
-    fn add_views(
-        &mut self,
-        blocks: &[Block],
-        gradient: &DVectorView<f64>,
-        hessian: &DMatrixView<f64>,
-    ) {
-        for row in places(&self.blocks, blocks) {
-            let mut part = self.gradient.rows_mut(row.to, row.size);
-            part += gradient.rows(row.from, row.size);
-            for column in places(&self.blocks, blocks) {
-                let size = (row.size, column.size);
-                let mut part = self.hessian.view_mut((row.to, column.to), size);
-                part += hessian.view((row.from, column.from), size);
-            }
-        }
     }
 }
 
@@ -403,6 +329,7 @@ fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = Place> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::SVector;
     use prehend_geometry::SplitMix64;
 
     use super::*;

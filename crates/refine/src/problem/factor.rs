@@ -1,7 +1,6 @@
 //! What one kind of evidence says of a state.
 
 use std::fmt;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -73,36 +72,6 @@ pub trait Factor: Send + Sync {
     /// eliminates nothing. Its gradient is that of its cost, and its cost takes less to compute.
     fn conditional_at(&self, _state: &State) -> Option<Box<dyn Factor + '_>> {
         None
-    }
-}
-
-impl<F: Factor + ?Sized> Factor for Arc<F> {
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
-
-    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        (**self).rows(state, rows);
-    }
-
-    fn cost(&self, state: &State) -> f64 {
-        (**self).cost(state)
-    }
-
-    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
-        (**self).linearize(state, equations)
-    }
-
-    fn cost_all(&self, states: &[State]) -> Vec<f64> {
-        (**self).cost_all(states)
-    }
-
-    fn linearize_all(&self, states: &[State], equations: &mut [NormalEquations]) -> Vec<f64> {
-        (**self).linearize_all(states, equations)
-    }
-
-    fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {
-        (**self).conditional_at(state)
     }
 }
 

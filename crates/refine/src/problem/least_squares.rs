@@ -1,6 +1,7 @@
 //! A sum of factors, and the way to its least value.
 
 use std::ops::ControlFlow;
+use std::slice;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -24,7 +25,7 @@ pub struct Problem {
     factors: Vec<Arc<dyn Factor>>,
     blocks: Vec<Block>,
     /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
-    patches: Option<Arc<SurfacePatches>>,
+    pub(crate) patches: Option<Arc<SurfacePatches>>,
     noise: NoiseScales,
 }
 
@@ -180,8 +181,7 @@ impl Problem {
 
     /// The cost at `state` of the model as it is \[nat\]. No derivative is computed.
     pub fn cost(&self, state: &State) -> f64 {
-        let cost = |factor: &Arc<dyn Factor>| self.scaled(factor.as_ref(), factor.cost(state));
-        self.prior.iter().chain(&self.factors).map(cost).sum()
+        self.cost_all(slice::from_ref(state))[0]
     }
 
     /// The [`cost`](Self::cost) at each of several states.
@@ -338,20 +338,12 @@ impl LeastSquares for Problem {
     type Point = State;
     type Linearization = Linearization;
 
-    /// The cost about `state`, factors side by side.
+    /// The cost about `state`.
     fn linearize(&self, state: &State) -> Linearization {
-        let contribution = |factor: &dyn Factor| {
-            let mut equations = self.no_equations();
-            let cost = factor.linearize(state, &mut equations);
-            self.contribution(factor, cost, equations)
-        };
-        let of_factors = self.factors.par_iter().map(|factor| contribution(factor.as_ref()));
-        let factors = of_factors.collect();
-        let prior = self.prior.as_ref().map(|prior| contribution(prior.as_ref()));
-        self.sum(state, prior, factors)
+        self.linearize_all(slice::from_ref(state)).remove(0)
     }
 
-    /// The same about several states: factors side by side, each with all states.
+    /// The costs about several states: factors side by side, each with all states.
     fn linearize_all(&self, states: &[State]) -> Vec<Linearization> {
         let contributions = |factor: &dyn Factor| {
             let mut equations = vec![self.no_equations(); states.len()];
@@ -415,7 +407,7 @@ mod tests {
             if equations.displacements() > 0 {
                 equations.add_with_auxiliary(&[Block::ObjectPose], &gradient, &hessian);
             } else {
-                equations.add_dynamic(&[Block::ObjectPose], &gradient, &hessian);
+                equations.add(&[Block::ObjectPose], &gradient, &hessian);
             }
             self.cost(state)
         }
@@ -435,7 +427,7 @@ mod tests {
 
         fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
             let (gradient, hessian) = (DVector::repeat(6, 1.0), DMatrix::identity(6, 6));
-            equations.add_dynamic(&[Block::ObjectPose], &gradient, &hessian);
+            equations.add(&[Block::ObjectPose], &gradient, &hessian);
             self.cost(state)
         }
     }

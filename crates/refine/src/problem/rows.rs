@@ -41,7 +41,9 @@ impl<'a> Rows<'a> {
             if residual != 0.0 {
                 equations.add_degrees(weighting.degrees);
             }
-            let mut row = equations.begin_row();
+            equations.entries.clear();
+            equations.auxiliary_entries.clear();
+            let mut row = Row { equations };
             jacobian(&mut row);
             row.add(residual, weighting.weight(residual));
         }
@@ -65,20 +67,21 @@ impl Row<'_> {
     /// If there are not as many as the block has parameters, or the state has another number of joints.
     #[inline]
     pub fn block(&mut self, block: Block, derivatives: &[f64]) {
-        self.equations.push_entries(block, derivatives);
-    }
-
-    /// Writes the derivative by one parameter of `block`, the only one of the block that counts.
-    #[inline]
-    pub fn parameter(&mut self, block: Block, index: usize, derivative: f64) {
-        self.equations.push_entry(block, index, derivative);
+        assert_eq!(derivatives.len(), block.dimension(), "derivatives by {block:?}");
+        if let Some(offset) = self.equations.offset(block) {
+            let derivatives = derivatives.iter().enumerate();
+            self.equations.entries.extend(derivatives.map(|(i, &d)| (offset + i, d)));
+        }
     }
 
     /// Writes the derivatives by the camera, of a residual about what is seen at `pixel` along `ray` (x/z, y/z).
     #[inline]
     pub fn camera(&mut self, pixel: &Vector2<f64>, ray: &Vector2<f64>, derivatives: &[f64]) {
         self.block(Block::Camera, derivatives);
-        self.equations.push_warp(pixel, ray, derivatives);
+        let Some(warp) = &self.equations.image_warp else { return };
+        let first = self.equations.displacements();
+        let derivatives = warp.derivatives(pixel, ray, derivatives);
+        self.equations.auxiliary_entries.extend(derivatives.map(|(k, d)| (first + k, d)));
     }
 
     /// Derivatives by the object's pose of a residual that changes by `direction`·v while a point of the object, now at
@@ -98,8 +101,20 @@ impl Row<'_> {
         self.block(Block::HandPose, (-object).as_slice());
     }
 
+    /// Adds ½ `weight` r² of the residual r.
     #[inline]
     fn add(self, residual: f64, weight: f64) {
-        self.equations.finish_row(residual, weight);
+        let NormalEquations { gradient, hessian, by_auxiliary, entries, auxiliary_entries, .. } =
+            self.equations;
+        for &(i, d) in &*entries {
+            gradient[i] += weight * residual * d;
+            let column = &mut hessian.column_mut(i);
+            for &(j, e) in &*entries {
+                column[j] += weight * d * e;
+            }
+        }
+        if let Some(auxiliary) = by_auxiliary.as_mut().filter(|_| !auxiliary_entries.is_empty()) {
+            auxiliary.add_row(auxiliary_entries, entries, residual, weight);
+        }
     }
 }

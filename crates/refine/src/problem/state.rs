@@ -99,6 +99,13 @@ impl State {
         (self.t_cam_object * self.object_center).coords
     }
 
+    /// All its blocks: object, hand, joints, camera, other cameras.
+    pub(crate) fn blocks(&self) -> Vec<Block> {
+        let first =
+            [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints.len()), Block::Camera];
+        first.into_iter().chain((0..self.views.len()).map(Block::View)).collect()
+    }
+
     /// The object's pose with another rotation, its center where it is.
     pub(crate) fn rotated_to(&self, rotation: &UnitQuaternion<f64>) -> Isometry3<f64> {
         let origin = self.center() - rotation * self.object_center.coords;

@@ -9,7 +9,7 @@ use prehend_render::Camera;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RefineError;
-use crate::factor::{Layout, PriorSettings};
+use crate::factor::PriorSettings;
 use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
 use crate::scene::{CameraCalibrationError, RemapCache, SurfaceDeviation};
 
@@ -169,7 +169,7 @@ impl Rig {
         jacobian
     }
 
-    /// Covariance of a frame's calibrations, in the order of [`Layout`], about what it says when corrected; `object` are the standard
+    /// Covariance of a frame's calibrations, in the order of [`State::blocks`], about what it says when corrected; `object` are the standard
     /// deviations of the object's pose.
     ///
     /// # Errors
@@ -184,12 +184,11 @@ impl Rig {
         if given != expected && given != 0 {
             return Err(of_other_joints(given, expected));
         }
-        let layout = Layout::new(given, 0);
         let object_rows = object.len();
         let mut jacobian = self.jacobian(said);
         // Where the object is, depth's field is a bias, and distortion a shift and another size.
         if let Some(pixel) = camera.project(&said.center().into()) {
-            let (at, first) = (layout.offset(Block::Camera) - object_rows, self.first_warp());
+            let (at, first) = (Block::HandPose.dimension() + given, self.first_warp());
             for (k, weight) in self.warp.depth.weights(pixel.x, pixel.y) {
                 jacobian[(at + CameraCalibrationError::DEPTH_BIAS, first + RADIAL + k)] += weight;
             }
@@ -197,7 +196,8 @@ impl Rig {
             jacobian.view_mut((at, first), radial.shape()).copy_from(&radial);
         }
         let known = &jacobian * &self.covariance * jacobian.transpose();
-        let mut covariance = DMatrix::zeros(layout.len(), layout.len());
+        let size = object_rows + known.nrows();
+        let mut covariance = DMatrix::zeros(size, size);
         covariance.view_mut((object_rows, object_rows), known.shape()).copy_from(&known);
         let own = object.iter().map(|sigma| sigma * sigma).chain(self.play.variances(given));
         own.enumerate().for_each(|(k, variance)| covariance[(k, k)] += variance);
@@ -216,14 +216,14 @@ impl Rig {
     ) -> Result<PriorSettings, RefineError> {
         let object = prior.sigmas(Block::ObjectPose);
         let variances = self.frame_covariance(said, camera, &object)?.diagonal();
-        let layout = Layout::new(said.joints.len(), 0);
         let sigma = |from: usize, count: usize| variances.rows(from, count).mean().sqrt();
-        let (hand, camera) = (layout.offset(Block::HandPose), layout.offset(Block::Camera));
+        let (hand, joints) = (object.len(), object.len() + Block::HandPose.dimension());
+        let camera = joints + said.joints.len();
         let mut prior = prior.clone();
         if let count @ 1.. = said.joints.len() {
             prior.hand_translation = sigma(hand, 3);
             prior.hand_rotation = sigma(hand + 3, 3);
-            prior.joints = sigma(layout.offset(Block::Joints(count)), count);
+            prior.joints = sigma(joints, count);
         }
         Ok(PriorSettings {
             depth_scale: sigma(camera, 1),

@@ -40,11 +40,6 @@ impl HandMeasurement {
         Self { forces, ..self }
     }
 
-    /// The same with what sensors say that measure no forces.
-    pub fn with_touch(self, touch: Vec<TouchReading>) -> Self {
-        Self { touch, ..self }
-    }
-
     /// The force on a taxel of which nothing is known, as on a dead one: it is no evidence of anything.
     pub const UNKNOWN_FORCE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
 

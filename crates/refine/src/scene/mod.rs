@@ -9,6 +9,7 @@ mod object;
 mod prepared_frame;
 mod region;
 mod remap_cache;
+mod sums;
 mod surface_deviation;
 mod target;
 mod touch;
@@ -27,6 +28,7 @@ pub(crate) use region::{
     ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index, pixel_distances,
 };
 pub(crate) use remap_cache::RemapCache;
+pub(crate) use sums::{Sums, squares};
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
 pub use target::Target;
 pub use touch::{BinaryContact, ContactPatch, ProximityReading, TouchReading};

@@ -143,6 +143,11 @@ impl Object {
         Ok(Self { stated_size: None, ..scaled })
     }
 
+    /// One of so many surface samples is taken where `most` are wanted at most.
+    pub(crate) fn sample_stride(&self, most: usize) -> usize {
+        self.samples.len().div_ceil(most.max(1)).max(1)
+    }
+
     /// Distance between the object's surfaces at two poses, at most \[m\]: that of its centers and, times its radius, the angle.
     pub(crate) fn surface_motion(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         (from * self.center - to * self.center).norm()

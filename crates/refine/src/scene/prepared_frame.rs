@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 use serde::{Deserialize, Serialize};
 
-use super::{ForegroundSettings, Frame, HandMeasurement, Object, RegionEvidence};
+use super::{ForegroundSettings, Frame, HandMeasurement, Object, RegionEvidence, Sums};
 use crate::error::RefineError;
 
 /// A frame and the object whose pose is sought, checked, with what factors derive from them: each image is made when it is first asked
@@ -25,12 +25,12 @@ pub struct PreparedFrame<'a> {
     brightness: OnceLock<f64>,
     /// Regions by mask and colors.
     regions: OnceLock<(ForegroundSettings, Arc<RegionEvidence>)>,
-    /// Regions that were found otherwise.
-    given_regions: Option<Arc<RegionEvidence>>,
+    /// Regions that are not those of the mask and the frame's own colors.
+    pub(crate) given_regions: Option<Arc<RegionEvidence>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
-    focus: Option<[Range<usize>; 2]>,
+    pub(crate) focus: Option<[Range<usize>; 2]>,
     /// What other cameras saw of the object.
     views: Vec<CameraView<'a>>,
 }
@@ -114,8 +114,8 @@ impl<'a> PreparedFrame<'a> {
         &'b self,
         object: &'b Arc<Object>,
     ) -> Result<PreparedFrame<'b>, RefineError> {
-        let mut frame = PreparedFrame::new(self.frame, object)?;
-        frame = frame.with_hand_depth(self.hand_depth()).with_depth(self.depth());
+        let frame = PreparedFrame::new(self.frame, object)?;
+        let mut frame = frame.with_depths(self.hand_depth(), self.depth());
         frame.given_regions.clone_from(&self.given_regions);
         frame.backend.clone_from(&self.backend);
         Ok(frame)
@@ -140,24 +140,10 @@ impl<'a> PreparedFrame<'a> {
         self.backend.as_ref()
     }
 
-    /// The same with the depth image of the hand, which is known already \[m\].
-    pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
-        Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
-    }
-
-    /// The same with a copy of the measured depth, which is there already \[m\].
-    pub(crate) fn with_depth(self, depth: &Arc<DepthImage>) -> Self {
-        Self { depth: OnceLock::from(Arc::clone(depth)), ..self }
-    }
-
-    /// Frame whose regions are not those of its mask and its own colors.
-    pub(crate) fn with_regions(self, regions: &Arc<RegionEvidence>) -> Self {
-        Self { given_regions: Some(Arc::clone(regions)), ..self }
-    }
-
-    /// The same of an object that is nowhere but in these columns and rows.
-    pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
-        Self { focus: Some(focus), ..self }
+    /// Frame whose depth image of the hand and copy of the measured depth are known already \[m\].
+    pub(crate) fn with_depths(self, hand: &Arc<DepthImage>, measured: &Arc<DepthImage>) -> Self {
+        let [hand_depth, depth] = [hand, measured].map(|image| OnceLock::from(Arc::clone(image)));
+        Self { hand_depth, depth, ..self }
     }
 
     /// What other cameras saw of the object: those with a mask of it.
@@ -310,27 +296,11 @@ impl<'a> PreparedFrame<'a> {
 
 /// Pixels of an image of `width` columns whose neighbors up to `reach` columns and rows away are all set.
 pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
-    let (mut rows, mut all) = (vec![false; set.len()], vec![false; set.len()]);
-    let height = set.len() / width.max(1);
-    for y in 0..height {
-        let mut run = 0;
-        for x in 0..width {
-            run = if set[y * width + x] { run + 1 } else { 0 };
-            if run > 2 * reach {
-                rows[y * width + x - reach] = true;
-            }
-        }
-    }
-    let mut runs = vec![0; width];
-    for y in 0..height {
-        for (x, run) in runs.iter_mut().enumerate() {
-            *run = if rows[y * width + x] { *run + 1 } else { 0 };
-            if *run > 2 * reach {
-                all[(y - reach) * width + x] = true;
-            }
-        }
-    }
-    all
+    let values: Vec<f32> = set.iter().map(|set| f32::from(u8::from(*set))).collect();
+    let (columns, mut sums) = (width.max(1), Sums::default());
+    sums.find(&values, (columns, set.len() / columns), reach);
+    let all = (2 * reach + 1).pow(2) as f32;
+    sums.all.iter().map(|sum| *sum >= all).collect()
 }
 
 /// Root mean square of the colors under the mask; never zero.

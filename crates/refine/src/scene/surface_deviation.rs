@@ -4,42 +4,28 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, Vector3};
 use prehend_geometry::TriMesh;
-use serde::{Deserialize, Serialize};
 
 use super::Object;
 use super::gaussian_process::{InducingPoints, farthest_points};
+use crate::defaults::settings;
 use crate::error::RefineError;
 
-/// Deviation of the surface of an object from that of its model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct ModelErrorSettings {
-    /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
-    pub sigma: f64,
-    /// Length scale of its Gaussian process over the surface \[m\]. EXPERIMENTS: Number and smoothness of patches.
-    pub length_scale: f64,
-    /// Number of patches of what is seen that would cover the mask if all were full. EXPERIMENTS: Number and smoothness of patches.
-    pub patches: f64,
-    /// Number of patches at most.
-    pub max_patches: usize,
-    /// Width of a patch at least, as a share of the length scale: nearer ones are displaced alike.
-    pub min_width: f64,
-    /// Distance from the object, as a share of its distance from the camera, within which a measured depth is where a patch is; beyond, it is of something else.
-    pub near: f64,
-}
-
-impl Default for ModelErrorSettings {
-    /// A scan, or a careful model, of a thing that fits into a hand.
-    fn default() -> Self {
-        Self {
-            sigma: 7e-4,
-            length_scale: 20e-3,
-            patches: 30.0,
-            max_patches: 64,
-            min_width: 0.6,
-            near: 0.2,
-        }
+settings! {
+    /// Deviation of the surface of an object from that of its model.
+    pub struct ModelErrorSettings {
+        // A scan, or a careful model, of a thing that fits into a hand.
+        /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
+        pub sigma: f64 = 7e-4,
+        /// Length scale of its Gaussian process over the surface \[m\]. EXPERIMENTS: Number and smoothness of patches.
+        pub length_scale: f64 = 20e-3,
+        /// Number of patches of what is seen that would cover the mask if all were full. EXPERIMENTS: Number and smoothness of patches.
+        pub patches: f64 = 30.0,
+        /// Number of patches at most.
+        pub max_patches: usize = 64,
+        /// Width of a patch at least, as a share of the length scale: nearer ones are displaced alike.
+        pub min_width: f64 = 0.6,
+        /// Distance from the object, as a share of its distance from the camera, within which a measured depth is where a patch is; beyond, it is of something else.
+        pub near: f64 = 0.2,
     }
 }
 

@@ -49,7 +49,7 @@ pub struct PoseCandidate {
 /// stages 1 and 2, and nothing in the factors: without it, small and much hidden objects are often found turned.
 ///
 /// How a pose is turned is often wrong where an object looks much the same from both sides: what begins at the best one should try the others, too
-/// ([`Fused::with_alternatives`](crate::strategy::Fused::with_alternatives)).
+/// ([`Fused::alternatives`](crate::strategy::Fused::alternatives)).
 ///
 /// The result does not depend on the number of threads. Poses that look and feel alike (a symmetry) are
 /// equally good; one of them comes first.

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::{Hypothesis, Iteration, Posterior, Trace};
 use crate::error::RefineError;
-use crate::factor::{RenderingFactor, RenderingSettings};
+use crate::factor::RenderingFactor;
 use crate::problem::{Factor, State};
 use crate::scene::PreparedFrame;
 
@@ -113,18 +113,6 @@ impl<'a, 'b> Recorder<'a, 'b> {
     ) -> Self {
         let (best, trace) = (initial.clone(), Trace::new(names));
         Self { observe, iterations, judge, lowest: f64::INFINITY, best, at: 0, trace }
-    }
-
-    /// The paper's checkpoint: the rendering factor of `frame`, if it is wanted.
-    ///
-    /// # Errors
-    /// If the images do not fit the camera.
-    pub(crate) fn judge(
-        frame: &PreparedFrame<'_>,
-        checkpoint: bool,
-        settings: &RenderingSettings,
-    ) -> Result<Option<RenderingFactor>, RefineError> {
-        checkpoint.then(|| RenderingFactor::new(frame, settings)).transpose()
     }
 
     /// Records that the walk is at `state`, with the judge's cost there if it is known already.

@@ -5,51 +5,35 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use prehend_render::{DepthImage, draw_depth};
-use serde::{Deserialize, Serialize};
 
 use super::settings::TrackerSettings;
 use super::sight::Sight;
-use super::sums::Sums;
+use crate::defaults::settings;
 use crate::scene::{
-    ColorRatios, ForegroundSettings, Frame, MaskBorder, Object, RegionColors, RegionEvidence,
+    ColorRatios, ForegroundSettings, Frame, MaskBorder, Object, RegionColors, RegionEvidence, Sums,
     color_index,
 };
 
-/// Settings of the object by its colors, where no depth is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct AppearanceSettings {
-    /// Distance around the object in which colors are learnt and compared, in radii of it.
-    pub around: f64,
-    /// Distance from the outline within which colors are mixed \[px\].
-    pub mixed: f64,
-    /// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
-    pub agreement: f64,
-    /// Area with its colors where an object is found, as a share of that seen before.
-    pub least_found: f64,
-    /// Number of places that are compared where an object is looked for.
-    pub places: usize,
-    /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
-    pub stated_sigma: f64,
-    /// Standard deviation of the sides of a box that is given for a mask \[px\].
-    pub box_sigma: f64,
-    /// Number of times that colors and pose are found in turns where no mask tells the object.
-    pub rounds: usize,
-}
-
-impl Default for AppearanceSettings {
-    fn default() -> Self {
-        Self {
-            around: 0.5,
-            mixed: 2.0,
-            agreement: 0.5,
-            least_found: 0.2,
-            places: 4,
-            stated_sigma: 5e-3,
-            box_sigma: 5.0,
-            rounds: 3,
-        }
+settings! {
+    /// Settings of the object by its colors, where no depth is measured.
+    #[derive(Copy)]
+    pub struct AppearanceSettings {
+        /// Distance around the object in which colors are learnt and compared, in radii of it.
+        pub around: f64 = 0.5,
+        /// Distance from the outline within which colors are mixed \[px\].
+        pub mixed: f64 = 2.0,
+        /// Share of a given mask, and of the pixels that seem to show the object, which both must have for the mask to count.
+        pub agreement: f64 = 0.5,
+        /// Area with its colors where an object is found, as a share of that seen before.
+        pub least_found: f64 = 0.2,
+        /// Number of places that are compared where an object is looked for.
+        pub places: usize = 4,
+        /// Standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
+        pub stated_sigma: f64 = 5e-3,
+        /// Standard deviation of the sides of a box that is given for a mask \[px\].
+        pub box_sigma: f64 = 5.0,
+        /// Number of times that colors and pose are found in turns where no mask tells the object.
+        pub rounds: usize = 3,
     }
 }
 
@@ -82,30 +66,10 @@ struct Silhouette {
 }
 
 impl Silhouette {
-    /// Silhouette of `object` at a pose, with what is around it; none if that is not in the image.
-    fn new(
-        sight: &Sight,
-        object: &Object,
-        t_cam_object: &Isometry3<f64>,
-        settings: &AppearanceSettings,
-    ) -> Option<Self> {
-        let camera = &sight.frame.camera;
-        let center = t_cam_object * object.center;
-        if center.z <= object.radius {
-            return None;
-        }
-        let at = camera.project(&center)?;
-        let extent = (1.0 + settings.around) * object.radius * camera.fx.max(camera.fy)
-            / (center.z - object.radius);
-        let window = sight.part(&at, extent, 1);
-        let [columns, rows] = &window;
-        if columns.is_empty() || rows.is_empty() {
-            return None;
-        }
-        let part = camera.cropped(columns.start, rows.start, columns.len(), rows.len());
-        let mut depth = DepthImage::default();
-        draw_depth(&mut depth, &part, &[(&object.model, *t_cam_object)]);
-        depth.pixels().iter().any(|z| *z > 0.0).then_some(Self { window, depth })
+    /// Border of the object.
+    fn border(&self, sight: &Sight) -> MaskBorder {
+        let set: Vec<bool> = self.depth.pixels().iter().map(|z| *z > 0.0).collect();
+        MaskBorder::within(sight.frame.camera.width, self.window.clone(), &set)
     }
 
     /// Indices in the image of the pixels that should show the object.
@@ -150,13 +114,30 @@ impl Appearance {
         self.colors.ratios(self.foreground.color_limit, self.foreground.unseen)
     }
 
+    /// Silhouette of `object` at a pose, with what is around it; none if that is not in the image.
     fn silhouette(
         &self,
         sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> Option<Silhouette> {
-        Silhouette::new(sight, object, t_cam_object, &self.settings)
+        let camera = &sight.frame.camera;
+        let center = t_cam_object * object.center;
+        if center.z <= object.radius {
+            return None;
+        }
+        let at = camera.project(&center)?;
+        let extent = (1.0 + self.settings.around) * object.radius * camera.fx.max(camera.fy)
+            / (center.z - object.radius);
+        let window = sight.part(&at, extent, 1);
+        let [columns, rows] = &window;
+        if columns.is_empty() || rows.is_empty() {
+            return None;
+        }
+        let part = camera.cropped(columns.start, rows.start, columns.len(), rows.len());
+        let mut depth = DepthImage::default();
+        draw_depth(&mut depth, &part, &[(&object.model, *t_cam_object)]);
+        depth.pixels().iter().any(|z| *z > 0.0).then_some(Silhouette { window, depth })
     }
 
     /// True once both kinds of colors are known.
@@ -216,14 +197,12 @@ impl Appearance {
         about: &Isometry3<f64>,
     ) {
         let (camera, given) = (&sight.frame.camera, sight.given.pixels());
-        let Some(Silhouette { window, depth }) = self.silhouette(sight, object, about) else {
-            return;
-        };
-        let set: Vec<bool> = depth.pixels().iter().map(|z| *z > 0.0).collect();
-        let border = MaskBorder::within(camera.width, window.clone(), &set);
+        let Some(silhouette) = self.silhouette(sight, object, about) else { return };
+        let border = silhouette.border(sight);
         let sigma = self.settings.stated_sigma * camera.fx / (about * object.center).z;
         regions.add_border(&border, sigma as f32, f32::INFINITY);
         if sight.given.count() > 0 {
+            let window = silhouette.window;
             let [columns, rows] = window.clone();
             let set = rows.flat_map(|y| columns.clone().map(move |x| given[y * camera.width + x]));
             let border = MaskBorder::within(camera.width, window, &set.collect::<Vec<_>>());
@@ -258,9 +237,7 @@ impl Appearance {
     /// Learns colors from a frame with the object at `t_cam_object`.
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let Some(silhouette) = self.silhouette(sight, object, t_cam_object) else { return };
-        let set: Vec<bool> = silhouette.depth.pixels().iter().map(|z| *z > 0.0).collect();
-        let width = sight.frame.camera.width;
-        let border = MaskBorder::within(width, silhouette.window.clone(), &set);
+        let border = silhouette.border(sight);
         let (mask, color) = (sight.frame.mask.pixels(), &sight.frame.color);
         let mut shown = vec![false; color.pixels().len()];
         silhouette.shown(sight).for_each(|at| shown[at] = true);
@@ -273,7 +250,7 @@ impl Appearance {
         self.colors.learn(color, &border, mixed, shows, self.gain as f32);
         self.ratios = self.ratios();
         let shares = self.shares(sight, &silhouette);
-        let drawn = set.iter().filter(|set| **set).count() as f64;
+        let drawn = silhouette.depth.pixels().iter().filter(|z| **z > 0.0).count() as f64;
         self.area = drawn * shares[0] / pixels_per_area(sight, &(t_cam_object * object.center));
         let usual = self.usual.unwrap_or(shares);
         let next = |k: usize| usual[k] + self.gain * (shares[k] - usual[k]);

@@ -10,7 +10,7 @@ use prehend_autodiff::optimize::LeastSquares;
 
 use super::appearance::Appearance;
 use super::clock::{Clock, Timing};
-use super::memory::TrackState;
+use super::memory::{Moment, TrackState};
 use super::settings::Recovery;
 use super::sight::{Images, Sight};
 use super::tracked::{TrackStatus, Tracked};
@@ -48,8 +48,8 @@ impl Tracker {
             None => stated,
         };
         let (solved, posterior) = self.estimate(frame, &nominal, alternatives)?;
-        let (in_hand, level) = (frame.hand().is_some(), solved.cost());
-        let mut track = self.remember(time, &solved, &nominal, in_hand, level);
+        let moment = Moment { time, nominal, in_hand: frame.hand().is_some() };
+        let mut track = self.remember(&moment, &solved, solved.cost());
         self.begin_anew(&mut track, sight, &posterior);
         self.track = Some(track);
         self.learn(sight, &solved);
@@ -131,10 +131,12 @@ impl Tracker {
         initial: &State,
         alternatives: Option<Vec<Isometry3<f64>>>,
     ) -> Result<(Solved, Posterior), RefineError> {
-        let fused = Fused::new(self.settings.fused.clone());
-        let mut fused = self.factors.iter().cloned().fold(fused, Fused::with);
-        fused.rig.clone_from(&self.rig);
-        fused.alternatives = alternatives;
+        let fused = Fused {
+            settings: self.settings.fused.clone(),
+            factors: self.factors.clone(),
+            rig: self.rig.clone(),
+            alternatives,
+        };
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;

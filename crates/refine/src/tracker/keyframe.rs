@@ -5,53 +5,37 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log, twist_row};
 use prehend_render::{DepthImage, draw_depth};
-use serde::{Deserialize, Serialize};
 
 use super::Tracker;
 use super::memory::{Prediction, TrackState};
 use super::pyramid::{LEVELS, Level, pyramid};
 use super::sight::Sight;
+use crate::defaults::settings;
 use crate::scene::Object;
 
-/// Settings of the alignment of images to a keyframe.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct KeyframeSettings {
-    /// Number of points at most; zero for no alignment.
-    pub points: usize,
-    /// Effective sample size of their intensities at most: shading and interpolation err alike in neighbors. EXPERIMENTS: Image alignment also in a known
-    /// hand.
-    pub effective_samples: f64,
-    /// Share of the points that must be seen as in the keyframe, or this frame is the next one.
-    pub least_inliers: f64,
-    /// Share of the variance of intensities that must be explained, likewise.
-    pub least_explained: f64,
-    /// Drift of an object that seems to stand still, a random walk \[m/√s\]: errors that frames share are not averaged away.
-    pub drift: f64,
-    /// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
-    pub degrees: f64,
-    /// Intensity that is resolved: the smallest standard deviation of residuals, and contrast of a point that is of use. About one of 256 levels.
-    pub resolution: f64,
-    /// Margin about a point in which the object must be seen, too \[px\].
-    pub margin: usize,
-    /// Distance from the surface from which depth is of another thing \[m\].
-    pub off_surface: f64,
-}
-
-impl Default for KeyframeSettings {
-    fn default() -> Self {
-        Self {
-            points: 300,
-            effective_samples: 12.0,
-            least_inliers: 0.5,
-            least_explained: 0.8,
-            drift: 8e-4,
-            degrees: 4.0,
-            resolution: 4e-3,
-            margin: 2,
-            off_surface: 10e-3,
-        }
+settings! {
+    /// Settings of the alignment of images to a keyframe.
+    #[derive(Copy)]
+    pub struct KeyframeSettings {
+        /// Number of points at most; zero for no alignment.
+        pub points: usize = 300,
+        /// Effective sample size of their intensities at most: shading and interpolation err alike in neighbors. EXPERIMENTS: Image alignment also in a known
+        /// hand.
+        pub effective_samples: f64 = 12.0,
+        /// Share of the points that must be seen as in the keyframe, or this frame is the next one.
+        pub least_inliers: f64 = 0.5,
+        /// Share of the variance of intensities that must be explained, likewise.
+        pub least_explained: f64 = 0.8,
+        /// Drift of an object that seems to stand still, a random walk \[m/√s\]: errors that frames share are not averaged away.
+        pub drift: f64 = 8e-4,
+        /// Degrees of freedom of the residuals' Student's t distribution (Lange, Little and Taylor, 1989).
+        pub degrees: f64 = 4.0,
+        /// Intensity that is resolved: the smallest standard deviation of residuals, and contrast of a point that is of use. About one of 256 levels.
+        pub resolution: f64 = 4e-3,
+        /// Margin about a point in which the object must be seen, too \[px\].
+        pub margin: usize = 2,
+        /// Distance from the surface from which depth is of another thing \[m\].
+        pub off_surface: f64 = 10e-3,
     }
 }
 
@@ -173,7 +157,7 @@ impl Keyframe {
                     Normal::new(self, intensities, level, &pose, object, &brightness, variance);
                 variance = system.variance;
                 let share = (settings.effective_samples / system.samples).min(1.0);
-                let off = deviation(&pose, &expected, object);
+                let off = deviation(&pose, &expected, &object.center);
                 let mut hessian = system.hessian * share;
                 let mut gradient = system.gradient * share;
                 let mut block = hessian.fixed_view_mut::<6, 6>(0, 0);
@@ -228,9 +212,13 @@ impl Tracker {
     }
 }
 
-/// Twist about the object's center that takes `from` to `pose`.
-fn deviation(pose: &Isometry3<f64>, from: &Isometry3<f64>, object: &Object) -> Vector6<f64> {
-    let off = pose * object.center - from * object.center;
+/// Twist about the object's `center` that takes `from` to `pose`.
+pub(super) fn deviation(
+    pose: &Isometry3<f64>,
+    from: &Isometry3<f64>,
+    center: &Point3<f64>,
+) -> Vector6<f64> {
+    let off = pose * center - from * center;
     let turn = so3_log(&(pose.rotation * from.rotation.inverse()));
     Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z)
 }
@@ -348,7 +336,7 @@ mod tests {
             * before.inverse();
         let covariance = Matrix6::from_diagonal(&[9e-6, 9e-6, 9e-6, 9e-4, 9e-4, 9e-4].into());
         let aligned = keyframe.align(&second, object, &expected, &covariance).unwrap();
-        let off = deviation(&aligned.pose, &(truth * before), object);
+        let off = deviation(&aligned.pose, &(truth * before), &object.center);
         let squared = off.dot(&(aligned.covariance.try_inverse().unwrap() * off));
         assert!(squared < 20.0, "χ² of six degrees of freedom: {squared}");
         for (k, error) in [(0, 3e-3), (3, 0.03)] {

@@ -5,12 +5,21 @@ use std::time::Duration;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
-use super::keyframe::Keyframe;
+use super::keyframe::{Keyframe, deviation};
 use super::modes::Modes;
 use super::settings::{ProcessNoise, TrackerSettings};
-use crate::factor::{Layout, PriorSettings};
+use crate::factor::PriorSettings;
 use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
+
+/// Measurements of a frame beside its images.
+pub(super) struct Moment {
+    pub(super) time: Duration,
+    /// The hand as it is said to be, without errors of cameras.
+    pub(super) nominal: State,
+    /// Whether the hand is known.
+    pub(super) in_hand: bool,
+}
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
@@ -28,9 +37,8 @@ pub(super) struct TrackState {
     /// Twist about the object's center, in the camera frame of then, relative to the hand where that was known
     /// \[m/s; rad/s\].
     velocity: Vector6<f64>,
-    /// Of the solution: see [`Layout`].
+    /// Of the solution, in the order of its [`blocks`](State::blocks).
     covariance: DMatrix<f64>,
-    layout: Layout,
     /// Running level of the misfit \[nat\].
     pub(super) level: f64,
     /// Frames in which something was seen, but not believed, less those in which it was believed again; not below zero.
@@ -50,7 +58,6 @@ pub(super) struct TrackState {
 pub(super) struct Prediction {
     pub(super) state: State,
     pub(super) covariance: DMatrix<f64>,
-    pub(super) layout: Layout,
     /// Where the object would be without its velocity.
     zero_velocity_pose: Isometry3<f64>,
     velocity: Vector6<f64>,
@@ -72,16 +79,14 @@ impl Prediction {
 }
 
 impl TrackState {
-    /// Of `point`, the solution of a frame in which the hand was said to be as in `nominal`, and known if `in_hand`.
+    /// Of `at`, the solution of a frame.
     pub(super) fn new(
-        time: Duration,
+        moment: &Moment,
         at: &Linearization,
-        nominal: &State,
-        in_hand: bool,
         prior: &PriorSettings,
         level: f64,
     ) -> Self {
-        let layout = layout_of(nominal, in_hand);
+        let &Moment { time, ref nominal, in_hand } = moment;
         let joints = at.state.joints.iter().zip(&nominal.joints);
         Self {
             time,
@@ -90,8 +95,7 @@ impl TrackState {
             hand_error: nominal.t_cam_hand.inverse() * at.state.t_cam_hand,
             joint_errors: joints.map(|(is, said)| is - said).collect(),
             velocity: Vector6::zeros(),
-            covariance: posterior(at, layout, prior),
-            layout,
+            covariance: posterior(at, prior),
             level,
             lost: 0,
             misses: 0,
@@ -145,29 +149,24 @@ impl TrackState {
         next.followed = self.followed.wrapping_add(1);
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
-            let moved = next.state.t_cam_object * prediction.zero_velocity_pose.inverse();
-            let rest = prediction.zero_velocity_pose * next.state.object_center;
-            let off = next.state.center() - rest.coords;
-            let turn = so3_log(&moved.rotation);
-            let measured =
-                Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z) / prediction.seconds;
+            let State { t_cam_object, object_center, .. } = &next.state;
+            let moved = deviation(t_cam_object, &prediction.zero_velocity_pose, object_center);
+            let measured = moved / prediction.seconds;
             next.velocity += motion.gain * (measured - next.velocity);
         }
         next
     }
 
-    /// What is expected at `time` where the hand is said to be as in `nominal`, and known if `in_hand`.
+    /// What is expected of a frame.
     pub(super) fn predict(
         &self,
-        time: Duration,
-        nominal: &State,
-        in_hand: bool,
+        moment: &Moment,
         prior: &PriorSettings,
         settings: &TrackerSettings,
     ) -> Prediction {
+        let &Moment { time, ref nominal, in_hand } = moment;
         let seconds = time.saturating_sub(self.time).as_secs_f64();
         let motion = settings.motion(in_hand);
-        let layout = layout_of(nominal, in_hand);
         let kept = (-seconds / settings.time_constant).exp();
         let (with_hand, velocity) = if in_hand == self.in_hand {
             let moved = match in_hand {
@@ -196,9 +195,9 @@ impl TrackState {
                 *view = view.changed(&before.parameters().map(|p| kept * p));
             }
         }
-        let stated = variances(prior, layout);
-        let covariance = if layout == self.layout {
-            let transition = transition(&with_hand.rotation, kept, layout);
+        let stated = variances(prior, &state);
+        let covariance = if state.blocks() == self.state.blocks() {
+            let transition = transition(&with_hand.rotation, kept, stated.len());
             &transition * &self.covariance * transition.transpose()
         } else {
             let mut fresh = DMatrix::from_diagonal(&stated);
@@ -217,7 +216,6 @@ impl TrackState {
         Prediction {
             state,
             covariance,
-            layout,
             zero_velocity_pose: rest,
             velocity,
             seconds,
@@ -239,9 +237,8 @@ fn both(turn: &UnitQuaternion<f64>, twist: &Vector6<f64>) -> Vector6<f64> {
     Vector6::from_iterator(halves.iter().flatten().copied())
 }
 
-/// What takes deviations of one frame to those of the next: twists turn with the hand, calibrations fade.
-fn transition(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<f64> {
-    let n = layout.len();
+/// What takes the `n` deviations of one frame to those of the next: twists turn with the hand, calibrations fade.
+fn transition(turn: &UnitQuaternion<f64>, kept: f64, n: usize) -> DMatrix<f64> {
     let mut transition = DMatrix::identity(n, n) * kept;
     let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
     for k in 0..4 {
@@ -251,31 +248,30 @@ fn transition(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<
     transition
 }
 
-/// What is known of frames like that of `nominal`; of the hand only if that is known.
-fn layout_of(nominal: &State, in_hand: bool) -> Layout {
-    Layout::new(if in_hand { nominal.joints.len() } else { 0 }, nominal.views.len())
-}
-
-/// Stated variances.
-fn variances(prior: &PriorSettings, layout: Layout) -> DVector<f64> {
-    prior.all_sigmas(layout).map(|sigma| sigma.powi(2))
+/// Stated variances of all parameters of `state`.
+fn variances(prior: &PriorSettings, state: &State) -> DVector<f64> {
+    prior.all_sigmas(state).map(|sigma| sigma.powi(2))
 }
 
 /// Covariance of what was solved for, and the stated one of the rest.
-fn posterior(at: &Linearization, layout: Layout, prior: &PriorSettings) -> DMatrix<f64> {
-    let mut covariance = DMatrix::from_diagonal(&variances(prior, layout));
+fn posterior(at: &Linearization, prior: &PriorSettings) -> DMatrix<f64> {
+    let mut covariance = DMatrix::from_diagonal(&variances(prior, &at.state));
     let Some(factor) = ScaledCholesky::new(at.equations.hessian(), RIDGE) else {
         return covariance;
     };
     let all = factor.inverse();
-    let n = all.nrows();
-    let mut places = Vec::with_capacity(n);
-    for block in at.equations.blocks() {
-        places.extend((0..block.dimension()).map(|k| layout.offset(*block) + k));
+    let mut places = Vec::with_capacity(all.nrows());
+    let mut first = 0;
+    for block in at.state.blocks() {
+        let next = first + block.dimension();
+        if let Some(from) = at.equations.offset(block) {
+            places.extend((first..next).zip(from..));
+        }
+        first = next;
     }
-    for r in 0..n {
-        for c in 0..n {
-            covariance[(places[r], places[c])] = all[(r, c)];
+    for &(r, from) in &places {
+        for &(c, to) in &places {
+            covariance[(r, c)] = all[(from, to)];
         }
     }
     covariance

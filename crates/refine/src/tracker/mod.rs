@@ -10,7 +10,6 @@ mod pyramid;
 mod segmentation;
 mod settings;
 mod sight;
-mod sums;
 
 /// Refuses a frame with other bodies than the first one: joints would be those of something else.
 fn require_same(first: &Arc<Hand>, now: &Arc<Hand>) -> Result<(), RefineError> {
@@ -45,7 +44,7 @@ pub use self::appearance::AppearanceSettings;
 use self::clock::Clock;
 pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
-use self::memory::{Prediction, TrackState};
+use self::memory::{Moment, Prediction, TrackState};
 use self::modes::{Followed, Modes};
 pub use self::segmentation::SegmentationSettings;
 use self::segmentation::Segmenter;
@@ -98,7 +97,7 @@ pub struct Tracker {
     hand: Option<Arc<Hand>>,
     settings: TrackerSettings,
     /// Factors of all frames besides.
-    factors: Vec<Arc<dyn Factor>>,
+    pub(crate) factors: Vec<Arc<dyn Factor>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<Arc<Rig>>,
@@ -208,19 +207,19 @@ impl Tracker {
                 _ => self.hand = Some(Arc::clone(hand)),
             }
         }
-        let in_hand = observation.hand.is_some();
         let Some(track) = self.track.clone() else {
             return self
                 .with_sight(observation, |tracker, sight| tracker.begin(sight, time, &mut clock));
         };
         let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
-        let mut prediction = track.predict(time, &nominal, in_hand, &self.prior, &self.settings);
+        let moment = Moment { time, nominal, in_hand: observation.hand.is_some() };
+        let mut prediction = track.predict(&moment, &self.prior, &self.settings);
         if !clock.has(Duration::ZERO) {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
         self.with_sight(observation, |tracker, sight| {
             tracker.align(sight, &track, &mut prediction);
-            tracker.look(sight, &track, &prediction, &nominal, time, &mut clock)
+            tracker.look(sight, &track, &prediction, &moment, &mut clock)
         })
     }
 
@@ -249,11 +248,9 @@ impl Tracker {
         sight: &mut Sight,
         track: &TrackState,
         prediction: &Prediction,
-        nominal: &State,
-        time: Duration,
+        moment: &Moment,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
-        let in_hand = sight.frame.hand.is_some();
         let seen = self.segment(sight, &prediction.state.t_cam_object);
         let mut timing = Timing::default();
         // What was away for long may be held in another way: it is looked for everywhere then.
@@ -263,7 +260,7 @@ impl Tracker {
         if seen && long_lost {
             rejection = Rejection::LongLost;
         } else if seen {
-            match self.follow(sight, track, prediction, nominal, time, clock, &mut timing)? {
+            match self.follow(sight, track, prediction, moment, clock, &mut timing)? {
                 Ok(tracked) => return Ok(tracked),
                 Err(own) => rejection = own,
             }
@@ -277,7 +274,7 @@ impl Tracker {
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
             let level = track.level + self.settings.gain * (solved.cost() - track.level);
-            let mut next = self.remember(time, &solved, nominal, in_hand, level);
+            let mut next = self.remember(moment, &solved, level);
             next.lost = track.lost;
             self.begin_anew(&mut next, sight, &posterior);
             self.track = Some(next);
@@ -291,21 +288,18 @@ impl Tracker {
     }
 
     /// Follows the object from where it should be: the frame's outcome, or why it is not believed.
-    #[allow(clippy::too_many_arguments)] // all that a frame has
     fn follow(
         &mut self,
         sight: &Sight,
         track: &TrackState,
         prediction: &Prediction,
-        nominal: &State,
-        time: Duration,
+        moment: &Moment,
         clock: &mut Clock,
         timing: &mut Timing,
     ) -> Result<Result<Tracked, Rejection>, RefineError> {
         let object = Arc::clone(&self.object);
         let frame = self.frame(sight, &object)?;
-        let in_hand = frame.hand().is_some();
-        let predicted = &prediction.state;
+        let (predicted, nominal) = (&prediction.state, &moment.nominal);
         let (problem, prior) = self.prepare(&frame, prediction)?;
         timing.preparation = clock.lap();
         if !clock.has(Duration::ZERO) {
@@ -328,7 +322,7 @@ impl Tracker {
         if let Some(rejection) = doubt {
             return Ok(Err(rejection));
         }
-        let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(in_hand));
+        let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(moment.in_hand));
         let rotation = solved.solution.at.state.t_cam_object.rotation;
         let mut is_turned = false;
         if modes.is_new_view(&rotation, self.settings.new_view) && clock.has(2 * timing.steps) {
@@ -343,7 +337,7 @@ impl Tracker {
         }
         modes.add_to(&mut posterior, self.object.radius);
         let level = track.level + self.settings.gain * (solved.cost() - track.level);
-        let next = self.remember(time, &solved, nominal, in_hand, level);
+        let next = self.remember(moment, &solved, level);
         let mut next = track.followed(next, prediction, &motion);
         next.lost = track.lost.saturating_sub(1);
         next.modes = modes;
@@ -364,19 +358,14 @@ impl Tracker {
         sight: &'a Sight,
         object: &'a Arc<Object>,
     ) -> Result<PreparedFrame<'a>, RefineError> {
-        let mut frame =
-            PreparedFrame::new(&sight.frame, object)?.with_hand_depth(&sight.hand_depth);
-        frame = frame.with_depth(&sight.depth);
-        if let Some(focus) = &sight.focus {
-            frame = frame.with_focus(focus.clone());
-        }
-        if let Some(regions) = &sight.regions {
-            frame = frame.with_regions(regions);
-        }
-        if let Some(backend) = &self.backend {
-            frame = frame.with_backend(Arc::clone(backend));
-        }
-        Ok(frame)
+        let frame = PreparedFrame::new(&sight.frame, object)?;
+        let mut frame = frame.with_depths(&sight.hand_depth, &sight.depth);
+        frame.focus.clone_from(&sight.focus);
+        frame.given_regions.clone_from(&sight.regions);
+        Ok(match &self.backend {
+            Some(backend) => frame.with_backend(Arc::clone(backend)),
+            None => frame,
+        })
     }
 
     /// The problem of a frame, and its prior, which is the prediction.
@@ -385,8 +374,8 @@ impl Tracker {
         frame: &PreparedFrame<'_>,
         prediction: &Prediction,
     ) -> Result<(Problem, Arc<GaussianPrior>), RefineError> {
-        let Prediction { state, covariance, layout, .. } = prediction;
-        let prior = GaussianPrior::correlated(state.clone(), *layout, covariance);
+        let Prediction { state, covariance, .. } = prediction;
+        let prior = GaussianPrior::correlated(state.clone(), covariance);
         let prior = Arc::new(prior.ok_or_else(|| {
             let problem = "does not allow for a prediction".to_owned();
             RefineError::Setting { name: "prior", problem }
@@ -480,14 +469,7 @@ impl Tracker {
         Ok(posterior)
     }
 
-    fn remember(
-        &self,
-        time: Duration,
-        solved: &Solved,
-        nominal: &State,
-        in_hand: bool,
-        level: f64,
-    ) -> TrackState {
-        TrackState::new(time, &solved.solution.at, nominal, in_hand, &self.prior, level)
+    fn remember(&self, moment: &Moment, solved: &Solved, level: f64) -> TrackState {
+        TrackState::new(moment, &solved.solution.at, &self.prior, level)
     }
 }

@@ -124,11 +124,11 @@ impl Tracker {
             modes.add_turned(&turn, &self.object.center.coords);
         }
         modes.seen = pose.rotation;
-        let Prediction { state: expected, layout, covariance, .. } = frame.prediction;
+        let Prediction { state: expected, covariance, .. } = frame.prediction;
         let mut best: Option<(f64, Isometry3<f64>, Solved)> = None;
         for mode in &mut modes.others {
             let start = State { t_cam_object: pose * mode.in_object, ..expected.clone() };
-            let Some(prior) = GaussianPrior::correlated(start.clone(), *layout, covariance) else {
+            let Some(prior) = GaussianPrior::correlated(start.clone(), covariance) else {
                 continue;
             };
             let problem = frame.problem.clone().with_prior(Arc::new(prior));

@@ -9,6 +9,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 use super::appearance::AppearanceSettings;
 use super::keyframe::KeyframeSettings;
 use super::segmentation::SegmentationSettings;
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
@@ -27,37 +28,24 @@ pub struct ProcessNoise {
     pub gain: f64,
 }
 
-/// When a pose is not believed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct GatingSettings {
-    /// Ratio of the cost to its running mean up to which a pose is believed, but for the margin below.
-    pub cost_ratio: f64,
-    /// Cost beyond that up to which it is believed, too \[nat\].
-    pub cost_margin: f64,
-    /// Mahalanobis distance of the object from its prediction up to which it is believed.
-    pub innovation_gate: f64,
-    /// Standard deviation of the pose in the direction in which it is largest up to which it is believed \[m of surface motion\].
-    pub max_sigma: f64,
-    /// Share of the pixels that should show an object found again, which do so, at least; half of it where it was expected. Without depth, also of an object
-    /// that is followed, as a share of what is usually seen of its colors.
-    pub least_shown: f64,
-    /// Growth of the running mean of costs with every frame that the object is lost, as a part of it, because circumstances may have changed for good:
-    /// slowly, or what is wrong for a moment would soon pass for right.
-    pub growth: f64,
-}
-
-impl Default for GatingSettings {
-    fn default() -> Self {
-        Self {
-            cost_ratio: 2.5,
-            cost_margin: 40.0,
-            innovation_gate: 8.0,
-            max_sigma: 12e-3,
-            least_shown: 0.5,
-            growth: 0.02,
-        }
+settings! {
+    /// When a pose is not believed.
+    #[derive(Copy)]
+    pub struct GatingSettings {
+        /// Ratio of the cost to its running mean up to which a pose is believed, but for the margin below.
+        pub cost_ratio: f64 = 2.5,
+        /// Cost beyond that up to which it is believed, too \[nat\].
+        pub cost_margin: f64 = 40.0,
+        /// Mahalanobis distance of the object from its prediction up to which it is believed.
+        pub innovation_gate: f64 = 8.0,
+        /// Standard deviation of the pose in the direction in which it is largest up to which it is believed \[m of surface motion\].
+        pub max_sigma: f64 = 12e-3,
+        /// Share of the pixels that should show an object found again, which do so, at least; half of it where it was expected. Without depth, also of an object
+        /// that is followed, as a share of what is usually seen of its colors.
+        pub least_shown: f64 = 0.5,
+        /// Growth of the running mean of costs with every frame that the object is lost, as a part of it, because circumstances may have changed for good:
+        /// slowly, or what is wrong for a moment would soon pass for right.
+        pub growth: f64 = 0.02,
     }
 }
 
@@ -100,81 +88,56 @@ fn unknown(text: &str) -> String {
     format!("unknown recovery {text:?}: one of {}", Recovery::VARIANTS.join(", "))
 }
 
-/// Settings of [`Tracker`](super::Tracker).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct TrackerSettings {
-    /// Evidence, nuisances and nominal accuracies; its stages serve where a pose has to be found.
-    #[serde(skip)]
-    pub fused: FusedSettings,
-    /// Stage that follows the object.
-    pub stage: Stage,
-    /// Process noise relative to a hand that is known.
-    pub in_hand: ProcessNoise,
-    /// Process noise in the camera frame, where no hand is known.
-    pub free: ProcessNoise,
-    /// Time within which what was learnt of calibrations is forgotten, and an object that is not seen comes to rest, all but 1/e \[s\]. Errors that
-    /// frames share, such as a warp of depth or a wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the
-    /// farther calibrations are led astray. EXPERIMENTS: Time constant of calibrations.
-    pub time_constant: f64,
-    /// Motion of the object by the images.
-    pub keyframe: KeyframeSettings,
-    /// Segmentation of the object in frames with depth.
-    pub segmentation: SegmentationSettings,
-    /// Appearance of the object, which tells it in frames without depth.
-    pub appearance: AppearanceSettings,
-    /// Gain of running means of costs, colors and masks: part of the way that they go to the next value.
-    pub gain: f64,
-    /// Number of frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than
-    /// before.
-    pub period: u32,
-    /// Rotation from which an object is seen anew, and its other modes are weighed \[rad\].
-    pub new_view: f64,
-    /// Angle of poses that are turned beside the tracked one \[rad\]; a mode that is nearer to another than half of that is the same.
-    pub turn: f64,
-    /// Standard deviation of the least certain rotation in [`Posterior::covariance`](crate::strategy::Posterior::covariance) from which poses turned
-    /// about its axis are modes, too \[rad\]; infinity for never.
-    pub turn_sigma: f64,
-    /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
-    /// not begun, as far as the one before it tells.
-    pub budget: Option<Duration>,
-    /// Gating: when a pose is not believed.
-    pub gating: GatingSettings,
-    /// Recovery of an object whose pose is not believed.
-    pub recovery: Recovery,
-    /// Search for poses.
-    #[serde(skip)]
-    pub search: SearchSettings,
-}
-
-impl Default for TrackerSettings {
-    fn default() -> Self {
-        Self {
-            fused: FusedSettings::default(),
-            stage: Stage {
+settings! {
+    /// Settings of [`Tracker`](super::Tracker).
+    pub struct TrackerSettings {
+        /// Evidence, nuisances and nominal accuracies; its stages serve where a pose has to be found.
+        #[serde(skip)]
+        pub fused: FusedSettings = FusedSettings::default(),
+        /// Stage that follows the object.
+        pub stage: Stage = Stage {
                 kernel_scale: 1.0,
                 hypotheses: 1,
                 measured_noise: false,
                 model_error: true,
                 ..Stage::octaves(1)
             },
-            in_hand: ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
-            free: ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
-            time_constant: 0.2,
-            keyframe: KeyframeSettings::default(),
-            segmentation: SegmentationSettings::default(),
-            appearance: AppearanceSettings::default(),
-            gain: 0.1,
-            period: 6,
-            new_view: PI / 12.0,
-            turn: PI / 18.0,
-            turn_sigma: 0.8f64.to_radians(),
-            budget: None,
-            gating: GatingSettings::default(),
-            recovery: Recovery::Anywhere,
-            search: SearchSettings::default(),
-        }
+        /// Process noise relative to a hand that is known.
+        pub in_hand: ProcessNoise = ProcessNoise { translation: 3.7e-3, rotation: 0.037, gain: 0.1 },
+        /// Process noise in the camera frame, where no hand is known.
+        pub free: ProcessNoise = ProcessNoise { translation: 0.055, rotation: 0.37, gain: 0.5 },
+        /// Time within which what was learnt of calibrations is forgotten, and an object that is not seen comes to rest, all but 1/e \[s\]. Errors that
+        /// frames share, such as a warp of depth or a wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the
+        /// farther calibrations are led astray. EXPERIMENTS: Time constant of calibrations.
+        pub time_constant: f64 = 0.2,
+        /// Motion of the object by the images.
+        pub keyframe: KeyframeSettings = KeyframeSettings::default(),
+        /// Segmentation of the object in frames with depth.
+        pub segmentation: SegmentationSettings = SegmentationSettings::default(),
+        /// Appearance of the object, which tells it in frames without depth.
+        pub appearance: AppearanceSettings = AppearanceSettings::default(),
+        /// Gain of running means of costs, colors and masks: part of the way that they go to the next value.
+        pub gain: f64 = 0.1,
+        /// Number of frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than
+        /// before.
+        pub period: u32 = 6,
+        /// Rotation from which an object is seen anew, and its other modes are weighed \[rad\].
+        pub new_view: f64 = PI / 12.0,
+        /// Angle of poses that are turned beside the tracked one \[rad\]; a mode that is nearer to another than half of that is the same.
+        pub turn: f64 = PI / 18.0,
+        /// Standard deviation of the least certain rotation in [`Posterior::covariance`](crate::strategy::Posterior::covariance) from which poses turned
+        /// about its axis are modes, too \[rad\]; infinity for never.
+        pub turn_sigma: f64 = 0.8f64.to_radians(),
+        /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
+        /// not begun, as far as the one before it tells.
+        pub budget: Option<Duration> = None,
+        /// Gating: when a pose is not believed.
+        pub gating: GatingSettings = GatingSettings::default(),
+        /// Recovery of an object whose pose is not believed.
+        pub recovery: Recovery = Recovery::Anywhere,
+        /// Search for poses.
+        #[serde(skip)]
+        pub search: SearchSettings = SearchSettings::default(),
     }
 }
 

@@ -204,7 +204,8 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let SequenceFrame { frame: observation, time, truth } = &SEQUENCE.frames[index];
     let remembered = tracker.track.clone().unwrap();
     let nominal = State::measured(observation, &object, truth).unwrap();
-    let prediction = remembered.predict(*time, &nominal, true, &tracker.prior, &tracker.settings);
+    let moment = Moment { time: *time, nominal: nominal.clone(), in_hand: true };
+    let prediction = remembered.predict(&moment, &tracker.prior, &tracker.settings);
     let mut sight = Sight::new(observation.clone(), Images::default());
     assert!(tracker.segmenter.segment(&mut sight, &object, truth));
     let frame = tracker.frame(&sight, &object).unwrap();

@@ -426,14 +426,6 @@ fn no_help_text_names_a_default_twice() {
 }
 
 /// Names of before the spelling was made one.
-#[test]
-fn old_names_of_methods_still_work() {
-    let place = Workplace::new();
-    let refine = "refine --dataset ds --poses ds/init.csv --image 0 --iterations 1";
-    place.succeed(&format!("{refine} --method fused-without-colour --out old.csv"));
-    place.succeed(&format!("{refine} --method fused-without-color --out new.csv"));
-    assert_eq!(place.read("old.csv"), place.read("new.csv"));
-}
 
 #[test]
 fn nobody_need_read_the_output() {

@@ -35,7 +35,7 @@ fn run(
 /// Settings with all modalities but one.
 fn without(modality: Modality) -> FusedSettings {
     FusedSettings {
-        modalities: Modality::ALL.into_iter().filter(|m| *m != modality).collect(),
+        modalities: Modality::ALL.iter().copied().filter(|m| *m != modality).collect(),
         ..FusedSettings::default()
     }
 }
@@ -83,7 +83,7 @@ fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
     let mut observation = SCENE.frame.clone();
     observation.hand = None;
     let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
-    let fused = Fused::new(without(Modality::Color)).with_alternatives(vec![]);
+    let fused = Fused { alternatives: Some(vec![]), ..Fused::new(without(Modality::Color)) };
     let found = refine(&frame, &turned(&OFF), &fused).unwrap();
     let posterior = found.posterior.unwrap();
     let best = posterior.hypotheses[0].t_cam_object;
@@ -271,7 +271,8 @@ fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
     let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * 0.02;
     let fused = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(2e-4) });
     let start = State::new(&frame, &turned(&OFF)).unwrap();
-    let diagnoses = fused.diagnose(&frame, &start).unwrap();
+    let found = refine(&frame, &turned(&OFF), &fused).unwrap();
+    let diagnoses = fused.diagnose(&frame, &start, found).unwrap();
     let names: Vec<_> = diagnoses.iter().map(|diagnosis| diagnosis.excluded).collect();
     assert_eq!(names, [None, Some("pull"), Some("color"), Some("depth"), Some("touch")]);
     let probability = |at: usize| diagnoses[at].estimate.posterior.as_ref().unwrap().probability();

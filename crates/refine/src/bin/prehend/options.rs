@@ -300,7 +300,7 @@ pub(crate) fn open_rig(file: Option<&Path>) -> Result<Option<Arc<Rig>>, DatasetE
 pub(crate) fn named(name: &str) -> Result<String, String> {
     let names = || Method::all().iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     match Method::named(name) {
-        Some(_) => Ok(name.replace("colour", "color")),
+        Some(_) => Ok(name.to_owned()),
         None => Err(format!("unknown method: one of {}", names())),
     }
 }

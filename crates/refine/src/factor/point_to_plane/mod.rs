@@ -10,65 +10,45 @@ use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::Mask;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 pub(crate) use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
 use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
 use crate::scene::{ModelErrorSettings, Object, PreparedFrame};
 
-/// Settings of [`PointToPlaneFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct PointToPlaneSettings {
-    /// Number of depth points at most, spread evenly over the mask.
-    pub points: usize,
-    /// Noise of distances of points from the surface \[m\].
-    pub noise: NoiseModel,
-    /// Standard deviation of the smooth field by which neighboring points are off alike \[m\]: errors of the depth camera and, unless
-    /// surface patches account for them, of the object's model; zero if there is none.
-    pub gp_sigma: f64,
-    /// Length scale of that field, a Gaussian process over space \[m\]. EXPERIMENTS: Settings of the depth field.
-    pub length_scale: f64,
-    /// Margin of the mask in which points are left out \[px\], if at least half of all is left then: there depth is of what is in front or behind, or of
-    /// both. EXPERIMENTS: Mask margin.
-    pub margin: usize,
-    /// Distance in front of the hand from which a point is of something else \[m\]: the accuracy of a hand's pose and joints.
-    pub in_front: f64,
-    /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
-    pub grazing: f64,
-    /// Number of inducing points of the smooth field at most (Quiñonero-Candela and Rasmussen, 2005).
-    pub inducing_points: usize,
-    /// Distance between them, as a share of the length scale.
-    pub spacing: f64,
-    /// Number of rounds of iteratively reweighted least squares in which field and weights are found.
-    pub reweightings: usize,
-    /// Number of patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
-    pub noise_patches: f64,
-    /// Number of points from which a patch counts there.
-    pub least_points: f64,
-}
-
-impl Default for PointToPlaneSettings {
-    fn default() -> Self {
-        Self {
-            points: 1000,
-            noise: NoiseModel::cauchy(1.5e-3, 20.0),
-            gp_sigma: 0.0,
-            length_scale: ModelErrorSettings::default().length_scale,
-            margin: 2,
-            in_front: 6e-3,
-            grazing: 0.2,
-            inducing_points: 24,
-            spacing: 0.5,
-            reweightings: 3,
-            noise_patches: 36.0,
-            least_points: 3.0,
-        }
+settings! {
+    /// Settings of [`PointToPlaneFactor`].
+    pub struct PointToPlaneSettings {
+        /// Number of depth points at most, spread evenly over the mask.
+        pub points: usize = 1000,
+        /// Noise of distances of points from the surface \[m\].
+        pub noise: NoiseModel = NoiseModel::cauchy(1.5e-3, 20.0),
+        /// Standard deviation of the smooth field by which neighboring points are off alike \[m\]: errors of the depth camera and, unless
+        /// surface patches account for them, of the object's model; zero if there is none.
+        pub gp_sigma: f64 = 0.0,
+        /// Length scale of that field, a Gaussian process over space \[m\]. EXPERIMENTS: Settings of the depth field.
+        pub length_scale: f64 = ModelErrorSettings::default().length_scale,
+        /// Margin of the mask in which points are left out \[px\], if at least half of all is left then: there depth is of what is in front or behind, or of
+        /// both. EXPERIMENTS: Mask margin.
+        pub margin: usize = 2,
+        /// Distance in front of the hand from which a point is of something else \[m\]: the accuracy of a hand's pose and joints.
+        pub in_front: f64 = 6e-3,
+        /// Sine of the inclination to the line of sight below which surface counts less, down to nothing where it looks away.
+        pub grazing: f64 = 0.2,
+        /// Number of inducing points of the smooth field at most (Quiñonero-Candela and Rasmussen, 2005).
+        pub inducing_points: usize = 24,
+        /// Distance between them, as a share of the length scale.
+        pub spacing: f64 = 0.5,
+        /// Number of rounds of iteratively reweighted least squares in which field and weights are found.
+        pub reweightings: usize = 3,
+        /// Number of patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
+        pub noise_patches: f64 = 36.0,
+        /// Number of points from which a patch counts there.
+        pub least_points: f64 = 3.0,
     }
 }
 

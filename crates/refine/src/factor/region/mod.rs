@@ -7,54 +7,38 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::{Camera, DepthImage, OutlinePoint, outline_points};
-use serde::{Deserialize, Serialize};
 
 use self::line::{Border, Misfit, REACH};
 use super::patch_sums::PatchSums;
 use super::rendering::{reprojected, seen_by_state};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Factor, NormalEquations, State};
 use crate::scene::{ForegroundSettings, Object, PreparedFrame, RegionEvidence};
 
-/// Settings of [`RegionFactor`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct RegionSettings {
-    /// Factor by which the image is made smaller.
-    pub downsample: usize,
-    /// True if colors count beside the mask.
-    pub color: bool,
-    /// Standard deviation of the outline beside what the pixels tell \[px of the reduced image\].
-    pub sigma: f64,
-    /// Standard deviation of the object's surface about its model \[m\].
-    pub surface: f64,
-    /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn
-    /// away are darker, masks are drawn too small or too large \[px of the reduced image\]. EXPERIMENTS: Offset of the outline.
-    pub offset: f64,
-    /// Effective sample size of the outline.
-    pub effective_samples: f64,
-    /// Cost of a part of the outline that nothing is seen of where it should be: something hides it \[nat\].
-    pub hidden: f64,
-    /// Cost of a part of the outline beyond which the object goes on \[nat\].
-    pub exceeded: f64,
-    /// Evidence of masks and colors that pixels are the object's.
-    pub foreground: ForegroundSettings,
-}
-
-impl Default for RegionSettings {
-    fn default() -> Self {
-        Self {
-            downsample: 1,
-            color: true,
-            sigma: 0.5,
-            surface: 0.0,
-            offset: 0.7,
-            effective_samples: 40.0,
-            hidden: 2.0,
-            exceeded: 8.0,
-            foreground: ForegroundSettings::default(),
-        }
+settings! {
+    /// Settings of [`RegionFactor`].
+    #[derive(Copy)]
+    pub struct RegionSettings {
+        /// Factor by which the image is made smaller.
+        pub downsample: usize = 1,
+        /// True if colors count beside the mask.
+        pub color: bool = true,
+        /// Standard deviation of the outline beside what the pixels tell \[px of the reduced image\].
+        pub sigma: f64 = 0.5,
+        /// Standard deviation of the object's surface about its model \[m\].
+        pub surface: f64 = 0.0,
+        /// Half-width of the Cauchy distribution of the outline's common offset from the border that pixels tell: colors mix at borders, surfaces that turn
+        /// away are darker, masks are drawn too small or too large \[px of the reduced image\]. EXPERIMENTS: Offset of the outline.
+        pub offset: f64 = 0.7,
+        /// Effective sample size of the outline.
+        pub effective_samples: f64 = 40.0,
+        /// Cost of a part of the outline that nothing is seen of where it should be: something hides it \[nat\].
+        pub hidden: f64 = 2.0,
+        /// Cost of a part of the outline beyond which the object goes on \[nat\].
+        pub exceeded: f64 = 8.0,
+        /// Evidence of masks and colors that pixels are the object's.
+        pub foreground: ForegroundSettings = ForegroundSettings::default(),
     }
 }
 

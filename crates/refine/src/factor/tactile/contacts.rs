@@ -4,30 +4,23 @@ use nalgebra::{Point3, Vector3};
 use prehend_geometry::DistanceField;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
-use serde::{Deserialize, Serialize};
 
-use super::probes::{Distance, Probe};
+use super::probe::{Distance, Probe};
+use crate::defaults::settings;
 use crate::problem::NoiseModel;
 use crate::scene::Hand;
 
-/// How touched taxels become contacts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct ContactSettings {
-    /// Distance within which taxels of one link that feel force are of one contact \[m\]: each from the next, and none twice as far from the strongest,
-    /// or facing away from it.
-    pub reach: f64,
-    /// Noise of distances of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of its taxels, and how
-    /// far the object is off from its model. EXPERIMENTS: Standard deviation of a contact.
-    pub noise: NoiseModel,
-    /// Force of a contact that counts half \[N\]: taxels that ring false feel less. EXPERIMENTS: Contacts instead of single taxels.
-    pub force: f64,
-}
-
-impl Default for ContactSettings {
-    fn default() -> Self {
-        Self { reach: 8e-3, noise: NoiseModel::cauchy(1.8e-3, f64::INFINITY), force: 2.0 }
+settings! {
+    /// How touched taxels become contacts.
+    pub struct ContactSettings {
+        /// Distance within which taxels of one link that feel force are of one contact \[m\]: each from the next, and none twice as far from the strongest,
+        /// or facing away from it.
+        pub reach: f64 = 8e-3,
+        /// Noise of distances of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of its taxels, and how
+        /// far the object is off from its model. EXPERIMENTS: Standard deviation of a contact.
+        pub noise: NoiseModel = NoiseModel::cauchy(1.8e-3, f64::INFINITY),
+        /// Force of a contact that counts half \[N\]: taxels that ring false feel less. EXPERIMENTS: Contacts instead of single taxels.
+        pub force: f64 = 2.0,
     }
 }
 

@@ -3,24 +3,27 @@
 mod binary;
 mod contacts;
 mod patch;
-mod probes;
+mod probe;
 mod proximity;
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use prehend_geometry::hand::Taxel;
+use prehend_geometry::robot::ArticulatedRobot;
 use serde::{Deserialize, Serialize};
 
-pub use self::binary::{BinaryTouchFactor, BinaryTouchSettings};
+pub use self::binary::BinaryTouchSettings;
 pub use self::contacts::ContactSettings;
 use self::contacts::contacts;
-pub use self::patch::{ContactPatchFactor, ContactPatchSettings};
-use self::probes::{Distance, Probe, Probes};
-pub use self::proximity::{ProximityFactor, ProximitySettings};
+pub use self::patch::ContactPatchSettings;
+use self::patch::NormalProbe;
+use self::probe::{Distance, Probe};
+pub use self::proximity::ProximitySettings;
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
-use crate::scene::{Hand, PreparedFrame};
+use crate::scene::{Hand, HandMeasurement, Object, PreparedFrame};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,70 +39,77 @@ pub enum TouchModel {
     Contacts(ContactSettings),
 }
 
-/// Settings of [`TactileFactor`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct TactileSettings {
-    /// Force above which a taxel counts as touched, the paper's γ \[N\].
-    pub contact_threshold: f64,
-    /// Model of touched taxels.
-    pub touch: TouchModel,
-    /// Noise of depths of inactive taxels inside the object \[m\]; the dead ones are outliers.
-    pub no_contact: NoiseModel,
-}
-
-impl Default for TactileSettings {
-    fn default() -> Self {
-        Self {
-            contact_threshold: 0.1,
-            touch: TouchModel::Contacts(ContactSettings::default()),
-            no_contact: NoiseModel::cauchy(1e-3, f64::INFINITY),
+impl TouchModel {
+    /// Noise of distances of what is touched from the surface.
+    pub(crate) fn noise_mut(&mut self) -> Option<&mut NoiseModel> {
+        match self {
+            Self::Nothing => None,
+            Self::Taxels(noise) => Some(noise),
+            Self::Contacts(contacts) => Some(&mut contacts.noise),
         }
     }
 }
 
-impl TactileSettings {
-    /// With kernels `factor` times as wide.
-    pub(crate) fn widened(mut self, factor: f64) -> Self {
-        self.no_contact = self.no_contact.widened(factor);
-        match &mut self.touch {
-            TouchModel::Nothing => {}
-            TouchModel::Taxels(noise) => *noise = noise.widened(factor),
-            TouchModel::Contacts(contacts) => contacts.noise = contacts.noise.widened(factor),
-        }
-        self
+settings! {
+    /// Settings of [`TactileFactor::new`].
+    pub struct TactileSettings {
+        /// Force above which a taxel counts as touched, the paper's γ \[N\].
+        pub contact_threshold: f64 = 0.1,
+        /// Model of touched taxels.
+        pub touch: TouchModel = TouchModel::Contacts(ContactSettings::default()),
+        /// Noise of depths of inactive taxels inside the object \[m\]; the dead ones are outliers.
+        pub no_contact: NoiseModel = NoiseModel::cauchy(1e-3, f64::INFINITY),
     }
 }
 
-/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the
-/// other taxels.
+/// Distances of places of the hand from the object's surface: of taxels and contacts ([`new`](Self::new)), and of sensors that measure no forces.
 ///
 /// What is touched is drawn to the surface from either side; inactive taxels are pushed out of it, which the
 /// paper leaves unused. Both have Cauchy's kernel, because some taxels are dead and some report false forces.
-pub struct TactileFactor(Probes);
+pub struct TactileFactor {
+    name: &'static str,
+    object: Arc<Object>,
+    hand: Arc<Hand>,
+    probes: Vec<Probe>,
+    normals: Vec<NormalProbe>,
+}
 
 impl TactileFactor {
-    /// Of the taxels of `frame`.
+    /// The paper's distance between the mesh and the taxels of `frame` in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the
+    /// other taxels.
     ///
     /// # Errors
     /// If the hand is unknown, or its forces are not one a taxel.
     pub fn new(frame: &PreparedFrame<'_>, settings: &TactileSettings) -> Result<Self, RefineError> {
-        let measured = frame.require_hand("tactile")?;
-        let hand = &measured.hand;
-        hand.check_forces(&measured.forces)?;
-        let links = hand.taxels.iter().map(|taxel| hand.link_of(taxel));
-        let links = links.collect::<Result<Vec<usize>, _>>()?;
-        let probes = probes(hand, &links, &measured.forces, settings);
-        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
-        Ok(Self(Probes { object, hand, probes }))
+        Self::of_hand("tactile", frame, |HandMeasurement { hand, forces, .. }| {
+            hand.check_forces(forces)?;
+            let links = hand.taxels.iter().map(|taxel| hand.link_of(taxel));
+            let links = links.collect::<Result<Vec<usize>, _>>()?;
+            Ok(probes(hand, &links, forces, settings))
+        })
+    }
+
+    /// Factor called `name` of probes of the hand of `frame`.
+    fn of_hand(
+        name: &'static str,
+        frame: &PreparedFrame<'_>,
+        probes: impl FnOnce(&HandMeasurement) -> Result<Vec<Probe>, RefineError>,
+    ) -> Result<Self, RefineError> {
+        let measured = frame.require_hand(name)?;
+        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(&measured.hand));
+        Ok(Self { name, object, hand, probes: probes(measured)?, normals: Vec::new() })
+    }
+
+    /// The hand at `state`; none that cannot be posed.
+    fn posed(&self, state: &State) -> Option<ArticulatedRobot> {
+        self.hand.articulated(&state.t_cam_hand, &state.joints).ok()
     }
 
     /// Distances of what is touched from the object's surface, positive outside \[m\]; of none for a hand that cannot be posed.
     pub(crate) fn touched_distances(&self, state: &State) -> Vec<f64> {
-        let Some(hand) = self.0.posed(state) else { return Vec::new() };
-        let touched = self.0.probes.iter().filter(|probe| probe.distance != Distance::Outside);
-        let measured = touched.filter_map(|probe| self.0.measure(state, &hand, probe));
+        let Some(hand) = self.posed(state) else { return Vec::new() };
+        let touched = self.probes.iter().filter(|probe| probe.distance != Distance::Outside);
+        let measured = touched.filter_map(|probe| probe.measure(&self.object, state, &hand));
         measured.map(|measured| measured.distance).collect()
     }
 }
@@ -140,11 +150,14 @@ fn probes(
 
 impl Factor for TactileFactor {
     fn name(&self) -> &'static str {
-        "tactile"
+        self.name
     }
 
+    /// A hand that cannot be posed costs nothing.
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        self.0.rows(state, rows);
+        let Some(hand) = self.posed(state) else { return };
+        self.probes.iter().for_each(|probe| probe.add_row(&self.object, state, &hand, rows));
+        self.normals.iter().for_each(|normal| normal.add_rows(&self.object, state, &hand, rows));
     }
 }
 
@@ -153,9 +166,7 @@ mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
     use crate::problem::Block;
-    use crate::scene::{
-        BinaryContact, ContactPatch, Frame, HandMeasurement, ProximityReading, TouchReading,
-    };
+    use crate::scene::{BinaryContact, ContactPatch, Frame, ProximityReading, TouchReading};
 
     #[test]
     fn gradients_match_differences() {
@@ -182,7 +193,7 @@ mod tests {
         let taxels = TactileSettings { touch, ..contacts.clone() };
         let probes = |observation: &Frame, settings: &TactileSettings| {
             let frame = PreparedFrame::new(observation, &scene.object).unwrap();
-            TactileFactor::new(&frame, settings).unwrap().0.probes.len()
+            TactileFactor::new(&frame, settings).unwrap().probes.len()
         };
         let all = probes(&observation, &taxels);
         fn forces(observation: &mut Frame) -> &mut [Vector3<f64>] {
@@ -218,9 +229,9 @@ mod tests {
         ];
         let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
         let (binary, proximity, patch) = (
-            BinaryTouchFactor::new(&frame, &BinaryTouchSettings::default(), [true; 2]).unwrap(),
-            ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap(),
-            ContactPatchFactor::new(&frame, &ContactPatchSettings::default()).unwrap(),
+            TactileFactor::binary(&frame, &BinaryTouchSettings::default(), [true; 2]).unwrap(),
+            TactileFactor::proximity(&frame, &ProximitySettings::default()).unwrap(),
+            TactileFactor::patches(&frame, &ContactPatchSettings::default()).unwrap(),
         );
         let factors: [&dyn Factor; 3] = [&binary, &proximity, &patch];
         for seed in 0..3 {
@@ -233,7 +244,7 @@ mod tests {
         }
         // What is not used says nothing.
         let neither = BinaryTouchSettings::default();
-        let neither = BinaryTouchFactor::new(&frame, &neither, [false; 2]).unwrap();
+        let neither = TactileFactor::binary(&frame, &neither, [false; 2]).unwrap();
         assert_eq!(neither.cost(&fixture(0).1), 0.0);
     }
 
@@ -256,7 +267,7 @@ mod tests {
             let readings = scene.hand.taxels.iter().map(reading).collect();
             observation.hand.as_mut().unwrap().touch = vec![TouchReading::Proximity(readings)];
             let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
-            ProximityFactor::new(&frame, &ProximitySettings::default()).unwrap().cost(&truth)
+            TactileFactor::proximity(&frame, &ProximitySettings::default()).unwrap().cost(&truth)
         };
         assert!(cost(0.0) < 1e-9 && cost(2e-3) > 0.1, "{} {}", cost(0.0), cost(2e-3));
     }
@@ -279,7 +290,7 @@ mod tests {
             })];
             let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
             let settings = ContactPatchSettings::default();
-            ContactPatchFactor::new(&frame, &settings).unwrap().cost(&truth)
+            TactileFactor::patches(&frame, &settings).unwrap().cost(&truth)
         };
         assert!(cost(-1.0) > cost(1.0) + 5.0, "{} {}", cost(1.0), cost(-1.0));
     }

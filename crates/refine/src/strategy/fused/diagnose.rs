@@ -108,25 +108,12 @@ impl Sensor {
 }
 
 impl Fused {
-    /// Refinements of `initial` in `frame` with all evidence, then without each sensor and without each user-defined factor: if one of them fits where
-    /// all evidence together does not, what it leaves out contradicts the rest.
+    /// `estimate`, found from `initial` in `frame` with all evidence, then refinements without each user-defined factor and without each sensor: if one of
+    /// them fits where all evidence together does not, what it leaves out contradicts the rest.
     ///
     /// # Errors
     /// Those of a run.
     pub fn diagnose(
-        &self,
-        frame: &PreparedFrame<'_>,
-        initial: &State,
-    ) -> Result<Vec<Diagnosis>, RefineError> {
-        let estimate = self.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
-        self.diagnose_estimate(frame, initial, estimate)
-    }
-
-    /// As [`diagnose`](Self::diagnose), where `estimate` was found with all evidence already.
-    ///
-    /// # Errors
-    /// Those of a run.
-    pub fn diagnose_estimate(
         &self,
         frame: &PreparedFrame<'_>,
         initial: &State,

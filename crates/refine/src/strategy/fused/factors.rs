@@ -7,10 +7,9 @@ use nalgebra::Point3;
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
-    BinaryTouchFactor, ContactPatchFactor, FreeSpaceFactor, HandDepthFactor, NoiseEstimate,
-    PenetrationFactor, PenetrationSettings, PointToPlaneFactor, PointToPlaneSettings,
-    ProximityFactor, RegionFactor, RenderingFactor, SupportFactor, TactileFactor, TouchModel,
-    ViewFactor,
+    FreeSpaceFactor, HandDepthFactor, NoiseEstimate, PenetrationFactor, PenetrationSettings,
+    PointToPlaneFactor, PointToPlaneSettings, RegionFactor, RenderingFactor, SupportFactor,
+    TactileFactor, TouchModel, ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
 use crate::scene::{CameraView, Occluders, PreparedFrame, TouchReading};
@@ -65,176 +64,178 @@ pub(crate) fn problem_of(
     patches: Option<Arc<SurfacePatches>>,
     own: &[Arc<dyn Factor>],
 ) -> Result<Problem, RefineError> {
-    let mut factors = factors_of(frame, stage, settings, patches.as_ref())?;
+    let mut factors = StageFactors { frame, stage, settings, patches: patches.as_ref() }.all()?;
     factors.extend(own.iter().cloned());
     let blocks = settings.blocks(frame.hand().is_some(), initial);
     Ok(Problem::new(factors, blocks).with_patches(patches))
 }
 
-/// The factors of `stage` for what `frame` brings.
-fn factors_of(
-    frame: &PreparedFrame<'_>,
-    stage: &Stage,
-    settings: &FusedSettings,
-    patches: Option<&Arc<SurfacePatches>>,
-) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
-    // Drawn by all threads, before two of them ask for it.
-    frame.hand_depth();
-    let views = view_factors(frame, stage, settings, patches.is_some())?;
-    let region = has_region(frame, settings);
-    let (picture, others) = rayon::join(
-        || picture_factor(frame, stage, settings, patches, region),
-        || other_factors(frame, stage, settings, patches, region),
-    );
-    Ok(picture?.into_iter().chain(others?).chain(views).collect())
+/// A stage of a frame, whose object may be off from its model in patches.
+#[derive(Clone, Copy)]
+struct StageFactors<'a> {
+    frame: &'a PreparedFrame<'a>,
+    stage: &'a Stage,
+    settings: &'a FusedSettings,
+    patches: Option<&'a Arc<SurfacePatches>>,
 }
 
-/// What other cameras see, one factor each. Where the object may be off from its model in patches of the first camera's image, what that does to
-/// another camera's depth is as large.
-fn view_factors(
-    frame: &PreparedFrame<'_>,
-    stage: &Stage,
-    settings: &FusedSettings,
-    with_patches: bool,
-) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
-    if frame.views().is_empty() || !settings.views {
-        return Ok(Vec::new());
+impl StageFactors<'_> {
+    /// The factors of the stage for what the frame brings.
+    fn all(&self) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+        // Drawn by all threads, before two of them ask for it.
+        self.frame.hand_depth();
+        let views = self.views()?;
+        let (picture, others) = rayon::join(|| self.picture(), || self.others());
+        Ok(picture?.into_iter().chain(others?).chain(views).collect())
     }
-    let mut settings = settings.clone();
-    settings.modalities.retain(|modality| SEEN.contains(modality));
-    if with_patches {
-        settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.patches.sigma);
-    }
-    let view = |view: &CameraView<'_>| {
-        let factors = factors_of(&view.frame, stage, &settings, None)?;
-        Ok(Arc::new(ViewFactor::new(view.index, factors, view.t_view_cam)) as Arc<dyn Factor>)
-    };
-    frame.views().iter().map(view).collect()
-}
 
-/// What compares pictures, if anything does; of the outline nothing where a `region` factor tells it.
-fn picture_factor(
-    frame: &PreparedFrame<'_>,
-    stage: &Stage,
-    settings: &FusedSettings,
-    patches: Option<&Arc<SurfacePatches>>,
-    region: bool,
-) -> Result<Option<Arc<dyn Factor>>, RefineError> {
-    let wanted = |modality| settings.modalities.contains(&modality);
-    let color = stage.color && wanted(Modality::Color) && frame.observation().has_colors();
-    let silhouette = wanted(Modality::Silhouette) && !region;
-    if !(color || silhouette) {
-        return Ok(None);
+    fn uses(&self, modality: Modality) -> bool {
+        self.settings.modalities.contains(&modality)
     }
-    let mut rendering = settings.rendering.clone();
-    rendering.downsample *= stage.downsample;
-    rendering.kernel_scale *= stage.kernel_scale;
-    rendering.color = color;
-    if !silhouette {
-        rendering.mask_sigma = f64::INFINITY;
-    }
-    if region {
-        rendering.occluders = Occluders::Unmasked;
-    }
-    let mut factor = RenderingFactor::new(frame, &rendering)?;
-    if let Some(patches) = patches {
-        factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
-    }
-    Ok(Some(Arc::new(factor)))
-}
 
-/// Regions tell the outline where no depth does.
-fn has_region(frame: &PreparedFrame<'_>, settings: &FusedSettings) -> bool {
-    let seen = frame.observation();
-    settings.modalities.contains(&Modality::Silhouette) && seen.has_colors() && !seen.has_depth()
-}
-
-/// All others, with a `region` factor or without.
-fn other_factors(
-    frame: &PreparedFrame<'_>,
-    stage: &Stage,
-    settings: &FusedSettings,
-    patches: Option<&Arc<SurfacePatches>>,
-    region: bool,
-) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
-    let wanted = |modality| settings.modalities.contains(&modality);
-    let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
-    if wanted(Modality::Depth) {
-        let depth = PointToPlaneSettings {
-            points: stage.points,
-            noise: settings.depth.noise.widened(stage.kernel_scale),
-            ..settings.depth.clone()
+    /// What other cameras see, one factor each. Where the object may be off from its model in patches of the first camera's image, what that does to
+    /// another camera's depth is as large.
+    fn views(&self) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+        if self.frame.views().is_empty() || !self.settings.views {
+            return Ok(Vec::new());
+        }
+        let mut settings = self.settings.clone();
+        settings.modalities.retain(|modality| SEEN.contains(modality));
+        if self.patches.is_some() {
+            settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.patches.sigma);
+        }
+        let view = |view: &CameraView<'_>| {
+            let of_view = StageFactors {
+                frame: &view.frame,
+                stage: self.stage,
+                settings: &settings,
+                patches: None,
+            };
+            let factor = ViewFactor::new(view.index, of_view.all()?, view.t_view_cam);
+            Ok(Arc::new(factor) as Arc<dyn Factor>)
         };
-        match PointToPlaneFactor::new(frame, &depth) {
-            Ok(mut factor) => {
-                if let Some(patches) = patches {
-                    factor = factor.with_patches(Arc::clone(patches));
+        self.frame.views().iter().map(view).collect()
+    }
+
+    /// What compares pictures, if anything does; of the outline nothing where a region factor tells it.
+    fn picture(&self) -> Result<Option<Arc<dyn Factor>>, RefineError> {
+        let &Self { frame, stage, settings, patches } = self;
+        let region = self.has_region();
+        let color = stage.color && self.uses(Modality::Color) && frame.observation().has_colors();
+        let silhouette = self.uses(Modality::Silhouette) && !region;
+        if !(color || silhouette) {
+            return Ok(None);
+        }
+        let mut rendering = settings.rendering.clone();
+        rendering.downsample *= stage.downsample;
+        rendering.kernel_scale *= stage.kernel_scale;
+        rendering.color = color;
+        if !silhouette {
+            rendering.mask_sigma = f64::INFINITY;
+        }
+        if region {
+            rendering.occluders = Occluders::Unmasked;
+        }
+        let mut factor = RenderingFactor::new(frame, &rendering)?;
+        if let Some(patches) = patches {
+            factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
+        }
+        Ok(Some(Arc::new(factor)))
+    }
+
+    /// Regions tell the outline where no depth does.
+    fn has_region(&self) -> bool {
+        let seen = self.frame.observation();
+        self.uses(Modality::Silhouette) && seen.has_colors() && !seen.has_depth()
+    }
+
+    /// All other factors.
+    fn others(&self) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+        let &Self { frame, stage, settings, patches } = self;
+        let wanted = |modality| self.uses(modality);
+        let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
+        if wanted(Modality::Depth) {
+            let depth = PointToPlaneSettings {
+                points: stage.points,
+                noise: settings.depth.noise.widened(stage.kernel_scale),
+                ..settings.depth.clone()
+            };
+            match PointToPlaneFactor::new(frame, &depth) {
+                Ok(mut factor) => {
+                    if let Some(patches) = patches {
+                        factor = factor.with_patches(Arc::clone(patches));
+                    }
+                    factors.push(Arc::new(factor));
                 }
-                factors.push(Arc::new(factor));
+                // Each modality may be absent.
+                Err(RefineError::NoDepth) => {}
+                Err(other) => return Err(other),
             }
-            // Each modality may be absent.
-            Err(RefineError::NoDepth) => {}
-            Err(other) => return Err(other),
         }
-    }
-    if region {
-        let mut region = settings.region;
-        region.surface = region.surface.hypot(settings.patches.sigma);
-        region.downsample *= stage.downsample.div_ceil(2);
-        region.color &= wanted(Modality::Color);
-        factors.push(Arc::new(RegionFactor::new(frame, &region)?));
-    }
-    if wanted(Modality::FreeSpace) {
-        factors.push(Arc::new(FreeSpaceFactor::new(frame, &settings.free_space)));
-    }
-    let Some(hand) = frame.hand() else { return Ok(factors) };
-    if wanted(Modality::HandDepth) {
-        let points = stage.points / 3;
-        factors.push(Arc::new(HandDepthFactor::new(frame, points, &settings.hand_depth)?));
-    }
-    let is_uncertain = patches.is_some() && settings.blurred_contact;
-    let surface = if is_uncertain { settings.patches.sigma } else { 0.0 };
-    let blurred = |noise: NoiseModel| noise.with_sigma(noise.sigma.hypot(surface));
-    let touch = wanted(Modality::Touch);
-    let inactive = stage.contact && wanted(Modality::Quiet);
-    if (touch || inactive) && !hand.forces.is_empty() {
-        let mut tactile = settings.tactile.clone().widened(stage.kernel_scale);
-        match &mut tactile.touch {
-            _ if !touch => tactile.touch = TouchModel::Nothing,
-            TouchModel::Nothing => {}
-            TouchModel::Taxels(noise) => *noise = blurred(*noise),
-            TouchModel::Contacts(contacts) => contacts.noise = blurred(contacts.noise),
+        if self.has_region() {
+            let mut region = settings.region;
+            region.surface = region.surface.hypot(settings.patches.sigma);
+            region.downsample *= stage.downsample.div_ceil(2);
+            region.color &= wanted(Modality::Color);
+            factors.push(Arc::new(RegionFactor::new(frame, &region)?));
         }
-        tactile.no_contact = blurred(tactile.no_contact);
-        if !inactive {
-            tactile.no_contact.sigma = f64::INFINITY;
+        if wanted(Modality::FreeSpace) {
+            factors.push(Arc::new(FreeSpaceFactor::new(frame, &settings.free_space)));
         }
-        factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
+        let Some(hand) = frame.hand() else { return Ok(factors) };
+        if wanted(Modality::HandDepth) {
+            let points = stage.points / 3;
+            factors.push(Arc::new(HandDepthFactor::new(frame, points, &settings.hand_depth)?));
+        }
+        let is_uncertain = patches.is_some() && settings.blurred_contact;
+        let surface = if is_uncertain { settings.patches.sigma } else { 0.0 };
+        let wide = |noise: NoiseModel| noise.widened(stage.kernel_scale);
+        let contact = |noise: NoiseModel| {
+            let noise = wide(noise);
+            noise.with_sigma(noise.sigma.hypot(surface))
+        };
+        let touch = wanted(Modality::Touch);
+        let inactive = stage.contact && wanted(Modality::Quiet);
+        if (touch || inactive) && !hand.forces.is_empty() {
+            let mut tactile = settings.tactile.clone();
+            if !touch {
+                tactile.touch = TouchModel::Nothing;
+            }
+            if let Some(noise) = tactile.touch.noise_mut() {
+                *noise = contact(*noise);
+            }
+            tactile.no_contact = contact(tactile.no_contact);
+            if !inactive {
+                tactile.no_contact.sigma = f64::INFINITY;
+            }
+            factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
+        }
+        let has = |kind: fn(&TouchReading) -> bool| hand.touch.iter().any(kind);
+        if (touch || inactive) && has(|reading| matches!(reading, TouchReading::Binary(_))) {
+            let mut binary = settings.binary_touch.clone();
+            binary.contact = contact(binary.contact);
+            binary.no_contact = contact(binary.no_contact);
+            factors.push(Arc::new(TactileFactor::binary(frame, &binary, [touch, inactive])?));
+        }
+        if touch && has(|reading| matches!(reading, TouchReading::Proximity(_))) {
+            let mut proximity = settings.proximity.clone();
+            proximity.noise = contact(proximity.noise);
+            factors.push(Arc::new(TactileFactor::proximity(frame, &proximity)?));
+        }
+        if touch && has(|reading| matches!(reading, TouchReading::Patch(_))) {
+            let mut patch = settings.contact_patch.clone();
+            patch.position = contact(patch.position);
+            patch.normal = wide(patch.normal);
+            factors.push(Arc::new(TactileFactor::patches(frame, &patch)?));
+        }
+        if stage.contact && wanted(Modality::Penetration) {
+            let sigma = settings.penetration.sigma.hypot(surface);
+            let penetration = PenetrationSettings { sigma, ..settings.penetration.clone() };
+            factors.push(Arc::new(PenetrationFactor::new(frame, &penetration)?));
+        }
+        if stage.contact && wanted(Modality::Support) && frame.observation().gravity.is_some() {
+            factors.push(Arc::new(SupportFactor::new(frame, &settings.support)?));
+        }
+        Ok(factors)
     }
-    let has = |kind: fn(&TouchReading) -> bool| hand.touch.iter().any(kind);
-    if (touch || inactive) && has(|reading| matches!(reading, TouchReading::Binary(_))) {
-        let mut binary = settings.binary_touch.clone().widened(stage.kernel_scale);
-        binary.contact = blurred(binary.contact);
-        binary.no_contact = blurred(binary.no_contact);
-        factors.push(Arc::new(BinaryTouchFactor::new(frame, &binary, [touch, inactive])?));
-    }
-    if touch && has(|reading| matches!(reading, TouchReading::Proximity(_))) {
-        let mut proximity = settings.proximity.clone().widened(stage.kernel_scale);
-        proximity.noise = blurred(proximity.noise);
-        factors.push(Arc::new(ProximityFactor::new(frame, &proximity)?));
-    }
-    if touch && has(|reading| matches!(reading, TouchReading::Patch(_))) {
-        let mut patch = settings.contact_patch.clone().widened(stage.kernel_scale);
-        patch.position = blurred(patch.position);
-        factors.push(Arc::new(ContactPatchFactor::new(frame, &patch)?));
-    }
-    if stage.contact && wanted(Modality::Penetration) {
-        let sigma = settings.penetration.sigma.hypot(surface);
-        let penetration = PenetrationSettings { sigma, ..settings.penetration.clone() };
-        factors.push(Arc::new(PenetrationFactor::new(frame, &penetration)?));
-    }
-    if stage.contact && wanted(Modality::Support) && frame.observation().gravity.is_some() {
-        factors.push(Arc::new(SupportFactor::new(frame, &settings.support)?));
-    }
-    Ok(factors)
 }

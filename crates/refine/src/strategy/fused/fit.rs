@@ -2,26 +2,19 @@
 
 use std::f64::consts::TAU;
 
-use serde::{Deserialize, Serialize};
-
+use crate::defaults::settings;
 use crate::factor::{NoiseEstimate, ScaleSettings, Scales};
 use crate::problem::{Contribution, Linearization};
 
-/// Settings of the test of fit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct FitSettings {
-    /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
-    pub fault: f64,
-    /// Standard deviation of the logarithm of the scale of its residuals then.
-    pub fault_scale: f64,
-}
-
-impl Default for FitSettings {
-    /// One in two hundred, of any size within a factor of ten.
-    fn default() -> Self {
-        Self { fault: 0.005, fault_scale: std::f64::consts::LN_10 }
+settings! {
+    /// Settings of the test of fit.
+    #[derive(Copy)]
+    pub struct FitSettings {
+        // One in two hundred, of any size within a factor of ten.
+        /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
+        pub fault: f64 = 0.005,
+        /// Standard deviation of the logarithm of the scale of its residuals then.
+        pub fault_scale: f64 = std::f64::consts::LN_10,
     }
 }
 

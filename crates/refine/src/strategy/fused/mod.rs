@@ -35,7 +35,7 @@ pub use self::settings::{FusedSettings, HypothesisSettings, Modality, Nuisance, 
 pub use self::summary::PosteriorSummary;
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::{GaussianPrior, Layout, NoiseEstimate, PriorSettings, Scales};
+use crate::factor::{GaussianPrior, NoiseEstimate, PriorSettings, Scales};
 use crate::problem::{
     Block, Factor, ImageWarp, NormalEquations, Problem, Solution, State, SurfacePatches,
     Termination,
@@ -102,16 +102,15 @@ impl Fused {
         };
         let object = settings.sigmas(Block::ObjectPose);
         let by_rig = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
-        let layout = Layout::of(initial);
         // A rig is of one camera.
-        let variances = settings.all_sigmas(layout).map(|sigma| sigma * sigma);
+        let variances = settings.all_sigmas(initial).map(|sigma| sigma * sigma);
         let mut covariance = DMatrix::from_diagonal(&variances);
         covariance.view_mut((0, 0), by_rig.shape()).copy_from(&by_rig);
-        let scale = PriorSettings::scales(layout, scales);
+        let scale = PriorSettings::scales(initial, scales);
         let covariance = DMatrix::from_fn(scale.len(), scale.len(), |r, c| {
             scale[r] * scale[c] * covariance[(r, c)]
         });
-        let prior = GaussianPrior::correlated(initial.clone(), layout, &covariance);
+        let prior = GaussianPrior::correlated(initial.clone(), &covariance);
         let prior = prior.ok_or_else(|| {
             let problem = "the covariance is not positive definite".into();
             RefineError::Setting { name: "rig", problem }
@@ -122,11 +121,6 @@ impl Fused {
     /// With frames and an object that are corrected by `rig` already: calibrations are as accurate as the rig is known.
     pub fn with_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig: Some(rig), ..self }
-    }
-
-    /// With alternatives of an initial pose that comes from a search.
-    pub fn with_alternatives(self, poses: Vec<Isometry3<f64>>) -> Self {
-        Self { alternatives: Some(poses), ..self }
     }
 
     /// Settings with the accuracy of the rig, and of the model of `frame`.
@@ -144,12 +138,6 @@ impl Fused {
         self.factors.push(Arc::new(factor));
         self
     }
-}
-
-/// The problem of a stage, without a prior, and where the object may be off from its model.
-struct StageProblem {
-    problem: Problem,
-    patches: Option<Arc<SurfacePatches>>,
 }
 
 /// What a frame says of its state and of the object's surface, beside what is known beforehand.
@@ -173,10 +161,8 @@ impl Fused {
         state: &State,
         warp: &Arc<ImageWarp>,
     ) -> Result<Option<Evidence>, RefineError> {
-        let Some(StageProblem { problem, patches }) = self.last_problem(frame, state)? else {
-            return Ok(None);
-        };
-        let equations = problem.evidence(state, warp);
+        let Some(problem) = self.last_problem(frame, state)? else { return Ok(None) };
+        let (equations, patches) = (problem.evidence(state, warp), problem.patches);
         Ok(Some(Evidence { state: state.clone(), equations, patches }))
     }
 
@@ -193,7 +179,7 @@ impl Fused {
     ) -> Result<Option<Posterior>, RefineError> {
         let Some(last) = self.last_problem(frame, state)? else { return Ok(None) };
         let prior = self.prior(frame, initial, &Scales::default())?;
-        let at = last.problem.with_prior(Arc::new(prior)).linearize(state);
+        let at = last.with_prior(Arc::new(prior)).linearize(state);
         let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
         Ok(Some(Posterior::new(&[solution], frame.object().radius, &self.settings.posterior)))
     }
@@ -203,7 +189,7 @@ impl Fused {
         &self,
         frame: &PreparedFrame<'_>,
         state: &State,
-    ) -> Result<Option<StageProblem>, RefineError> {
+    ) -> Result<Option<Problem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
         let mut settings = self.settings_for(frame);
         self.stage_problem(frame, state, state, stage, &mut settings).map(Some)
@@ -217,15 +203,13 @@ impl Fused {
         seen: &State,
         stage: &Stage,
         settings: &mut FusedSettings,
-    ) -> Result<StageProblem, RefineError> {
+    ) -> Result<Problem, RefineError> {
         let patches = surface_patches(frame, initial, seen, stage, settings);
         let measured = stage.measured_noise.then(|| depth_noise(frame, seen, &self.settings));
         if let Some(noise) = measured.flatten() {
             take_noise(settings, &noise, patches.is_some());
         }
-        let own = &self.factors;
-        let problem = problem_of(frame, initial, stage, settings, patches.clone(), own)?;
-        Ok(StageProblem { problem, patches })
+        problem_of(frame, initial, stage, settings, patches, &self.factors)
     }
 }
 

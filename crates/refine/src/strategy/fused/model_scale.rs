@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use serde::{Deserialize, Serialize};
 
-use super::{Fused, Stage, StageProblem};
+use super::{Fused, Stage};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, Scales};
 use crate::problem::State;
@@ -22,24 +22,18 @@ pub struct ModelScale {
     pub sigma: f64,
 }
 
-/// Settings of the estimate of an object's size ([`Fused::model_scale`]).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct ModelScaleSettings {
-    /// Standard deviation of the object's size, as a share of the model's; zero of a model whose size is known, which is then not estimated.
-    pub sigma: f64,
-    /// Reach of the scales that are compared first to either side of one, in standard deviations; they are one standard deviation apart.
-    pub reach: u32,
-    /// Number of times that scales about the best one are compared, nearer to it each time.
-    pub refinements: usize,
-    /// Distance of those from it, as a share of the distance before.
-    pub ratio: f64,
-}
-
-impl Default for ModelScaleSettings {
-    fn default() -> Self {
-        Self { sigma: 0.0, reach: 3, refinements: 2, ratio: 0.3 }
+settings! {
+    /// Settings of the estimate of an object's size ([`Fused::model_scale`]).
+    #[derive(Copy)]
+    pub struct ModelScaleSettings {
+        /// Standard deviation of the object's size, as a share of the model's; zero of a model whose size is known, which is then not estimated.
+        pub sigma: f64 = 0.0,
+        /// Reach of the scales that are compared first to either side of one, in standard deviations; they are one standard deviation apart.
+        pub reach: u32 = 3,
+        /// Number of times that scales about the best one are compared, nearer to it each time.
+        pub refinements: usize = 2,
+        /// Distance of those from it, as a share of the distance before.
+        pub ratio: f64 = 0.3,
     }
 }
 
@@ -102,8 +96,7 @@ impl Fused {
         };
         let state = State { t_cam_object: *t_cam_object, ..initial.clone() };
         let mut settings = self.settings_for(&frame);
-        let StageProblem { problem, .. } =
-            self.stage_problem(&frame, &state, &state, &geometry, &mut settings)?;
+        let problem = self.stage_problem(&frame, &state, &state, &geometry, &mut settings)?;
         let prior: GaussianPrior = self.prior(&frame, initial, &Scales::default())?;
         let problem = problem.with_prior(Arc::new(prior));
         let solved = problem.solve_all(std::slice::from_ref(&state), &geometry.solver);

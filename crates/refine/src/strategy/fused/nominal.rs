@@ -4,8 +4,6 @@ use thiserror::Error;
 
 use super::FusedSettings;
 use crate::MM_PER_M;
-use crate::factor::TouchModel;
-use crate::problem::NoiseModel;
 
 /// Why a nominal size is not taken.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -65,16 +63,8 @@ const SIZES: [(&str, Quantity, Field); 16] = [
     ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
     ("model", Quantity::Length, |s| Some(&mut s.patches.sigma)),
     ("model.scale", Quantity::Ratio, |s| Some(&mut s.model_scale.sigma)),
-    ("touch", Quantity::Length, |s| touch_noise(s).map(|noise| &mut noise.sigma)),
+    ("touch", Quantity::Length, |s| s.tactile.touch.noise_mut().map(|noise| &mut noise.sigma)),
 ];
-
-fn touch_noise(settings: &mut FusedSettings) -> Option<&mut NoiseModel> {
-    match &mut settings.tactile.touch {
-        TouchModel::Contacts(contacts) => Some(&mut contacts.noise),
-        TouchModel::Taxels(noise) => Some(noise),
-        TouchModel::Nothing => None,
-    }
-}
 
 /// Standard deviation of what is exact, as a share of the nominal one.
 const EXACT: f64 = 1e-4;
@@ -122,7 +112,7 @@ impl FusedSettings {
         // What is forgiven beyond larger errors begins farther out; exact data may have the outliers that they had.
         let noise = match name {
             "depth.noise" => Some(&mut self.depth.noise),
-            "touch" => touch_noise(self),
+            "touch" => self.tactile.touch.noise_mut(),
             _ => None,
         };
         if let Some(noise) = noise {

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::fit::Fit;
 use super::model_scale::ModelScale;
+use crate::defaults::settings;
 use crate::factor::Scales;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
@@ -46,33 +46,21 @@ pub struct Inconsistency {
     pub distance: f64,
 }
 
-/// Settings of what is said of a posterior.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct PosteriorSettings {
-    /// Distance of the object's center from the true one within which a pose is right \[m\]: what a grasp forgives.
-    pub right_distance: f64,
-    /// Angle of its rotation from the true one within which a pose is right \[rad\].
-    pub right_angle: f64,
-    /// Number of random poses of each mode that the probability of a right pose is the share of: its standard error is 2.2 % at most.
-    pub samples: usize,
-    /// Standard deviation of surface motion from which a direction is reported as hardly observable \[m\].
-    pub unobservable_sigma: f64,
-    /// Threshold of [`Inconsistency::distance`] from which a factor is reported, in standard deviations: a rule of thumb. EXPERIMENTS: Widening by
-    /// inconsistent factors.
-    pub inconsistent: f64,
-}
-
-impl Default for PosteriorSettings {
-    fn default() -> Self {
-        Self {
-            right_distance: 5e-3,
-            right_angle: 5f64.to_radians(),
-            samples: 512,
-            unobservable_sigma: 8e-3,
-            inconsistent: 5.0,
-        }
+settings! {
+    /// Settings of what is said of a posterior.
+    #[derive(Copy)]
+    pub struct PosteriorSettings {
+        /// Distance of the object's center from the true one within which a pose is right \[m\]: what a grasp forgives.
+        pub right_distance: f64 = 5e-3,
+        /// Angle of its rotation from the true one within which a pose is right \[rad\].
+        pub right_angle: f64 = 5f64.to_radians(),
+        /// Number of random poses of each mode that the probability of a right pose is the share of: its standard error is 2.2 % at most.
+        pub samples: usize = 512,
+        /// Standard deviation of surface motion from which a direction is reported as hardly observable \[m\].
+        pub unobservable_sigma: f64 = 8e-3,
+        /// Threshold of [`Inconsistency::distance`] from which a factor is reported, in standard deviations: a rule of thumb. EXPERIMENTS: Widening by
+        /// inconsistent factors.
+        pub inconsistent: f64 = 5.0,
     }
 }
 

@@ -171,9 +171,8 @@ impl<'a> Run<'a> {
     fn problem(&mut self, index: usize, seen: &State) -> Result<Problem, RefineError> {
         let (fused, frame, initial) = (self.fused, self.frame, self.initial);
         let stage = &fused.settings.stages[index];
-        let of_stage = fused.stage_problem(frame, initial, seen, stage, &mut self.settings)?;
-        let problem = of_stage.problem.with_noise(self.noise.clone());
-        Ok(problem.with_prior(self.prior.clone()))
+        let problem = fused.stage_problem(frame, initial, seen, stage, &mut self.settings)?;
+        Ok(problem.with_noise(self.noise.clone()).with_prior(self.prior.clone()))
     }
 
     /// The distinct solutions of `problem`, that of stage `index`, from `states`, the best one first.

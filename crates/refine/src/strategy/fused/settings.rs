@@ -1,11 +1,12 @@
 //! Settings of the fused estimator.
 
 use serde::{Deserialize, Serialize};
-use strum::IntoStaticStr;
+use strum::{IntoStaticStr, VariantArray};
 
 use super::fit::FitSettings;
 use super::model_scale::ModelScaleSettings;
 use super::posterior::PosteriorSettings;
+use crate::defaults::settings;
 use crate::factor::{
     BinaryTouchSettings, ContactPatchSettings, FreeSpaceSettings, HandDepthSettings,
     PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings, RegionSettings,
@@ -15,7 +16,9 @@ use crate::problem::{Block, Solver, State};
 use crate::scene::{ModelErrorSettings, PreparedFrame};
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, VariantArray, Serialize, Deserialize,
+)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case")]
 #[serde(rename_all = "kebab-case")]
@@ -42,17 +45,7 @@ pub enum Modality {
 
 impl Modality {
     /// All kinds.
-    pub const ALL: [Self; 9] = [
-        Self::Color,
-        Self::Silhouette,
-        Self::Depth,
-        Self::HandDepth,
-        Self::FreeSpace,
-        Self::Touch,
-        Self::Quiet,
-        Self::Penetration,
-        Self::Support,
-    ];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
@@ -61,7 +54,9 @@ impl Modality {
 }
 
 /// A group of quantities that are estimated beside the pose because they are not known exactly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, VariantArray, Serialize, Deserialize,
+)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case")]
 #[serde(rename_all = "kebab-case")]
@@ -78,7 +73,7 @@ pub enum Nuisance {
 
 impl Nuisance {
     /// All groups.
-    pub const ALL: [Self; 4] = [Self::HandPose, Self::Joints, Self::Camera, Self::Model];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
@@ -147,116 +142,98 @@ impl Stage {
     }
 }
 
-/// Settings of the hypotheses from which the estimator starts, and of which it keeps the best.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct HypothesisSettings {
-    /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose where that alone leaves
-    /// something open \[rad\]; zero for none.
-    pub restart_angle: f64,
-    /// Distance of further hypotheses where the first stage leaves the pose open \[m of surface motion\]. EXPERIMENTS: More restarts.
-    pub spacing: f64,
-    /// Reach of these to both sides, in standard deviations of the pose and in multiples of the distance. Wide, since first solutions of hardly any
-    /// difference in cost lie farther apart than the curvature about the best of them has it. EXPERIMENTS: More restarts.
-    pub reach: f64,
-    /// Standard deviation of the pose \[m of surface motion\] below which the first solution needs no others beside it, if depth scatters about the
-    /// surface by less than its nominal noise. EXPERIMENTS: Restarts only where the first solution leaves a direction open.
-    pub settled_sigma: f64,
-    /// Cost behind the best hypothesis after a stage, colors considered, from which another is given up \[nat\]: its weight would be 3·10⁻⁷. EXPERIMENTS:
-    /// Pruning of unconverged hypotheses 15 nat behind.
-    pub prune_margin: f64,
-    /// Factor by which color and silhouette tell more of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as
-    /// errors of light and shape, is nearly the same in all modes. EXPERIMENTS: Weight of the image between modes.
-    pub image_between_modes: f64,
-    /// Surface motion below which two poses are the same solution \[m\].
-    pub same: f64,
-    /// Angle from which a rotation is that of another mode \[rad\].
-    pub another: f64,
-    /// Number of steps of geometry alone that a pose of another convention of rotations is given before it is compared.
-    pub alternative_steps: usize,
-    /// Ratio of such a pose's cost to that of the best one from which it is given up.
-    pub hopeless: f64,
-}
-
-impl Default for HypothesisSettings {
-    fn default() -> Self {
-        Self {
-            restart_angle: 20f64.to_radians(),
-            spacing: 10e-3,
-            reach: 4.0,
-            settled_sigma: 6e-3,
-            prune_margin: 15.0,
-            image_between_modes: 2.0,
-            same: 2e-3,
-            another: 0.2,
-            alternative_steps: 4,
-            hopeless: 4.0,
-        }
+settings! {
+    /// Settings of the hypotheses from which the estimator starts, and of which it keeps the best.
+    #[derive(Copy)]
+    pub struct HypothesisSettings {
+        /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose where that alone leaves
+        /// something open \[rad\]; zero for none.
+        pub restart_angle: f64 = 20f64.to_radians(),
+        /// Distance of further hypotheses where the first stage leaves the pose open \[m of surface motion\]. EXPERIMENTS: More restarts.
+        pub spacing: f64 = 10e-3,
+        /// Reach of these to both sides, in standard deviations of the pose and in multiples of the distance. Wide, since first solutions of hardly any
+        /// difference in cost lie farther apart than the curvature about the best of them has it. EXPERIMENTS: More restarts.
+        pub reach: f64 = 4.0,
+        /// Standard deviation of the pose \[m of surface motion\] below which the first solution needs no others beside it, if depth scatters about the
+        /// surface by less than its nominal noise. EXPERIMENTS: Restarts only where the first solution leaves a direction open.
+        pub settled_sigma: f64 = 6e-3,
+        /// Cost behind the best hypothesis after a stage, colors considered, from which another is given up \[nat\]: its weight would be 3·10⁻⁷. EXPERIMENTS:
+        /// Pruning of unconverged hypotheses 15 nat behind.
+        pub prune_margin: f64 = 15.0,
+        /// Factor by which color and silhouette tell more of distinct modes than of the pose in one of them: what neighboring pixels have in common, such as
+        /// errors of light and shape, is nearly the same in all modes. EXPERIMENTS: Weight of the image between modes.
+        pub image_between_modes: f64 = 2.0,
+        /// Surface motion below which two poses are the same solution \[m\].
+        pub same: f64 = 2e-3,
+        /// Angle from which a rotation is that of another mode \[rad\].
+        pub another: f64 = 0.2,
+        /// Number of steps of geometry alone that a pose of another convention of rotations is given before it is compared.
+        pub alternative_steps: usize = 4,
+        /// Ratio of such a pose's cost to that of the best one from which it is given up.
+        pub hopeless: f64 = 4.0,
     }
 }
 
-/// Settings of [`Fused`](super::Fused).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct FusedSettings {
-    /// Modalities to use, where the observation brings them.
-    pub modalities: Vec<Modality>,
-    /// True if other cameras' images are used, where there are any.
-    pub views: bool,
-    /// Groups of quantities that are estimated beside the pose; the rest is believed as it is said to be.
-    pub nuisances: Vec<Nuisance>,
-    /// Prior: nominal standard deviations of the initial pose and of calibrations.
-    pub prior: PriorSettings,
-    /// Stages, from coarse to fine.
-    pub stages: Vec<Stage>,
-    /// Initial and alternative poses.
-    pub hypotheses: HypothesisSettings,
-    /// Smallest standard deviation of depth points that is believed when measured \[m\]: a rendered image has none.
-    pub min_depth_sigma: f64,
-    /// Effective sample size of depth points at most, beside the errors that neighbors share. EXPERIMENTS: Settings of the depth field.
-    pub max_effective_samples: f64,
-    /// Effective sample size of the hand's depth in frames of a known rig: what depth is off by in all frames is in the rig. EXPERIMENTS: Depth points of
-    /// the hand near edges left out.
-    pub samples_with_rig: f64,
-    /// True if contact says less of the pose where the surface may be elsewhere than the model has it; a rig has the surface as it is.
-    pub blurred_contact: bool,
-    /// True if nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
-    pub rotation_unknown: bool,
-    /// Hyperprior of scales: factors by which errors may be larger or smaller than their nominal sizes.
-    pub scales: ScaleSettings,
-    /// Test of fit.
-    pub fit: FitSettings,
-    /// Posterior.
-    pub posterior: PosteriorSettings,
-    /// Patches of the surface: how far that may be from the model's, with [`Nuisance::Model`].
-    pub patches: ModelErrorSettings,
-    /// Size of the object beside the model's.
-    pub model_scale: ModelScaleSettings,
-    /// Color and silhouette.
-    pub rendering: RenderingSettings,
-    /// Regions within and around the outline, where no depth tells it.
-    pub region: RegionSettings,
-    /// Depth on the object. In stages with [`Stage::measured_noise`], what is measured takes the place of its standard deviations and effective sample
-    /// size, from this number of points; stages have a number of their own.
-    pub depth: PointToPlaneSettings,
-    /// Depth on the hand.
-    pub hand_depth: HandDepthSettings,
-    /// Free space.
-    pub free_space: FreeSpaceSettings,
-    /// Taxels that feel forces.
-    pub tactile: TactileSettings,
-    /// Touch sensors that feel contact alone.
-    pub binary_touch: BinaryTouchSettings,
-    /// Proximity.
-    pub proximity: ProximitySettings,
-    /// Contact patches.
-    pub contact_patch: ContactPatchSettings,
-    /// Non-penetration.
-    pub penetration: PenetrationSettings,
-    /// Feasibility of contact forces.
-    pub support: SupportSettings,
+settings! {
+    /// Settings of [`Fused`](super::Fused).
+    pub struct FusedSettings {
+        /// Modalities to use, where the observation brings them.
+        pub modalities: Vec<Modality> = Modality::ALL.to_vec(),
+        /// True if other cameras' images are used, where there are any.
+        pub views: bool = true,
+        /// Groups of quantities that are estimated beside the pose; the rest is believed as it is said to be.
+        pub nuisances: Vec<Nuisance> = Nuisance::ALL.to_vec(),
+        /// Prior: nominal standard deviations of the initial pose and of calibrations.
+        pub prior: PriorSettings = PriorSettings::default(),
+        /// Stages, from coarse to fine.
+        pub stages: Vec<Stage> = Stage::coarse_to_fine(),
+        /// Initial and alternative poses.
+        pub hypotheses: HypothesisSettings = HypothesisSettings::default(),
+        /// Smallest standard deviation of depth points that is believed when measured \[m\]: a rendered image has none.
+        pub min_depth_sigma: f64 = 2e-4,
+        /// Effective sample size of depth points at most, beside the errors that neighbors share. EXPERIMENTS: Settings of the depth field.
+        pub max_effective_samples: f64 = 50.0,
+        /// Effective sample size of the hand's depth in frames of a known rig: what depth is off by in all frames is in the rig. EXPERIMENTS: Depth points of
+        /// the hand near edges left out.
+        pub samples_with_rig: f64 = 200.0,
+        /// True if contact says less of the pose where the surface may be elsewhere than the model has it; a rig has the surface as it is.
+        pub blurred_contact: bool = true,
+        /// True if nothing is known of the object's rotation: near symmetries of its shape are then tried, too.
+        pub rotation_unknown: bool = false,
+        /// Hyperprior of scales: factors by which errors may be larger or smaller than their nominal sizes.
+        pub scales: ScaleSettings = ScaleSettings::default(),
+        /// Test of fit.
+        pub fit: FitSettings = FitSettings::default(),
+        /// Posterior.
+        pub posterior: PosteriorSettings = PosteriorSettings::default(),
+        /// Patches of the surface: how far that may be from the model's, with [`Nuisance::Model`].
+        pub patches: ModelErrorSettings = ModelErrorSettings::default(),
+        /// Size of the object beside the model's.
+        pub model_scale: ModelScaleSettings = ModelScaleSettings::default(),
+        /// Color and silhouette.
+        pub rendering: RenderingSettings = RenderingSettings::default(),
+        /// Regions within and around the outline, where no depth tells it.
+        pub region: RegionSettings = RegionSettings::default(),
+        /// Depth on the object. In stages with [`Stage::measured_noise`], what is measured takes the place of its standard deviations and effective sample
+        /// size, from this number of points; stages have a number of their own.
+        pub depth: PointToPlaneSettings = PointToPlaneSettings::default(),
+        /// Depth on the hand.
+        pub hand_depth: HandDepthSettings = HandDepthSettings::default(),
+        /// Free space.
+        pub free_space: FreeSpaceSettings = FreeSpaceSettings::default(),
+        /// Taxels that feel forces.
+        pub tactile: TactileSettings = TactileSettings::default(),
+        /// Touch sensors that feel contact alone.
+        pub binary_touch: BinaryTouchSettings = BinaryTouchSettings::default(),
+        /// Proximity.
+        pub proximity: ProximitySettings = ProximitySettings::default(),
+        /// Contact patches.
+        pub contact_patch: ContactPatchSettings = ContactPatchSettings::default(),
+        /// Non-penetration.
+        pub penetration: PenetrationSettings = PenetrationSettings::default(),
+        /// Feasibility of contact forces.
+        pub support: SupportSettings = SupportSettings::default(),
+    }
 }
 
 impl FusedSettings {
@@ -281,39 +258,5 @@ impl FusedSettings {
         let views = if self.nuisances.contains(&Nuisance::Camera) { state.views.len() } else { 0 };
         let views = (0..views).map(Block::View);
         std::iter::once(Block::ObjectPose).chain(blocks).chain(views).collect()
-    }
-}
-
-impl Default for FusedSettings {
-    fn default() -> Self {
-        Self {
-            modalities: Modality::ALL.to_vec(),
-            views: true,
-            nuisances: Nuisance::ALL.to_vec(),
-            prior: PriorSettings::default(),
-            stages: Stage::coarse_to_fine(),
-            hypotheses: HypothesisSettings::default(),
-            min_depth_sigma: 2e-4,
-            max_effective_samples: 50.0,
-            samples_with_rig: 200.0,
-            blurred_contact: true,
-            rotation_unknown: false,
-            scales: ScaleSettings::default(),
-            fit: FitSettings::default(),
-            posterior: PosteriorSettings::default(),
-            patches: ModelErrorSettings::default(),
-            model_scale: ModelScaleSettings::default(),
-            rendering: RenderingSettings::default(),
-            region: RegionSettings::default(),
-            depth: PointToPlaneSettings::default(),
-            hand_depth: HandDepthSettings::default(),
-            free_space: FreeSpaceSettings::default(),
-            tactile: TactileSettings::default(),
-            binary_touch: BinaryTouchSettings::default(),
-            proximity: ProximitySettings::default(),
-            contact_patch: ContactPatchSettings::default(),
-            penetration: PenetrationSettings::default(),
-            support: SupportSettings::default(),
-        }
     }
 }

@@ -54,15 +54,11 @@ impl Segmenter {
         t_cam_object: &Isometry3<f64>,
     ) -> bool {
         let mut window = mem::take(&mut self.window);
-        let seen =
-            window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_some()
-                && self.segment_within(&window, sight);
-        self.window = window;
-        seen
-    }
-
-    fn segment_within(&mut self, window: &Window, sight: &mut Sight) -> bool {
-        self.judge_masks(window);
+        if window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_none() {
+            self.window = window;
+            return false;
+        }
+        self.judge_masks(&window);
         let [set, unset] = self.mask_evidence(sight);
         let settings = &self.settings;
         let (width, height) = (sight.frame.camera.width, sight.frame.camera.height);
@@ -85,7 +81,9 @@ impl Segmenter {
             fill(mask, pixel.at, settings.stride());
         }
         sight.focus = Some(window.range());
-        seen >= settings.least_share as f32 * expected && seen > 0.0
+        let is_seen = seen >= settings.least_share as f32 * expected && seen > 0.0;
+        self.window = window;
+        is_seen
     }
 
     /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
@@ -154,22 +152,19 @@ impl Segmenter {
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let mut window = mem::take(&mut self.window);
         if window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_some() {
-            self.learn_within(&window);
+            let area: f32 = window.pixels().map(Pixel::expected_area).sum();
+            let gain = if self.seen_area > 0.0 { self.gain } else { 1.0 };
+            self.seen_area += gain * (area - self.seen_area);
+            for (label, colors) in
+                [(Label::Object, &mut self.colors.object), (Label::Other, &mut self.colors.others)]
+            {
+                let pixels =
+                    window.pixels().filter(|pixel| pixel.label(&self.settings) == Some(label));
+                colors.learn(pixels.map(|pixel| pixel.color), self.gain);
+            }
+            self.ratios = self.colors.ratios(self.settings.color_limit, self.unseen);
         }
         self.window = window;
-    }
-
-    fn learn_within(&mut self, window: &Window) {
-        let area: f32 = window.pixels().map(Pixel::expected_area).sum();
-        let gain = if self.seen_area > 0.0 { self.gain } else { 1.0 };
-        self.seen_area += gain * (area - self.seen_area);
-        for (label, colors) in
-            [(Label::Object, &mut self.colors.object), (Label::Other, &mut self.colors.others)]
-        {
-            let pixels = window.pixels().filter(|pixel| pixel.label(&self.settings) == Some(label));
-            colors.learn(pixels.map(|pixel| pixel.color), self.gain);
-        }
-        self.ratios = self.colors.ratios(self.settings.color_limit, self.unseen);
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.

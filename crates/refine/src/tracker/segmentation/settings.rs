@@ -1,55 +1,36 @@
 //! Settings of segmentation.
 
-use serde::{Deserialize, Serialize};
+use crate::defaults::settings;
 
-/// What of a picture shows the object, by where it should be, depth, colors and masks.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct SegmentationSettings {
-    /// Distance of the rows and columns of which colors, depth and masks are asked \[px\]: that of the window below.
-    pub stride: usize,
-    /// Distance from where it should be within which the object is looked for \[m\].
-    pub reach: f64,
-    /// Half-width of the band about the outline in which that is expected \[px of the window\]; depth of the surface is carried on over four times as
-    /// many.
-    pub band: usize,
-    /// Probability that the object is where it should be.
-    pub prior: f64,
-    /// Largest log-likelihood ratio of a color \[nat\]; from half of it on it is another thing's, whatever depth says: what is found may lie flush with a wall.
-    pub color_limit: f64,
-    /// Standard deviation of depth about where the object should be, and at the hand \[m\]; what is three of them away is not of the object.
-    pub depth_sigma: f64,
-    /// Density of depths of what is not known \[1/m\].
-    pub background: f64,
-    /// Share of outliers of depth, not in front of the object, where that is seen.
-    pub outliers: f64,
-    /// Distance from the middle of a hand within which it holds something \[m\].
-    pub held: f64,
-    /// Number of pixels that are needed to judge by.
-    pub enough: usize,
-    /// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
-    pub least_share: f64,
-    /// Probability that a mask errs, at least.
-    pub mask_error: f64,
-}
-
-impl Default for SegmentationSettings {
-    fn default() -> Self {
-        Self {
-            stride: 2,
-            reach: 0.04,
-            band: 4,
-            prior: 0.85,
-            color_limit: 2.0,
-            depth_sigma: 5e-3,
-            background: 3.0,
-            outliers: 0.03,
-            held: 0.2,
-            enough: 30,
-            least_share: 0.1,
-            mask_error: 0.02,
-        }
+settings! {
+    /// What of a picture shows the object, by where it should be, depth, colors and masks.
+    #[derive(Copy)]
+    pub struct SegmentationSettings {
+        /// Distance of the rows and columns of which colors, depth and masks are asked \[px\]: that of the window below.
+        pub stride: usize = 2,
+        /// Distance from where it should be within which the object is looked for \[m\].
+        pub reach: f64 = 0.04,
+        /// Half-width of the band about the outline in which that is expected \[px of the window\]; depth of the surface is carried on over four times as
+        /// many.
+        pub band: usize = 4,
+        /// Probability that the object is where it should be.
+        pub prior: f64 = 0.85,
+        /// Largest log-likelihood ratio of a color \[nat\]; from half of it on it is another thing's, whatever depth says: what is found may lie flush with a wall.
+        pub color_limit: f64 = 2.0,
+        /// Standard deviation of depth about where the object should be, and at the hand \[m\]; what is three of them away is not of the object.
+        pub depth_sigma: f64 = 5e-3,
+        /// Density of depths of what is not known \[1/m\].
+        pub background: f64 = 3.0,
+        /// Share of outliers of depth, not in front of the object, where that is seen.
+        pub outliers: f64 = 0.03,
+        /// Distance from the middle of a hand within which it holds something \[m\].
+        pub held: f64 = 0.2,
+        /// Number of pixels that are needed to judge by.
+        pub enough: usize = 30,
+        /// Share that is too small to judge by: of the pixels that should show the object, of the area that was seen of it before, of its largest part.
+        pub least_share: f64 = 0.1,
+        /// Probability that a mask errs, at least.
+        pub mask_error: f64 = 0.02,
     }
 }
 

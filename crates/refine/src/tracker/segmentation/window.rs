@@ -7,10 +7,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
 use super::SegmentationSettings;
-use crate::scene::{Object, color_index};
-
+use crate::scene::{Object, Sums, color_index, squares};
 use crate::tracker::sight::Sight;
-use crate::tracker::sums::{Sums, squares};
 
 /// What a pixel surely shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

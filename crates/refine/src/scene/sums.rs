@@ -2,8 +2,8 @@
 
 /// Sums over the square about each pixel.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sums {
-    pub(super) all: Vec<f32>,
+pub(crate) struct Sums {
+    pub(crate) all: Vec<f32>,
     across: Vec<f32>,
     /// Sum of each column over the rows at hand.
     column: Vec<f32>,
@@ -11,7 +11,7 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Finds those of `values` over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
-    pub(super) fn find(&mut self, values: &[f32], (columns, rows): (usize, usize), reach: usize) {
+    pub(crate) fn find(&mut self, values: &[f32], (columns, rows): (usize, usize), reach: usize) {
         let Self { all, across, column } = self;
         for sums in [&mut *all, &mut *across] {
             sums.clear();
@@ -49,7 +49,7 @@ impl Sums {
 }
 
 /// How many of `size` pixels in a line are within `reach` of number `at`.
-pub(super) fn squares(at: usize, size: usize, reach: usize) -> usize {
+pub(crate) fn squares(at: usize, size: usize, reach: usize) -> usize {
     (at + reach + 1).min(size) - at.saturating_sub(reach)
 }
 
