@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 16_060),
     ("sim", 16_110),
     ("render", 10_900),
-    ("refine", 31_510),
+    ("refine", 30_060),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

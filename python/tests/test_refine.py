@@ -79,7 +79,7 @@ def test_a_made_up_frame_is_refined(example, refined):
     assert before > 5e-3 and after < 1e-3
     assert refined.pose.shape == (4, 4) and refined.pose.dtype == np.float64
     assert 0.9 < refined.probability <= 1.0
-    assert refined.ending and refined.iterations > 0
+    assert refined.termination and refined.iterations > 0
     best, share = refined.hypotheses[0]
     assert (best == refined.pose).all() and 0.5 < share <= 1.0
     assert sum(share for _, share in refined.hypotheses) == pytest.approx(1.0)
@@ -301,27 +301,27 @@ def test_an_object_is_followed():
     first = frames[0][0]
     tracker = prehend.Tracker(first.object, pose=initial)
     followed = [tracker.push(frame, at) for frame, at, _ in frames]
-    assert [tracked.status for tracked in followed] == ["found"] + ["followed"] * 3
+    assert [tracked.status for tracked in followed] == ["relocalized"] + ["tracked"] * 3
     for tracked, (_, _, truth) in zip(followed, frames, strict=True):
         assert np.linalg.norm(tracked.pose[:3, 3] - truth[:3, 3]) < 3e-3
         assert tracked.covariance.shape == (6, 6) and tracked.probability > 0.5
         assert tracked.seconds > 0
     bare = prehend.Frame(**inputs(frames[-1][0], mask=None))
-    assert tracker.push(bare, 0.1).status == "followed"
+    assert tracker.push(bare, 0.1).status == "tracked"
     hidden = inputs(frames[-1][0], mask=None, depth=np.full((480, 640), 0.3), rgb=np.full((480, 640, 3), 128, np.uint8))
     tracker = prehend.Tracker(first.object, pose=initial, recovery="off")
     tracker.push(first, 0.0)
     lost = tracker.push(prehend.Frame(**hidden), 0.2)
-    assert (lost.status, lost.covariance, lost.doubt) == ("lost", None, "nothing of the object is seen")
+    assert (lost.status, lost.covariance, lost.rejection) == ("lost", None, "nothing of the object is seen")
     tracker.start_from(frames[0][2])
-    assert tracker.push(first, 0.0).status == "found"
+    assert tracker.push(first, 0.0).status == "relocalized"
     with pytest.raises(prehend.Error, match="recovery"):
         prehend.Tracker(first.object, recovery="far")
     with pytest.raises(prehend.Error, match="budget"):
         prehend.Tracker(first.object, budget=-1.0)
     with pytest.raises(prehend.Error, match="time"):
         tracker.push(first, float("nan"))
-    assert prehend.Tracker(first.object, pose=initial).push(bare, 0.0).status == "found"
+    assert prehend.Tracker(first.object, pose=initial).push(bare, 0.0).status == "relocalized"
 
 
 def test_results_files(tmp_path):

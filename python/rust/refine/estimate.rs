@@ -22,15 +22,15 @@ fn describe(fields: &Bound<'_, PyDict>, posterior: Option<&Posterior>) -> PyResu
         for name in ["covariance", "probability"] {
             fields.set_item(name, py.None())?;
         }
-        return fields.set_item("hypotheses", Vec::<f64>::new());
+        return fields.set_item("modes", Vec::<f64>::new());
     };
     let covariance = posterior.covariance().as_slice().to_vec();
     // Symmetric: the order of rows and columns is all the same.
     fields.set_item("covariance", array(py, covariance, &[6, 6])?)?;
     fields.set_item("probability", posterior.probability())?;
-    let hypotheses = posterior.hypotheses.iter();
-    let hypotheses = hypotheses.map(|h| Ok((matrix(py, &h.t_cam_object)?, h.weight)));
-    fields.set_item("hypotheses", hypotheses.collect::<PyResult<Vec<_>>>()?)
+    let modes = posterior.modes.iter();
+    let modes = modes.map(|h| Ok((matrix(py, &h.t_cam_object)?, h.weight)));
+    fields.set_item("modes", modes.collect::<PyResult<Vec<_>>>()?)
 }
 
 /// An `Estimate`, of a refinement that began at `initial`.
@@ -50,12 +50,12 @@ pub(super) fn estimate<'py>(
     if let Some(summary) = posterior.map(PosteriorSummary::from) {
         fields.set_item("fit", summary.fit)?;
         fields.set_item("misfits", summary.misfits)?;
-        fields.set_item("disagreements", summary.disagreements)?;
+        fields.set_item("inconsistencies", summary.inconsistencies)?;
         fields.set_item("scales", summary.scales)?;
         fields.set_item("model_scale", summary.model_scale)?;
-        let unobserved: Vec<f64> = summary.unobserved_mm.iter().map(|mm| 1e-3 * mm).collect();
-        fields.set_item("unobserved", unobserved)?;
-        fields.set_item("ending", summary.ending)?;
+        let unobservable: Vec<f64> = summary.unobservable_mm.iter().map(|mm| 1e-3 * mm).collect();
+        fields.set_item("unobservable", unobservable)?;
+        fields.set_item("termination", summary.termination)?;
     }
     dataclass("Estimate", &fields)
 }
@@ -66,7 +66,7 @@ pub(super) fn tracked<'py>(py: Python<'py>, tracked: &Tracked) -> PyResult<Bound
     fields.set_item("pose", matrix(py, &tracked.t_cam_object)?)?;
     describe(&fields, tracked.posterior.as_ref())?;
     fields.set_item("status", tracked.status.name())?;
-    fields.set_item("doubt", tracked.rejection.map(|doubt| doubt.to_string()))?;
+    fields.set_item("rejection", tracked.rejection.map(|rejection| rejection.to_string()))?;
     fields.set_item("iterations", tracked.iterations)?;
     fields.set_item("seconds", tracked.timing.total().as_secs_f64())?;
     dataclass("Tracked", &fields)

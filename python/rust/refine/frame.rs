@@ -123,7 +123,7 @@ impl Frame {
     ///
     /// `iterations` limits those of each stage. `noise` has sizes of errors by name, as
     /// `prehend refine --noise` does: `{"model.scale": "5%"}` estimates the size of the model. `settings` of the estimator are a dict such as
-    /// `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
+    /// `{"estimator.patches.sigma": 1.5e-3}`, or the path of a TOML file, which `prehend settings` prints.
     #[pyo3(signature = (pose, *, method="fused", iterations=None, noise=None, settings=None))]
     #[allow(clippy::too_many_arguments)] // as Python has it
     fn refine<'py>(

@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use prehend_geometry::hand::load_taxels;
-use prehend_geometry::robot::KinematicTree;
 use prehend_refine::data::user_cache;
 use pyo3::prelude::*;
 
@@ -24,10 +22,8 @@ impl Hand {
     #[new]
     #[pyo3(signature = (urdf, taxels=None))]
     fn new(py: Python<'_>, urdf: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
-        let tree = KinematicTree::from_urdf_file(urdf).raise()?;
-        let taxels = taxels.map(|file| load_taxels(&file)).transpose().raise()?;
-        let taxels = taxels.unwrap_or_default();
-        let hand = py.detach(|| prehend_refine::Hand::cached(tree, taxels, user_cache().as_ref()));
+        let load = || prehend_refine::Hand::load(&urdf, taxels.as_deref(), user_cache().as_ref());
+        let hand = py.detach(load);
         Ok(Self { hand: Arc::new(hand.raise()?) })
     }
 

@@ -369,7 +369,6 @@ class Tracker:
     def __new__(
         cls,
         object: Object | Mesh,
-        hand: Hand | None = None,
         *,
         pose: ArrayLike | None = None,
         rig: Rig | None = None,

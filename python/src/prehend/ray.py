@@ -22,7 +22,7 @@ import numpy as np
 from . import _prehend
 from ._prehend import Error, refine_batch
 from ._version import __version__
-from .datasets import Result, read_results, read_hypotheses, write_results
+from .datasets import Result, read_hypotheses, read_results, write_results
 from .journal import Journal
 from .progress import Progress
 from .ray_blocks import Job, Source, blocks_of, open_dataset, outcomes

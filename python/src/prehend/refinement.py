@@ -27,30 +27,30 @@ class Estimate:
         covariance: 6 × 6, of the pose's error as a small motion in the axes of the camera: first the displacement of the object's center
             (`Object.center`) along x, y, z [m], then the rotation about x, y, z through that center [rad]. The true pose is the motion applied after `pose`.
         probability: That model, data and pose are right, the last within 5 mm and 5° of the true one.
-        hypotheses: The poses that the search came upon (4 × 4), each with its share of the posterior; the first is `pose`.
+        modes: The poses that the search came upon (4 × 4), each with its share of the posterior; the first is `pose`.
         warnings: What looks wrong with object, frame and initial pose.
         fit: Probability that model and data are right, where that was asked.
         misfits: Evidence that is more probably of something else (another object, another frame, a hand that is elsewhere) than not, and how probably.
-        disagreements: Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
+        inconsistencies: Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
         scales: Errors over their nominal sizes, by group: "hand", "joints", "camera", "surface".
         model_scale: Size of the object by that of its model, and its standard deviation, where that is estimated (`noise={"model.scale": "5%"}`).
-        unobserved: Standard deviations of surface motion along directions that the evidence says hardly anything of [m].
-        ending: Why the search ended.
+        unobservable: Standard deviations of surface motion along directions that the evidence says hardly anything of [m].
+        termination: Why the search ended.
         iterations: Iterations done.
     """
 
     pose: NDArray[np.float64]
     covariance: NDArray[np.float64] | None = None
     probability: float | None = None
-    hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
+    modes: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     fit: float | None = None
     misfits: list[tuple[str, float]] = field(default_factory=list)
-    disagreements: list[tuple[str, float]] = field(default_factory=list)
+    inconsistencies: list[tuple[str, float]] = field(default_factory=list)
     scales: list[tuple[str, float]] = field(default_factory=list)
     model_scale: tuple[float, float] | None = None
-    unobserved: list[float] = field(default_factory=list)
-    ending: str = ""
+    unobservable: list[float] = field(default_factory=list)
+    termination: str = ""
     iterations: int = 0
 
 
@@ -60,12 +60,12 @@ class Tracked:
 
     Attributes:
         pose: 4 × 4, camera ← object [m].
-        status: "followed" (from the frame before), "found" (anew), "predicted" (no time to look), or "lost"; of the last two
+        status: "tracked" (from the frame before), "relocalized" (found anew), "predicted" (no time to look), or "lost"; of the last two
             the pose is where the object should be.
         covariance: As of `Estimate`, unless the pose was only predicted.
         probability: That the pose is within 5 mm and 5° of the true one, unless it was only predicted.
-        hypotheses: As of `Estimate`.
-        doubt: Why the object was not followed, if that was tried.
+        modes: As of `Estimate`.
+        rejection: Why tracking was rejected, if it was tried.
         iterations: Steps that lowered the cost.
         seconds: Time that it took [s].
     """
@@ -74,8 +74,8 @@ class Tracked:
     status: str
     covariance: NDArray[np.float64] | None = None
     probability: float | None = None
-    hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
-    doubt: str | None = None
+    modes: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
+    rejection: str | None = None
     iterations: int = 0
     seconds: float = 0.0
 
@@ -123,7 +123,7 @@ def refine(
         method: One of `methods()`.
         iterations: At most so many in each stage.
         noise: Sizes of errors by name, as `prehend refine --noise` has them, such as `{"hand.translation": "5mm", "model.scale": "5%"}`.
-        settings: Settings of the estimator: a dict such as `{"estimator.patches.sigma": 7e-4}`, or the path of a TOML file, which `prehend settings` prints.
+        settings: Settings of the estimator: a dict such as `{"estimator.patches.sigma": 1.5e-3}`, or the path of a TOML file, which `prehend settings` prints.
 
     Raises:
         Error: What is wrong with the input, or why nothing was found.

@@ -2,6 +2,7 @@
 
 mod guard;
 
+use prehend_geometry::hand::TaxelError;
 use prehend_geometry::robot::RobotError;
 use thiserror::Error;
 
@@ -86,6 +87,9 @@ pub enum RefineError {
     /// Kinematics failed.
     #[error(transparent)]
     Robot(#[from] RobotError),
+    /// A table of taxels cannot be read.
+    #[error(transparent)]
+    Taxels(#[from] TaxelError),
     /// The program is at fault.
     #[error(transparent)]
     Panicked(#[from] Panicked),

@@ -1,11 +1,12 @@
 //! The robot hand, prepared once and shared by all frames.
 
 use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::GridCache;
-use prehend_geometry::hand::Taxel;
+use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::{
     ArticulatedRobot, KinematicTree, PosedRobot, RobotError, RobotShape,
 };
@@ -36,6 +37,20 @@ impl Hand {
     /// If the geometry of a link cannot be used.
     pub fn new(tree: KinematicTree, taxels: Vec<Taxel>) -> Result<Self, RobotError> {
         Self::cached(tree, taxels, None)
+    }
+
+    /// Hand of a URDF file, with the taxels of a table ([`load_taxels`]) and distance grids of a `cache`, where they are given.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or the geometry of a link cannot be used.
+    pub fn load(
+        urdf: &Path,
+        taxels: Option<&Path>,
+        cache: Option<&GridCache>,
+    ) -> Result<Self, RefineError> {
+        let tree = KinematicTree::from_urdf_file(urdf)?;
+        let taxels = taxels.map(load_taxels).transpose()?.unwrap_or_default();
+        Ok(Self::cached(tree, taxels, cache)?)
     }
 
     /// As [`Self::new`] has it, with distance grids from `cache` where it holds them; others are left there.

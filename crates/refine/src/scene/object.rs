@@ -1,5 +1,6 @@
 //! The object whose pose is sought, prepared for every factor.
 
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -91,6 +92,18 @@ impl Object {
         seed: u64,
     ) -> Result<Self, RefineError> {
         Self::build(name, mesh, inertial, None, seed)
+    }
+
+    /// Object of a mesh file in meters, of an assumed density.
+    ///
+    /// # Errors
+    /// If the file cannot be read, and those of [`Self::with_mass`].
+    pub fn load(file: &Path) -> Result<Self, RefineError> {
+        let name = file.display().to_string();
+        let mesh = TriMesh::load(file);
+        let mesh =
+            mesh.map_err(|e| RefineError::Object { object: name.clone(), reason: e.to_string() });
+        Self::with_mass(&name, mesh?, None, 0)
     }
 
     /// Prepares `mesh` (meters) of uniform density and mass `mass` \[kg\], or of an assumed density.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::{Hypothesis, Iteration, Posterior, Trace};
+use super::{Iteration, Posterior, PosteriorMode, Trace};
 use crate::error::RefineError;
 use crate::factor::RenderingFactor;
 use crate::problem::{Factor, State};
@@ -84,8 +84,8 @@ impl Estimate {
     }
 
     /// Modes of the posterior, the most likely one first; of the fused estimator.
-    pub fn modes(&self) -> &[Hypothesis] {
-        self.posterior.as_ref().map_or(&[], |posterior| &posterior.hypotheses)
+    pub fn modes(&self) -> &[PosteriorMode] {
+        self.posterior.as_ref().map_or(&[], |posterior| &posterior.modes)
     }
 }
 

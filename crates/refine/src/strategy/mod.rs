@@ -8,9 +8,10 @@ pub(crate) use estimate::Recorder;
 pub use estimate::{Estimate, Observer, Progress, Strategy, refine};
 pub(crate) use fused::Evidence;
 pub use fused::{
-    Consistency, Diagnosis, DiagnosisSummary, Fit, FitSettings, Fused, FusedSettings, Hypothesis,
+    Consistency, Diagnosis, DiagnosisSummary, Fit, FitSettings, Fused, FusedSettings,
     HypothesisSettings, Inconsistency, Modality, ModelScale, ModelScaleSettings, NominalSizeError,
-    Nuisance, Posterior, PosteriorSettings, PosteriorSummary, Stage, UnobservableDirection,
+    Nuisance, Posterior, PosteriorMode, PosteriorSettings, PosteriorSummary, Stage,
+    UnobservableDirection,
 };
 pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
 pub use trace::{Iteration, Trace};

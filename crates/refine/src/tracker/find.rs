@@ -206,12 +206,13 @@ impl Tracker {
             let is_expected = reach == Recovery::Near && moved <= 0.5 * object.radius;
             // Fingers that hide most of it are known to some millimeters only.
             let least = self.settings.gating.least_shown * if is_expected { 0.5 } else { 1.0 };
-            let doubt = self.gate(&solved, &posterior, None, level);
-            if shown >= least && doubt.is_none() {
+            let rejection = self.gate(&solved, &posterior, None, level);
+            if shown >= least && rejection.is_none() {
                 return Ok(Some((solved, posterior)));
             }
-            let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
-            debug!("not found {reach:?}: {shown:.2} of it are seen{doubt}");
+            let rejection =
+                rejection.map_or_else(String::new, |rejection| format!(", {rejection}"));
+            debug!("not found {reach:?}: {shown:.2} of it are seen{rejection}");
         }
         Ok(None)
     }

@@ -311,15 +311,15 @@ impl Tracker {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
         let mut posterior = self.posterior(&solved, nominal)?;
-        let doubt = self.gate(
+        let rejection = self.gate(
             &solved,
             &posterior,
             Some(&prior),
             track.allowance(self.settings.gating.growth),
         );
-        let doubt = doubt.or_else(|| self.other_colors(sight, &solved));
+        let rejection = rejection.or_else(|| self.other_colors(sight, &solved));
         timing.validation = clock.lap();
-        if let Some(rejection) = doubt {
+        if let Some(rejection) = rejection {
             return Ok(Err(rejection));
         }
         let (mut modes, mut motion) = (track.modes.clone(), *self.settings.motion(moment.in_hand));

@@ -9,7 +9,7 @@ use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Problem, State};
-use crate::strategy::{Hypothesis, Posterior, ScaleMixture};
+use crate::strategy::{Posterior, PosteriorMode, ScaleMixture};
 
 /// A pose that the object may have instead of that which is tracked.
 #[derive(Clone, Copy, Debug)]
@@ -34,8 +34,8 @@ pub(super) struct Modes {
 impl Modes {
     /// Those of `posterior`.
     pub(super) fn new(posterior: &Posterior) -> Self {
-        let [best, others @ ..] = &posterior.hypotheses[..] else { return Self::default() };
-        let mode = |other: &Hypothesis| Mode {
+        let [best, others @ ..] = &posterior.modes[..] else { return Self::default() };
+        let mode = |other: &PosteriorMode| Mode {
             in_object: best.t_cam_object.inverse() * other.t_cam_object,
             log_odds: (other.weight / best.weight).ln(),
         };

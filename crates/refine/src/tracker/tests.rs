@@ -237,8 +237,8 @@ fn a_turned_pose_that_fits_better_is_taken() {
     assert!(oe(&found) < 3.0, "{}°", oe(&found));
     // The pose that was left is still a mode, of little weight.
     modes.add_to(&mut posterior, object.radius);
-    let left = &posterior.hypotheses[1];
-    assert!(posterior.hypotheses[0].weight > 0.8, "{}", posterior.hypotheses[0].weight);
+    let left = &posterior.modes[1];
+    assert!(posterior.modes[0].weight > 0.8, "{}", posterior.modes[0].weight);
     assert!(
         left.t_cam_object.rotation.angle_to(&wrong.solution.at.state.t_cam_object.rotation) < 0.02
     );

@@ -15,12 +15,12 @@ use crate::strategy::Posterior;
 #[strum(serialize_all = "lowercase")]
 pub enum TrackStatus {
     /// From the frame before.
-    #[strum(serialize = "followed")]
+    #[strum(serialize = "tracked")]
     Tracked,
     /// It is where the object should be: there was no time to look at the frame.
     Predicted,
     /// It was found anew: the first of all, or after a loss.
-    #[strum(serialize = "found")]
+    #[strum(serialize = "relocalized")]
     Relocalized,
     /// It is where the object should be, and it does not seem to be there.
     Lost,

@@ -101,7 +101,7 @@ fn refined_frames_are_rows_of_a_numpy_archive() {
     }
     assert!(column("iterations").integers().iter().all(|count| *count > 0));
     assert!(column("scales").texts().iter().all(|scales| scales.contains("camera")));
-    assert!(!column("ending").texts()[0].is_empty());
+    assert!(!column("termination").texts()[0].is_empty());
     // What is not the same every time is there on demand.
     assert!(column("seconds").numbers().iter().all(|s| s.is_nan()));
     assert!(!table.contains_key("status"));
@@ -119,7 +119,7 @@ fn tracked_frames_say_how_they_came_about() {
     let place = Workplace::new();
     place.succeed("track --dataset ds --poses ds/init.csv --budget 0 --out t.csv --details d.npz");
     let table = archive(&place.path("d.npz"));
-    assert_eq!(table["status"].texts(), ["found", "predicted"]);
+    assert_eq!(table["status"].texts(), ["relocalized", "predicted"]);
     assert!(are_poses(&table["t_cam_model"].numbers(), &place.poses("t.csv")));
     // Of a frame that was not looked at nothing is known.
     let probability = table["probability"].numbers();

@@ -31,7 +31,7 @@ fn poses_come_with_how_sure_they_are() {
     assert!(
         confidence["deviation_mm"].as_array().unwrap().iter().all(|d| d.as_f64().unwrap() > 0.0)
     );
-    assert!(confidence["ending"].is_string() && confidence["weights"].is_array());
+    assert!(confidence["termination"].is_string() && confidence["weights"].is_array());
 }
 
 #[test]

@@ -38,13 +38,9 @@ fn json_tells_every_frame() {
     let place = Workplace::new();
     let said = place.succeed(&format!("{TRACK} --budget 0 --time --json --out t.csv"));
     let told: Value = serde_json::from_str(&said).unwrap();
-    let following: Vec<&str> = told["frames"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|f| f["following"].as_str().unwrap())
-        .collect();
-    assert_eq!(following, ["found", "predicted"]);
+    let following: Vec<&str> =
+        told["frames"].as_array().unwrap().iter().map(|f| f["status"].as_str().unwrap()).collect();
+    assert_eq!(following, ["relocalized", "predicted"]);
     let rows = place.poses("t.csv");
     assert!(rows[0].time > 0.0 && rows[1].score == 0.0);
     for (row, frame) in rows.iter().zip(told["frames"].as_array().unwrap()) {

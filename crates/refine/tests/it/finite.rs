@@ -95,15 +95,15 @@ fn of_posterior(posterior: &Posterior) -> Vec<f64> {
     let mut all = vec![posterior.probability(), posterior.probability_within(1.0, 1.0)];
     let of = |p: f64| if (0.0..=1.0 + 1e-9).contains(&p) { p } else { f64::NAN };
     all.iter_mut().for_each(|p| *p = of(*p));
-    let covariances = posterior.hypotheses.iter().map(|h| h.covariance);
+    let covariances = posterior.modes.iter().map(|h| h.covariance);
     for covariance in covariances.chain([posterior.cramer_rao_bound]) {
         all.extend(covariance.iter());
         let symmetric = (covariance - covariance.transpose()).norm() <= 1e-9 * covariance.norm();
         let least = covariance.symmetric_eigenvalues().min();
         all.push(if symmetric && least >= -1e-9 * covariance.norm() { 0.0 } else { f64::NAN });
     }
-    all.extend(posterior.hypotheses.iter().flat_map(|h| [of(h.weight), h.cost]));
-    let weights: f64 = posterior.hypotheses.iter().map(|h| h.weight).sum();
+    all.extend(posterior.modes.iter().flat_map(|h| [of(h.weight), h.cost]));
+    let weights: f64 = posterior.modes.iter().map(|h| h.weight).sum();
     all.push(if (weights - 1.0).abs() < 1e-6 { 0.0 } else { f64::NAN });
     all.extend(
         posterior.unobservable.iter().flat_map(|u| u.twist.iter().copied().chain([u.deviation])),

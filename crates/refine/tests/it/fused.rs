@@ -28,7 +28,7 @@ fn run(
     let frame = PreparedFrame::new(observation, &SCENE.object).unwrap();
     let found = refine(&frame, start, &Fused::new(settings)).unwrap();
     let posterior = found.posterior.unwrap();
-    assert_eq!(found.state.t_cam_object, posterior.hypotheses[0].t_cam_object);
+    assert_eq!(found.state.t_cam_object, posterior.modes[0].t_cam_object);
     (found.state.t_cam_object, posterior)
 }
 
@@ -63,8 +63,8 @@ fn a_start_that_is_turned_by_half_or_transposed_is_turned_back() {
         let (pose, posterior) = from_the_back(alternatives);
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
-        assert_eq!(pose, posterior.hypotheses[0].t_cam_object);
-        let weights: Vec<f64> = posterior.hypotheses.iter().map(|h| h.weight).collect();
+        assert_eq!(pose, posterior.modes[0].t_cam_object);
+        let weights: Vec<f64> = posterior.modes.iter().map(|h| h.weight).collect();
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{weights:?}");
         assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]), "{weights:?}");
         assert!(posterior.probability() > 0.9);
@@ -86,9 +86,9 @@ fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
     let fused = Fused { alternatives: Some(vec![]), ..Fused::new(without(Modality::Color)) };
     let found = refine(&frame, &turned(&OFF), &fused).unwrap();
     let posterior = found.posterior.unwrap();
-    let best = posterior.hypotheses[0].t_cam_object;
+    let best = posterior.modes[0].t_cam_object;
     let share: f64 = posterior
-        .hypotheses
+        .modes
         .iter()
         .filter(|h| oe_deg(&h.t_cam_object, &best) > 170.0)
         .map(|h| h.weight)

@@ -4,7 +4,7 @@ use prehend_refine::evaluate::report::{Column, Figure};
 use prehend_refine::strategy::PosteriorSummary;
 
 const ERROR: Column = Column::new("error", "error", "mm", 2);
-const TURN_ERROR: Column = Column::new("turned-error", "turned wrong", "°", 2);
+const TURN_ERROR: Column = Column::new("turned-error", "orientation error", "°", 2);
 const PROBABILITY: Column = Column::new("probability", "probability", "", 3);
 const SIGMA: Column = Column::new("sigma", "σ", "mm", 2);
 const TURN_SIGMA: Column = Column::new("turned-sigma", "σ of rotation", "°", 2);
@@ -12,7 +12,7 @@ pub(crate) const MOVED: Column = Column::new("moved", "moved", "mm", 1);
 pub(crate) const TURNED: Column = Column::new("turned", "turned", "°", 1);
 pub(crate) const INITIAL_ERROR: Column = Column::new("initial-error", "error before", "mm", 1);
 pub(crate) const INITIAL_TURN: Column =
-    Column::new("initial-turned-error", "turned wrong before", "°", 1);
+    Column::new("initial-turned-error", "orientation error before", "°", 1);
 pub(crate) const SECONDS: Column = Column::new("seconds", "time", "s", 3);
 pub(crate) const ITERATIONS: Column = Column::new("iterations", "iterations", "", 0);
 pub(crate) const MILLISECONDS: Column = Column::new("milliseconds", "time", "ms", 1);
@@ -39,9 +39,9 @@ pub(crate) fn flags(confidence: &PosteriorSummary) -> Vec<String> {
     let known = [
         (confidence.probability < 0.5, "improbable"),
         (!confidence.misfits.is_empty(), "misfit"),
-        (!confidence.disagreements.is_empty(), "disagreement"),
+        (!confidence.inconsistencies.is_empty(), "inconsistency"),
         (rival, "ambiguous"),
-        (!confidence.unobserved_mm.is_empty(), "unobserved direction"),
+        (!confidence.unobservable_mm.is_empty(), "unobservable direction"),
     ];
     known.iter().filter(|(is, _)| *is).map(|(_, flag)| (*flag).to_owned()).collect()
 }

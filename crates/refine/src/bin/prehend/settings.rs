@@ -15,7 +15,7 @@ pub(crate) struct SettingsOptions {
     /// Take settings from this TOML file; `prehend settings` prints one with all of them, and what each is
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Change one setting, such as estimator.patches.sigma=7e-4, after --settings; may be repeated
+    /// Change one setting, such as estimator.patches.sigma=1.5e-3, after --settings; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }

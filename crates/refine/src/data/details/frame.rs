@@ -88,12 +88,12 @@ fn of_posteriors(frames: &[FrameDetails]) -> Vec<TableColumn> {
         array("covariance", &[6, 6], |p| p.covariance.concat()),
         number("probability", |p| Some(p.probability)),
         number("fit", |p| p.fit),
-        array("unobserved", &[6], |p| p.unobserved_mm.iter().map(|mm| mm * 1e-3).collect()),
+        array("unobservable", &[6], |p| p.unobservable_mm.iter().map(|mm| mm * 1e-3).collect()),
         array("weights", &[most], |p| p.weights.clone()),
         text("misfits", |p| pairs(&p.misfits)),
-        text("disagreements", |p| pairs(&p.disagreements)),
+        text("inconsistencies", |p| pairs(&p.inconsistencies)),
         text("scales", |p| pairs(&p.scales)),
-        text("ending", |p| p.ending.clone()),
+        text("termination", |p| p.termination.clone()),
     ]
 }
 

@@ -163,7 +163,7 @@ impl RecordingWriter {
         }
         self.write(("/prehend/probability", NUMBER), at, &probability)?;
         let mut message = status.name().to_owned();
-        message.extend(rejection.map(|doubt| format!(": {doubt}")));
+        message.extend(rejection.map(|rejection| format!(": {rejection}")));
         let status = DiagnosticStatus {
             level: match status {
                 TrackStatus::Tracked | TrackStatus::Relocalized => 0,

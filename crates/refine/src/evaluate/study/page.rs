@@ -10,7 +10,7 @@ use crate::evaluate::report::{Column, FrameReport, Report};
 /// The metrics of the table of frames by their place in [`Record::metrics`], with the factor of their unit.
 const METRICS: [(Column, usize, f64); 6] = [
     (Column::new("error", "error", "mm", 2), 0, 10.0),
-    (Column::new("turned-error", "turned wrong", "°", 2), 2, 1.0),
+    (Column::new("turned-error", "orientation error", "°", 2), 2, 1.0),
     (Column::new("adi", "ADI", "mm", 2), 4, 1.0),
     (Column::new("mssd", "MSSD", "mm", 2), 5, 1.0),
     (Column::new("contact", "|ΔCA|", "cm²", 2), 9, 1.0),

@@ -58,7 +58,7 @@ impl Prediction {
         object: &Object,
         truth: &Isometry3<f64>,
     ) -> Option<Self> {
-        let best = &posterior.hypotheses[0];
+        let best = &posterior.modes[0];
         let pose = &best.t_cam_object;
         let off = truth * object.center - pose * object.center;
         let turn = so3_log(&(truth.rotation * pose.rotation.inverse()));
@@ -78,7 +78,7 @@ impl Prediction {
             probabilities: EVENTS.map(within),
             probability: Some(posterior.probability()),
             cost: Some(best.cost),
-            hypotheses: Some(posterior.hypotheses.len()),
+            hypotheses: Some(posterior.modes.len()),
             weight: Some(best.weight),
             unobservable: Some(posterior.unobservable.len()),
             inconsistent: inconsistent.collect::<Vec<_>>().join(" "),

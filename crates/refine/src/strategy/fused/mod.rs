@@ -27,7 +27,7 @@ pub use self::model_scale::{ModelScale, ModelScaleSettings};
 pub use self::nominal::NominalSizeError;
 pub(crate) use self::pixels::Pixels;
 pub use self::posterior::{
-    Hypothesis, Inconsistency, Posterior, PosteriorSettings, UnobservableDirection,
+    Inconsistency, Posterior, PosteriorMode, PosteriorSettings, UnobservableDirection,
 };
 pub(crate) use self::posterior::{ScaleMixture, chi_square_z};
 use self::run::Run;

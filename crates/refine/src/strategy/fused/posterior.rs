@@ -16,7 +16,7 @@ use crate::problem::{
 
 /// A pose that the search came upon.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Hypothesis {
+pub struct PosteriorMode {
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_object: Isometry3<f64>,
     /// Its share of the posterior among the hypotheses found.
@@ -68,7 +68,7 @@ settings! {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// The poses found, that of the lowest value first; where the initial pose comes from a search, that of the largest weight.
-    pub hypotheses: Vec<Hypothesis>,
+    pub modes: Vec<PosteriorMode>,
     /// Directions that are hardly observed.
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
@@ -119,8 +119,8 @@ impl Posterior {
         let mass = |k: usize| if first.is_finite() { (bounds[k].1 - first).exp() } else { 1.0 };
         let masses: Vec<f64> = (0..found.len()).map(mass).collect();
         let total: f64 = masses.iter().sum();
-        let hypotheses: Vec<Hypothesis> = (0..found.len())
-            .map(|k| Hypothesis {
+        let modes: Vec<PosteriorMode> = (0..found.len())
+            .map(|k| PosteriorMode {
                 t_cam_object: found[k].at.state.t_cam_object,
                 weight: masses[k] / total,
                 cost: found[k].at.cost,
@@ -128,12 +128,12 @@ impl Posterior {
             })
             .collect();
         Self {
-            unobservable: unobservable(&hypotheses[0].covariance, radius, settings),
+            unobservable: unobservable(&modes[0].covariance, radius, settings),
             inconsistencies: inconsistencies(&best.at, settings.inconsistent),
             fit: None,
             scales: Scales::default(),
             model_scale: None,
-            hypotheses,
+            modes,
             termination: best.termination,
             cramer_rao_bound: bounds[0].0,
             center: best.at.state.center(),
@@ -160,11 +160,11 @@ impl Posterior {
     /// With the uncertainty of scales that another posterior of the same object in the same hand has.
     pub(crate) fn widen(&mut self, mixture: &ScaleMixture, radius: f64) {
         let excess = mixture.excess;
-        if self.hypotheses.iter().all(|h| (h.covariance + excess).cholesky().is_some()) {
-            self.hypotheses.iter_mut().for_each(|h| h.covariance += excess);
+        if self.modes.iter().all(|h| (h.covariance + excess).cholesky().is_some()) {
+            self.modes.iter_mut().for_each(|h| h.covariance += excess);
             self.mixture = mixture.clone();
         }
-        self.unobservable = unobservable(&self.hypotheses[0].covariance, radius, &self.settings);
+        self.unobservable = unobservable(&self.modes[0].covariance, radius, &self.settings);
     }
 
     /// Uncertainty of scales.
@@ -174,20 +174,20 @@ impl Posterior {
 
     /// Adds poses that fit, too: each by the motion in object coordinates that takes the best pose there, and by the logarithm of its odds.
     pub(crate) fn add_modes(&mut self, modes: impl Iterator<Item = (Isometry3<f64>, f64)>) {
-        let best = self.hypotheses[0].clone();
-        self.hypotheses.extend(modes.map(|(motion, log_odds)| Hypothesis {
+        let best = self.modes[0].clone();
+        self.modes.extend(modes.map(|(motion, log_odds)| PosteriorMode {
             t_cam_object: best.t_cam_object * motion,
             weight: best.weight * log_odds.exp(),
             cost: best.cost - log_odds,
             covariance: best.covariance,
         }));
-        let total: f64 = self.hypotheses.iter().map(|h| h.weight).sum();
-        self.hypotheses.iter_mut().for_each(|h| h.weight /= total);
+        let total: f64 = self.modes.iter().map(|h| h.weight).sum();
+        self.modes.iter_mut().for_each(|h| h.weight /= total);
     }
 
     /// Covariance of the pose's error: a left twist about the object's center in the camera frame \[m², m rad, rad²\].
     pub fn covariance(&self) -> Matrix6<f64> {
-        self.hypotheses[0].covariance
+        self.modes[0].covariance
     }
 
     /// The same of a left twist about `point` (camera frame) \[m\] instead of the center.
@@ -216,12 +216,12 @@ impl Posterior {
     /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, if model and data are right; all
     /// hypotheses considered. By sampling; always the same for the same posterior.
     pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
-        let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
+        let place = self.modes[0].t_cam_object.inverse() * Point3::from(self.center);
         let mut random = SplitMix64::new(0);
         let normal = [(Vector6::zeros(), Matrix6::zeros())];
         let mixture = &self.mixture.components[..];
         let components = if mixture.is_empty() { &normal } else { mixture };
-        let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
+        let of = |hypothesis: &PosteriorMode, random: &mut SplitMix64| {
             let roots: Vec<_> = components
                 .iter()
                 .filter_map(|(off, more)| {
@@ -239,12 +239,12 @@ impl Posterior {
             });
             inside.count() as f64 / samples as f64
         };
-        self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
+        self.modes.iter().map(|h| h.weight * of(h, &mut random)).sum()
     }
 
     /// How far `pose` is from the best one: displacement of the object's center \[m\] and rotation vector \[rad\].
     fn deviation(&self, pose: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-        let best = &self.hypotheses[0].t_cam_object;
+        let best = &self.modes[0].t_cam_object;
         let place = best.inverse() * Point3::from(self.center);
         let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
         ((pose * place).coords - self.center, turn)

@@ -23,10 +23,10 @@ pub struct PosteriorSummary {
     pub covariance: [[f64; 6]; 6],
     /// The center of the object, about which that twist turns (camera frame) \[m\].
     pub center_m: [f64; 3],
-    /// Standard deviations of surface motion along directions that the evidence says hardly anything of \[mm\].
-    pub unobserved_mm: Vec<f64>,
-    /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
-    pub disagreements: Vec<(String, f64)>,
+    /// Standard deviations of surface motion along unobservable directions \[mm\].
+    pub unobservable_mm: Vec<f64>,
+    /// Inconsistent factors, with their distances \[standard deviations\].
+    pub inconsistencies: Vec<(String, f64)>,
     /// Scales of errors: factors by which they are larger than their nominal sizes.
     #[serde(default)]
     pub scales: Vec<(String, f64)>,
@@ -38,8 +38,8 @@ pub struct PosteriorSummary {
     /// The poses that have them: object → camera, homogeneous, row by row \[m\].
     #[serde(default)]
     pub modes: Vec<[[f64; 4]; 4]>,
-    /// Why the search ended.
-    pub ending: String,
+    /// Reason for which the solver stopped.
+    pub termination: String,
 }
 
 impl From<&Posterior> for PosteriorSummary {
@@ -58,21 +58,25 @@ impl From<&Posterior> for PosteriorSummary {
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             covariance: std::array::from_fn(|r| std::array::from_fn(|c| covariance[(r, c)])),
             center_m: posterior.center().into(),
-            unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * MM_PER_M).collect(),
-            disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
+            unobservable_mm: posterior
+                .unobservable
+                .iter()
+                .map(|u| u.deviation * MM_PER_M)
+                .collect(),
+            inconsistencies: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
             scales: posterior
                 .scales
                 .iter()
                 .map(|(g, ln, _)| (g.name().to_owned(), ln.exp()))
                 .collect(),
             model_scale: posterior.model_scale.map(|found| [found.scale, found.sigma]),
-            weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
+            weights: posterior.modes.iter().map(|h| h.weight).collect(),
             modes: posterior
-                .hypotheses
+                .modes
                 .iter()
                 .map(|h| h.t_cam_object.to_homogeneous().transpose().into())
                 .collect(),
-            ending: posterior.termination.name().to_owned(),
+            termination: posterior.termination.name().to_owned(),
         }
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn details(frame: &Done, timed: bool) -> FrameDetails {
         warnings: Vec::new(),
         track: Some(TrackDetails {
             status: frame.status.name(),
-            rejection: frame.rejection.map(|doubt| doubt.to_string()),
+            rejection: frame.rejection.map(|rejection| rejection.to_string()),
             cost: frame.cost,
             stamp: frame.stamp,
         }),
@@ -84,10 +84,10 @@ pub(super) fn summary(frame: &Done) -> serde_json::Value {
         "im_id": row.im_id,
         "stamp_ns": stamp,
         "obj_id": row.obj_id,
-        "following": status.name(),
-        "doubt": rejection.map(|d| d.to_string()),
+        "status": status.name(),
+        "rejection": rejection.map(|d| d.to_string()),
         "iterations": iterations,
-        "misfit": cost.is_finite().then_some(cost),
+        "cost": cost.is_finite().then_some(cost),
         "probability_within_5mm_5deg": row.score,
         "milliseconds": {
             "preparation": milliseconds(timing.preparation),

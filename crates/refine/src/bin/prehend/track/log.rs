@@ -6,8 +6,6 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use prehend_geometry::TriMesh;
-use prehend_geometry::hand::load_taxels;
-use prehend_geometry::robot::KinematicTree;
 use prehend_refine::data::FrameInput;
 use prehend_refine::data::mcap::{ImageTopics, RecordedFrame, Recording, RecordingWriter};
 use prehend_refine::scene::{Frame, Hand, Object};
@@ -52,10 +50,7 @@ impl Log {
         let object = Arc::new(object.with_context(|| name.clone())?);
         let mut hand = None;
         if let Some(urdf) = &options.hand {
-            let tree = KinematicTree::from_urdf_file(urdf)?;
-            let taxels =
-                options.taxels.as_deref().map(load_taxels).transpose()?.unwrap_or_default();
-            let prepared = Hand::cached(tree, taxels, cache().as_ref());
+            let prepared = Hand::load(urdf, options.taxels.as_deref(), cache().as_ref());
             hand = Some(Arc::new(prepared.with_context(|| urdf.display().to_string())?));
         }
         let mut topics = ImageTopics::default();

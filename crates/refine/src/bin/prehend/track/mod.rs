@@ -399,8 +399,10 @@ impl Tracking<'_> {
             match frame() {
                 Ok((tracked, input)) => {
                     bar.set_message(tracked.status.name());
-                    if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
-                        warn(&bar, target, format!("lost: {doubt}"));
+                    if let (TrackStatus::Lost, Some(rejection)) =
+                        (tracked.status, tracked.rejection)
+                    {
+                        warn(&bar, target, format!("lost: {rejection}"));
                     }
                     let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
                     let mut row = row(&target, tracked.t_cam_object, score);

@@ -19,11 +19,11 @@ function drawPosterior(posterior) {
     ["σ of the rotation about them", `${list(posterior.deviation_deg, 2)}°`],
   ];
   if (posterior.weights.length > 1) rows.push(["shares of the poses found", list(posterior.weights, 2)]);
-  if (posterior.unobserved_mm.length) rows.push(["σ along directions hardly observed", `${list(posterior.unobserved_mm, 1)} mm`]);
+  if (posterior.unobservable_mm.length) rows.push(["σ along unobservable directions", `${list(posterior.unobservable_mm, 1)} mm`]);
   for (const [what, z] of posterior.misfits) rows.push([`probability that this is of something else: ${what}`, shown(z, 2)]);
-  for (const [what, z] of posterior.disagreements) rows.push([`would have it elsewhere: ${what}`, `${shown(z, 1)} σ`]);
+  for (const [what, z] of posterior.inconsistencies) rows.push([`inconsistent: ${what}`, `${shown(z, 1)} σ`]);
   for (const [what, scale] of posterior.scales) rows.push([`errors over their nominal size: ${what}`, shown(scale, 2)]);
-  rows.push(["the search ended", posterior.ending]);
+  rows.push(["termination", posterior.termination]);
   const table = el("table", {}, ...rows.map(([what, value]) => el("tr", {}, el("td.words", {}, what), el("td", {}, value))));
   return el("section.card", {}, el("h3", {}, "Confidence"), table);
 }
