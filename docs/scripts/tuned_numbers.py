@@ -4,7 +4,7 @@
 
 A tuned number is, in the sources of problem, factor, strategy, tracker, search and scene/region (without tests and comments),
 - a numeric constant,
-- a number in an `impl Default` other than 0, 1, 2 and 1/2,
+- a number in an `impl Default`, or among the defaults of `settings!`, other than 0, 1, 2 and 1/2,
 - any other float literal other than 0, 1, 2 and 1/2.
 The first line is the count at commit e963f66, before scales were learnt.
 """
@@ -65,7 +65,7 @@ def tuned(path):
         if IS_NUMERIC.match(match.group(0)) and re.search(r"\d|[A-Z]", match.group(1)):
             found.append(match.group(0).split("=")[0].strip())
             text = text[: match.start()] + text[match.end() :]
-    while match := re.search(r"impl Default for \w+[^{]*", text):
+    while match := re.search(r"impl Default for \w+[^{]*|settings!\s*", text):
         end = block_end(text, match.end())
         found += [f"Default: {number}" for number in numbers(text[match.end() : end], False)]
         text = text[: match.start()] + text[end:]
