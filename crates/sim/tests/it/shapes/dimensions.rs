@@ -219,7 +219,7 @@ fn reverse_mode_and_checkpoints_know_dimensions() {
     let field = world.add(Body::fixed_from_shape("ground", &ground));
     let shape = Shape::from_parry(&ball).unwrap();
     let samples = world.add(Body::from_shape("ball", &shape, 1e3).unwrap());
-    let [law, _] = laws();
+    let [law, ..] = laws();
     world
         .add_contact(ContactBodies { samples, field }, law, GapSmoothing::Softplus { width: 1e-5 })
         .unwrap();
