@@ -385,7 +385,7 @@ mod tests {
             factor.err().unwrap().to_string()
         };
         assert!(refused(|o| o.gravity = None).contains("gravity"));
-        assert!(refused(|o| o.hand = None).contains("hand state"));
+        assert!(refused(|o| o.hand = None).contains("hand"));
         let short = |o: &mut Frame| o.hand.as_mut().unwrap().forces.truncate(5);
         assert_eq!(refused(short), "5 taxel forces were given for 368 taxels");
     }

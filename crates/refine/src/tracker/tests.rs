@@ -30,11 +30,8 @@ fn errors(tracked: &Tracked, index: usize) -> (f64, f64) {
 fn a_jump_is_noticed_and_recovered_from() {
     let jump = |tracker: &mut Tracker| {
         (0..3).for_each(|index| drop(track(tracker, index)));
-        // The hand's reading stays behind: to the tracker, the object has left it.
-        let frame = &SEQUENCE.frames[23];
-        let mut observation = frame.frame.clone();
-        observation.hand = SEQUENCE.frames[3].frame.hand.clone();
-        tracker.hand = None;
+        // The hand is not known any more: to the tracker, the object has left it.
+        let observation = Frame { hand: None, ..SEQUENCE.frames[23].frame.clone() };
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
     };

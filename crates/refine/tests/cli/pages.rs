@@ -52,29 +52,36 @@ const COMMANDS: [&str; 12] = [
 
 /// A command's help as Markdown: what it does, its usage, a table of options by heading.
 fn markdown(name: &str, help: &str) -> String {
-    let cell = |text: &str| text.replace('|', "\\|").replace('<', "\\<");
+    let cell = |text: &str| {
+        text.replace('|', "\\|").replace("<br>", "\n").replace('<', "\\<").replace('\n', "<br>")
+    };
     let (about, rest) = help.split_once("Usage: ").unwrap();
     let (usage, rest) = rest.split_once("\n\n").unwrap();
     let mut page = format!("\n## {name}\n\n{}\n\n```text\n{usage}\n```\n", about.trim());
     let mut rows: Vec<(String, Vec<String>)> = Vec::new();
     let flush = |page: &mut String, rows: &mut Vec<(String, Vec<String>)>| {
         for (option, text) in rows.drain(..) {
-            *page += &format!("| `{}` | {} |\n", option.replace('|', "\\|"), cell(&text.join(" ")));
+            let (option, text) = (option.replace('|', "\\|"), cell(&text.concat()));
+            *page += &format!("| `{option}` | {} |\n", text.trim_start_matches("<br>").trim());
         }
     };
+    let mut is_new = false;
     for line in rest.lines() {
         let indent = line.len() - line.trim_start().len();
         match (line.trim(), indent) {
-            ("", _) => {}
+            ("", _) => is_new = true,
             (heading, 0) => {
                 flush(&mut page, &mut rows);
                 page += &format!("\n| {} | |\n|---|---|\n", heading.trim_end_matches(':'));
             }
             (option, 1..=6) => rows.push((option.to_owned(), Vec::new())),
             (text, _) => {
-                if let Some((_, words)) = rows.last_mut() {
-                    words.push(text.to_owned());
+                // Lists and paragraphs keep their lines.
+                let is_item = is_new || text.starts_with(['-', '[']) || text.contains("  ");
+                if let Some((_, lines)) = rows.last_mut() {
+                    lines.push(format!("{}{}", if is_item { "<br>" } else { " " }, text));
                 }
+                is_new = false;
             }
         }
     }

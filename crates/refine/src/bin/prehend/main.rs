@@ -72,13 +72,12 @@ enum Command {
     Track(Box<track::Track>),
     /// Score poses against a dataset's ground truth
     ///
-    /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
-    /// ADD, ADI, MSSD, MSPD and VSD, of AR (BOP's average recall, over the poses given), and of CA and IV
-    /// (contact area and intersection volume with the hand).
+    /// Prints means and medians, overall and by object. PE and OE are position and orientation error; ADD, ADI, MSSD, MSPD and VSD are BOP's errors, and AR its
+    /// average recall over the poses given. CA and IV are contact area and intersection volume with the hand.
     /// With --bop, it prints BOP's average recall over all targets of the dataset instead.
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Eval),
-    /// Write poses for other programs: hand and object as a film (GLB), and where they touch (PLY)
+    /// Write poses for other programs: hand and object as a film (GLB)
     ///
     /// docs/EXPORT.md describes the files.
     Export(export::Export),
@@ -88,9 +87,8 @@ enum Command {
     Calibrate(Box<calibrate::Calibrate>),
     /// Draw poses over their images, and say what looks wrong with object, hand and sensors, before refining anything
     ///
-    /// Each warning has a figure and a likely cause. Judged are the mesh (its unit, and its size against models_info.json), the pose,
-    /// the mask (against the object's outline, the hand and depth), depth (on the object and on the hand), the hand (its joints
-    /// against their limits, and its pose), and forces (their size and sign, and whether the object is where they are felt).
+    /// Each warning has a figure and a likely cause. Checks: unit and size of the mesh; the pose; the mask against the object's outline, the hand and depth;
+    /// depth on the object and on the hand; the hand's pose and joint limits. Forces are checked for size, sign and place.
     Check(check::Check),
     /// Say what a file or a folder is, what it holds and what is wrong with it
     Info(info::Info),

@@ -18,8 +18,8 @@ pub(super) struct OutputOptions {
     /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional); in a folder, a file named as BOP has it,
     /// METHOD_DATASET-SPLIT.csv
     ///
-    /// A score is, of the methods fused and combined, the probability that model, data and pose are right (within 5 mm and 5°), 0 to 1, of which that of
-    /// combined knows of no other solutions; the methods of one gradient and the ICPs know none, and keep the score of the initial pose.
+    /// Score: probability that the pose is right (center of the bounding box within 5 mm, rotation within 5° of the truth) times the probability that mesh, mask,
+    /// depth and hand fit the image. That of the method combined has no test of fit; methods of one gradient and ICPs keep the score of the initial pose.
     ///
     /// The file appears whole or not at all, once all frames are done; an existing one is replaced. Until then
     /// FILE.journal records the finished frames: after an interruption the same command resumes, and ends with
