@@ -16,7 +16,7 @@ fn a_scene_is_a_sequence() {
     place.write("first.csv", &(first.join("\n") + "\n"));
     let told = place.succeed("track --dataset ds --poses first.csv --out t.csv");
     assert!(
-        told.starts_with("2 frames tracked at ") && told.contains("1 followed, 1 found"),
+        told.starts_with("2 frames tracked at ") && told.contains("1 tracked, 1 relocalized"),
         "{told}"
     );
     let rows = place.poses("t.csv");

@@ -25,9 +25,10 @@ pub(super) fn refine_frame(
     backend: Arc<dyn Backend>,
 ) -> anyhow::Result<ExitCode> {
     let Refine { output, method, rig, .. } = options;
+    let configured = method.configured()?;
     let (rig, cache) = (open_rig(rig.as_deref())?, cache());
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
-    let mut estimator = input.estimator(&method.configured()?).backend(backend);
+    let mut estimator = input.estimator(&configured).backend(backend);
     // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
     if method.terms.is_none() {
         estimator = estimator.supported_by(&input.frame);
