@@ -166,7 +166,7 @@ def test_a_frame_shows_residuals_confidence_and_touch(opened):
 
 
 @pytest.mark.parametrize(("name", "texts"), {
-    "track": ["Tracked objects", "found", "Probability of being right", "Error of position"],
+    "track": ["Tracked objects", "relocalized", "Probability of being right", "Error of position"],
     "page": ["Study: main", "depth", "means over 8 frames", "|ΔIV| cm³"],
     "calibrate": ["Rig", "Residuals by sensor", "depth scale", "outlines of object and hand"],
 }.items())
