@@ -126,7 +126,8 @@ pub(crate) fn pose(array: Option<&Numbers<'_>>, what: &str) -> PyResult<Isometry
 
 /// A pose as the sixteen numbers of a matrix, row by row.
 pub(crate) fn rows(pose: &Isometry3<f64>) -> [f64; 16] {
-    pose.to_homogeneous().transpose().into()
+    let columns = pose.to_homogeneous();
+    std::array::from_fn(|i| columns[(i / 4, i % 4)])
 }
 
 /// A pose as a matrix of 4 × 4.

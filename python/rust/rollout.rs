@@ -1,7 +1,6 @@
 //! Rollouts as functions of arrays.
 
-use numpy::ndarray::IxDyn;
-use numpy::{PyArray, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
 use prehend_sim::{RolloutFunction, RolloutGradient, RolloutInputs, SimulationError};
 use pyo3::prelude::*;
 use rayon::prelude::*;

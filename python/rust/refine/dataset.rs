@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use prehend_refine::data::bop::{self, Detections, GroundTruth};
 use prehend_refine::data::{Assets, MaskSource, Target, find_targets, user_cache};
 use pyo3::prelude::*;

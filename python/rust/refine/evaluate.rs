@@ -1,7 +1,5 @@
 //! Poses of a dataset against its truth.
 
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use prehend_refine::data::bop::ResultRow;
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::metrics::{ScoredRow, Statistic, summarize};

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use prehend_refine::data::FrameInput;
 use prehend_refine::scene::{SequenceFrame, default_scene, default_sequence};
 use pyo3::prelude::*;

@@ -3,8 +3,6 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

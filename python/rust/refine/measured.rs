@@ -1,6 +1,7 @@
 //! What is said and felt of a hand.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use numpy::PyUntypedArrayMethods;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
 use nalgebra::Isometry3;
-use prehend_refine::data::FrameInput;
 use prehend_refine::{Method, RefineJob, refine_all};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -83,12 +82,12 @@ pub(crate) fn refine_batch<'py>(
     if given != count {
         return Err(wrong(format!("poses: {count} are expected, one a frame, not {given}")));
     }
-    let job = |(input, initial): (&'_ FrameInput, Isometry3<f64>)| {
+    let job = |(frame, initial): (_, &Isometry3<f64>)| {
+        let Frame { input, .. } = Py::get(frame);
         let estimator = input.estimator(&method).supported_by(&input.frame);
-        RefineJob { estimator, frame: &input.frame, hypotheses: initial.into() }
+        RefineJob { estimator, frame: &input.frame, hypotheses: (*initial).into() }
     };
-    let frames = frames.iter().map(|frame| &frame.get().input);
-    let jobs: Vec<RefineJob<'_>> = frames.zip(poses.iter().copied()).map(job).collect();
+    let jobs: Vec<RefineJob<'_>> = frames.iter().zip(&poses).map(job).collect();
     let done = py.detach(|| refine_all(&jobs, threads)).raise()?;
     let results = PyList::empty(py);
     for (outcome, initial) in done.iter().zip(&poses) {

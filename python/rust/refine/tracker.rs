@@ -8,7 +8,6 @@ use pyo3::prelude::*;
 
 use super::estimate;
 use super::frame::Frame;
-use super::hand::Hand;
 use super::object::prepared;
 use super::poses::pose;
 use super::rig::Rig;

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use prehend_geometry::RobustKernel;
 use prehend_render::{
     DepthOptions, Hypothesis, Light, LossOptions, PoseProblem, Session, light_samples,

@@ -1,9 +1,7 @@
 //! Pictures as arrays, and derivatives by them carried back.
 
 use nalgebra::Vector3;
-use numpy::PyArray;
 use numpy::PyUntypedArrayMethods;
-use numpy::ndarray::IxDyn;
 use prehend_render::{BufferAdjoints, Light, Rendering, Scene, SceneGradient, vjp_each};
 use pyo3::prelude::*;
 

@@ -1,7 +1,5 @@
 //! What sensors feel, and how short steps have to be.
 
-use numpy::PyArray;
-use numpy::ndarray::IxDyn;
 use prehend_sim::Integrator;
 use pyo3::prelude::*;
 
