@@ -80,9 +80,9 @@ def test_a_made_up_frame_is_refined(example, refined):
     assert refined.pose.shape == (4, 4) and refined.pose.dtype == np.float64
     assert 0.9 < refined.probability <= 1.0
     assert refined.termination and refined.iterations > 0
-    best, share = refined.hypotheses[0]
+    best, share = refined.modes[0]
     assert (best == refined.pose).all() and 0.5 < share <= 1.0
-    assert sum(share for _, share in refined.hypotheses) == pytest.approx(1.0)
+    assert sum(share for _, share in refined.modes) == pytest.approx(1.0)
 
 
 def test_the_covariance_is_in_the_order_and_frame_that_are_documented(example, refined):
@@ -132,7 +132,7 @@ def test_less_may_be_known(example):
     only = prehend.Frame(frame.rgb, frame.depth, frame.K, frame.object.mesh, mask=frame.mask)
     assert (only.hand, only.joints, only.touch, only.gravity, only.ids) == (None,) * 5
     estimate = only.refine(initial, method="robust-icp")
-    assert estimate.covariance is None and estimate.probability is None and estimate.hypotheses == []
+    assert estimate.covariance is None and estimate.probability is None and estimate.modes == []
     assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 5e-3
     assert "robust-icp" in prehend.methods()
     # Gradients without evidence drop out of the paper's method.
