@@ -210,7 +210,7 @@ mod tests {
     fn the_first_hand_leads_and_all_are_where_they_are_placed() {
         let turn = UnitQuaternion::from_euler_angles(0.4, -1.2, 2.0);
         let place = |x| Isometry3::from_parts([x, 0.1, 0.5].into(), turn);
-        let bodies = vec![
+        let bodies = [
             body("table", false, place(0.0)),
             body("left", true, place(0.2)),
             body("right", true, Isometry3::translation(0.0, 0.0, 0.7)),
