@@ -59,7 +59,7 @@ impl<'a> EstimatorInput<'a> {
         Ok(self)
     }
 
-    /// What factors derive from the frame and the object, rendered by `backend` or the processor.
+    /// Frame and object prepared for factors, rendered by `backend` or the processor.
     ///
     /// # Errors
     /// Those of [`PreparedFrame::new`].

@@ -176,7 +176,7 @@ impl Estimator {
             Method::Fused(fused) => Fused::clone(fused),
             _ => Fused::default(),
         };
-        let fused = Fused { rig: self.rig.clone(), ..fused };
+        let fused = Fused { rig: self.rig.clone().or(fused.rig), ..fused };
         EstimatorInput::new(frame, &self.object).completed(&fused, t_cam_object)
     }
 
@@ -204,7 +204,7 @@ impl Estimator {
         let mut method = self.method.clone();
         match &mut method {
             Method::Fused(fused) => {
-                fused.rig.clone_from(&self.rig);
+                fused.rig = self.rig.clone().or(fused.rig.take());
                 fused.alternatives.clone_from(&hypotheses.alternatives);
                 fused.factors.extend(self.factors.iter().cloned());
             }

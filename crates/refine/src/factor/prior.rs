@@ -259,6 +259,10 @@ impl Factor for GaussianPrior {
                 for &block in &blocks {
                     let (own, others) = rest.split_at(block.dimension());
                     rest = others;
+                    // Most deviations are independent of those of other blocks.
+                    if own.iter().all(|weight| *weight == 0.0) {
+                        continue;
+                    }
                     let by_pose = match block {
                         Block::ObjectPose => &by_object,
                         Block::HandPose => &by_hand,

@@ -19,7 +19,7 @@ pub struct HandMeasurement {
     pub joints: Vec<f64>,
     /// Force of the object on each taxel, in the taxel's link frame \[N\], or [`UNKNOWN_FORCE`](Self::UNKNOWN_FORCE); empty without a skin.
     pub forces: Vec<Vector3<f64>>,
-    /// What sensors say that measure no forces.
+    /// Readings of sensors that measure no forces.
     pub touch: Vec<TouchReading>,
     /// Standard deviations of `t_cam_hand` at the object's place in each direction, and about each axis \[m, rad\], where they are known.
     pub pose_sigmas: [Option<f64>; 2],
@@ -43,7 +43,7 @@ impl HandMeasurement {
     /// The force on a taxel of which nothing is known, as on a dead one: it is no evidence of anything.
     pub const UNKNOWN_FORCE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
 
-    /// Whether nothing is known of the force on a taxel. A force that is a number in some axes only is broken.
+    /// True of a force on a taxel that is unknown. A force that is a number in some axes only is broken.
     pub(crate) fn is_unknown(force: &Vector3<f64>) -> bool {
         force.iter().all(|f| f.is_nan())
     }
@@ -73,11 +73,11 @@ pub struct Frame {
     pub gravity: Option<Vector3<f64>>,
     /// The hand, where known.
     pub hand: Option<HandMeasurement>,
-    /// What other cameras saw at the same moment.
+    /// Frames of other cameras at the same moment.
     pub views: Vec<AdditionalView>,
 }
 
-/// What another camera saw.
+/// Frame of another camera.
 #[derive(Clone, Debug)]
 pub struct AdditionalView {
     /// Its coordinates → those of the first camera \[m\].
@@ -92,7 +92,7 @@ impl AdditionalView {
         self.t_cam_view.inverse()
     }
 
-    /// What it saw, in its own frame.
+    /// Its frame, in its own coordinates.
     pub fn observation(&self) -> &Frame {
         &self.frame
     }
@@ -206,7 +206,7 @@ impl Frame {
             .map_err(|(image, problem)| RefineError::Images(format!("the {image} has {problem}")))
     }
 
-    /// Whether the picture shows anything under the mask: one color everywhere is what a camera gives that failed.
+    /// True if the picture shows anything under the mask: one color everywhere is what a camera gives that failed.
     pub(crate) fn has_colors(&self) -> bool {
         let masked = self.color.pixels().iter().zip(self.mask.pixels()).filter(|(_, m)| **m);
         let mut colors = masked.map(|(color, _)| color);

@@ -27,25 +27,25 @@ pub struct PreparedFrame<'a> {
     regions: OnceLock<(ForegroundSettings, Arc<RegionEvidence>)>,
     /// Regions that are not those of the mask and the frame's own colors.
     pub(crate) given_regions: Option<Arc<RegionEvidence>>,
-    /// What renders, if not the processor at hand.
+    /// Renderer, if not the processor.
     backend: Option<Arc<dyn Backend>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     pub(crate) focus: Option<[Range<usize>; 2]>,
-    /// What other cameras saw of the object.
+    /// Views of other cameras.
     views: Vec<CameraView<'a>>,
 }
 
-/// What another camera saw of the object.
+/// View of another camera.
 pub struct CameraView<'a> {
     /// Which of the observation's [`views`](Frame::views) it is.
     pub index: usize,
     /// The first camera's coordinates → its own \[m\].
     pub t_view_cam: Isometry3<f64>,
-    /// What it saw, in its own coordinates.
+    /// Its frame, in its own coordinates.
     pub frame: PreparedFrame<'a>,
 }
 
-/// What may hide the object in the image.
+/// Occluders of the object in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -135,7 +135,7 @@ impl<'a> PreparedFrame<'a> {
         Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), views, ..self }
     }
 
-    /// What renders, if not the processor at hand.
+    /// Renderer, if not the processor.
     pub(crate) fn backend(&self) -> Option<&Arc<dyn Backend>> {
         self.backend.as_ref()
     }
@@ -146,12 +146,12 @@ impl<'a> PreparedFrame<'a> {
         Self { hand_depth, depth, ..self }
     }
 
-    /// What other cameras saw of the object: those with a mask of it.
+    /// Views of other cameras that have a mask of the object.
     pub fn views(&self) -> &[CameraView<'a>] {
         &self.views
     }
 
-    /// What was sensed.
+    /// Frame.
     pub fn observation(&self) -> &'a Frame {
         self.frame
     }

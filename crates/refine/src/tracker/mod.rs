@@ -10,21 +10,6 @@ mod pyramid;
 mod segmentation;
 mod settings;
 mod sight;
-
-/// Refuses a frame with other bodies than the first one: joints would be those of something else.
-fn require_same(first: &Arc<Hand>, now: &Arc<Hand>) -> Result<(), RefineError> {
-    let (expected, found) = (first.tree.joint_names(), now.tree.joint_names());
-    if Arc::ptr_eq(first, now) || expected == found {
-        return Ok(());
-    }
-    let differs = |names: &[String], others: &[String]| {
-        names.iter().find(|name| !others.contains(name)).cloned()
-    };
-    let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
-    let problem = format!("are others than in the first frame: joint {which:?} is in one only");
-    Err(RefineError::Setting { name: "bodies", problem })
-}
-
 #[cfg(test)]
 mod tests;
 mod tracked;
@@ -472,4 +457,18 @@ impl Tracker {
     fn remember(&self, moment: &Moment, solved: &Solved, level: f64) -> TrackState {
         TrackState::new(moment, &solved.solution.at, &self.prior, level)
     }
+}
+
+/// Refuses a frame with other bodies than the first one: joints would be those of something else.
+fn require_same(first: &Arc<Hand>, now: &Arc<Hand>) -> Result<(), RefineError> {
+    let (expected, found) = (first.tree.joint_names(), now.tree.joint_names());
+    if Arc::ptr_eq(first, now) || expected == found {
+        return Ok(());
+    }
+    let differs = |names: &[String], others: &[String]| {
+        names.iter().find(|name| !others.contains(name)).cloned()
+    };
+    let which = differs(found, expected).or_else(|| differs(expected, found)).unwrap_or_default();
+    let problem = format!("are others than in the first frame: joint {which:?} is in one only");
+    Err(RefineError::Setting { name: "bodies", problem })
 }

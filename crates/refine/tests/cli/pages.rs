@@ -74,7 +74,12 @@ fn markdown(name: &str, help: &str) -> String {
                 flush(&mut page, &mut rows);
                 page += &format!("\n| {} | |\n|---|---|\n", heading.trim_end_matches(':'));
             }
-            (option, 1..=6) => rows.push((option.to_owned(), Vec::new())),
+            (option, 1..=6) => {
+                // Commands with short texts have them beside the option.
+                let (option, text) = option.split_once("  ").unwrap_or((option, ""));
+                rows.push((option.to_owned(), vec![text.trim().to_owned()]));
+                is_new = false;
+            }
             (text, _) => {
                 // Lists and paragraphs keep their lines.
                 let is_item = is_new || text.starts_with(['-', '[']) || text.contains("  ");
