@@ -40,7 +40,7 @@ fn align(
     Ok(t_world_model)
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let folder = std::env::args().nth(1).map_or("target/align_with_glam".into(), PathBuf::from);
     let mug = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/assets/mug.glb"));
     let model = RenderModel::new(&TriMesh::load(mug)?)?;

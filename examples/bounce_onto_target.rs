@@ -54,7 +54,7 @@ fn thrown<S: Scalar>(
     Ok(run.iter().map(|states| states[1].pose.translation.vector).collect())
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let (world, states) = ball_and_floor()?;
     let miss = |velocity: &[Fwd<3>]| match thrown(&world, &states, velocity, 1) {
         Ok(path) => (0..3).map(|i| path[1][i].plus(-TARGET[i])).collect(),

@@ -22,7 +22,7 @@ impl ContactLaw for Quadratic {
         &self.0
     }
     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-        let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
+        let normal = p[0] * contact.gap * contact.gap * contact.area;
         let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
         ContactForce { normal, tangential }
     }
@@ -64,7 +64,7 @@ fn height<S: Scalar>(
     Ok(world.simulate(&states, TIME)?[1].pose.translation.z)
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let (world, states) = ball_on_floor(Quadratic([1e10, 0.5]))?;
     let at = [0.01, 1e10];
 

@@ -45,7 +45,7 @@ fn slide<S: Scalar>(
     Ok(along(world.joint_motion(&end, *bead)?[0]))
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let mut world = World::new(Vector3::z() * -GRAVITY);
     let body = RigidBody::ball(0.02, 5e-3)?;
     let bead = Link::new("bead", Joint::custom(Cycloid), &body);

@@ -49,7 +49,7 @@ impl Strategy for RandomRestarts {
     }
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
     let frame = PreparedFrame::new(&scene.frame, &scene.object)?;
     let strategy = RandomRestarts { count: 300, spread: (0.01, 0.15), icp: RobustIcp::default() };

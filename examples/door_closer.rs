@@ -142,7 +142,7 @@ fn shut<S: Scalar>(run: &[[S; 2]]) -> Option<(S, [S; 2])> {
     Some((left.plus(DT * (there - 1) as f64), [fastest, at_stop]))
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let doorway = Doorway::new()?;
     // A closer that damps strongly, and so is slow.
     let guess = [40.0f64.ln(), 60.0f64.ln()];

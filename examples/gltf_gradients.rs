@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use prehend::geometry::TriMesh;
 use prehend::render::{BufferAdjoints, Camera, Light, RenderModel, Renderer, Scene, look_at};
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let mug = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/assets/mug.glb"));
     let mesh = TriMesh::load(&std::env::args().nth(1).map_or(mug, PathBuf::from))?;
     let model = RenderModel::new(&mesh)?;

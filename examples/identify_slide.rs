@@ -106,7 +106,7 @@ fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> 
     Ok(run.iter().map(seen).collect())
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = scene()?;
     let (mut recording, mut random) = (slide(&scene, &TRUTH)?, SplitMix64::new(1));
     for frame in &mut recording {

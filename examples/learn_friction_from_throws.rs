@@ -77,7 +77,7 @@ fn ends<S: Scalar>(
     ends.map(|end| end.map(|states| states[1].pose.translation).map(|at| [at.x, at.z])).collect()
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let world = world()?;
     let batch = Batch::new(&world)?;
     let mut random = SplitMix64::new(2026);

@@ -31,7 +31,7 @@ impl Factor for Landmark {
     }
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
     // Without the hand and without colors, a bottle's outline and depth say little of how it is turned.
     let bare = Frame { hand: None, ..scene.frame.clone() };

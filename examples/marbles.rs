@@ -86,7 +86,7 @@ fn run<S: Scalar>(
     Ok(run.iter().map(places).collect())
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = marbles()?;
     let moved = MARBLES[0] * (MARBLES[1] - 1) + MARBLES[0] / 2;
     let began = std::time::Instant::now();

@@ -24,7 +24,7 @@ const MOMENTS: usize = 4;
 /// Width and height of each \[px\].
 const SIZE: [usize; 2] = [240, 180];
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let path = std::env::args().nth(1).unwrap_or("target/mesh_contacts.png".into());
     // How long each is followed \[s\], and from where it is looked at.
     let mut all = vec![

@@ -121,7 +121,7 @@ impl Throw {
     }
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or("target/mug_onto_hook".into()));
     let mug = Mug::default();
     let throw = Throw::new(&mug)?;

@@ -81,7 +81,7 @@ fn effort<S: Scalar>(x: &S) -> S {
     x.tanh().times(MOST)
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let pendulum = Pendulum::new()?;
     let all_it_has = pendulum.swing(&Adaptive::default(), &[MOST; EFFORTS], 1)?;
     let highest = all_it_has.iter().map(|[angle, _]| *angle).fold(0.0, f64::max);

@@ -69,7 +69,7 @@ fn scene() -> (Scene, Isometry3<f64>) {
     (Scene::new(camera), Isometry3::from_parts(Translation3::new(0.0, 0.03, 0.45), turn))
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let folder = std::env::args().nth(1).unwrap_or("target/pixels_to_physics".to_owned());
     let (world, model) = (world()?, Arc::new(RenderModel::new(&block())?));
     let renderer = Renderer::new(Light::headlight(0.5, 0.5));

@@ -115,7 +115,7 @@ fn push<S: Scalar>(
     Ok(run.iter().map(seen).collect())
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = scene()?;
     // Off by a millimeter counts as much as by half a degree, and as a bend of the path by 10 cm.
     let units = [1e-3, 1e-3, 0.5f64.to_radians()];

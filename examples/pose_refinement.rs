@@ -14,7 +14,7 @@ use prehend::refine::scene::HandMeasurement;
 use prehend::refine::scene::default_scene;
 use prehend::refine::{Method, PreparedFrame, refine};
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let seed = std::env::args()
         .nth(1)
         .map_or(Ok(1), |text| text.parse())

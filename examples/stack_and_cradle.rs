@@ -84,7 +84,7 @@ fn strike<S: Scalar>(
     world.cast().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let (world, start) = stack()?;
     let stack = world.rollout(&start, TimeSteps { dt: 0.4, steps: 5 })?;
     let fastest = stack[5][1..4].iter().map(|s| s.linear.norm()).fold(0.0, f64::max);

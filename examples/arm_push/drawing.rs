@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector2};
 use plotters::prelude::*;
 use prehend::sim::State;
 
-use crate::scene::{HALF, LINKS, PEG, Scene};
+use super::scene::{HALF, LINKS, PEG, Scene};
 
 /// Pixels a meter.
 const SCALE: f64 = 1000.0;

@@ -78,7 +78,7 @@ fn place<S: Scalar>(scene: &Scene, states: &[State<S>]) -> Vector2<S> {
     states[scene.pushed].pose.translation.vector.xy()
 }
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let scene = Scene::new()?;
     let integrator = StepCheckpointed::new(SemiImplicitEuler, &scene.world)?;
     // Off by a millimeter counts as much as a bend of the plan by half a radian.

@@ -29,7 +29,7 @@ const LIFT: f64 = 0.1;
 /// What the pads should press with \[N\].
 const GRIP: f64 = 6.0;
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let gripper = Gripper::add(&mut world)?;
     println!("{}", gripper.name);

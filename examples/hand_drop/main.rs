@@ -29,7 +29,7 @@ const HEIGHT: f64 = 0.17;
 const TIME: f64 = 1.2;
 const DT: f64 = 0.01;
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None)?;
     let shape = RobotShape::new(&robot, 3e-3, 6e-3)?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));

@@ -2,7 +2,7 @@
 
 use prehend::nalgebra::Vector3;
 
-use crate::point_contact::{DEPTH, PointContact};
+use super::point_contact::{DEPTH, PointContact};
 
 /// Something to be drawn.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use prehend::geometry::SplitMix64;
 use prehend::nalgebra::Vector3;
 use prehend::sim::{ContactForce, ContactKinematics};
 
-use crate::finding::{Finding, Verdict};
-use crate::point_contact::{AREA, DEPTH, PointContact};
+use super::finding::{Finding, Verdict};
+use super::point_contact::{AREA, DEPTH, PointContact};
 
 /// Contacts that are tried.
 const CONTACTS: usize = 200;
@@ -78,7 +78,7 @@ pub(crate) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
 fn contact<S: Scalar>([gap, normal_speed, x, y]: [S; 4]) -> ContactKinematics<S> {
     let slip = Vector3::new(x, y, S::zero());
     let normal = Vector3::z().map(S::constant);
-    ContactKinematics { gap, normal_speed, slip, normal, area: AREA }
+    ContactKinematics { gap, normal_speed, slip, normal, area: S::constant(AREA) }
 }
 
 fn force(contact_point: &PointContact<'_>, at: &[f64; 4], p: &[f64]) -> [f64; 3] {

@@ -18,14 +18,14 @@ use plotters::prelude::*;
 use prehend::sim::contact::LawRegistry;
 use prehend::sim::{ContactCalibration, DynContactLaw};
 
-use crate::curves::Curve;
-use crate::report::{LawReport, law_report};
+use self::curves::Curve;
+use self::report::{LawReport, law_report};
 
 /// 300 g on 4 cm², half a millimeter deep.
 const TARGET: ContactCalibration =
     ContactCalibration { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let registry = LawRegistry::default();
     let mut args = std::env::args().skip(1);
     let name = args.next().unwrap_or_else(|| "hunt_crossley".to_owned());

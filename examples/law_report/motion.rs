@@ -9,9 +9,9 @@ use prehend::sim::{
     SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
 };
 
-use crate::curves::Curve;
-use crate::finding::{Finding, Verdict};
-use crate::point_contact::{AREA, DEPTH, PointContact};
+use super::curves::Curve;
+use super::finding::{Finding, Verdict};
+use super::point_contact::{AREA, DEPTH, PointContact};
 
 /// Gravity \[m/s²\].
 pub(crate) const GRAVITY: f64 = 9.81;

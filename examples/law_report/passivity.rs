@@ -2,8 +2,8 @@
 
 use prehend::nalgebra::Vector3;
 
-use crate::finding::{Finding, Verdict};
-use crate::point_contact::{DEPTH, PointContact};
+use super::finding::{Finding, Verdict};
+use super::point_contact::{DEPTH, PointContact};
 
 /// Steps of a cycle.
 const STEPS: usize = 4000;
@@ -54,8 +54,8 @@ fn work(contact_point: &PointContact<'_>, rate: f64, slip: f64, swing: f64) -> f
 mod tests {
     use prehend::sim::{Coulomb, KelvinVoigt, Law};
 
+    use super::super::point_contact::AREA;
     use super::*;
-    use crate::point_contact::AREA;
 
     #[test]
     fn a_spring_gives_back_what_it_took_and_a_damper_nothing() {

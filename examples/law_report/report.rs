@@ -6,12 +6,12 @@ use std::sync::Arc;
 use prehend::nalgebra::Vector3;
 use prehend::sim::{DynContactLaw, SimulationError};
 
-use crate::curves::{self, Curve};
-use crate::derivatives;
-use crate::finding::{Finding, Verdict};
-use crate::motion::{GRAVITY, Specimen};
-use crate::passivity;
-use crate::point_contact::{DEPTH, PointContact};
+use super::curves::{self, Curve};
+use super::derivatives;
+use super::finding::{Finding, Verdict};
+use super::motion::{GRAVITY, Specimen};
+use super::passivity;
+use super::point_contact::{DEPTH, PointContact};
 
 /// What was found of a law, see [`law_report`].
 #[derive(Clone, Debug)]
@@ -90,8 +90,8 @@ mod tests {
     use prehend::autodiff::Scalar;
     use prehend::sim::{ContactForce, ContactKinematics, ContactLaw, Coulomb, KelvinVoigt, Law};
 
+    use super::super::point_contact::AREA;
     use super::*;
-    use crate::point_contact::AREA;
 
     /// A belt: friction that drives instead of braking.
     struct Belt([f64; 2]);
@@ -101,7 +101,7 @@ mod tests {
             &self.0
         }
         fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-            let normal = (-p[0] * contact.gap).times(contact.area);
+            let normal = -p[0] * contact.gap * contact.area;
             ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
         }
         fn cutoff(&self) -> f64 {
@@ -134,7 +134,7 @@ mod tests {
             let [mut stiffness, mut gap] = [p[0], contact.gap];
             let lost = if self.gap { &mut gap } else { &mut stiffness };
             *lost = S::constant(lost.value());
-            let normal = (-stiffness * gap).times(contact.area);
+            let normal = -stiffness * gap * contact.area;
             ContactForce { normal, tangential: contact.slip.map(|_| S::zero()) }
         }
         fn cutoff(&self) -> f64 {

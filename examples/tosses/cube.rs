@@ -10,9 +10,9 @@ use prehend::sim::{
     State, Surface, TimeSteps, World,
 };
 
-use crate::law::CubeLaw;
-use crate::parameters::COUNT;
-use crate::recording::{RATE, Start};
+use super::law::CubeLaw;
+use super::parameters::COUNT;
+use super::recording::{RATE, Start};
 
 /// Mass of the cube \[kg\]: forces are in proportion to it.
 const MASS: f64 = 0.37;

@@ -5,10 +5,10 @@ use prehend::geometry::SplitMix64;
 use prehend::sim::RungeKutta4;
 use rayon::prelude::*;
 
-use crate::cube::{self, Steps};
-use crate::fit;
-use crate::parameters::{COUNT, PARAMETERS};
-use crate::recording::{RATE, Row, Start, Toss};
+use super::cube::{self, Steps};
+use super::fit;
+use super::parameters::{COUNT, PARAMETERS};
+use super::recording::{RATE, Row, Start, Toss};
 
 const TOSSES: u32 = 24;
 const ROWS: usize = 100;

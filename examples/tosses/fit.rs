@@ -7,9 +7,9 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use rayon::prelude::*;
 
-use crate::parameters::{self, CONTACT, COUNT, FLIGHT, PARAMETERS};
-use crate::recording::{Start, Toss};
-use crate::target::{Part, Target};
+use super::parameters::{self, CONTACT, COUNT, FLIGHT, PARAMETERS};
+use super::recording::{Start, Toss};
+use super::target::{Part, Target};
 
 /// A fit to the rows of a toss up to some after its first touch: from what hardly depends on chance to whole tosses.
 struct Stage {

@@ -6,9 +6,9 @@ use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations}
 use prehend::autodiff::{Fwd, Scalar, forward_jacobian};
 use prehend::sim::RungeKutta4;
 
-use crate::cube::{self, Steps};
-use crate::parameters::{COUNT, LANES};
-use crate::recording::{Row, Start, Toss};
+use super::cube::{self, Steps};
+use super::parameters::{COUNT, LANES};
+use super::recording::{Row, Start, Toss};
 
 /// Half-width that surely holds the cube \[m\], and the least height of its corners in flight \[m\].
 const HALF: f64 = 0.0524;

@@ -31,7 +31,7 @@ use fit::Fit;
 use parameters::{COUNT, PARAMETERS};
 use recording::{RATE, Row, Start, Toss};
 
-fn main() -> anyhow::Result<()> {
+pub(crate) fn main() -> anyhow::Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let option = |name: &str| {
         let at = args.iter().position(|arg| arg == name)?;

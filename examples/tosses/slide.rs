@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, UnitQuaternion, Vector3};
 
-use crate::recording::{RATE, Row, Start, Toss};
+use super::recording::{RATE, Row, Start, Toss};
 
 /// How far a cube that slides on a face may seem tilted \[rad\], and its height may seem to change \[m\].
 const TILT: f64 = 0.023;

@@ -6,11 +6,11 @@ use nalgebra::{DVector, Dyn, OMatrix, SMatrix, SVector, U22};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::RungeKutta4;
 
-use crate::cube::{self, Path, Steps};
-use crate::flight::{self, NOISE};
-use crate::parameters::{self, COUNT, DEPTH, EXACT, HALF_WIDTH, LANES};
-use crate::recording::{Start, Toss};
-use crate::slide;
+use super::cube::{self, Path, Steps};
+use super::flight::{self, NOISE};
+use super::parameters::{self, COUNT, DEPTH, EXACT, HALF_WIDTH, LANES};
+use super::recording::{Start, Toss};
+use super::slide;
 
 /// Width of the cube, by which positions are measured \[m\].
 const WIDTH: f64 = 0.1048;

@@ -11,8 +11,8 @@ use pyo3::types::PyTuple;
 use crate::error::wrong;
 use crate::world::laws::Values;
 
-/// Gap, its rate, slip and normal.
-const MOTION: usize = 8;
+/// Gap, its rate, slip, normal and area.
+const MOTION: usize = 9;
 
 /// What a law has raised. Laws have no way to fail: they answer what is no number, which ends the simulation, and this says why.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
@@ -38,7 +38,7 @@ impl LawFailure {
 
 /// A law whose forces, and their derivatives, Python computes at each contact point.
 pub(crate) struct PythonLaw {
-    /// `prehend.laws._respond(law, numbers, area, differentiate)`.
+    /// `prehend.laws._respond(law, numbers, differentiate)`.
     respond: Py<PyAny>,
     law: Py<PyAny>,
     names: Vec<&'static str>,
@@ -75,15 +75,10 @@ impl PythonLaw {
     }
 
     /// The four numbers of a response, each with its derivatives by motion and parameters if asked for.
-    fn respond(
-        &self,
-        numbers: &[f64],
-        area: f64,
-        differentiate: bool,
-    ) -> PyResult<Vec<(f64, Vec<f64>)>> {
+    fn respond(&self, numbers: &[f64], differentiate: bool) -> PyResult<Vec<(f64, Vec<f64>)>> {
         Python::attach(|py| {
             let numbers = PyTuple::new(py, numbers)?;
-            self.respond.call1(py, (&self.law, numbers, area, differentiate))?.extract(py)
+            self.respond.call1(py, (&self.law, numbers, differentiate))?.extract(py)
         })
     }
 }
@@ -101,9 +96,10 @@ impl ContactLaw for PythonLaw {
         let mut inputs: Vec<S> = Vec::with_capacity(MOTION + p.len());
         inputs.extend([contact.gap, contact.normal_speed]);
         inputs.extend(contact.slip.iter().chain(contact.normal.iter()));
+        inputs.push(contact.area);
         inputs.extend_from_slice(p);
         let numbers: Vec<f64> = inputs.iter().map(|x| x.value()).collect();
-        let outputs = match self.respond(&numbers, contact.area, S::ORDER > 0) {
+        let outputs = match self.respond(&numbers, S::ORDER > 0) {
             Ok(outputs) if outputs.len() == 4 => outputs,
             Ok(_) => {
                 LawFailure::keep(wrong(

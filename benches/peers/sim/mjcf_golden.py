@@ -1,4 +1,4 @@
-"""Golden values of MJCF models by MuJoCo, for crates/geometry/tests/mjcf_golden.rs.
+"""Golden values of MJCF models by MuJoCo, for crates/geometry/tests/it/mjcf_golden.rs.
 
     pip install mujoco
     PREHEND_DATA=../../../../shared/data python mjcf_golden.py > ../../../crates/geometry/tests/golden/mjcf.json

@@ -2,6 +2,7 @@
 
 mod energy;
 mod step_resolution;
+mod tunneling;
 
 use std::fmt;
 
@@ -14,6 +15,7 @@ use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use energy::EnergyBalance;
 use step_resolution::StepResolution;
+use tunneling::Tunneling;
 
 /// Roughness up to which a simulation is resolved.
 const FINE: f64 = 0.1;
@@ -29,18 +31,27 @@ pub struct Resolution {
     pub roughness: Option<f64>,
     /// The body with the largest such change, and when \[s\]; none if nothing touched.
     pub roughest: Option<(String, f64)>,
+    /// The first body that passed through another within a step, that other one, and when \[s\]: contacts that were missed. An integrator that holds its error
+    /// takes shorter steps instead.
+    pub passed: Option<(String, String, f64)>,
 }
 
 impl Resolution {
-    /// True if the steps were short enough, for values and derivatives: a roughness of no more than 0.1.
+    /// True if the steps were short enough, for values and derivatives: a roughness of no more than 0.1, and no contact missed.
     pub fn is_fine(&self) -> bool {
-        self.roughness.is_none_or(|roughness| roughness <= FINE)
+        self.passed.is_none() && self.roughness.is_none_or(|roughness| roughness <= FINE)
     }
 }
 
 impl fmt::Display for Resolution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let steps = self.steps;
+        if let Some((body, other, time)) = &self.passed {
+            return write!(
+                f,
+                "{steps} steps, too long for contacts: '{body}' passed through '{other}' at {time:.4} s"
+            );
+        }
         let Some(roughness) = self.roughness else {
             return write!(f, "{steps} steps of an integrator that holds its error");
         };
@@ -60,6 +71,7 @@ pub(crate) struct Diagnostics<'a, S: Scalar> {
     world: &'a World<S>,
     /// None if the integrator holds its error itself.
     roughness: Option<StepResolution>,
+    tunneling: Option<Tunneling>,
     energy: EnergyBalance,
 }
 
@@ -67,8 +79,9 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not.
     pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
         let roughness = (!controls_error).then(|| StepResolution::new(world, initial));
+        let tunneling = (!controls_error).then(|| Tunneling::new(world, initial));
         let energy = EnergyBalance::new(world, initial, controls_error);
-        Self { world, roughness, energy }
+        Self { world, roughness, tunneling, energy }
     }
 
     /// After `step` has led to `states`.
@@ -78,6 +91,9 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     pub(crate) fn step(&mut self, step: Step, states: &[State<S>]) -> Result<(), SimulationError> {
         if let Some(roughness) = &mut self.roughness {
             roughness.step(step, states);
+        }
+        if let Some(tunneling) = &mut self.tunneling {
+            tunneling.step(self.world, step, states);
         }
         self.energy.step(self.world, step, states)
     }
@@ -103,6 +119,11 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
             steps,
             roughness,
             roughest: roughest.map(|(body, time)| (name(body), time)),
+            passed: self
+                .tunneling
+                .as_ref()
+                .and_then(Tunneling::first)
+                .map(|(bodies, time)| (name(bodies.samples), name(bodies.field), time)),
         })
     }
 }
@@ -115,7 +136,7 @@ mod tests {
     fn tells_how_fine_steps_were_and_which_body_moved_most() {
         let said = |roughness, body: &str| {
             let roughest = Some((body.to_owned(), 0.5));
-            Resolution { steps: 40, roughness, roughest }.to_string()
+            Resolution { steps: 40, roughness, roughest, passed: None }.to_string()
         };
         assert_eq!(said(None, "mug"), "40 steps of an integrator that holds its error");
         let fine = "40 steps, contact forces change by 2.0 % from one to the next";

@@ -230,7 +230,7 @@
 //!         &self.0
 //!     }
 //!     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-//!         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
+//!         let normal = p[0] * contact.gap * contact.gap * contact.area;
 //!         ContactForce { normal, tangential: contact.slip * -(p[1] * normal) }
 //!     }
 //!     fn cutoff(&self) -> f64 {

@@ -24,6 +24,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from ._callback import callback
 from ._prehend import Rollout
 from .jax_render import perturb, pose_loss, render
 
@@ -45,24 +46,39 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
     Derivatives are first ones, in reverse mode: ``jax.grad``, ``vjp`` and ``jacrev``, not ``jacfwd`` or ``hessian``.
     """
 
+    own = (function.rows, STATE)
+
+    def at_end(*arrays: Array) -> NDArray[Any]:
+        batch, inputs = _flat(arrays, (2, 1, 2))
+        return function(*inputs, end=True).reshape(*batch, *own)
+
+    def at_all(*arrays: Array) -> NDArray[Any]:
+        batch, inputs = _flat(arrays, (2, 1, 2))
+        return function(*inputs).reshape(*batch, function.steps + 1, *own)
+
+    def pull_back(*arrays: Array) -> list[NDArray[Any]]:
+        return _pull_back(function, arrays)
+
     @jax.custom_vjp
     def run(states: Array, parameters: Array, controls: Array) -> Array:
-        return _call(function, end, states, parameters, controls)
+        if not end:
+            return whole_of(states, parameters, controls)
+        result = jax.ShapeDtypeStruct(own, states.dtype)
+        return callback(at_end, result, states, parameters, controls, vmap_method="broadcast_all")
+
+    def whole_of(states: Array, parameters: Array, controls: Array) -> Array:
+        result = jax.ShapeDtypeStruct((function.steps + 1, *own), states.dtype)
+        return callback(at_all, result, states, parameters, controls, vmap_method="broadcast_all")
 
     def forward(states: Array, parameters: Array, controls: Array) -> tuple[Array, Any]:
-        whole = _call(function, False, states, parameters, controls)
+        whole = whole_of(states, parameters, controls)
         return whole[-1] if end else whole, (whole, states, parameters, controls)
 
     def backward(kept: Any, adjoints: Array) -> tuple[Array, ...]:
         whole, *inputs = kept
         shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in inputs]
-        gradients = jax.pure_callback(
-            lambda *arrays: _pull_back(function, arrays, shapes),
-            shapes,
-            whole,
-            adjoints,
-            *inputs,
-            vmap_method="broadcast_all",
+        gradients = callback(
+            pull_back, shapes, whole, adjoints, *inputs, vmap_method="broadcast_all"
         )
         return tuple(gradients)
 
@@ -82,28 +98,14 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
     return with_defaults
 
 
-def _call(function: Rollout, end: bool, states: Array, parameters: Array, controls: Array) -> Array:
-    own = (function.rows, STATE)
-    shape = own if end else (function.steps + 1, *own)
-
-    def compute(*arrays: Array) -> NDArray[Any]:
-        batch, inputs = _flat(arrays, (2, 1, 2))
-        result = function(*inputs, end=end)
-        return result.reshape(*batch, *shape).astype(states.dtype)
-
-    result = jax.ShapeDtypeStruct(shape, states.dtype)
-    arrays = (states, parameters, controls)
-    return jax.pure_callback(compute, result, *arrays, vmap_method="broadcast_all")
-
-
-def _pull_back(function: Rollout, arrays: Any, shapes: Any) -> list[NDArray[Any]]:
-    whole, adjoints = arrays[:2]
+def _pull_back(function: Rollout, arrays: Any) -> list[NDArray[Any]]:
+    whole, adjoints, *given = arrays
     own = adjoints.ndim - (whole.ndim - 3)
-    batch, (run, flat, *inputs) = _flat(arrays, (3, own, 2, 1, 2))
+    _, (run, flat, *inputs) = _flat(arrays, (3, own, 2, 1, 2))
     gradients = function.pullback(run, flat, *inputs)
     return [
-        gradient.reshape(*batch, *shape.shape).astype(shape.dtype)
-        for gradient, shape in zip(gradients, shapes, strict=True)
+        gradient.reshape(x.shape).astype(x.dtype)
+        for gradient, x in zip(gradients, given, strict=True)
     ]
 
 

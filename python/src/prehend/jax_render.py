@@ -23,6 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from ._callback import callback
 from ._prehend import PoseLoss, Renderer
 from .render import Image, twist_generators
 
@@ -71,14 +72,14 @@ def render(renderer: Renderer) -> Callable[..., Image]:
 
     @jax.custom_vjp
     def run(given: dict[str, Array]) -> Image:
-        return jax.pure_callback(draw, shapes(given["pose"].dtype), given, vmap_method="expand_dims")  # type: ignore[no-any-return]
+        return callback(draw, shapes(given["pose"].dtype), given, vmap_method="expand_dims")  # type: ignore[no-any-return]
 
     def forward(given: dict[str, Array]) -> tuple[Image, dict[str, Array]]:
         return run(given), given
 
     def backward(given: dict[str, Array], adjoints: Image) -> tuple[dict[str, Array]]:
         like = {name: jax.ShapeDtypeStruct(x.shape, x.dtype) for name, x in given.items()}
-        return (jax.pure_callback(pull_back, like, given, adjoints, vmap_method="expand_dims"),)
+        return (callback(pull_back, like, given, adjoints, vmap_method="expand_dims"),)
 
     run.defvjp(forward, backward)
 
@@ -111,11 +112,11 @@ def pose_loss(loss: PoseLoss) -> Callable[..., Array]:
     @jax.custom_vjp
     def run(pose: Array, light: Array) -> Array:
         number = jax.ShapeDtypeStruct((), pose.dtype)
-        return jax.pure_callback(value, number, pose, light, vmap_method="expand_dims")
+        return callback(value, number, pose, light, vmap_method="expand_dims")
 
     def forward(pose: Array, light: Array) -> tuple[Array, tuple[Array, Array]]:
         shapes = jax.ShapeDtypeStruct((), pose.dtype), jax.ShapeDtypeStruct((4, 4), pose.dtype)
-        total, by_pose = jax.pure_callback(both, shapes, pose, light, vmap_method="expand_dims")
+        total, by_pose = callback(both, shapes, pose, light, vmap_method="expand_dims")
         return total, (by_pose, jnp.zeros_like(light))
 
     def backward(kept: tuple[Array, Array], adjoint: Array) -> tuple[Array, Array]:

@@ -168,7 +168,7 @@ class Contact:
     """Velocity of the sample across the normal [m/s]."""
     normal: Sequence[Number]
     """Unit normal, out of the body with the field."""
-    area: float
+    area: Number
     """Surface area that the sample stands for [m²]."""
 
 
@@ -181,15 +181,15 @@ def regularized_coulomb(
 
 
 def _respond(
-    law: Any, numbers: tuple[float, ...], area: float, differentiate: bool
+    law: Any, numbers: tuple[float, ...], differentiate: bool
 ) -> list[tuple[float, NDArray[np.float64] | list[float]]]:
     """The four numbers of a law's response, with their derivatives by ``numbers`` if asked for: Rust calls this."""
     inputs: Sequence[Number] = numbers
     if differentiate:
         slopes = np.eye(len(numbers))
         inputs = [Dual(x, row) for x, row in zip(numbers, slopes, strict=True)]
-    contact = Contact(inputs[0], inputs[1], inputs[2:5], inputs[5:8], area)
-    normal, tangential = law.law(list(inputs[8:]), contact)
+    contact = Contact(inputs[0], inputs[1], inputs[2:5], inputs[5:8], inputs[8])
+    normal, tangential = law.law(list(inputs[9:]), contact)
     response = [normal, *tangential]
     return [
         (x.value, x.slopes.tolist()) if isinstance(x, Dual) else (float(x), []) for x in response

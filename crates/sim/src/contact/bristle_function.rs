@@ -142,22 +142,19 @@ impl BristleFunction<'_> {
         let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
         let sound = query.for_each_contact(cutoff, T::ORDER == 0, |touch| {
-            let LiftedContact { mut contact, lever, stretch } = lift(touch, cutoff);
+            let LiftedContact { mut contact, lever } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
             contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
             let response = law.force(&contact);
             let force = contact.normal * response.normal + response.tangential;
-            let force = stretch.map_or(force, |stretch| force * stretch);
             let torque = lever.cross(&force);
             wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
             // By depth, which ends smoothly where a contact does; the force of a damper may end before.
             let depth = -contact.gap.plus(-cutoff);
             if depth.value() > 0.0 {
-                let weight = depth.times(contact.area);
-                let weight = stretch.map_or(weight, |stretch| weight * stretch);
-                fit.add(&across, weight, depth, bristles.rate(&slip, &deflected));
+                fit.add(&across, depth * contact.area, depth, bristles.rate(&slip, &deflected));
             }
         });
         let rate = fit.rate(deflection, bristles);

@@ -29,8 +29,7 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
         let inputs = inputs_of(contact);
         let at = inputs.map(T::value);
         if T::ORDER == 0 {
-            let ContactForce { normal, tangential } =
-                self.law.force(&self.values, &contact_of(at, contact.area));
+            let ContactForce { normal, tangential } = self.law.force(&self.values, &contact_of(at));
             return ContactForce {
                 normal: T::constant(normal),
                 tangential: tangential.map(T::constant),
@@ -49,8 +48,8 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
         let changes = inputs.map(|x| x.plus(-x.value()));
         for from in [0, LANES] {
             let seeded = std::array::from_fn(|i| seed(at[i], i.wrapping_sub(from)));
-            let contact = contact_of(seeded, contact.area);
-            add(self.law.force_with_derivative(&self.constants, &contact), &changes[from..]);
+            let response = self.law.force_with_derivative(&self.constants, &contact_of(seeded));
+            add(response, &changes[from..]);
         }
         for from in (0..self.p.len()).step_by(LANES) {
             let changes: Vec<T> = self.p[from..].iter().map(|p| p.plus(-p.value())).collect();
@@ -59,7 +58,7 @@ impl<'a, T: Scalar> BristleLaw<'a, T> {
             }
             let seeded = |(i, &p): (usize, &f64)| seed(p, i.wrapping_sub(from));
             let p: Vec<Fwd<LANES>> = self.values.iter().enumerate().map(seeded).collect();
-            let contact = contact_of(at.map(Fwd::constant), contact.area);
+            let contact = contact_of(at.map(Fwd::constant));
             add(self.law.force_with_derivative(&p, &contact), &changes);
         }
         let [normal, x, y, z] = sum.unwrap_or_default();
@@ -72,13 +71,13 @@ fn seed(value: f64, lane: usize) -> Fwd<LANES> {
     if lane < LANES { Fwd::variable(value, lane) } else { Fwd::constant(value) }
 }
 
-fn inputs_of<T: Scalar>(contact: &ContactKinematics<T>) -> [T; 8] {
-    let ContactKinematics { gap, normal_speed, slip: s, normal: n, .. } = *contact;
-    [gap, normal_speed, s.x, s.y, s.z, n.x, n.y, n.z]
+fn inputs_of<T: Scalar>(contact: &ContactKinematics<T>) -> [T; 9] {
+    let ContactKinematics { gap, normal_speed, slip: s, normal: n, area } = *contact;
+    [gap, normal_speed, s.x, s.y, s.z, n.x, n.y, n.z, area]
 }
 
-fn contact_of<T: Scalar>(inputs: [T; 8], area: f64) -> ContactKinematics<T> {
-    let [gap, normal_speed, sx, sy, sz, nx, ny, nz] = inputs;
+fn contact_of<T: Scalar>(inputs: [T; 9]) -> ContactKinematics<T> {
+    let [gap, normal_speed, sx, sy, sz, nx, ny, nz, area] = inputs;
     let (slip, normal) = (Vector3::new(sx, sy, sz), Vector3::new(nx, ny, nz));
     ContactKinematics { gap, normal_speed, slip, normal, area }
 }

@@ -1,7 +1,7 @@
 //! A surface beside a distance field: which of its points touch, and what a contact law sees of them.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use prehend_autodiff::Fwd;
+use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::{DistanceField, FieldSample};
 
 use super::gap_smoothing::{GapSmoothing, SmoothedGap};
@@ -115,6 +115,40 @@ impl ContactQuery<'_> {
         touched.any(|(_, points)| points.iter().any(crosses))
     }
 
+    /// True if a sample has gone straight through the middle of the solid since its body was in `before`, whether it touched then or
+    /// touches now.
+    pub(crate) fn has_passed(&self, before: State) -> bool {
+        let earlier = Self { state: before, ..*self };
+        self.surface.points().iter().any(|point| {
+            let [from, to] = [&earlier, self].map(|query| query.place(&point.position));
+            let path = to - from;
+            let length = path.norm();
+            if length == 0.0 {
+                return false;
+            }
+            let reach = self.field.lipschitz_bound() * length;
+            let shortest = (0.5 * self.field.thickness()).max(1e-3 * length);
+            // To where the path enters the solid, by sphere tracing.
+            let mut way = 0.0;
+            let entered = loop {
+                let place = from + path * (way / length);
+                match self.field.distance(&place, reach) {
+                    Some(distance) if distance < 0.0 => break place,
+                    Some(distance) => {
+                        way += (distance / self.field.lipschitz_bound()).max(shortest);
+                    }
+                    None => return false,
+                }
+                if way >= length {
+                    return false;
+                }
+            };
+            let gradient = |place| self.field.sample(place, reach).map(|sample| sample.gradient);
+            let ends = gradient(&entered).zip(gradient(&to));
+            ends.is_some_and(|(a, b)| a.dot(&b) < OPPOSITE * a.norm() * b.norm())
+        })
+    }
+
     /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that a law that reaches to `cutoff` may push.
     pub(crate) fn for_each_gap(&self, cutoff: f64, mut visit: impl FnMut(f64, f64)) {
         let within = cutoff + self.smoothing.force_band();
@@ -218,7 +252,7 @@ impl ContactPoint {
             normal_speed: activation * speed,
             slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),
             normal,
-            area: self.area,
+            area: Fwd::constant(self.area),
         }
     }
 

@@ -111,7 +111,7 @@ mod tests {
             normal_speed,
             slip: Vector3::new(x, y, z),
             normal,
-            area: 2e-5,
+            area: Fwd::constant(2e-5),
         };
         let p = [k, Fwd::constant(2e5), Fwd::constant(0.7)];
         let (own, twin) = (law.law(&p, &contact), boxed.force_with_derivative(&p, &contact));

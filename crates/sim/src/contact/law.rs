@@ -23,7 +23,7 @@ use super::point::{ContactForce, ContactKinematics};
 ///         &self.0
 ///     }
 ///     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-///         let normal = p[0] * contact.gap * contact.gap * S::constant(contact.area);
+///         let normal = p[0] * contact.gap * contact.gap * contact.area;
 ///         ContactForce { normal, tangential: Vector3::zeros() }
 ///     }
 ///     fn cutoff(&self) -> f64 {

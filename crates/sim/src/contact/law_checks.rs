@@ -112,7 +112,7 @@ fn pack(gap: f64, speed: f64, slip: &Vector3<f64>, normal: &Vector3<f64>) -> [f6
 
 fn unpack<S: Scalar>(x: &[S]) -> ContactKinematics<S> {
     let (slip, normal) = (Vector3::new(x[2], x[3], x[4]), Vector3::new(x[5], x[6], x[7]));
-    ContactKinematics { gap: x[0], normal_speed: x[1], slip, normal, area: 2e-5 }
+    ContactKinematics { gap: x[0], normal_speed: x[1], slip, normal, area: S::constant(2e-5) }
 }
 
 /// Force components for the inputs of a contact, followed by the law's parameters.

@@ -10,8 +10,6 @@ use super::point::ContactKinematics;
 pub(crate) struct LiftedContact<T: Scalar> {
     pub(crate) contact: ContactKinematics<T>,
     pub(crate) lever: Vector3<T>,
-    /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
-    pub(crate) stretch: Option<T>,
 }
 
 /// A query whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
@@ -59,8 +57,8 @@ impl<T: Scalar> MovedQuery<T> {
             normal_speed: smoothed(smoothing.activation, smoothing.activation_slope) * speed,
             slip: velocity - normal_now * speed,
             normal: normal_now,
-            area: touch.area,
+            area: T::constant(touch.area),
         };
-        LiftedContact { contact, lever: constant(lever) + lever_change, stretch: None }
+        LiftedContact { contact, lever: constant(lever) + lever_change }
     }
 }

@@ -32,7 +32,7 @@ use super::point::ContactKinematics;
 ///
 /// impl NormalLaw for Exponential {
 ///     fn force<S: Scalar>(&self, [pressure]: [S; 1], contact: &ContactKinematics<S>) -> S {
-///         pressure * (-contact.gap.times(1e3)).exp_m1().times(contact.area)
+///         pressure * (-contact.gap.times(1e3)).exp_m1() * contact.area
 ///     }
 /// }
 ///

@@ -17,8 +17,8 @@ pub struct ContactKinematics<S: Scalar> {
     pub slip: Vector3<S>,
     /// Unit normal, out of the body with the field.
     pub normal: Vector3<S>,
-    /// Surface area that the sample stands for \[m²\]. Forces are proportional to it: derivatives by the size of a shape count on that.
-    pub area: f64,
+    /// Surface area that the sample stands for \[m²\]; it has derivatives by the dimensions of a shape.
+    pub area: S,
 }
 
 /// Force on the body with the sample at one contact point, along the axes of its [`ContactKinematics`].

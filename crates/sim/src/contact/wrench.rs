@@ -174,7 +174,7 @@ fn add_param_slopes<L: ContactLaw>(
                 normal_speed: Fwd::constant(normal_speed),
                 slip: slip.map(Fwd::constant),
                 normal: normal.map(Fwd::constant),
-                area,
+                area: Fwd::constant(area),
             },
         );
         for (lane, slope) in slopes.iter_mut().enumerate() {

@@ -8,6 +8,7 @@ use crate::error::BuildError;
 use crate::handle::BodyId;
 use crate::world::World;
 use crate::world::joint_force::JointAxis;
+use crate::world::transmission::Coupling;
 
 /// Options of reading a robot in URDF that forces move.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +108,9 @@ impl World {
                 let stiffness = inertia / options.time_constant.powi(2);
                 let damping = 2.0 * inertia / options.time_constant;
                 self.add_coupling(&axes, offset, [stiffness, damping])?;
+                let leader = JointAxis::from(bodies[leader.child]);
+                let coupling = Coupling { follower: axis, leader, slope: multiplier, offset };
+                self.transmissions.couplings.push(coupling);
             }
         }
         Ok(())

@@ -33,10 +33,9 @@ impl VariableShapes<'_> {
         let p: Vec<Lane> = p.iter().map(|&p| Fwd::constant(p)).collect();
         let (mut force, mut torque) = (Vector3::<Lane>::zeros(), Vector3::<Lane>::zeros());
         self.query.for_each_contact(law.cutoff(), false, |touch| {
-            let LiftedContact { contact, lever, stretch } = self.lift(touch, law.cutoff());
+            let LiftedContact { contact, lever } = self.lift(touch, law.cutoff());
             let response = law.force_with_derivative(&p, &contact);
             let own = contact.normal * response.normal + response.tangential;
-            let own = stretch.map_or(own, |stretch| own * stretch);
             force += own;
             torque += lever.cross(&own);
         });
@@ -52,12 +51,15 @@ impl VariableShapes<'_> {
         let constant = |v: &Vector3<f64>| v.map(Fwd::constant);
         let rotation = self.query.state.pose.rotation.to_rotation_matrix();
         let sample = self.samples.as_ref().and_then(|all| all.get(touch.index as usize));
-        let (arm, radius, stretch) = match sample {
-            None => (constant(&touch.arm), Fwd::constant(touch.radius), None),
+        let (arm, radius, area) = match sample {
+            None => {
+                let [radius, area] = [touch.radius, touch.area].map(Fwd::constant);
+                (constant(&touch.arm), radius, area)
+            }
             Some(Sample { center, radius, area }) => {
                 let from_com = center - self.query.com.map(Fwd::constant);
                 let arm = rotation.matrix().map(Fwd::constant) * from_com;
-                (arm, *radius, Some(area.times(1.0 / area.value)))
+                (arm, *radius, area.times(touch.area / area.value))
             }
         };
         let place = Point3::from(arm + constant(&self.query.state.pose.translation.vector));
@@ -77,8 +79,8 @@ impl VariableShapes<'_> {
             normal_speed: smoothed(s.activation, s.activation_slope) * speed,
             slip: velocity - normal * speed,
             normal,
-            area: touch.area,
+            area,
         };
-        LiftedContact { contact, lever, stretch }
+        LiftedContact { contact, lever }
     }
 }

@@ -106,7 +106,8 @@ impl<S: Scalar> World<S> {
         states
     }
 
-    /// Sets coordinates and velocities of the joint of a link, as [`Joint`] has them, and moves all links to where they are then.
+    /// Sets coordinates and velocities of the joint of a link, as [`Joint`] has them, and of those that mimic it in URDF, and
+    /// moves all links to where they are then.
     ///
     /// # Errors
     /// If it is no link, the numbers are too few or too many, a quaternion is zero, or the states are not those of this world.
@@ -118,7 +119,29 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         self.write_joint(states, link, position, velocity)?;
+        self.move_followers(states, link, self.transmissions.couplings.len())?;
         self.forward_kinematics(states);
+        Ok(())
+    }
+
+    /// Writes the joints that follow that of `leader`, and those that follow these, in a chain of at most `longest`.
+    fn move_followers(
+        &self,
+        states: &mut [State<S>],
+        leader: BodyId,
+        longest: usize,
+    ) -> Result<(), SimulationError> {
+        let couplings = self.transmissions.couplings.iter();
+        for own in couplings.filter(|own| own.leader.link == leader && longest > 0) {
+            let joint = self.joint(states, leader)?;
+            let [&[position], &[velocity]] = [&joint.position[..], &joint.velocity] else {
+                continue;
+            };
+            let [position, velocity] =
+                [position.times(own.slope).plus(own.offset), velocity.times(own.slope)];
+            self.write_joint(states, own.follower.link, &[position], &[velocity])?;
+            self.move_followers(states, own.follower.link, longest - 1)?;
+        }
         Ok(())
     }
 

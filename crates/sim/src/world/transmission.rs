@@ -26,6 +26,17 @@ pub struct Transmissions {
     pub(crate) rotors: Vec<Rotor>,
     /// The share of the weight of links that is carried for them.
     pub(crate) carried: Vec<(BodyId, f64)>,
+    /// Joints that mimic others.
+    pub(crate) couplings: Vec<Coupling>,
+}
+
+/// A joint that follows another one: q = `slope` q_leader + `offset`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coupling {
+    pub(crate) follower: JointAxis,
+    pub(crate) leader: JointAxis,
+    pub(crate) slope: f64,
+    pub(crate) offset: f64,
 }
 
 /// Inertia that moves with a sum of joints and a path.
@@ -39,6 +50,7 @@ pub(crate) struct Rotor {
 }
 
 impl Transmissions {
+    /// True if they act on nothing.
     pub(crate) fn is_empty(&self) -> bool {
         self.bounds.is_empty() && self.rotors.is_empty() && self.carried.is_empty()
     }
@@ -57,10 +69,17 @@ impl Transmissions {
             ..rotor.clone()
         });
         let carried = self.carried.iter().filter(|(link, _)| has(*link));
+        let couplings = self.couplings.iter().filter(|own| has(own.leader.link));
+        let couplings = couplings.map(|own| Coupling {
+            follower: axis(own.follower),
+            leader: axis(own.leader),
+            ..*own
+        });
         Self {
             bounds: bounds.map(|(own, range, counts)| (axis(*own), *range, *counts)).collect(),
             rotors: rotors.collect(),
             carried: carried.map(|(link, share)| (body(*link), *share)).collect(),
+            couplings: couplings.collect(),
         }
     }
 }

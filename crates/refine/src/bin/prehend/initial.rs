@@ -53,7 +53,7 @@ pub(crate) struct Initial {
     /// Seed of the errors
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Find the objects from depth, mask, color and touch alone; where a scene says nothing of its hand, without touch
+    /// Find the objects from sensors alone: masks (files or --detections) and depth, both needed, and color, hand and touch if given
     ///
     /// All poses that the search of an object ends with, the best one first and with their shares as scores, are written to FILE.hypotheses.csv beside
     /// the best ones, where `prehend refine` finds them.

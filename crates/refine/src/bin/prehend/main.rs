@@ -66,9 +66,8 @@ enum Command {
     Initial(initial::Initial),
     /// Follow objects through the images of scenes, taken for the frames of a camera
     ///
-    /// An image's pose comes from the one before it; an object that is lost is looked for. Masks are needed in the first image alone, and not
-    /// even there with --search where the object is in a hand, or with --poses; others are believed as far as they fit depth and colors. Depth may
-    /// be missing in all images.
+    /// An image's pose comes from the one before it; an object that is lost is looked for. With --poses, masks and depth may be missing in all images.
+    /// With --search, the first image needs depth, and a mask unless the object is in a hand. Masks count as far as they fit depth and colors.
     Track(Box<track::Track>),
     /// Score poses against a dataset's ground truth
     ///

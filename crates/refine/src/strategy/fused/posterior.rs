@@ -64,14 +64,14 @@ settings! {
     }
 }
 
-/// What is known of how good a pose is.
+/// Posterior of a pose: its modes, and evidence for and against them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
-    /// The poses found, that of the lowest value first; where the initial pose comes from a search, that of the largest weight.
+    /// Modes, that of the largest weight first.
     pub modes: Vec<PosteriorMode>,
     /// Directions that are hardly observed.
     pub unobservable: Vec<UnobservableDirection>,
-    /// Senses that disagree with the pose.
+    /// Factors whose own optimum is far from the pose.
     pub inconsistencies: Vec<Inconsistency>,
     /// The test of fit of the best pose, where that was asked.
     pub fit: Option<Fit>,

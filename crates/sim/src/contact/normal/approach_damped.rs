@@ -43,7 +43,7 @@ impl NormalLaw for ApproachDamped {
         // A still contact counts as approaching: its derivative then resists both ways.
         let approaching = contact.normal_speed.value() <= 0.0;
         let damper = if approaching { damping * contact.normal_speed } else { S::zero() };
-        -(stiffness * contact.gap + damper) * S::constant(contact.area)
+        -(stiffness * contact.gap + damper) * contact.area
     }
 }
 

@@ -43,7 +43,7 @@ impl NormalLaw for Hertz {
         if depth.value() <= 0.0 {
             return S::zero();
         }
-        stiffness * depth * depth.sqrt() * S::constant(contact.area)
+        stiffness * depth * depth.sqrt() * contact.area
     }
 }
 

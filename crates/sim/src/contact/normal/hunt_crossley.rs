@@ -66,7 +66,7 @@ impl NormalLaw for HuntCrossley {
         if depth.value() < 0.0 || load.value() <= 0.0 {
             return S::zero();
         }
-        stiffness * depth.powf(exponent) * load * S::constant(contact.area)
+        stiffness * depth.powf(exponent) * load * contact.area
     }
 }
 

@@ -42,7 +42,7 @@ impl NormalLaw for KelvinVoigt {
         if pressure.value() < 0.0 || contact.gap.value() > 0.0 {
             return S::zero();
         }
-        pressure * S::constant(contact.area)
+        pressure * contact.area
     }
 }
 

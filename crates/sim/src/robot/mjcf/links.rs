@@ -39,7 +39,7 @@ impl Chain {
             Some(_) => body.t_parent_body,
             None => t_world_model * body.t_parent_body,
         };
-        for joint in &body.joints {
+        for (number, joint) in body.joints.iter().enumerate() {
             let anchor = Translation3::from(joint.anchor.coords);
             let (moves, t_body_joint) = match joint.kind {
                 JointKind::Hinge => {
@@ -59,9 +59,12 @@ impl Chain {
             };
             let shifted = matches!(joint.kind, JointKind::Hinge | JointKind::Ball)
                 && joint.anchor != Point3::origin();
-            let link = self.push(&body.name, parent, place * t_body_joint, moves);
+            let name = name_of(joint, body, number);
+            // The last link is the body.
+            let own = format!("{}/{name}", body.name);
+            let link = self.push(&own, parent, place * t_body_joint, moves);
             self.links[link].armature = joint.armature;
-            self.joints.push(ChainJoint { name: name_of(joint, body), kind: joint.kind, link });
+            self.joints.push(ChainJoint { name, kind: joint.kind, link });
             parent = Some(link);
             place = if shifted { anchor.inverse().into() } else { Isometry3::identity() };
         }
@@ -71,8 +74,9 @@ impl Chain {
                 None if parent.is_none() => self.push(&body.name, None, place, base.clone()),
                 None => self.push(&body.name, parent, place, Joint::Fixed),
             };
+        let own = &mut self.links[link];
+        own.name.clone_from(&body.name);
         if let Some(inertial) = &body.inertial {
-            let own = &mut self.links[link];
             (own.mass, own.com, own.inertia) = (inertial.mass, inertial.com, inertial.inertia);
         }
         self.bodies.push(link);
@@ -91,9 +95,13 @@ impl Chain {
     }
 }
 
-/// A joint's name, or its body's if it has none.
-fn name_of(joint: &MjcfJoint, body: &Body) -> String {
-    if joint.name.is_empty() { body.name.clone() } else { joint.name.clone() }
+/// A joint's name, or its body's if it has none, with the joint's number among several.
+fn name_of(joint: &MjcfJoint, body: &Body, number: usize) -> String {
+    match (joint.name.as_str(), body.joints.len()) {
+        ("", 1) => body.name.clone(),
+        ("", _) => format!("{}/{number}", body.name),
+        (name, _) => name.to_owned(),
+    }
 }
 
 /// The link whose velocity is the state of an actuator: it moves nothing.

@@ -26,7 +26,7 @@ impl ContactLaw for Quadratic {
         &self.0
     }
     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-        let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
+        let normal = p[0] * contact.gap * contact.gap * contact.area;
         let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
         ContactForce { normal, tangential }
     }

@@ -156,6 +156,33 @@ fn what_contacts_cannot_stop_is_told_to_pass_through() {
     }
 }
 
+#[test]
+fn fixed_steps_tell_what_passed_through() {
+    let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 1e-3), rounding: 1e-4 };
+    let fly = |speed: f64, dt: f64, grouped: bool| {
+        let start = state(at(0.0, 0.0, 0.11), [0.0, 0.0, -speed], [0.0; 3]);
+        let (mut world, start) =
+            on(plate, down(), pebble(), (hunt_crossley(5e4, 0.3, 1e-2), HARD), start);
+        if grouped {
+            let all: Vec<_> = world.body_ids().collect();
+            world.contacts.clear();
+            world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+        }
+        let time_steps = TimeSteps { dt, steps: (0.15 / (speed * dt)).round() as usize };
+        let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
+        run.map(|run| run.resolution)
+    };
+    for grouped in [false, true] {
+        let missed = fly(20.0, 1e-3, grouped).unwrap();
+        let (body, other, time) = missed.passed.clone().unwrap();
+        assert_eq!([body, other], ["pebble", "ground"]);
+        // From 1 cm above the center of the plate to 1 cm below.
+        assert!((time - 5e-3).abs() < 1e-9 && !missed.is_fine(), "{missed}");
+        assert!(missed.to_string().contains("'pebble' passed through 'ground' at 0.0050 s"));
+        assert_eq!(fly(0.2, 1e-5, grouped).unwrap().passed, None);
+    }
+}
+
 /// Friction that drives.
 struct Belt([f64; 2]);
 
@@ -164,7 +191,7 @@ impl ContactLaw for Belt {
         &self.0
     }
     fn law<S: Scalar>(&self, p: &[S], contact: &ContactKinematics<S>) -> ContactForce<S> {
-        let normal = (-p[0] * contact.gap).times(contact.area);
+        let normal = -p[0] * contact.gap * contact.area;
         ContactForce { normal, tangential: contact.slip * (p[1] * normal) }
     }
     fn cutoff(&self) -> f64 {

@@ -1,6 +1,6 @@
 //! A model with joints of every kind, several on a body, anchors and references. Poses and efforts against gravity are MuJoCo's.
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::mjcf::Model;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::{MjcfError, MjcfOptions};
@@ -103,11 +103,31 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
     robot_there.set_positions(&moved, &mut there, &POSITIONS).unwrap();
     for (here, other) in robot.bodies.iter().zip(&robot_there.bodies) {
         let by = there[*other].pose.translation.vector - states[*here].pose.translation.vector;
-        assert!((by - nalgebra::Vector3::new(5.0, 0.0, 2.0)).norm() < 1e-12);
+        assert!((by - Vector3::new(5.0, 0.0, 2.0)).norm() < 1e-12);
     }
 
     let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
     assert_eq!(refused, Err(MjcfError::Count { what: "positions", given: 13, expected: 14 }));
+}
+
+#[test]
+fn a_body_of_several_joints_is_one_with_one_mass() {
+    let model = r#"<mujoco><worldbody>
+        <body name="bob"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+            <joint name="turn" type="hinge"/><geom type="sphere" size="0.1" mass="0.3"/></body>
+        <body name="tail" pos="1 0 0"><joint name="lead" type="hinge"/><geom type="sphere" size="0.1" mass="1"/></body>
+        </worldbody></mujoco>"#;
+    let model = Model::from_str(model, None).unwrap();
+    let mut world = World::new(Vector3::zeros());
+    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
+    let mass = |world: &World, name: &str| {
+        let place = world.parameter_names().iter().position(|own| own == name).unwrap();
+        world.parameters()[place]
+    };
+    assert_eq!([mass(&world, "bob.mass"), mass(&world, "tail.mass")], [0.3, 1.0]);
+    assert_eq!(world.body_named("bob"), robot.body("bob"));
+    let joints: Vec<&str> = robot.joints.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(joints, ["bob/0", "bob/1", "turn", "lead"]);
 }
 
 #[test]

@@ -51,6 +51,20 @@ fn moved(gravity: f64, from: [f64; 2], time: f64) -> [[f64; 2]; 2] {
 }
 
 #[test]
+fn what_mimics_is_set_with_its_leader() {
+    let (tree, world, bodies) = arm(9.81);
+    let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
+    let mut states: Vec<State> = world.neutral_states();
+    world.set_joint(&mut states, upper, &[0.4], &[0.7]).unwrap();
+    let slide = world.joint(&states, finger).unwrap();
+    assert!((slide.position[0] - 0.06).abs() < 1e-15 && (slide.velocity[0] - 0.07).abs() < 1e-15);
+    // It may be pulled away from there.
+    world.set_joint(&mut states, finger, &[0.1], &[0.0]).unwrap();
+    assert_eq!(world.joint(&states, finger).unwrap().position, [0.1]);
+    assert_eq!(world.joint(&states, upper).unwrap().position, [0.4]);
+}
+
+#[test]
 fn links_are_where_kinematics_has_them() {
     let (tree, world, bodies) = arm(9.81);
     assert_eq!(bodies.len(), 4);

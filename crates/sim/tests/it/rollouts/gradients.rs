@@ -32,7 +32,8 @@ impl ContactLaw for Powers {
         let depth = -contact.gap;
         let normal = p[0]
             * (p[1] * depth.times(1e4)).exp()
-            * depth.times(contact.area)
+            * depth
+            * contact.area
             * (S::one() - p[2] * contact.normal_speed);
         let tangential = regularized_coulomb(p[3], normal, &contact.slip, 3e-2);
         ContactForce { normal, tangential }

@@ -9,6 +9,7 @@ use parry3d_f64::shape::{
 };
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_geometry::SplitMix64;
+use prehend_sim::contact::{GraspD, GraspDParameters};
 use prehend_sim::{
     Adaptive, Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
     HuntCrossley, KelvinVoigt, Law, Shape, ShapeOptions, State, StepCheckpointed, TimeSteps, World,
@@ -19,11 +20,17 @@ use super::catalog::{ROUND, SHARP, vector};
 /// How deep things are in each other \[m\].
 const DEPTH: f64 = 3e-4;
 
-fn laws() -> [Arc<dyn DynContactLaw>; 2] {
+fn laws() -> [Arc<dyn DynContactLaw>; 3] {
     let friction = Coulomb { friction: 0.5, slip_scale: 2e-2 };
     let held = BristleFriction { friction, deflection: 1e-4 };
     let normal = KelvinVoigt { stiffness: 1e7, damping: 2e5 };
-    [Arc::new(Law::new(normal, friction).unwrap()), Arc::new(Law::new(normal, held).unwrap())]
+    // Of springs per sample, whatever its area.
+    let springs = GraspDParameters { stiffness: 1e3, offset: 1e-3, ..GraspDParameters::default() };
+    [
+        Arc::new(Law::new(normal, friction).unwrap()),
+        Arc::new(Law::new(normal, held).unwrap()),
+        Arc::new(GraspD::new(springs).unwrap()),
+    ]
 }
 
 /// Wrenches, and rates of deflections, as functions of a dimension of the second body: the value, the derivative and differences.
@@ -213,7 +220,7 @@ fn reverse_mode_and_checkpoints_know_dimensions() {
     let field = world.add(Body::fixed_from_shape("ground", &ground));
     let shape = Shape::from_parry(&ball).unwrap();
     let samples = world.add(Body::from_shape("ball", &shape, 1e3).unwrap());
-    let [law, _] = laws();
+    let [law, ..] = laws();
     world
         .add_contact(ContactBodies { samples, field }, law, GapSmoothing::Softplus { width: 1e-5 })
         .unwrap();

@@ -95,8 +95,7 @@ pub(crate) struct Track {
     idle: f64,
     /// Write the poses here, as a BOP results file with a row an image; an existing one is replaced
     ///
-    /// The score is the probability that a pose is within 5 mm and 5°, and 0 where the object is lost or there was no time to look: there the
-    /// pose is where it should be.
+    /// The score is that of `prehend refine`, and 0 where the object is lost or there was no time to look: there the pose is the predicted one.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
     /// Write a web page here: frames in a table, outlines, hand and object in three dimensions, and curves over time

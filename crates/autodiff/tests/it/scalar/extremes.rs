@@ -1,7 +1,7 @@
 //! Slopes where naive formulas overflow, underflow or cancel, computed with 400 digits.
 
-use crate::table::cases;
-use crate::{forward, reverse};
+use super::table::cases;
+use super::{forward, reverse};
 
 /// A text of the table, the operands, and the two slopes. A second operand of 0.5 is not used.
 #[rustfmt::skip]

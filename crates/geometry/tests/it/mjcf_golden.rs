@@ -1,5 +1,4 @@
 //! MJCF models against MuJoCo: `benches/peers/sim/mjcf_golden.py` has made the values.
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +11,7 @@ use prehend_geometry::mjcf::{
 };
 use serde_json::Value;
 
-const GOLDEN: &str = include_str!("golden/mjcf.json");
+const GOLDEN: &str = include_str!("../golden/mjcf.json");
 
 fn golden() -> Value {
     serde_json::from_str(GOLDEN).unwrap()

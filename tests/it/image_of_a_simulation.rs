@@ -1,7 +1,5 @@
 //! A loss of the picture of a thrown and bouncing body, differentiated by how it was thrown.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};

@@ -1,7 +1,5 @@
 //! Images of a pinhole through a lens, and back.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use nalgebra::{Isometry3, Vector2};
 use prehend_geometry::TriMesh;
 use prehend_render::{

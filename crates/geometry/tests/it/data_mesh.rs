@@ -1,7 +1,5 @@
 //! Reading and cleaning the meshes of the test data.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};

@@ -1,8 +1,6 @@
 //! Finite numbers in, finite numbers out: extreme cameras, sizes, poses, masks and settings, for the loss of a pose with its gradient and
 //! matrix, for pictures, and for the adjoint of the renderer.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 

@@ -1,7 +1,5 @@
 //! Alignment of clouds to meshes and to each other.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::se3_exp;
 use prehend_geometry::cloud::CloudError;

@@ -1,8 +1,6 @@
 //! Finite numbers in, finite numbers out: degenerate, tiny and huge meshes, queries at and far from them, clouds of too
 //! few points, robots at turns by π. `finite_shapes.rs` has what needs no mesh.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 

@@ -1,5 +1,4 @@
 //! Forward kinematics and taxel distances against values computed by independent tools.
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,8 +1,6 @@
 //! Inside and outside of scanned objects, against rays through closed meshes and the sum of all solid angles of others:
 //! neither has a tree, a closest point or a normal in common with the library.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, LN_2, PI};
 use nalgebra::{ComplexField, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
-use crate::table::cases;
-use crate::{forward, reverse};
+use super::table::cases;
+use super::{forward, reverse};
 
 const INF: f64 = f64::INFINITY;
 const NAN: f64 = f64::NAN;

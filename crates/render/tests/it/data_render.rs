@@ -1,7 +1,5 @@
 //! Renders a real scan at its true pose and compares it with an independent renderer's picture.
 
-#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
-
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -1,0 +1,92 @@
+//! Samples that pass through a body within a step.
+
+use prehend_autodiff::Scalar;
+
+use crate::state::State;
+use crate::time::Step;
+use crate::world::World;
+use crate::world::broad_phase::BroadPhase;
+use crate::world::contact_pair::{ContactBodies, ContactPair};
+
+/// Part of the thickness of what they may touch by which samples move safely within a step.
+const SAFE_TRAVEL: f64 = 0.25;
+
+/// Watches what moves by more than a small part of another body's thickness in a step.
+pub(super) struct Tunneling {
+    /// The states before the step; empty where no field is thin.
+    before: Vec<State>,
+    /// Smallest thickness of a field \[m\].
+    thinnest: f64,
+    first: Option<(ContactBodies, f64)>,
+}
+
+impl Tunneling {
+    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
+        let fields = world.bodies.iter().filter_map(|body| body.field.as_ref());
+        let thinnest = fields.map(|field| field.thickness()).fold(f64::INFINITY, f64::min);
+        let watched = if thinnest.is_finite() { initial } else { &[] };
+        Self { before: watched.iter().map(State::value).collect(), thinnest, first: None }
+    }
+
+    /// After `step` has led to `states`.
+    #[inline]
+    pub(super) fn step<S: Scalar>(&mut self, world: &World<S>, step: Step, states: &[State<S>]) {
+        if self.before.is_empty() || self.first.is_some() {
+            return;
+        }
+        let passed = |pair: &&ContactPair<S>| self.has_passed(world, pair, states);
+        let mut found = world.contacts.iter().find(passed).map(|pair| pair.bodies);
+        if found.is_none() && !world.contact_groups.is_empty() {
+            found = self.in_groups(world, step, states);
+        }
+        self.first = found.map(|bodies| (bodies, step.start));
+        self.before.iter_mut().zip(states).for_each(|(before, state)| *before = state.value());
+    }
+
+    /// Samples and field of the first passage, and when \[s\].
+    pub(super) fn first(&self) -> Option<(ContactBodies, f64)> {
+        self.first
+    }
+
+    /// A passage between bodies of groups.
+    fn in_groups<S: Scalar>(
+        &self,
+        world: &World<S>,
+        step: Step,
+        states: &[State<S>],
+    ) -> Option<ContactBodies> {
+        let search = BroadPhase::new(world);
+        let moved = |(before, after): (&State, &State<S>)| travel(before, &after.value(), 0.0);
+        let moved: Vec<f64> = self.before.iter().zip(states).map(moved).collect();
+        let fastest = search
+            .free()
+            .map(|(body, size)| travel(&self.before[body], &states[body].value(), size));
+        if fastest.fold(0.0, f64::max) <= SAFE_TRAVEL * self.thinnest {
+            return None;
+        }
+        let near = search.find(&self.before, &moved, step.dt);
+        let pairs = world.contacts_with(&near);
+        let passed = |pair: &&ContactPair<S>| self.has_passed(world, pair, states);
+        pairs.iter().find(passed).map(|pair| pair.bodies)
+    }
+
+    fn has_passed<S: Scalar>(
+        &self,
+        world: &World<S>,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+    ) -> bool {
+        let [before, after] =
+            [world.relative_value(pair, &self.before), world.relative_value(pair, states)];
+        let Some(query) = world.contact_query(pair, after) else { return false };
+        let radius = query.surface.radius_about(&query.com);
+        travel(&before, &after, radius) > SAFE_TRAVEL * query.field.thickness()
+            && query.has_passed(before)
+    }
+}
+
+/// Bound of the distance \[m\] that points of a body within `radius` \[m\] of its center of mass move.
+fn travel(before: &State, after: &State, radius: f64) -> f64 {
+    let moved = after.pose.translation.vector - before.pose.translation.vector;
+    moved.norm() + radius * after.pose.rotation.angle_to(&before.pose.rotation)
+}
