@@ -8,7 +8,7 @@ use std::{fs, io};
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_100),
     ("geometry", 16_060),
-    ("sim", 16_110),
+    ("sim", 16_280),
     ("render", 10_900),
     ("refine", 30_060),
 ];
