@@ -41,7 +41,10 @@ fn align(
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let folder = std::env::args().nth(1).map_or("target/align_with_glam".into(), PathBuf::from);
+    let folder = std::env::args()
+        .nth(1)
+        .filter(|_| !cfg!(test))
+        .map_or("target/align_with_glam".into(), PathBuf::from);
     let mug = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/assets/mug.glb"));
     let model = RenderModel::new(&TriMesh::load(mug)?)?;
     let (width, height) = (480, 360);

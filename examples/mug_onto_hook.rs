@@ -122,7 +122,9 @@ impl Throw {
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or("target/mug_onto_hook".into()));
+    let folder = PathBuf::from(
+        std::env::args().nth(1).filter(|_| !cfg!(test)).unwrap_or("target/mug_onto_hook".into()),
+    );
     let mug = Mug::default();
     let throw = Throw::new(&mug)?;
     let guess: Vec<f64> = GUESS.iter().zip(UNITS).map(|(x, unit)| x / unit).collect();

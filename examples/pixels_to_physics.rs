@@ -70,7 +70,10 @@ fn scene() -> (Scene, Isometry3<f64>) {
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let folder = std::env::args().nth(1).unwrap_or("target/pixels_to_physics".to_owned());
+    let folder = std::env::args()
+        .nth(1)
+        .filter(|_| !cfg!(test))
+        .unwrap_or("target/pixels_to_physics".to_owned());
     let (world, model) = (world()?, Arc::new(RenderModel::new(&block())?));
     let renderer = Renderer::new(Light::headlight(0.5, 0.5));
     let (empty, t_cam_world) = scene();

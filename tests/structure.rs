@@ -7,10 +7,10 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_100),
-    ("geometry", 16_060),
-    ("sim", 16_280),
+    ("geometry", 16_170),
+    ("sim", 16_370),
     ("render", 10_900),
-    ("refine", 30_060),
+    ("refine", 30_157),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

@@ -27,7 +27,7 @@ const TARGET: ContactCalibration =
 
 pub(crate) fn main() -> anyhow::Result<()> {
     let registry = LawRegistry::default();
-    let mut args = std::env::args().skip(1);
+    let mut args = std::env::args().skip(1).filter(|_| !cfg!(test));
     let name = args.next().unwrap_or_else(|| "hunt_crossley".to_owned());
     let given: Vec<f64> = args.map(|a| a.parse().context(a)).collect::<anyhow::Result<_>>()?;
     let values = if given.is_empty() { usual(&registry, &name) } else { given };

@@ -32,7 +32,7 @@ use parameters::{COUNT, PARAMETERS};
 use recording::{RATE, Row, Start, Toss};
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<String> = std::env::args().skip(1).filter(|_| !cfg!(test)).collect();
     let option = |name: &str| {
         let at = args.iter().position(|arg| arg == name)?;
         args.get(at + 1).cloned()

@@ -8,6 +8,7 @@ use prehend_sim::{
 use pyo3::prelude::*;
 
 use crate::error::wrong;
+use crate::threads::is_interrupted;
 
 /// One of the integrators.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +81,9 @@ impl Integrator for AnyIntegrator {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
+        if is_interrupted() {
+            return Err(SimulationError::Interrupted);
+        }
         each!(self, integrator => integrator.step(world, states, step))
     }
 

@@ -2,6 +2,7 @@
 #![cfg(feature = "extension")]
 
 mod arrays;
+mod copies;
 mod error;
 mod integrator;
 mod link;

@@ -192,10 +192,8 @@ impl Rollout {
             })
         };
         let failure = LawFailure::watch();
-        let results: Vec<Result<T, SimulationError>> = py.detach(|| match inputs.worlds() {
-            1 => Ok(vec![compute(0)]),
-            worlds => threads::run(|| (0..worlds).into_par_iter().map(&compute).collect()),
-        })?;
+        let all = || (0..inputs.worlds()).into_par_iter().map(&compute).collect();
+        let results: Vec<Result<T, SimulationError>> = threads::detached(py, all)?;
         let results: PyResult<Vec<T>> = results.into_iter().enumerate().map(named).collect();
         match (results, failure.taken()) {
             (_, Some(of_law)) => Err(of_law),

@@ -11,6 +11,7 @@ use prehend_sim::ShapeOptions;
 
 use crate::arrays::{Numbers, faces, in_order, points, pose, vector, vector_or};
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// The shape of a body: mass properties, samples of its surface and its distance field. Lengths in m; cylinders, capsules and cones lie along y.
 ///
@@ -32,7 +33,7 @@ impl Shape {
     ) -> PyResult<Self> {
         let options = ShapeOptions { rounding, spacing, cell };
         let make = || prehend_sim::Shape::from_parry_with(&*parry, &options);
-        let shape = Python::attach(|py| py.detach(make)).raise()?;
+        let shape = Python::attach(|py| detached(py, make))?.raise()?;
         Ok(Self { parry, shape })
     }
 }

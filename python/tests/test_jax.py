@@ -1,5 +1,9 @@
 """Rollouts in JAX."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import prehend
 import pytest
@@ -90,3 +94,60 @@ def test_whole_numbers_are_states_too():
     world.add_body("stone", prehend.Shape.ball(0.1))
     function = prehend.jax.rollout(world.rollout(0.1, 2), end=True)
     assert function([[0] * 6 + [1] + [0] * 6])[0, 9] == pytest.approx(-1.962)
+
+
+ONE_CORE = """
+import os
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+import numpy as np, prehend, jax
+jax.config.update("jax_enable_x64", True)
+import prehend.jax
+world = prehend.World()
+world.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
+throw = prehend.jax.rollout(world.rollout(1e-3, 2), end=True)
+many = np.repeat(world.neutral_states()[None], 4000, 0)
+loss = lambda states: throw(states)[0, :3].sum()
+ends, slopes = jax.jit(jax.vmap(throw))(many), jax.jit(jax.vmap(jax.grad(loss)))(many)
+print(np.asarray(ends).shape, np.asarray(slopes).shape)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no choice of cores")
+@pytest.mark.parametrize("dispatch", ["true", "false"])
+def test_large_batches_do_not_wait_for_another_core(dispatch):
+    """With arrays of 400 kB, which ``jax.pure_callback`` waits for without end."""
+    environment = {**os.environ, "JAX_CPU_ENABLE_ASYNC_DISPATCH": dispatch}
+    done = subprocess.run(
+        [sys.executable, "-c", ONE_CORE], env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "(4000, 1, 13) (4000, 1, 13)\n", done.stderr
+
+
+def test_errors_of_a_world_are_those_of_jax():
+    rollout, (states, parameters, controls) = bounce()
+    with pytest.raises(Exception, match="not finite"):
+        jax.jit(prehend.jax.rollout(rollout))(states * np.nan, parameters, controls)
+
+
+def test_a_law_that_raises_is_an_error_whatever_it_raises():
+    """Also one without a text, and one whose text is no UTF-8."""
+    from prehend._callback import callback
+
+    class Mute(Exception):
+        def __str__(self):
+            raise RuntimeError
+
+    number = jax.ShapeDtypeStruct((2, 3), np.float64)
+    for error in (ValueError("told"), ValueError("\udcff"), Mute(), KeyboardInterrupt()):
+
+        def failing(x, error=error):
+            raise error
+
+        with pytest.raises(Exception, match="INTERNAL"):
+            jax.jit(lambda x: callback(failing, number, x, vmap_method="sequential"))(np.ones(2))
+
+    def scalar(x):
+        return 1.0
+
+    with pytest.raises(Exception, match="shape"):
+        jax.jit(lambda x: callback(scalar, number, x, vmap_method="sequential"))(np.ones(2))

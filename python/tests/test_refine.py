@@ -1,6 +1,7 @@
 """Refinement: of made-up frames, and of those of the data folder that PREHEND_DATA names, where there is one."""
 
 import json
+import multiprocessing
 import os
 import pickle
 import subprocess
@@ -498,3 +499,25 @@ def test_a_rig_is_learnt_and_used_as_by_the_command(dataset, command, tmp_path):
     assert repr(rig.corrected(plain.object, 999)) == repr(plain.object)
     with pytest.raises(prehend.Error, match="missing.json"):
         prehend.Rig.load(tmp_path / "missing.json")
+
+
+def refined_in_a_fork(frame, initial, queue):
+    queue.put(frame.refine(initial).pose)
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning", "ignore:.*fork:RuntimeWarning")
+def test_a_forked_process_refines(example, refined):
+    frame, initial, _ = example
+    fork = multiprocessing.get_context("fork")
+    queue = fork.Queue()
+    process = fork.Process(target=refined_in_a_fork, args=(frame, initial, queue))
+    process.start()
+    np.testing.assert_array_equal(queue.get(timeout=120), refined.pose)
+    process.join()
+
+
+def test_negative_masks_are_refused(example):
+    frame = example[0]
+    mask = np.where(frame.mask, 1, -1)
+    with pytest.raises(ValueError, match="negative"):
+        prehend.Frame(**inputs(frame, mask=mask))

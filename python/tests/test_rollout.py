@@ -1,6 +1,8 @@
 """Rollouts as functions: derivatives, batches, threads and arrays of other kinds."""
 
 import multiprocessing
+import subprocess
+import sys
 import threading
 import time
 
@@ -147,6 +149,28 @@ def test_changes_in_place_change_no_derivative():
 
 def forked(rollout, states, parameters, controls, queue):
     queue.put(rollout(states, parameters, controls, end=True))
+
+
+INTERRUPTED = """
+import os, signal, threading, time, prehend
+world = prehend.World()
+world.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
+rollout = world.rollout(1e-3, 20_000_000, integrator="semi_implicit_euler")
+threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+began = time.monotonic()
+try:
+    rollout(world.neutral_states(), end=True)
+except KeyboardInterrupt:
+    print(time.monotonic() - began < 20)
+print(prehend.World().rollout(1e-3, 1).steps)
+"""
+
+
+def test_an_interrupt_ends_a_long_rollout():
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=300
+    )
+    assert done.stdout == "True\n1\n", done.stderr
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning", "ignore:.*fork:RuntimeWarning")

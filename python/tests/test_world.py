@@ -195,3 +195,26 @@ def test_many_balls_touch_by_groups():
         world.set_pose(states, ball, [0.0, 0.0, 0.05 + 0.1001 * k])
     end = world.rollout(0.1, 2, parameters=[names["stiffness"]])(states, end=True)
     assert end[balls, 2] == pytest.approx([0.05, 0.15, 0.25], abs=2e-3)
+
+
+def test_contacts_of_all_bodies_need_no_law():
+    world = prehend.World()
+    world.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    cube = world.add_body("cube", prehend.Shape.cuboid([0.06, 0.06, 0.06]), density=500.0)
+    world.add_contacts(friction=0.5)
+    states = world.neutral_states()
+    world.set_pose(states, "cube", [0.0, 0.0, 0.03], velocity=[1.0, 0.0, 0.0])
+    rollout = world.rollout(0.5, 1)
+    run, pullback = prehend.vjp(rollout, states)
+    # It slides by v²/2µg, to its derivative v/µg.
+    assert run[-1, cube, 0] == pytest.approx(0.102, abs=2e-3)
+    end = np.zeros((2, 13))
+    end[cube, 0] = 1.0
+    assert pullback(end).states[cube, 7] == pytest.approx(0.204, abs=4e-3)
+    with pytest.raises(ValueError, match="restitution"):
+        world.copy().add_contacts(restitution=2.0)
+
+
+def test_copies_of_what_never_changes_are_itself():
+    shape = prehend.Shape.ball(0.1)
+    assert copy.deepcopy(shape) is shape and copy.copy(shape) is shape

@@ -38,3 +38,16 @@ examples! {
     stack_and_cradle: "../../examples/stack_and_cradle.rs",
     tosses: "../../examples/tosses/main.rs",
 }
+
+#[test]
+fn every_example_is_among_these() {
+    let own = include_str!("examples.rs");
+    let listed = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/examples")).unwrap();
+    for entry in listed {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|of| of == "rs") || path.join("main.rs").exists() {
+            let name = path.file_stem().unwrap().to_string_lossy();
+            assert!(own.contains(&format!("    {name}: ")), "{name}");
+        }
+    }
+}

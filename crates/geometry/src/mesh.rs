@@ -48,10 +48,15 @@ impl TriMesh {
         (0..self.faces.len()).map(|f| 0.5 * self.area_vector(f).norm()).sum()
     }
 
-    /// Smallest and largest corner of the axis-aligned bounding box \[m\]; `None` without vertices.
+    /// Smallest and largest corner of the axis-aligned box around the faces \[m\], of a mesh without faces around its vertices; `None` without
+    /// vertices.
     pub fn bounds(&self) -> Option<(Point3<f64>, Point3<f64>)> {
-        let first = *self.vertices.first()?;
-        Some(self.vertices.iter().fold((first, first), |(lo, hi), v| (lo.inf(v), hi.sup(v))))
+        type Corners = (Point3<f64>, Point3<f64>);
+        let join = |a: Corners, b: Corners| (a.0.inf(&b.0), a.1.sup(&b.1));
+        // Vertices that no face uses are no part of the surface.
+        let used = self.faces.iter().flatten().filter_map(|&v| self.vertices.get(v as usize));
+        let all = || self.vertices.iter().map(|v| (*v, *v)).reduce(join);
+        used.map(|v| (*v, *v)).reduce(join).or_else(all)
     }
 
     /// Moves every vertex and normal by `t_new_mesh`, which maps mesh coordinates into the new frame.
@@ -120,6 +125,18 @@ mod tests {
     use super::*;
     use crate::mass::signed_volume;
     use crate::shapes::cuboid;
+
+    #[test]
+    fn bounds_are_of_what_faces_use() {
+        let mut mesh = cuboid(Vector3::new(0.1, 0.2, 0.3));
+        let bounds = mesh.bounds();
+        assert_eq!(bounds, Some((Point3::new(-0.05, -0.1, -0.15), Point3::new(0.05, 0.1, 0.15))));
+        mesh.vertices.push(Point3::new(5.0, 0.0, 0.0));
+        assert_eq!(mesh.bounds(), bounds);
+        mesh.faces.clear();
+        assert_eq!(mesh.bounds().unwrap().1, Point3::new(5.0, 0.1, 0.15));
+        assert_eq!(TriMesh::default().bounds(), None);
+    }
 
     #[test]
     fn a_reflected_body_still_looks_outward() {

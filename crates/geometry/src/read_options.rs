@@ -12,7 +12,7 @@ pub struct ReadOptions {
     /// warnings instead of errors.
     pub partial: bool,
     /// The folder that files which the description names may lie in. Without it, that is the next folder above the description with a
-    /// `package.xml` or a `.git`, or else the description's own.
+    /// `package.xml` or a `.git`, or else the description's own, and for `package://` names those above it that are called like the package.
     pub root: Option<PathBuf>,
     /// Whether files that a description names may lie anywhere.
     pub allow_outside: bool,
@@ -62,7 +62,7 @@ impl ReadOptions {
         }
         match self.root.clone().or_else(|| package_root(own)) {
             Some(root) => Folder::within(own, &root),
-            None => Folder::own(own),
+            None => Folder::in_packages(own),
         }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::box_tree::Bounds;
 use crate::mesh::{Texture, TriMesh};
 
 /// Finest grid: cells along the longest side of the bounding box.
@@ -47,7 +48,8 @@ impl TriMesh {
 
     /// Vertices by the cell of a grid that they are in, of so many cells along the longest side.
     fn cluster(&self, cells: u32) -> Clusters {
-        let (low, high) = self.bounds().unwrap_or_default();
+        // Of all vertices: those that no face uses are in cells of their own.
+        let Bounds { low, high } = Bounds::of(&self.vertices);
         let size = (high - low).max() / f64::from(cells);
         let mut known: HashMap<[i64; 3], u32> = HashMap::new();
         let mut cluster = |v: &Point3<f64>| {

@@ -172,7 +172,11 @@ impl Robot for Urdf {
         let own = &self.world.articulations[0];
         let (n, mut order) = (own.tree.nv(), Vec::new());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
-        for joint in self.tree.joints().iter().filter(|j| j.motion != Motion::Fixed) {
+        // Followers after what they mimic, to be where they are told.
+        let mut joints: Vec<_> =
+            self.tree.joints().iter().filter(|joint| joint.motion != Motion::Fixed).collect();
+        joints.sort_by_key(|joint| !self.tree.joint_names().contains(&joint.name));
+        for joint in joints {
             let body = self.bodies[joint.child];
             let place = own.bodies().iter().position(|link| *link == body).context("no link")?;
             let dof = own.tree.range(place)[1].start;

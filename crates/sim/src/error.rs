@@ -136,6 +136,9 @@ pub enum BuildError {
 /// Error of a simulation.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SimulationError {
+    /// An integrator was told to stop.
+    #[error("interrupted")]
+    Interrupted,
     /// The world is none that can be simulated.
     #[error(transparent)]
     Build(#[from] BuildError),
@@ -262,10 +265,10 @@ pub enum SimulationError {
         /// Time \[s\].
         time: f64,
     },
-    /// Contacts have made energy. Not asked in a world where a body is kinematic, or fixed and given a velocity.
+    /// Contacts or steps have made energy. Not asked in a world where a body is kinematic, or fixed and given a velocity.
     #[error(
-        "contacts have made {energy:.3e} J by {time} s, most of it in body '{body}'{}: a time step too long for them, or a \
-         law that is not passive",
+        "{} made {energy:.3e} J by {time} s, most of it in body '{body}'{}: time steps that are too long, or a law that is not passive",
+        if contact.is_some() { "contacts have" } else { "the motion has" },
         touching(contact)
     )]
     Energy {

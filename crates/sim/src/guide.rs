@@ -170,7 +170,8 @@
 //!
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
-//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)).
+//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion, and the first body that passed through another
+//! ([`Resolution`](crate::Resolution)).
 //! An energy gain by contacts of more than a quarter of the largest kinetic energy is an error, as by default; it is not tested
 //! with motors, kinematic bodies, or fixed ones with a velocity.
 //!

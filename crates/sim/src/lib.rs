@@ -80,5 +80,6 @@ pub use world::bushing::{Bushing, BushingStiffness};
 pub use world::contact_group::ContactGroup;
 pub use world::contact_pair::{ContactBodies, ContactPair};
 pub use world::joint_force::{JointAxis, JointForce};
+pub use world::material::Material;
 pub use world::trajectory::Trajectory;
 pub use world::transmission::Transmissions;

@@ -13,7 +13,7 @@ pub use crate::joint_law::{
 pub use crate::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
 pub use crate::{
     Adaptive, BackwardEuler, Batch, Body, BodyId, BuildError, Bushing, BushingId, BushingStiffness,
-    ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Motion, RigidBody,
+    ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Material, Motion, RigidBody,
     RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, ShapeOptions,
     SimulationError, State, Step, StepCheckpointed, SubStepped, Surface, TimeSteps, World,
 };

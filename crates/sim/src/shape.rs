@@ -28,6 +28,8 @@ pub(crate) mod variable;
 use std::fmt;
 use std::sync::Arc;
 
+use nalgebra::UnitVector3;
+use parry3d_f64::math::Vector;
 use prehend_autodiff::Scalar;
 use prehend_geometry::{DistanceField, Moments, TriMesh};
 
@@ -120,6 +122,31 @@ impl Shape {
         let (kind, dimensions) = from_parry::read(shape, options)?;
         let built = Arc::new(Built::new(Arc::new(kind), dimensions.clone())?);
         Ok(Self { built, dimensions })
+    }
+
+    /// Ball of this radius \[m\] around the origin.
+    ///
+    /// # Errors
+    /// Unless the radius is positive and finite.
+    pub fn ball(radius: f64) -> Result<Self, ShapeError> {
+        Self::from_parry(&parry3d_f64::shape::Ball::new(radius))
+    }
+
+    /// Box around the origin, with these halves of its edges \[m\].
+    ///
+    /// # Errors
+    /// Unless they are positive and finite.
+    pub fn cuboid([x, y, z]: [f64; 3]) -> Result<Self, ShapeError> {
+        Self::from_parry(&parry3d_f64::shape::Cuboid::new(Vector::new(x, y, z)))
+    }
+
+    /// Solid below the plane through the origin with this normal.
+    ///
+    /// # Errors
+    /// Unless the normal is finite.
+    pub fn half_space(normal: UnitVector3<f64>) -> Result<Self, ShapeError> {
+        let normal = Vector::new(normal.x, normal.y, normal.z);
+        Self::from_parry(&parry3d_f64::shape::HalfSpace::new(normal))
     }
 
     /// The shape of a closed mesh \[m\], whose distance is a C² grid; of an open one, or one that faces inward, only a fixed body.

@@ -12,6 +12,7 @@ mod contacts_between;
 mod failure;
 pub(crate) mod joint_force;
 mod linear_contacts;
+pub(crate) mod material;
 mod matter;
 mod pair_function;
 mod pair_wrench;

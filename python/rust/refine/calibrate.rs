@@ -15,6 +15,7 @@ use super::run::at_least_one;
 use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// `prehend.calibrate` is made of it: the rig, what is to be said of frames that were left out, and what is wrong with others. `ids` are the numbers of
 /// scene, image, object and mask of each pose.
@@ -55,7 +56,7 @@ pub(crate) fn _calibrate(
         let nominal = Calibrator::new(joints.unwrap_or(0), size, objects, settings)?;
         frames.calibrate(nominal, passes, window, &mut |_| ())
     };
-    let done = py.detach(learn).raise()?;
+    let done = detached(py, learn)?.raise()?;
     let failed = done.failed.iter().map(|(index, error)| format!("{}: {error}", targets[*index]));
     let failed: Vec<String> = failed.collect();
     if done.poses.is_empty() {

@@ -12,6 +12,7 @@ use super::object::Object;
 use super::rig::Rig;
 use crate::arrays::{Array, matrix};
 use crate::error::Raise;
+use crate::threads::detached;
 
 /// A split of a BOP dataset: `prehend.datasets.Bop` is made of it.
 #[pyclass(frozen, subclass, module = "prehend")]
@@ -72,7 +73,7 @@ impl Dataset {
 
     /// The object of that number, prepared once.
     fn object(&self, py: Python<'_>, object: u32) -> PyResult<Object> {
-        let object = py.detach(|| self.assets().object(object)).raise()?;
+        let object = detached(py, || self.assets().object(object))?.raise()?;
         Ok(Object { object })
     }
 
@@ -94,7 +95,7 @@ impl Dataset {
     ) -> PyResult<Frame> {
         let target = Target { scene_id: scene, im_id: image, obj_id: object, instance };
         // Python's lock first let go: another thread may wait for it with the assets in hand.
-        let input = py.detach(|| self.assets().load(&target, &[])).raise()?;
+        let input = detached(py, || self.assets().load(&target, &[]))?.raise()?;
         Ok(Frame { input, target: Some(target) })
     }
 

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{array, matrix};
+use crate::threads::detached;
 
 /// Calls the dataclass of that name in `prehend.refinement`.
 fn dataclass<'py>(name: &str, fields: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
@@ -43,7 +44,7 @@ pub(super) fn estimate<'py>(
     let (found, posterior) = (&refined.estimate, refined.estimate.posterior.as_ref());
     fields.set_item("pose", matrix(py, found.t_cam_object())?)?;
     describe(&fields, posterior)?;
-    let warnings = py.detach(|| refined.input.warnings(initial).concat());
+    let warnings = detached(py, || refined.input.warnings(initial).concat())?;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     fields.set_item("warnings", warnings)?;
     fields.set_item("iterations", found.trace.iterations.len().saturating_sub(1))?;

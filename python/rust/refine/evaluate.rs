@@ -9,6 +9,7 @@ use super::dataset::Dataset;
 use super::poses::poses;
 use crate::arrays::{Array, Numbers, array};
 use crate::error::wrong;
+use crate::threads::detached;
 
 /// Names of the metrics; of each pose its metrics, n × metrics, NaN where there are none; means and medians of the metrics; what is wrong with poses that
 /// could not be scored, by their places.
@@ -35,10 +36,10 @@ pub(crate) fn _score<'py>(
         time: -1.0,
     });
     let rows: Vec<ResultRow> = rows.collect();
-    let scored: Vec<Result<ScoredRow, String>> = py.detach(|| {
+    let scored: Vec<Result<ScoredRow, String>> = detached(py, || {
         let mut scorer = Scorer::new(&dataset.dataset);
         rows.iter().map(|row| scorer.score(row).map_err(|error| error.to_string())).collect()
-    });
+    })?;
     let good: Vec<ScoredRow> = scored.iter().filter_map(|row| row.as_ref().ok().copied()).collect();
     let summary = summarize(&good);
     let count = summary.columns.len();

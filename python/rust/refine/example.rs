@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::frame::Frame;
 use crate::arrays::{Array, matrix};
 use crate::error::Raise;
+use crate::threads::detached;
 
 /// A made-up frame of the built-in hand holding the built-in bottle, a pose to start from (2 cm and 15° off), and the true one; 4 × 4, camera ←
 /// object [m]. `seed` decides noise and initial pose.
@@ -18,7 +19,7 @@ pub(crate) fn example_frame<'py>(
     py: Python<'py>,
     seed: u64,
 ) -> PyResult<(Frame, Array<'py>, Array<'py>)> {
-    let scene = py.detach(|| default_scene(seed)).raise()?;
+    let scene = detached(py, || default_scene(seed))?.raise()?;
     let (initial, truth) = (matrix(py, &scene.initial)?, matrix(py, &scene.truth)?);
     let input = FrameInput { frame: scene.frame, object: scene.object, rig: None };
     Ok((Frame { input, target: None }, initial, truth))
@@ -33,7 +34,7 @@ pub(crate) fn example_sequence<'py>(
     seed: u64,
     count: usize,
 ) -> PyResult<(Array<'py>, Vec<(Frame, f64, Array<'py>)>)> {
-    let sequence = py.detach(|| default_sequence(seed, count)).raise()?;
+    let sequence = detached(py, || default_sequence(seed, count))?.raise()?;
     let initial = matrix(py, &sequence.initial)?;
     let frame = |SequenceFrame { time, frame, truth }| {
         let input = FrameInput { frame, object: Arc::clone(&sequence.object), rig: None };

@@ -21,6 +21,7 @@ use super::settings::settings;
 use super::{estimate, images};
 use crate::arrays::{Array, Numbers, array, in_order, rows, vector};
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// One segmented RGB-D frame of an object, with the hand that holds it where that is known: what `refine` starts from, prepared once.
 ///
@@ -139,7 +140,7 @@ impl Frame {
         let (frame, hypotheses) = (&self.input.frame, hypotheses(&pose)?);
         let estimator = self.input.estimator(&method).supported_by(frame);
         let run = || estimator.run(frame, &hypotheses, &mut |_| ControlFlow::Continue(()));
-        let refined = py.detach(run).raise()?;
+        let refined = detached(py, run)?.raise()?;
         estimate::estimate(py, &refined, &hypotheses.best)
     }
 
@@ -157,7 +158,7 @@ impl Frame {
             PoseSearch::new(object, settings)?
                 .run(&PreparedFrame::new(&self.input.frame, &self.input.object)?)
         };
-        let found = py.detach(search).raise()?;
+        let found = detached(py, search)?.raise()?;
         let poses = found.iter().flat_map(|c| rows(&c.t_cam_object)).collect();
         let weights = found.iter().map(|c| c.weight).collect();
         Ok((array(py, poses, &[found.len(), 4, 4])?, array(py, weights, &[found.len()])?))
@@ -166,9 +167,9 @@ impl Frame {
     /// What looks wrong with object, frame and a pose in it, in words.
     fn warnings(&self, py: Python<'_>, pose: Numbers<'_>) -> PyResult<Vec<String>> {
         let pose = self::pose(&pose, "pose")?;
-        let warnings = py.detach(|| {
+        let warnings = detached(py, || {
             EstimatorInput::new(&self.input.frame, &self.input.object).warnings(&pose).concat()
-        });
+        })?;
         Ok(warnings.iter().map(ToString::to_string).collect())
     }
 

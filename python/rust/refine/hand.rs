@@ -7,6 +7,7 @@ use prehend_refine::data::user_cache;
 use pyo3::prelude::*;
 
 use crate::error::Raise;
+use crate::threads::detached;
 
 /// A robot hand, prepared once for any number of frames: collision geometry of a URDF file, and taxels of a CSV file with the columns idx, patch,
 /// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
@@ -23,7 +24,7 @@ impl Hand {
     #[pyo3(signature = (urdf, taxels=None))]
     fn new(py: Python<'_>, urdf: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
         let load = || prehend_refine::Hand::load(&urdf, taxels.as_deref(), user_cache().as_ref());
-        let hand = py.detach(load);
+        let hand = detached(py, load)?;
         Ok(Self { hand: Arc::new(hand.raise()?) })
     }
 

@@ -93,6 +93,9 @@ pub(super) fn mask(image: &Bound<'_, PyAny>) -> PyResult<Mask> {
             array.dtype()
         )));
     }
+    if kind == b'i' && array.as_any().call_method0("min")?.extract::<i64>()? < 0 {
+        return Err(wrong("mask: it has negative numbers: give True where the object is"));
+    }
     let set = pixels::<bool>(array.as_any(), "bool")?;
     let set = set.try_readonly().raise()?;
     Mask::new(width, height, set.as_slice().raise()?.to_vec()).raise()

@@ -34,6 +34,9 @@ impl Mesh {
     ) -> PyResult<Self> {
         let vertices = points(&vertices, "vertices")?;
         let count = vertices.len();
+        if let Some(at) = vertices.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
+            return Err(wrong(format!("vertices: vertex {at} is not finite")));
+        }
         let corners = self::faces(&faces, count)?;
         let mut mesh = TriMesh::new(vertices, corners);
         if let Some(colors) = colors {

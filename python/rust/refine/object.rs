@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use super::mesh::Mesh;
 use crate::arrays::{Numbers, inertia, vector};
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// An object whose pose is sought, prepared once for any number of frames: what takes long is made when it is first needed, and kept.
 ///
@@ -36,7 +37,8 @@ pub(super) fn prepared(given: &Bound<'_, PyAny>) -> PyResult<Arc<prehend_refine:
     };
     let mesh = mesh.get().mesh.clone();
     let object =
-        given.py().detach(|| prehend_refine::Object::with_mass("object", mesh, None, 0)).raise()?;
+        detached(given.py(), || prehend_refine::Object::with_mass("object", mesh, None, 0))?
+            .raise()?;
     Ok(Arc::new(object))
 }
 
@@ -74,10 +76,10 @@ impl Object {
             }
         };
         let mesh = mesh.mesh.clone();
-        let object = py.detach(|| match inertial {
+        let object = detached(py, || match inertial {
             Some(_) => prehend_refine::Object::new(name, mesh, inertial, seed),
             None => prehend_refine::Object::with_mass(name, mesh, mass, seed),
-        });
+        })?;
         Ok(Self { object: Arc::new(object.raise()?) })
     }
 

@@ -11,6 +11,7 @@ use pyo3::types::PyDict;
 use super::object::Object;
 use crate::arrays::array;
 use crate::error::Raise;
+use crate::threads::detached;
 
 /// What a rig of camera and hand gets wrong in all of its frames, as `calibrate` has found it.
 #[pyclass(frozen, module = "prehend")]
@@ -34,7 +35,7 @@ impl Rig {
     /// The object of that number with the surface and the mass that the rig has found; as it is, if the rig does not know the number.
     fn corrected(&self, py: Python<'_>, object: &Object, object_id: u32) -> PyResult<Object> {
         let given = Arc::clone(&object.object);
-        let corrected = py.detach(|| self.rig.corrected_object(object_id, &given)).raise()?;
+        let corrected = detached(py, || self.rig.corrected_object(object_id, &given))?.raise()?;
         Ok(Object { object: corrected.map_or(given, Arc::new) })
     }
 

@@ -14,6 +14,7 @@ use super::poses::poses;
 use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Error, Raise, wrong};
+use crate::threads::detached;
 
 /// A number that may not be 0.
 pub(super) fn at_least_one(number: usize, what: &str) -> PyResult<NonZeroUsize> {
@@ -88,7 +89,7 @@ pub(crate) fn refine_batch<'py>(
         RefineJob { estimator, frame: &input.frame, hypotheses: (*initial).into() }
     };
     let jobs: Vec<RefineJob<'_>> = frames.iter().zip(&poses).map(job).collect();
-    let done = py.detach(|| refine_all(&jobs, threads)).raise()?;
+    let done = detached(py, || refine_all(&jobs, threads))?.raise()?;
     let results = PyList::empty(py);
     for (outcome, initial) in done.iter().zip(&poses) {
         match outcome {

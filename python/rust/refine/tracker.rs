@@ -14,6 +14,7 @@ use super::rig::Rig;
 use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// Follows one object through the frames of a camera.
 ///
@@ -67,8 +68,7 @@ impl Tracker {
         frame: &Frame,
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let time = seconds(time, "time")?;
-        let tracked = py.detach(|| self.tracker.track(&frame.input.frame, time)).raise()?;
+        let tracked = detached(py, || self.tracker.track_at(&frame.input.frame, time))?.raise()?;
         estimate::tracked(py, &tracked)
     }
 

@@ -20,6 +20,7 @@ use super::pose::{by_matrix, pose};
 use super::pullback::shape;
 use crate::arrays::{Array, Numbers, array};
 use crate::error::{Raise, wrong};
+use crate::threads::detached;
 
 /// How well a mesh at a pose explains a segmented image: a number with its gradient and its Gauss–Newton matrix.
 ///
@@ -126,7 +127,7 @@ impl PoseLoss {
         light: Option<Numbers<'py>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (hypotheses, batch) = self.hypotheses(&pose, light.as_ref())?;
-        let losses = py.detach(|| self.problem.losses(&hypotheses));
+        let losses = detached(py, || self.problem.losses(&hypotheses))?;
         numbers(py, losses.iter().map(|loss| loss.total).collect(), batch)
     }
 
@@ -143,7 +144,7 @@ impl PoseLoss {
         light: Option<Numbers<'py>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (hypotheses, batch) = self.hypotheses(&pose, light.as_ref())?;
-        let linearized = py.detach(|| self.problem.clone().linearize(&hypotheses)).raise()?;
+        let linearized = detached(py, || self.problem.clone().linearize(&hypotheses))?.raise()?;
         let mut values = Vec::new();
         let [mut gradients, mut hessians, mut poses, mut centers] = [const { Vec::new() }; 4];
         for (at, hypothesis) in linearized.iter().zip(&hypotheses) {
@@ -179,11 +180,11 @@ impl PoseLoss {
         };
         let PoseProblem { model, target, .. } = &self.problem;
         let pose = &hypotheses[0].t_cam_object;
-        let fitted = py.detach(|| {
+        let fitted = detached(py, || {
             let samples = light_samples(model, pose, target, margin, most);
             // The pull settles what normals in a narrow cone leave open.
             Light::fit(&samples, 1e-3)
-        });
+        })?;
         to_array(py, &fitted.raise()?)
     }
 

@@ -9,6 +9,7 @@ use super::named;
 use super::pose::by_matrix;
 use crate::arrays::{Array, Numbers, array, in_order};
 use crate::error::wrong;
+use crate::threads::detached;
 
 /// Carries derivatives of a number by pictures back to what made them. Made by `Renderer.vjp`; call it as often as wanted.
 #[pyclass(frozen, module = "prehend")]
@@ -112,7 +113,7 @@ impl RenderPullback {
                 normal: part(&normal, k).as_chunks().0.iter().map(vector).collect(),
             })
             .collect();
-        let gradients = py.detach(|| vjp_each(&self.renderings, &adjoints));
+        let gradients = detached(py, || vjp_each(&self.renderings, &adjoints))?;
         let all = |of: &dyn Fn(&SceneGradient) -> Vec<f64>| gradients.iter().map(of).collect();
         let poses: Vec<Vec<f64>> = gradients
             .iter()

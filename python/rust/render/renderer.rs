@@ -14,6 +14,7 @@ use super::mesh::{Look, model};
 use super::mode::mode;
 use super::pullback::{RenderPullback, picture};
 use crate::arrays::{Array, Numbers, array, vector_or};
+use crate::threads::detached;
 
 /// Pictures of a mesh, with derivatives by its pose and by all that makes them.
 ///
@@ -47,7 +48,7 @@ impl Renderer {
     ) -> PyResult<(Vec<Rendering<Light>>, RenderPullback)> {
         let inputs = self.inputs(pose, others)?;
         let scenes = self.scenes(&inputs)?;
-        let renderings = py.detach(|| render_each(self.mode, &scenes));
+        let renderings = detached(py, || render_each(self.mode, &scenes))?;
         let scenes = scenes.into_iter().map(|(scene, _)| scene).collect();
         let pullback = RenderPullback::new(scenes, inputs.batched(), inputs.batch.is_some());
         Ok((renderings, pullback))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use prehend_sim::{Bushing, BushingStiffness, ContactBodies};
+use prehend_sim::{Bushing, BushingStiffness, ContactBodies, Material};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -55,6 +55,12 @@ impl World {
         let (a, b) = (list(&a)?, list(&b)?);
         let smoothing = Begins::smoothing(smoothing)?;
         self.naming(|world| world.add_contacts_between(&a, &b, law, smoothing).raise())
+    }
+
+    /// Lets all bodies with shapes touch each other, with a stiffness from their masses and sizes, and friction that holds what rests.
+    #[pyo3(signature = (*, friction=0.5, restitution=0.2))]
+    fn add_contacts(&mut self, friction: f64, restitution: f64) -> PyResult<()> {
+        self.world.add_contacts(Material { friction, restitution }).raise().map(|_| ())
     }
 
     /// Holds a frame of one body on a frame of another by springs, so that what moves with `mass` [kg] and `inertia` [kg m²] settles in `time` [s];

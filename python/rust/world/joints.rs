@@ -18,6 +18,7 @@ use crate::arrays::{Numbers, pose};
 use crate::error::{Raise, wrong};
 use crate::link::Link;
 use crate::robot::Robot;
+use crate::threads::detached;
 
 /// Distance of the grid of a robot's link [m], and how far it reaches.
 const LINK_GRID: [f64; 2] = [2e-3, 8e-3];
@@ -100,7 +101,7 @@ impl World {
             MjcfOptions { t_world_model, base: base(floating), shapes, ..MjcfOptions::default() };
         let before = self.world.parameter_names();
         let model = Model::from_file(&path).raise()?;
-        let robot = py.detach(|| self.world.add_mjcf(&model, &options)).raise()?;
+        let robot = detached(py, || self.world.add_mjcf(&model, &options))?.raise()?;
         Ok(Robot::of_mjcf(&model, robot, &self.world, &before))
     }
 
@@ -122,7 +123,7 @@ impl World {
             let shape = || RobotShape::cached(&robot, spacing, margin, cache.as_ref());
             shapes.then(shape).transpose()
         };
-        let shape = py.detach(shape).raise()?;
+        let shape = detached(py, shape)?.raise()?;
         let t_world_base = self::pose(pose.as_ref(), "pose")?;
         let options = UrdfOptions { t_world_base, base: base(floating), ..UrdfOptions::default() };
         let bodies = self.world.add_articulated_robot(&robot, shape.as_ref(), &options).raise()?;

@@ -111,7 +111,7 @@ impl World {
         matrix(py, &pose)
     }
 
-    /// Writes coordinates [m, rad] and velocities of the joint of a link into `states`, and where the links are then. A spherical joint has a
+    /// Writes coordinates [m, rad] and velocities of the joint of a link into `states`, with those of joints that mimic it in URDF, and where the links are then. A spherical joint has a
     /// quaternion (x, y, z, w), a floating one a place before it.
     #[pyo3(signature = (states, link, position, velocity=None))]
     fn set_joint(

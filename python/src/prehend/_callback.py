@@ -8,24 +8,36 @@ from __future__ import annotations
 
 import ctypes
 import math
+import threading
+import traceback
+import weakref
 from collections.abc import Callable
 from ctypes import POINTER, c_char_p, c_int, c_int64, c_size_t, c_uint32, c_void_p
 from typing import Any
 
 import jax
+import ml_dtypes
 import numpy as np
 from numpy.typing import NDArray
 
 TARGET = "prehend_callback"
 
-TYPES = {1: np.bool_, 4: np.int32, 5: np.int64, 11: np.float32, 12: np.float64}
+TYPES = {
+    1: np.bool_,
+    4: np.int32,
+    5: np.int64,
+    10: np.float16,
+    11: np.float32,
+    12: np.float64,
+    16: ml_dtypes.bfloat16,
+}
 """Types of numbers by their code in XLA."""
 
 METADATA = 1
 """Kind of the extension that asks for a handler's version."""
 
 INTERNAL = 13
-"""Code of an error of a function."""
+"""Code of XLA for an internal error."""
 
 
 class _Extension(ctypes.Structure):
@@ -112,50 +124,84 @@ class _Call(ctypes.Structure):
     ]
 
 
-_functions: list[Callable[..., Any]] = []
-"""Functions by number. Compiled programs call them as long as the process lives."""
+class _Registry:
+    """Functions by number. They live as long as what JAX was given, which refers to them."""
 
-_numbers: dict[tuple[Callable[..., Any], Any], int] = {}
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._by_number: list[tuple[weakref.ref[Callable[..., Any]], Any]] = []
+        self._numbers: weakref.WeakKeyDictionary[Callable[..., Any], dict[Any, int]] = (
+            weakref.WeakKeyDictionary()
+        )
+
+    def number(self, function: Callable[..., Any], tree: Any) -> int:
+        """The number of a function of arguments of that structure."""
+        with self._lock:
+            if not self._by_number:
+                jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(_handle), platform="cpu")
+            own = self._numbers.setdefault(function, {})
+            if tree not in own:
+                own[tree] = len(self._by_number)
+                self._by_number.append((weakref.ref(function), tree))
+            return own[tree]
+
+    def call(self, number: int, arrays: list[NDArray[Any]]) -> list[Any]:
+        """What the function of that number returns."""
+        reference, tree = self._by_number[number]
+        function = reference()
+        if function is None:
+            raise ReferenceError("the function that this program was compiled from is no more: keep it")
+        return jax.tree.leaves(function(*jax.tree.unflatten(tree, arrays)))
+
+
+_registry = _Registry()
 
 
 def callback(function: Callable[..., Any], shapes: Any, *args: Any, vmap_method: str) -> Any:
-    """``jax.pure_callback`` of a function that is kept for the life of the process."""
+    """``jax.pure_callback`` of a function of arrays that it may neither change nor keep."""
     if jax.default_backend() != "cpu":
-        return jax.pure_callback(function, shapes, *args, vmap_method=vmap_method)
+
+        def cast(*arrays: Any) -> Any:
+            found = function(*arrays)
+            return jax.tree.map(lambda array, like: np.asarray(array, like.dtype), found, shapes)
+
+        return jax.pure_callback(cast, shapes, *args, vmap_method=vmap_method)
     arguments, tree = jax.tree.flatten(args)
     results, structure = jax.tree.flatten(shapes)
     call = jax.ffi.ffi_call(TARGET, results, vmap_method=vmap_method)
-    found = call(*arguments, function=np.int64(_number(function, tree)))
+    found = call(*arguments, function=np.int64(_registry.number(function, tree)))
     return jax.tree.unflatten(structure, found)
-
-
-def _number(function: Callable[..., Any], tree: Any) -> int:
-    if not _numbers:
-        jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(_handle), platform="cpu")
-    if (function, tree) not in _numbers:
-        _functions.append(lambda arrays: jax.tree.leaves(function(*jax.tree.unflatten(tree, arrays))))
-        _numbers[function, tree] = len(_functions) - 1
-    return _numbers[function, tree]
 
 
 @ctypes.CFUNCTYPE(c_void_p, POINTER(_Call))
 def _handle(frame: Any) -> int | None:
-    call = frame.contents
+    # An exception that left this function would be an error at a random address.
     try:
-        if call.extension and call.extension.contents.kind == METADATA:
-            # Nothing here is newer than the first version.
-            asked = ctypes.cast(call.extension, POINTER(_MetadataExtension)).contents.metadata.contents
-            own = call.api.contents.version
-            asked.version.major, asked.version.minor = own.major, own.minor
-            return None
-        number = call.attributes.values[0].contents.value[0]
-        found = _functions[number](_arrays(call.arguments))
-        for array, result in zip(_arrays(call.results), found, strict=True):
-            array[...] = result
-    except BaseException as error:  # noqa: BLE001: whatever it is, JAX raises it.
-        said = _Error(ctypes.sizeof(_Error), None, f"{type(error).__name__}: {error}".encode(), INTERNAL)
-        return call.api.contents.create_error(ctypes.byref(said))  # type: ignore[no-any-return]
-    return None
+        return _answer(frame.contents)
+    except BaseException:
+        try:
+            text = traceback.format_exc().encode(errors="backslashreplace")
+        except BaseException:
+            text = b"an exception without a text"
+        said = _Error(ctypes.sizeof(_Error), None, text, INTERNAL)
+        return frame.contents.api.contents.create_error(ctypes.byref(said))  # type: ignore[no-any-return]
+
+
+def _answer(call: Any) -> None:
+    if call.extension and call.extension.contents.kind == METADATA:
+        # Nothing here is newer than the first of these versions.
+        asked = ctypes.cast(call.extension, POINTER(_MetadataExtension)).contents.metadata.contents
+        own = call.api.contents.version
+        asked.version.major, asked.version.minor = 0, own.minor if own.major == 0 else 1
+        return
+    arguments = _arrays(call.arguments)
+    for array in arguments:
+        array.flags.writeable = False
+    found = _registry.call(call.attributes.values[0].contents.value[0], arguments)
+    for array, result in zip(_arrays(call.results), found, strict=True):
+        if np.shape(result) != array.shape:
+            raise ValueError(f"a result of shape {np.shape(result)}, not {array.shape}")
+        array[...] = result
 
 
 def _arrays(buffers: Any) -> list[NDArray[Any]]:

@@ -191,6 +191,7 @@ class World:
         smoothing: float | str | None = None,
         **parameters: float,
     ) -> dict[str, str]: ...
+    def add_contacts(self, *, friction: float = 0.5, restitution: float = 0.2) -> None: ...
     def add_bushing(
         self,
         a: _Body,

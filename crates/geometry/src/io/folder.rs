@@ -37,6 +37,8 @@ pub(crate) struct Folder {
 enum Reach {
     /// In the folder or below.
     Own,
+    /// As `Own`, and files of packages in folders above that are called like them.
+    Package,
     /// In this folder, above it, or below.
     Within(PathBuf),
     Anywhere,
@@ -46,6 +48,11 @@ impl Folder {
     /// A folder alone.
     pub(crate) fn own(path: &Path) -> Self {
         Self { path: path.to_path_buf(), reach: Reach::Own }
+    }
+
+    /// A folder, with the packages that it lies in.
+    pub(crate) fn in_packages(path: &Path) -> Self {
+        Self { path: path.to_path_buf(), reach: Reach::Package }
     }
 
     /// A folder with all that is in `root`.
@@ -60,21 +67,42 @@ impl Folder {
 
     /// The file `name`, seen from the folder, whether or not it exists.
     pub(crate) fn file(&self, name: &str) -> Result<PathBuf, &'static str> {
-        let root = match &self.reach {
-            Reach::Own => return inside(&self.path, name),
-            Reach::Within(root) => Some(root),
-            Reach::Anywhere => None,
-        };
         let path = self.path.join(name.trim().replace('\\', "/"));
-        let Some(root) = root else { return Ok(path) };
+        let (root, outside) = match &self.reach {
+            Reach::Anywhere => return Ok(path),
+            Reach::Within(root) => (root, "the path leaves the root of the file's package"),
+            // Absolute names may lead into the folder.
+            _ if Path::new(name.trim()).is_absolute() => (&self.path, OUTSIDE),
+            _ => return inside(&self.path, name),
+        };
         let root = root.canonicalize().map_err(|_| "the root folder does not exist")?;
         match path.canonicalize() {
-            Ok(file) if file.starts_with(&root) => Ok(path),
-            Ok(_) => Err("the path leaves the root of the file's package"),
+            Ok(file) if !file.starts_with(&root) => Err(outside),
             // What does not exist has no content that could be given away.
-            Err(_) => Ok(path),
+            _ => Ok(path),
         }
     }
+
+    /// The file `name` of `package`, in the nearest folder upwards that is called so and has it.
+    pub(crate) fn packaged(&self, package: &str, name: &str) -> Option<PathBuf> {
+        let Reach::Package = self.reach else { return None };
+        let own = self.path.canonicalize().ok()?;
+        let is_called = |folder: &&Path| folder.file_name().is_some_and(|own| own == package);
+        let mut packages = own.ancestors().filter(is_called);
+        packages.find_map(|folder| inside(folder, name).ok().filter(|file| file.is_file()))
+    }
+}
+
+/// A URI with the characters that it writes as `%20`.
+pub(crate) fn percent_decoded(uri: &str) -> String {
+    let (mut out, mut rest) = (Vec::new(), uri.as_bytes());
+    while let Some((&first, tail)) = rest.split_first() {
+        let digits = tail.get(..2).filter(|h| first == b'%' && h.iter().all(u8::is_ascii_hexdigit));
+        let hex = digits.and_then(|h| u8::from_str_radix(str::from_utf8(h).ok()?, 16).ok());
+        out.push(hex.unwrap_or(first));
+        rest = if hex.is_some() { &tail[2..] } else { tail };
+    }
+    String::from_utf8_lossy(&out).into_owned()
 }
 
 #[cfg(test)]
@@ -92,6 +120,12 @@ mod tests {
     }
 
     #[test]
+    fn uris_are_decoded() {
+        assert_eq!(percent_decoded("a%20b%2Fc%C3%A4"), "a b/cä");
+        assert_eq!(percent_decoded("50%, %zz%+1%2"), "50%, %zz%+1%2");
+    }
+
+    #[test]
     fn a_package_reaches_to_its_root() {
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("package/robots");
@@ -104,6 +138,17 @@ mod tests {
         assert!(within.file("../../secret").is_err());
         assert!(Folder::anywhere(&folder).file("../../secret").is_ok());
         assert_eq!(Folder::own(&folder).file("../mesh"), Err(OUTSIDE));
+        let absolute = |name: &str| root.path().join(name).display().to_string();
+        assert!(Folder::own(&folder).file(&absolute("package/robots/own")).is_ok());
+        assert_eq!(Folder::own(&folder).file(&absolute("package/mesh")), Err(OUTSIDE));
+        // A package without a mark of its root is known by its name.
+        let marked = Folder::in_packages(&folder);
+        let mesh = root.path().canonicalize().unwrap().join("package/mesh");
+        assert_eq!(marked.packaged("package", "mesh"), Some(mesh));
+        assert_eq!(marked.packaged("package", "../secret"), None);
+        assert_eq!(marked.packaged("other", "mesh"), None);
+        assert_eq!(marked.file("../mesh"), Err(OUTSIDE));
+        assert_eq!(Folder::own(&folder).packaged("package", "mesh"), None);
     }
 
     #[cfg(unix)]

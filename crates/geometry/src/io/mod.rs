@@ -33,7 +33,8 @@ impl TriMesh {
     /// meters.
     ///
     /// Polygons become fans of triangles, glTF node transforms are applied, and textures are read from
-    /// the folder of the mesh (never from outside it). A vertex on a texture seam is stored once for each of
+    /// the folder of the mesh (never from outside it). Images and libraries that an OBJ file names elsewhere, or in another case, are looked for there by
+    /// their file names. A vertex on a texture seam is stored once for each of
     /// its coordinates. An image or a library of materials that cannot be read costs the colors alone, with a warning in the log. Stored normals are brought to unit length; where one is zero, the surface's own stands in.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! Wavefront OBJ with MTL materials, through `tobj` (coordinates in single precision).
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -16,24 +17,24 @@ const OPTIONS: LoadOptions =
     LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
-    let bytes = &*plain_text(bytes);
-    check_indices(bytes, path)?;
-    let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OPTIONS, |name| {
-        library(path, &name.display().to_string()).map_err(|reason| {
-            log::warn!("{}: mtllib {}: {reason}: no colors", path.display(), name.display());
-            LoadError::MaterialParseError
-        })
-    })
-    .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
-    // Collision meshes often name materials that were never shipped.
-    let materials = materials.unwrap_or_default();
+    let text = plain_text(bytes);
+    check_indices(&text, path)?;
+    let library = libraries(&text, path);
+    let unknown = unknown_materials(&text, &library);
+    if !unknown.is_empty() {
+        let names = Vec::from_iter(unknown).join(", ");
+        log::warn!("{}: no library has the materials {names}: no colors of them", path.display());
+    }
+    let mut arranged = Cursor::new(arranged(&text));
+    let (models, _) = tobj::load_obj_buf(&mut arranged, &OPTIONS, |_| Ok(library.clone()))
+        .map_err(|e| MeshError::malformed(path, line_at_fault(&text), e))?;
     let mut images = Images::new(path);
     let mut parts = Vec::new();
     for model in &models {
-        let material = model.mesh.material_id.and_then(|id| materials.get(id));
+        let material = model.mesh.material_id.and_then(|id| library.0.get(id));
         let image = match material.and_then(image_name) {
             Some(name) if !model.mesh.texcoords.is_empty() => {
-                images.get(name, || texture::beside(path, name))
+                images.get(name, || texture::near(path, name))
             }
             _ => None,
         };
@@ -42,26 +43,76 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     }
     // A group of nothing but points or lines leaves a part without faces.
     parts.retain(|p| !p.mesh.faces.is_empty());
+    // Colors of eight bits, as some programs write them.
+    if parts.iter().flat_map(|p| p.mesh.colors.iter().flatten().flatten()).any(|c| *c > 1.0) {
+        let colors = parts.iter_mut().flat_map(|p| p.mesh.colors.iter_mut().flatten().flatten());
+        colors.for_each(|c| *c /= 255.0);
+    }
     join(parts, path)
 }
 
-/// Materials of the library `name`, or of several with spaces between.
-fn library(path: &Path, name: &str) -> Result<mtl::Library, String> {
-    let read = |name: &str| texture::beside(path, name).and_then(|content| mtl::parse(&content));
-    read(name).or_else(|reason| {
-        let mut all = mtl::Library::default();
-        for name in name.split_whitespace() {
-            let (materials, places) = read(name).map_err(|_| reason.clone())?;
-            let first = all.0.len();
-            all.0.extend(materials);
-            all.1.extend(places.into_iter().map(|(name, place)| (name, first + place)));
-        }
-        Ok(all)
+/// What follows `key` in the lines that begin with it.
+fn values<'a>(text: &'a str, key: &'a str) -> impl Iterator<Item = &'a str> {
+    text.lines().filter_map(move |line| {
+        let (word, value) = line.trim().split_once(char::is_whitespace)?;
+        (word == key).then_some(value.trim())
     })
 }
 
-/// The text in UTF-8 without a byte order mark, each line whole where a backslash broke it.
-fn plain_text(bytes: &[u8]) -> Cow<'_, [u8]> {
+/// Materials of all libraries that the text names, wherever it does: a line names one, or several with spaces between.
+fn libraries(text: &str, path: &Path) -> mtl::Library {
+    let mut all = mtl::Library::default();
+    let mut add = |name: &str| -> Result<(), String> {
+        let (materials, places) = mtl::parse(&texture::near(path, name)?)?;
+        let first = all.0.len();
+        all.0.extend(materials);
+        all.1.extend(places.into_iter().map(|(name, place)| (name, first + place)));
+        Ok(())
+    };
+    let mut seen = BTreeSet::new();
+    for names in values(text, "mtllib").filter(|names| seen.insert(*names)) {
+        let Err(whole) = add(names) else { continue };
+        let words: Vec<&str> = names.split_whitespace().collect();
+        let read = |name: &&str| Some(format!("{name}: {}", add(name).err()?));
+        let unread: Vec<String> = words.iter().filter_map(read).collect();
+        if unread.len() == words.len() {
+            log::warn!("{}: mtllib {names}: {whole}: no colors", path.display());
+        } else if !unread.is_empty() {
+            log::warn!("{}: mtllib {}: no colors of it", path.display(), unread.join("; "));
+        }
+    }
+    all
+}
+
+/// Materials that the text uses and no library has.
+fn unknown_materials<'a>(text: &'a str, library: &mtl::Library) -> BTreeSet<&'a str> {
+    values(text, "usemtl").filter(|name| !library.1.contains_key(*name)).collect()
+}
+
+/// The text as `tobj` needs it: with one library, before any material is used, and a new group wherever faces begin or cease to have
+/// texture coordinates, since a group has them at all corners or at none.
+fn arranged(text: &str) -> String {
+    let mut out = String::from("mtllib all\n");
+    let mut painted = None;
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("mtllib") => continue,
+            Some("f") => {
+                let own = words.all(|w| w.split('/').nth(1).is_some_and(|uv| !uv.is_empty()));
+                if painted.replace(own).is_some_and(|before| before != own) {
+                    out.push_str("g\n");
+                }
+            }
+            _ => {}
+        }
+        out.extend([line, "\n"]);
+    }
+    out
+}
+
+/// The text in UTF-8 without a byte order mark, each line whole where a backslash broke it, and without comments behind numbers.
+fn plain_text(bytes: &[u8]) -> String {
     let wide = |decode: fn([u8; 2]) -> u16| {
         let units = bytes[2..].as_chunks().0.iter().map(|pair| decode(*pair));
         let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
@@ -72,24 +123,28 @@ fn plain_text(bytes: &[u8]) -> Cow<'_, [u8]> {
         [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
         _ => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
     };
-    if !text.contains('\\') {
-        return match text {
-            Cow::Borrowed(text) => Cow::Borrowed(text.as_bytes()),
-            Cow::Owned(text) => Cow::Owned(text.into_bytes()),
-        };
+    let mut out = String::with_capacity(text.len() + 1);
+    for line in text.lines() {
+        // Names may hold the mark of comments.
+        let is_plain = line.trim_start().starts_with(|c: char| "#vflp-.0123456789".contains(c));
+        let line = line.split_once('#').filter(|_| is_plain).map_or(line, |(own, _)| own);
+        match line.strip_suffix('\\') {
+            Some(begun) => out.extend([begun, " "]),
+            None => out.extend([line, "\n"]),
+        }
     }
-    text.replace("\\\r\n", " ").replace("\\\n", " ").into_bytes().into()
+    out
 }
 
 /// Positions and faces alone.
 pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
-    let bytes = &*plain_text(bytes);
-    check_indices(bytes, path)?;
+    let text = plain_text(bytes);
+    check_indices(&text, path)?;
     // Corners share their position whatever their normals are.
     let options = LoadOptions { single_index: false, ..OPTIONS };
     let no_materials = |_: &Path| Err(LoadError::GenericFailure);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
-        .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(&text), &options, no_materials)
+        .map_err(|e| MeshError::malformed(path, line_at_fault(&text), e))?;
     let mut whole = TriMesh::default();
     for Model { mesh, .. } in models {
         let vertices = mesh.positions.chunks_exact(3);
@@ -102,9 +157,8 @@ pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErro
 
 /// The positions alone, with no faces.
 pub(super) fn points(bytes: &[u8]) -> TriMesh {
-    let bytes = plain_text(bytes);
-    let lines = bytes.split(|b| *b == b'\n').filter_map(|line| std::str::from_utf8(line).ok());
-    let points = lines.filter_map(|line| {
+    let text = plain_text(bytes);
+    let points = text.lines().filter_map(|line| {
         let mut words = line.strip_prefix("v ")?.split_whitespace().map(str::parse::<f64>);
         let mut next = || words.next()?.ok().filter(|x| x.is_finite());
         Some(Point3::new(next()?, next()?, next()?))
@@ -113,12 +167,12 @@ pub(super) fn points(bytes: &[u8]) -> TriMesh {
 }
 
 /// Refuses indices before the first element and beyond [`u32`], with which `tobj` computes offsets that overflow.
-fn check_indices(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
+fn check_indices(text: &str, path: &Path) -> Result<(), MeshError> {
     // Of positions, texture coordinates and normals: a face counts back from the last one above it.
     let mut counts = [0_i64; 3];
-    for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
-        // The white space of `tobj`; what is no UTF-8 it refuses.
-        let mut words = str::from_utf8(line).unwrap_or_default().split_whitespace();
+    for (number, line) in text.lines().enumerate() {
+        // The white space of `tobj`.
+        let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => counts[0] += 1,
             Some("vt") => counts[1] += 1,
@@ -144,7 +198,8 @@ fn out_of_range(text: &str, count: i64) -> Option<i64> {
 
 /// The line, from 1, without which the lines before it can be read: `tobj` does not say where it stopped. Where faces
 /// precede their vertices, it may be such a face's.
-fn line_at_fault(bytes: &[u8]) -> String {
+fn line_at_fault(text: &str) -> String {
+    let bytes = text.as_bytes();
     let ends: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == b'\n').map(|i| i + 1).collect();
     let reads = |lines: usize| {
         let end = if lines > ends.len() { bytes.len() } else { ends[lines - 1] };
@@ -263,6 +318,52 @@ mod tests {
         std::fs::remove_file(folder.path().join("a b.mtl")).unwrap();
         let several = load(&text.replace(" c.mtl", ""), &path).unwrap();
         assert_eq!(several.colors.unwrap()[3], [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn faces_without_texture_coordinates_have_the_plain_color() {
+        let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 0 1\nusemtl a\n\
+            f 1/1 2/1 3/2\nf 1 2 4\nf 1/1 3/2 4/2\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.obj");
+        let material = "newmtl a\nKd 1 0 0\nmap_Kd C:\\art\\TEX.PNG\n";
+        std::fs::write(folder.path().join("m.mtl"), material).unwrap();
+        let image = image::RgbImage::from_raw(1, 2, vec![9, 9, 9, 7, 7, 7]).unwrap();
+        image.save(folder.path().join("tex.png")).unwrap();
+        // Once with the image repeated.
+        for text in [text, text.replace("vt 0 1", "vt 0 2").as_str()] {
+            let mesh = load(text, &path).unwrap();
+            let (texture, uvs) = (mesh.texture.unwrap(), mesh.uvs.unwrap());
+            let pixel = |v: u32| {
+                let [u, v] = uvs[v as usize];
+                let row = ((1.0 - v) * texture.height as f32) as usize;
+                texture.pixels[row * texture.width + (u * texture.width as f32) as usize][0]
+            };
+            let red: Vec<[u8; 3]> = mesh.faces.iter().map(|f| f.map(pixel)).collect();
+            assert_eq!(red, [[7, 7, 9], [255; 3], [7, 9, 9]]);
+        }
+    }
+
+    #[test]
+    fn libraries_apply_wherever_they_are_named() {
+        let text = "v 0 0 0 # origin\nv 1 0 0\nv 0 1 0\nusemtl a#b\nf 1 2 3 # one\nusemtl gone\n\
+            f 1 3 2\nmtllib gone.mtl M.MTL # two\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.obj");
+        std::fs::write(folder.path().join("m.mtl"), "newmtl a#b\nKd 1 0 0\n").unwrap();
+        let mesh = load(text, &path).unwrap();
+        assert_eq!(mesh.faces, [[0, 1, 2], [3, 4, 5]]);
+        let colors = mesh.colors.unwrap();
+        assert_eq!((colors[0], colors[3]), ([1.0, 0.0, 0.0], [1.0; 3]));
+        let unknown = unknown_materials(text, &libraries(text, &path));
+        assert_eq!(unknown, BTreeSet::from(["gone"]));
+    }
+
+    #[test]
+    fn colors_of_eight_bits() {
+        let text = "v 0 0 0 128 51 255\nv 1 0 0 0 0 1\nv 0 1 0 0 0 0\nf 1 2 3\n";
+        let colors = load(text, Path::new("m.obj")).unwrap().colors.unwrap();
+        assert_eq!(colors[..2], [[128.0 / 255.0, 0.2, 1.0], [0.0, 0.0, 1.0 / 255.0]]);
     }
 
     #[test]

@@ -47,57 +47,86 @@ fn join_plain(mut parts: Vec<Part>) -> TriMesh {
     whole
 }
 
+/// An image as often beside and above itself as texture coordinates reach: whole numbers along u and v.
+struct Tile {
+    image: Arc<Texture>,
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl Tile {
+    fn of(image: Arc<Texture>, uvs: &[[f32; 2]]) -> Self {
+        let mut tile = Self { image, low: [0.0; 2], high: [1.0; 2] };
+        for (k, c) in uvs.iter().flat_map(|uv| uv.iter().enumerate()) {
+            // Rounding leads across the edge of the image, and needs no other one.
+            tile.low[k] = tile.low[k].min((c + 1e-3).floor());
+            tile.high[k] = tile.high[k].max((c - 1e-3).ceil());
+        }
+        tile
+    }
+
+    /// Whether it shows the same; the content counts for plain colors, of which each part makes its own image.
+    fn is(&self, other: &Self) -> bool {
+        (self.low, self.high) == (other.low, other.high)
+            && (Arc::ptr_eq(&self.image, &other.image) || self.image == other.image)
+    }
+
+    /// Columns and rows, far too many at most.
+    fn size(&self) -> [usize; 2] {
+        let times = [0, 1].map(|k| (self.high[k] - self.low[k]) as usize);
+        let own = [(self.image.width, times[0]), (self.image.height, times[1])];
+        own.map(|(size, times)| size.saturating_mul(times).min(MAX_PIXELS + 1))
+    }
+}
+
 /// Stacks the images of `parts` from the top down, each within a border of repeated pixels so that filtering does
 /// not mix neighbors, and moves the UVs along.
 fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>, MeshError> {
-    let mut tiles: Vec<Arc<Texture>> = Vec::new();
+    let mut tiles: Vec<Tile> = Vec::new();
     let mut tile_of = Vec::new();
     for part in &mut parts {
-        let texture = match (&part.texture, &part.mesh.uvs) {
-            (Some(texture), Some(_)) => texture.clone(),
-            _ => {
+        let painted = part.texture.clone().zip(part.mesh.uvs.as_ref());
+        let tile = match painted.map(|(image, uvs)| Tile::of(image, uvs)) {
+            Some(tile) if tile.size().iter().product::<usize>() <= MAX_PIXELS => tile,
+            other => {
+                if other.is_some() {
+                    let path = path.display();
+                    log::warn!("{path}: a texture repeats too often: its faces get a plain color");
+                }
                 part.mesh.uvs = Some(vec![[0.5; 2]; part.mesh.vertices.len()]);
                 let pixel = part.color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
-                Arc::new(Texture { width: 1, height: 1, pixels: vec![pixel] })
+                Tile::of(Arc::new(Texture { width: 1, height: 1, pixels: vec![pixel] }), &[])
             }
         };
-        let known = tiles.iter().position(|t| Arc::ptr_eq(t, &texture));
+        let known = tiles.iter().position(|own| own.is(&tile));
         tile_of.push(known.unwrap_or_else(|| {
-            tiles.push(texture);
+            tiles.push(tile);
             tiles.len() - 1
         }));
     }
-    let width = tiles.iter().map(|t| t.width + 2).max().unwrap_or(0);
-    let height: usize = tiles.iter().map(|t| t.height + 2).sum();
+    let width = tiles.iter().map(|t| t.size()[0] + 2).max().unwrap_or(0);
+    let height: usize = tiles.iter().map(|t| t.size()[1] + 2).sum();
     // A wide tile beside a tall one spans far more than both.
-    MeshError::within(
-        path,
-        "joined texture, pixels",
-        width.saturating_mul(height),
-        2 * MAX_PIXELS,
-    )?;
+    let area = width.saturating_mul(height);
+    MeshError::within(path, "joined texture, pixels", area, 2 * MAX_PIXELS)?;
     let mut pixels = Vec::with_capacity(width * height);
     let mut top = Vec::new();
     for tile in &tiles {
         top.push(pixels.len() / width);
-        for y in 0..tile.height + 2 {
-            let row = y.saturating_sub(1).min(tile.height - 1) * tile.width;
-            pixels.extend(
-                (0..width).map(|x| tile.pixels[row + x.saturating_sub(1).min(tile.width - 1)]),
-            );
+        let ([columns, rows], image) = (tile.size(), &tile.image);
+        for y in 0..rows + 2 {
+            let row = y.saturating_sub(1).min(rows - 1) % image.height * image.width;
+            let column = |x: usize| x.saturating_sub(1).min(columns - 1) % image.width;
+            pixels.extend((0..width).map(|x| image.pixels[row + column(x)]));
         }
     }
     let atlas = Arc::new(Texture { width, height, pixels });
     for (part, tile) in parts.iter_mut().zip(tile_of) {
-        let (w, h) = (tiles[tile].width as f32, tiles[tile].height as f32);
+        let Tile { image, low, high } = &tiles[tile];
+        let (w, h) = (image.width as f32, image.height as f32);
         for uv in part.mesh.uvs.iter_mut().flatten() {
-            if uv.iter().any(|c| !(-1e-3..=1.001).contains(c)) {
-                let feature =
-                    "texture coordinates outside 0..1 in a mesh with several materials".into();
-                return Err(MeshError::Unsupported { path: path.into(), feature });
-            }
-            let from_top = top[tile] as f32 + 1.0 + (1.0 - uv[1]) * h;
-            *uv = [(1.0 + uv[0] * w) / width as f32, 1.0 - from_top / height as f32];
+            let from_top = top[tile] as f32 + 1.0 + (high[1] - uv[1]) * h;
+            *uv = [(1.0 + (uv[0] - low[0]) * w) / width as f32, 1.0 - from_top / height as f32];
         }
         (part.mesh.colors, part.texture) = (None, Some(atlas.clone()));
     }
@@ -147,9 +176,19 @@ mod tests {
             assert_eq!(pixel(&texture, atlas_uvs[6 + k]), pixel(&b, uv));
             assert_eq!(atlas_uvs[9 + k], atlas_uvs[k]);
         }
-        let repeated =
-            vec![part(Some([[0.0, 2.0]; 3]), Some(&a), [1.0; 3]), part(None, None, [1.0; 3])];
-        assert!(matches!(join(repeated, path), Err(MeshError::Unsupported { .. })));
+        let repeated = [[0.1_f32, 1.9], [0.9, 0.3], [2.4, -0.95]];
+        let parts = vec![
+            part(Some(repeated), Some(&a), [1.0; 3]),
+            part(None, None, [1.0, 0.0, 0.2]),
+            part(Some([[0.0, 1e9]; 3]), Some(&b), [0.2, 0.0, 1.0]),
+        ];
+        let mesh = join(parts, path).unwrap();
+        let (texture, atlas_uvs) = (mesh.texture.unwrap(), mesh.uvs.unwrap());
+        for (k, uv) in repeated.into_iter().enumerate() {
+            assert_eq!(pixel(&texture, atlas_uvs[k]), pixel(&a, uv.map(|c| c.rem_euclid(1.0))));
+            assert_eq!(pixel(&texture, atlas_uvs[3 + k]), [255, 0, 51]);
+            assert_eq!(pixel(&texture, atlas_uvs[6 + k]), [51, 0, 255]);
+        }
         let (wide, tall) = (image(20_000, 1, 0), image(1, 20_000, 0));
         let cross =
             vec![part(Some(uvs), Some(&wide), [1.0; 3]), part(Some(uvs), Some(&tall), [1.0; 3])];

@@ -42,6 +42,19 @@ pub(super) fn beside(path: &Path, name: &str) -> Result<Vec<u8>, String> {
     read_plain(&file, MAX_FILE_BYTES).map_err(|e| e.to_string())
 }
 
+/// As [`beside`], or else the content of the file of that name in the folder of the mesh itself, in whatever case: names come from
+/// other machines, as `C:\art\TEX.PNG` does.
+pub(super) fn near(path: &Path, name: &str) -> Result<Vec<u8>, String> {
+    beside(path, name).or_else(|reason| {
+        let bare = name.trim().rsplit(['/', '\\']).next().unwrap_or_default();
+        let entries = companion(path, ".")?.read_dir().into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let alike = names.filter(|own| own.eq_ignore_ascii_case(bare));
+        let nearest = alike.min_by_key(|own| (own != bare, own.clone()));
+        beside(path, &nearest.ok_or(reason)?)
+    })
+}
+
 /// Decodes an image of at most `limit` pixels that is embedded in, or named by, the mesh at `path`.
 pub(super) fn decode(
     bytes: &[u8],
@@ -67,6 +80,21 @@ pub(super) fn decode(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_other_machines_are_found_in_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.obj");
+        std::fs::write(folder.path().join("TEX.png"), "in capitals").unwrap();
+        for name in ["tex.PNG", "C:\\art\\Tex.png", "/art/tex.png", "../tex.png"] {
+            assert_eq!(near(&path, name).unwrap(), b"in capitals", "{name}");
+        }
+        std::fs::write(folder.path().join("tex.png"), "own").unwrap();
+        assert_eq!(near(&path, "C:\\art\\tex.png").unwrap(), b"own");
+        for name in ["other.png", "art/", ""] {
+            assert!(near(&path, name).is_err(), "{name}");
+        }
+    }
 
     #[test]
     fn png_round_trip_and_broken_images() {

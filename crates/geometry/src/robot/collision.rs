@@ -11,7 +11,7 @@ use urdf_rs::Geometry;
 
 use super::{RobotError, origin};
 use crate::closest;
-use crate::io::folder::Folder;
+use crate::io::folder::{Folder, percent_decoded};
 use crate::io::load_shape;
 use crate::mesh::TriMesh;
 use crate::read_options::ReadOptions;
@@ -76,7 +76,10 @@ fn geometry(
                 file: filename.clone(),
                 reason,
             };
-            let path = resolve(filename, folder, options).map_err(error)?;
+            let named = |name: &str| resolve(name, folder, options);
+            let path = named(filename)
+                .or_else(|reason| named(&percent_decoded(filename)).map_err(|_| reason))
+                .map_err(error)?;
             let loaded = load_shape(&path).map_err(|e| error(e.to_string()))?;
             let mut mesh = TriMesh::new(loaded.vertices, loaded.faces);
             let scale = scale.map_or([1.0; 3], |s| s.0);
@@ -99,8 +102,8 @@ fn geometry(
 
 /// The file a mesh name stands for: inside `folder`, whatever the name, or in its package.
 ///
-/// `package://name/path` is in the folder of that package, where it is given. Else it is `path` or `name/path` in the folder of the description or one
-/// above it, whichever exists.
+/// `package://name/path` is in the folder of that package, where it is given. Else it is `path` in the nearest folder above the description that is called
+/// `name`, or `path` or `name/path` in the folder of the description or one above it, whichever exists.
 fn resolve(file: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result<PathBuf, String> {
     let Some(folder) = folder else {
         return Err("mesh files need a folder to be looked for in".into());
@@ -113,6 +116,9 @@ fn resolve(file: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result
                 let path = Folder::own(&own).file(path)?;
                 let known = path.is_file().then_some(path);
                 return known.ok_or_else(|| format!("no such file in {}", own.display()));
+            }
+            if let Some(path) = folder.packaged(name, path) {
+                return Ok(path);
             }
             let levels = folder.path.canonicalize().map_or(0, |own| own.components().count());
             let above = (0..levels.max(1)).map(|level| "../".repeat(level));
@@ -200,6 +206,34 @@ mod tests {
         std::fs::write(folder.join("far.obj"), obj.replace("v 1 0 0", "v 1e30 0 0")).unwrap();
         let far = read("far.obj").unwrap_err();
         assert!(far.contains("link 'l': collision mesh 'far.obj': vertex 2 of the mesh"), "{far}");
+    }
+
+    #[test]
+    fn packages_are_known_by_their_folders_and_uris_by_their_paths() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        std::fs::create_dir_all(at("pkg/meshes")).unwrap();
+        std::fs::create_dir_all(at("pkg/urdf")).unwrap();
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+        for name in ["pkg/meshes/a.obj", "pkg/urdf/b c.obj", "pkg/urdf/d%20e.obj"] {
+            std::fs::write(at(name), obj).unwrap();
+        }
+        let uri = |name: &str| format!("file://{}", at(name).display());
+        for file in [
+            "package://pkg/meshes/a.obj".to_owned(),
+            "package://pkg/urdf/b%20c.obj".to_owned(),
+            uri("pkg/urdf/b c.obj"),
+            uri("pkg/urdf/b%20c.obj"),
+            uri("pkg/urdf/d%20e.obj"),
+        ] {
+            let xml = link(&format!("<mesh filename=\"{file}\"/>"));
+            std::fs::write(at("pkg/urdf/robot.urdf"), &xml).unwrap();
+            let robot = KinematicTree::from_urdf_file(at("pkg/urdf/robot.urdf")).unwrap();
+            assert_eq!(robot.links()[0].parts[0].faces.len(), 4, "{file}");
+        }
+        let outside = link(&format!("<mesh filename=\"{}\"/>", uri("pkg/meshes/a.obj")));
+        let error = KinematicTree::from_urdf_str(&outside, Some(&at("pkg/urdf"))).unwrap_err();
+        assert!(error.to_string().contains("leaves the folder"), "{error}");
     }
 
     #[test]

@@ -6,17 +6,25 @@ use roxmltree::Node;
 
 use super::RobotError;
 
+/// Error of a description that `xacro` has yet to expand.
+const MACROS: &str = "it has xacro macros: run `xacro FILE > robot.urdf` first and read its output";
+
 /// URDF text of links, collision shapes and joints alone that follows the format, and what was put right.
 pub(super) fn put_right(xml: &str, partial: bool) -> Result<(String, Vec<String>), RobotError> {
     let wrong = |message: String| RobotError::Urdf { message };
-    let document = roxmltree::Document::parse(xml).map_err(|e| wrong(e.to_string()))?;
+    let document = roxmltree::Document::parse(xml).map_err(|e| {
+        // The prefix may be declared nowhere.
+        wrong(if xml.contains("<xacro:") { MACROS.to_owned() } else { e.to_string() })
+    })?;
     let root = document.root_element();
-    let is_macro =
-        |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|n| n.contains("xacro"));
+    // The namespace alone says nothing: it stays in what xacro writes.
+    let is_macro = |node: &Node<'_, '_>| {
+        let mut values = node.attributes().map(|attribute| attribute.value());
+        node.tag_name().namespace().is_some_and(|n| n.contains("xacro"))
+            || values.any(|value| value.contains("${") || value.contains("$("))
+    };
     if document.descendants().any(|node| is_macro(&node)) {
-        let message =
-            "it has xacro macros: run `xacro FILE > robot.urdf` first and read its output";
-        return Err(wrong(message.to_owned()));
+        return Err(wrong(MACROS.to_owned()));
     }
     if root.tag_name().name() != "robot" {
         return Err(wrong(format!(
@@ -248,8 +256,21 @@ mod tests {
 
     #[test]
     fn macros_are_named() {
-        let xml = r#"<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>"#;
-        let error = KinematicTree::from_urdf_str(xml, None).unwrap_err().to_string();
-        assert!(error.contains("run `xacro FILE"), "{error}");
+        let space = r#"xmlns:xacro="http://www.ros.org/wiki/xacro""#;
+        let read = |attributes: &str, content: &str| {
+            let xml = format!("<robot name=\"r\" {attributes}>{content}</robot>");
+            KinematicTree::from_urdf_str(&xml, None).map_err(|e| e.to_string())
+        };
+        let mesh = r#"<link name="a"><collision><geometry><mesh filename="$(find p)/a.stl"/></geometry></collision></link>"#;
+        for (attributes, content) in [
+            (space, r#"<xacro:include filename="a"/>"#),
+            ("", r#"<xacro:include filename="a"/>"#),
+            (space, r#"<link name="${side}_a"/>"#),
+            ("", mesh),
+        ] {
+            let error = read(attributes, content).unwrap_err();
+            assert!(error.contains("run `xacro FILE"), "{error}");
+        }
+        assert!(read(space, r#"<link name="a"/>"#).is_ok());
     }
 }

@@ -153,7 +153,10 @@ impl Sought<'_> {
         let file = detections.file();
         let (width, height) = (observation.camera.width, observation.camera.height);
         let mut all = Vec::new();
-        for found in detections.of(scene_id, im_id, obj_id) {
+        for found in detections.of((scene_id, im_id, obj_id))? {
+            if let Some(warning) = detections.corners(found, width, height) {
+                log::warn!("{}: {}: {warning}", file.display(), self.target);
+            }
             let mask = found.mask(width, height).map_err(|[rows, columns]| {
                 let problem = format!(
                     "{}: the mask is {columns}x{rows} pixels, the image {width}x{height}",

@@ -73,6 +73,9 @@ pub enum RefineError {
     /// Nothing of the object is in the image at its initial pose.
     #[error("nothing of the object is in the image at its initial pose")]
     OutOfView,
+    /// No pixel of a detector's box shows the object at its initial pose.
+    #[error("nothing of the object at its initial pose is in the box")]
+    OutOfBox,
     /// A search has come to nothing.
     #[error("no pose of the object fits what is seen")]
     NothingFits,

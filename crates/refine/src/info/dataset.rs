@@ -77,8 +77,8 @@ fn of_scene(
     warnings: &mut Vec<String>,
 ) -> Result<Value, DatasetError> {
     let images = scene.images()?;
-    let count = |folder: &str| {
-        let there = numbered(&scene.dir().join(folder));
+    let count = |folder: &Path| {
+        let there = numbered(folder);
         images.iter().filter(|image| there.contains(image)).count()
     };
     let (mut hand, mut touch, mut faults) = (0, 0, BTreeSet::new());
@@ -105,9 +105,9 @@ fn of_scene(
     Ok(json!({
         "id": scene.id(),
         "images": images.len(),
-        "color": count("rgb"),
-        "depth": count("depth"),
-        "masks": count("mask_visib"),
+        "color": count(&scene.color_dir()),
+        "depth": count(&scene.dir().join("depth")),
+        "masks": count(&scene.dir().join("mask_visib")),
         "hand": hand,
         "touch": touch,
         "truth": scene.dir().join("scene_gt.json").is_file(),

@@ -24,7 +24,9 @@ pub(super) fn read(
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     Ok(match extension.to_ascii_lowercase().as_str() {
-        "ply" | "obj" | "stl" | "gltf" | "glb" => ("mesh", mesh::read(path, options, warnings)?),
+        "ply" | "obj" | "stl" | "gltf" | "glb" | "dae" => {
+            ("mesh", mesh::read(path, options, warnings)?)
+        }
         "urdf" => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
         "xml" => match outermost(&read_text(path)?) {
             Some("robot") => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
@@ -51,7 +53,7 @@ pub(super) fn read(
 
 /// The error of a file that is nothing known.
 pub(super) fn unknown(path: &Path, problem: &str) -> AssetError {
-    let known = "meshes (PLY, OBJ, STL, glTF), URDF, MJCF, BOP datasets, frames and rigs (JSON), poses (CSV) and images (PNG, JPEG)";
+    let known = "meshes (PLY, OBJ, STL, glTF, COLLADA), URDF, MJCF, BOP datasets, frames and rigs (JSON), poses (CSV) and images (PNG, JPEG)";
     DatasetError::unusable(path, format!("{problem}; known are {known}")).into()
 }
 
@@ -81,6 +83,23 @@ mod tests {
         assert_eq!(outermost("<!DOCTYPE x>\n<robot\n name='r'>"), Some("robot"));
         assert_eq!(outermost("<!-- never ends"), None);
         assert_eq!(outermost(""), None);
+    }
+
+    #[test]
+    fn collada_is_a_mesh() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.DAE");
+        let text = r##"<COLLADA><asset><unit meter="0.01"/></asset><library_geometries><geometry id="g"><mesh>
+            <source id="p"><float_array>0 0 0 20 0 0 0 10 0</float_array></source>
+            <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+            <triangles><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
+            <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+            <scene><instance_visual_scene url="#s"/></scene></COLLADA>"##;
+        fs::write(&path, text).unwrap();
+        let told = describe(&path, &DescribeOptions::default()).unwrap();
+        assert_eq!((told.kind, &told.fields["faces"]), ("mesh", &Value::from(1)));
+        let size = told.fields["size_m"][0].as_f64().unwrap();
+        assert!((size - 0.2).abs() < 1e-9, "{size}");
     }
 
     #[test]

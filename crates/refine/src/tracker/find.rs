@@ -68,8 +68,11 @@ impl Tracker {
                     let (given, mask) = (sight.given.pixels(), sight.frame.mask.pixels_mut());
                     mask.iter_mut().zip(given).for_each(|(set, given)| *set &= given);
                 }
-                if !is_seen || sight.frame.mask.count() == 0 {
+                if !is_seen {
                     return Err(RefineError::OutOfView);
+                }
+                if sight.frame.mask.count() == 0 {
+                    return Err(RefineError::OutOfBox);
                 }
                 // The pose may be far off.
                 sight.focus = None;

@@ -91,6 +91,8 @@ pub struct Tracker {
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
     track: Option<TrackState>,
+    /// Time of the last frame.
+    last_time: Option<Duration>,
     /// Made when it is first needed.
     search: Option<PoseSearch>,
     segmenter: Segmenter,
@@ -129,6 +131,7 @@ impl Tracker {
             prior: settings.fused.prior.clone(),
             initial: None,
             track: None,
+            last_time: None,
             search: None,
             segmenter: Segmenter::new(&settings),
             appearance: Appearance::new(&settings),
@@ -156,7 +159,7 @@ impl Tracker {
     /// Forgets all, and begins anew at `t_cam_object` \[m\] in the next frame.
     pub fn start_from(&mut self, t_cam_object: &Isometry3<f64>) {
         self.initial = Some(*t_cam_object);
-        self.track = None;
+        (self.track, self.last_time) = (None, None);
         self.segmenter = Segmenter::new(&self.settings);
         self.appearance = Appearance::new(&self.settings);
     }
@@ -169,17 +172,41 @@ impl Tracker {
         self.push(observation.clone(), time)
     }
 
-    /// The pose in the next frame, which was taken at `time`, counted from any moment; if it is before that of the
-    /// last frame, no time has passed.
+    /// [`track`](Self::track) of a frame that was taken at `seconds` \[s\].
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push), also of what is no time.
+    pub fn track_at(&mut self, observation: &Frame, seconds: f64) -> Result<Tracked, RefineError> {
+        let time = Duration::try_from_secs_f64(seconds).map_err(|_| self.untimely(seconds))?;
+        self.track(observation, time)
+    }
+
+    /// The pose in the next frame, which was taken at `time`, counted from any moment, after the last frame.
     ///
     /// Its mask may be empty, or wrong: what shows the object is told by where it should be, by depth and colors, and by a mask as far as it
     /// agrees with these. In the first frame the pose or a search tells where it is.
     ///
     /// # Errors
-    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with;
-    /// [`RefineError::Panicked`] for a fault of the program or of a factor. The tracker is then as it was before.
+    /// [`RefineError::Setting`] for a time that is not after that of the last frame. If the images do not fit each other, the hand's joints or forces do
+    /// not fit the hand, or nothing is found to begin with; [`RefineError::Panicked`] for a fault of the program or of a factor. The tracker is then as it
+    /// was before.
     pub fn push(&mut self, observation: Frame, time: Duration) -> Result<Tracked, RefineError> {
-        guard(|| self.advance(observation, time))
+        if self.last_time.is_some_and(|last| time <= last) {
+            return Err(self.untimely(time.as_secs_f64()));
+        }
+        let tracked = guard(|| self.advance(observation, time))?;
+        self.last_time = Some(time);
+        Ok(tracked)
+    }
+
+    /// The error of a frame that was taken at `seconds`: that is no time, or not after the last one's.
+    fn untimely(&self, seconds: f64) -> RefineError {
+        let last = self.last_time.map(|last| last.as_secs_f64());
+        let problem = match last.filter(|last| seconds.is_nan() || seconds <= *last) {
+            Some(last) => format!("is {seconds} s, not after that of the last frame, {last} s"),
+            None => format!("is {seconds} s, no time from 0 on"),
+        };
+        RefineError::Setting { name: "time", problem }
     }
 
     fn advance(&mut self, observation: Frame, time: Duration) -> Result<Tracked, RefineError> {

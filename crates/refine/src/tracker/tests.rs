@@ -69,6 +69,29 @@ fn without_time_the_prediction_is_returned() {
 }
 
 #[test]
+fn a_time_that_is_not_after_the_last_one_is_refused() {
+    let mut tracker = tracker(TrackerSettings::default());
+    let frame = &SEQUENCE.frames[1].frame;
+    let said = |tracked: Result<Tracked, RefineError>| tracked.unwrap_err().to_string();
+    assert_eq!(said(tracker.track_at(frame, f64::NAN)), "time is NaN s, no time from 0 on");
+    track(&mut tracker, 0);
+    tracker.settings.budget = Some(Duration::ZERO);
+    tracker.track_at(frame, 0.1).unwrap();
+    for (time, expected) in [
+        (0.05, "time is 0.05 s, not after that of the last frame, 0.1 s"),
+        (0.1, "time is 0.1 s, not after that of the last frame, 0.1 s"),
+        (-1.0, "time is -1 s, not after that of the last frame, 0.1 s"),
+        (f64::NAN, "time is NaN s, not after that of the last frame, 0.1 s"),
+        (f64::INFINITY, "time is inf s, no time from 0 on"),
+    ] {
+        assert_eq!(said(tracker.track_at(frame, time)), expected);
+    }
+    tracker.track_at(frame, 0.15).unwrap();
+    tracker.start_from(&SEQUENCE.initial);
+    assert_eq!(track(&mut tracker, 0).status, TrackStatus::Relocalized);
+}
+
+#[test]
 fn a_moment_s_loss_makes_little_pass_for_right() {
     let mut tracker = tracker(TrackerSettings::default());
     track(&mut tracker, 0);

@@ -154,6 +154,37 @@ fn the_only_mask_serves_any_row_and_several_go_by_row() {
 }
 
 #[test]
+fn images_are_found_by_their_numbers() {
+    let fixture = Fixture::new();
+    let rename = |from: &str, to: &str| {
+        let scene = fixture.root().join("test/000004");
+        fs::rename(scene.join(from), scene.join(to)).unwrap();
+    };
+    rename("rgb/000000.png", "rgb/0.PNG");
+    rename("rgb/000003.jpg", "rgb/3.JPG");
+    rename("depth/000000.png", "depth/00.png");
+    rename("mask_visib/000000_000005.png", "mask_visib/0_5.png");
+    let camera = fixture.root().join("test/000004/scene_camera.json");
+    let padded = fs::read_to_string(&camera).unwrap().replace("\"0\":", "\"000000\":");
+    fs::write(&camera, padded).unwrap();
+    let dataset = fixture.open();
+    assert_eq!(dataset.scene(4).unwrap().images().unwrap(), [0, 3]);
+    let frame = dataset.frame(4, 0).unwrap();
+    let seen = frame.observation(0).unwrap();
+    let first = (seen.color.pixels()[0], seen.depth.pixels()[0], seen.mask.count());
+    assert_eq!(first, ([1.0, 0.0, 0.2], 0.5, 1));
+    assert!(dataset.frame(4, 3).unwrap().rgb_path().unwrap().ends_with("rgb/3.JPG"));
+    rename("rgb/0.PNG", "rgb/0.tif");
+    fixture.scene("rgb/5.tif", "");
+    let error = frame.observation(0).unwrap_err().to_string();
+    let expected = "rgb/000000.png: no such file; the folder has 0.tif, 3.JPG, 5.tif";
+    assert!(error.ends_with(expected), "{error}");
+    fixture.scene("rgb/6.tif", "");
+    let error = frame.rgb_path().unwrap_err().to_string();
+    assert!(error.ends_with("0.tif, 3.JPG, 5.tif, …"), "{error}");
+}
+
+#[test]
 fn truth_prefers_its_own_files_and_falls_back() {
     let fixture = Fixture::new();
     let dataset = fixture.open();
@@ -242,7 +273,8 @@ fn an_absent_or_broken_file_spoils_only_what_needs_it() {
     let frame = dataset.frame(4, 0).unwrap();
     assert_eq!(frame.bodies(), Err(DatasetError::Missing { file: bodies }));
     assert!(matches!(frame.tactile(), Err(DatasetError::Unusable { file, .. }) if file == tactile));
-    assert_eq!(frame.rgb_path(), Err(DatasetError::Missing { file: rgb }));
+    let found = "000003.jpg".to_owned();
+    assert_eq!(frame.rgb_path(), Err(DatasetError::NoImage { file: rgb, found }));
     assert!(frame.depth().is_ok() && frame.mask(0).is_ok());
     assert!(dataset.frame(4, 3).unwrap().rgb_path().is_ok());
 }

@@ -276,14 +276,20 @@ fn a_tracker_of_anything_at_any_time() {
     let settings = TrackerSettings { recovery: Recovery::Off, ..TrackerSettings::default() };
     let mut tracker = Tracker::new(Arc::clone(&SCENE.object), settings).unwrap();
     tracker.start_from(&SCENE.initial);
-    let times = [1.0, 1.0, 0.5, 0.5 + 1e-9, 1e9];
+    let steps = [1.0, 1e-9, 0.5, 1e-3, 1e3].map(Duration::from_secs_f64);
     let mut faults: Vec<Fault> = FAULTS.to_vec();
     // What was seen before is seen again.
     faults.extend(FAULTS);
-    for (fault, time) in faults.into_iter().zip(times.into_iter().cycle()) {
+    // And a frame after ages.
+    let count = faults.len() - 1;
+    let ages = [Duration::from_secs(1_000_000_000)];
+    let steps = steps.into_iter().cycle().take(count).chain(ages);
+    let mut time = Duration::ZERO;
+    for (fault, step) in faults.into_iter().zip(steps) {
+        time += step;
         let observation = observation(fault);
-        assert_finite(&format!("{}, {time} s", fault.0), || {
-            let tracked = tracker.push(observation, Duration::from_secs_f64(time))?;
+        assert_finite(&format!("{}, {time:?}", fault.0), || {
+            let tracked = tracker.push(observation, time)?;
             let posterior = tracked.posterior.iter().flat_map(of_posterior);
             Ok(of_pose(&tracked.t_cam_object).into_iter().chain(posterior).collect())
         });

@@ -15,6 +15,16 @@ const MIN_GRADIENT: f64 = 1e-9;
 /// Cosine of the angle from which on two normals are those of opposite sides.
 const OPPOSITE: f64 = -0.5;
 
+/// Shortest step along a sample's path, in thicknesses of the solid: no more than to its middle.
+const THIN_PART: f64 = 0.25;
+/// Shortest such step, as part of the path: a bound on their number.
+const SHORT_PART: f64 = 1e-3;
+
+/// True of gradients on opposite sides of a solid.
+fn are_opposite(a: Option<Vector3<f64>>, b: Option<Vector3<f64>>) -> bool {
+    a.zip(b).is_some_and(|(a, b)| a.dot(&b) < OPPOSITE * a.norm() * b.norm())
+}
+
 /// A body's surface beside a distance field, at one moment; everything in the field's frame.
 #[derive(Clone, Copy)]
 pub struct ContactQuery<'a> {
@@ -104,13 +114,8 @@ impl ContactQuery<'_> {
         let gradient = |query: &Self, point: &SurfacePoint| {
             Some(query.field.sample(&query.place(&point.position), point.radius)?.gradient)
         };
-        let crosses = |point: &SurfacePoint| {
-            gradient(&earlier, point).is_some_and(|from| {
-                let opposite =
-                    |to: Vector3<f64>| from.dot(&to) < OPPOSITE * from.norm() * to.norm();
-                gradient(self, point).is_some_and(opposite)
-            })
-        };
+        let crosses =
+            |point: &SurfacePoint| are_opposite(gradient(&earlier, point), gradient(self, point));
         let mut touched = self.surface.blocks().filter(|(block, _)| self.may_touch(block, reach));
         touched.any(|(_, points)| points.iter().any(crosses))
     }
@@ -126,26 +131,27 @@ impl ContactQuery<'_> {
             if length == 0.0 {
                 return false;
             }
-            let reach = self.field.lipschitz_bound() * length;
-            let shortest = (0.5 * self.field.thickness()).max(1e-3 * length);
-            // To where the path enters the solid, by sphere tracing.
+            let lipschitz = self.field.lipschitz_bound();
+            let reach = lipschitz * length;
+            let shortest = (THIN_PART * self.field.thickness()).max(SHORT_PART * length);
+            let normal = |place: &Point3<f64>| Some(self.field.sample(place, reach)?.gradient);
+            // Sphere tracing, from outside to outside of each part of the solid.
+            let mut entry = None;
             let mut way = 0.0;
-            let entered = loop {
+            while way < length {
                 let place = from + path * (way / length);
-                match self.field.distance(&place, reach) {
-                    Some(distance) if distance < 0.0 => break place,
-                    Some(distance) => {
-                        way += (distance / self.field.lipschitz_bound()).max(shortest);
+                let Some(distance) = self.field.distance(&place, reach) else { return false };
+                match entry {
+                    None if distance < 0.0 => entry = normal(&place),
+                    Some(entry) if distance >= 0.0 && are_opposite(Some(entry), normal(&place)) => {
+                        return true;
                     }
-                    None => return false,
+                    Some(_) if distance >= 0.0 => entry = None,
+                    _ => {}
                 }
-                if way >= length {
-                    return false;
-                }
-            };
-            let gradient = |place| self.field.sample(place, reach).map(|sample| sample.gradient);
-            let ends = gradient(&entered).zip(gradient(&to));
-            ends.is_some_and(|(a, b)| a.dot(&b) < OPPOSITE * a.norm() * b.norm())
+                way += (distance.abs() / lipschitz).max(shortest);
+            }
+            are_opposite(entry, normal(&to))
         })
     }
 

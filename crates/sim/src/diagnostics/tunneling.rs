@@ -5,16 +5,19 @@ use prehend_autodiff::Scalar;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
+use crate::world::body::Body;
 use crate::world::broad_phase::BroadPhase;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
 
 /// Part of the thickness of what they may touch by which samples move safely within a step.
 const SAFE_TRAVEL: f64 = 0.25;
 
-/// Watches what moves by more than a small part of another body's thickness in a step.
+/// Watch over bodies that move by more than a small part of another one's thickness in a step.
 pub(super) struct Tunneling {
     /// The states before the step; empty where no field is thin.
     before: Vec<State>,
+    /// Distance of each body's samples from its center of mass \[m\].
+    radii: Vec<f64>,
     /// Smallest thickness of a field \[m\].
     thinnest: f64,
     first: Option<(ContactBodies, f64)>,
@@ -25,7 +28,16 @@ impl Tunneling {
         let fields = world.bodies.iter().filter_map(|body| body.field.as_ref());
         let thinnest = fields.map(|field| field.thickness()).fold(f64::INFINITY, f64::min);
         let watched = if thinnest.is_finite() { initial } else { &[] };
-        Self { before: watched.iter().map(State::value).collect(), thinnest, first: None }
+        let radius = |body: &Body<S>| {
+            let com = body.com().map(S::value);
+            body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&com))
+        };
+        Self {
+            before: watched.iter().map(State::value).collect(),
+            radii: world.bodies.iter().map(radius).collect(),
+            thinnest,
+            first: None,
+        }
     }
 
     /// After `step` has led to `states`.
@@ -55,16 +67,15 @@ impl Tunneling {
         step: Step,
         states: &[State<S>],
     ) -> Option<ContactBodies> {
-        let search = BroadPhase::new(world);
-        let moved = |(before, after): (&State, &State<S>)| travel(before, &after.value(), 0.0);
-        let moved: Vec<f64> = self.before.iter().zip(states).map(moved).collect();
-        let fastest = search
-            .free()
-            .map(|(body, size)| travel(&self.before[body], &states[body].value(), size));
+        let bodies = || self.before.iter().zip(states).zip(&self.radii);
+        let fastest =
+            bodies().map(|((before, after), radius)| travel(before, &after.value(), *radius));
         if fastest.fold(0.0, f64::max) <= SAFE_TRAVEL * self.thinnest {
             return None;
         }
-        let near = search.find(&self.before, &moved, step.dt);
+        let moved: Vec<f64> =
+            bodies().map(|((before, after), _)| travel(before, &after.value(), 0.0)).collect();
+        let near = BroadPhase::new(world).find(&self.before, &moved, step.dt);
         let pairs = world.contacts_with(&near);
         let passed = |pair: &&ContactPair<S>| self.has_passed(world, pair, states);
         pairs.iter().find(passed).map(|pair| pair.bodies)

@@ -98,16 +98,21 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// States in which everything is at rest: bodies with their center of mass at the origin, joints at their neutral coordinates.
+    /// States in which everything is at rest: bodies with their center of mass at the origin, joints at their neutral coordinates, those that mimic
+    /// others where these put them.
     pub fn neutral_states(&self) -> Vec<State<S>> {
         let at_rest = State::at_rest(Isometry3::identity());
         let mut states = vec![at_rest; self.bodies.len() + self.joint_count()];
+        for own in &self.transmissions.couplings {
+            // Both are joints of this world.
+            drop(self.move_followers(&mut states, own.leader.link));
+        }
         self.forward_kinematics(&mut states);
         states
     }
 
     /// Sets coordinates and velocities of the joint of a link, as [`Joint`] has them, and of those that mimic it in URDF, and
-    /// moves all links to where they are then.
+    /// moves all links to where they are then. Set a follower that is to be elsewhere after its leader.
     ///
     /// # Errors
     /// If it is no link, the numbers are too few or too many, a quaternion is zero, or the states are not those of this world.
@@ -119,28 +124,24 @@ impl<S: Scalar> World<S> {
         velocity: &[S],
     ) -> Result<(), SimulationError> {
         self.write_joint(states, link, position, velocity)?;
-        self.move_followers(states, link, self.transmissions.couplings.len())?;
+        self.move_followers(states, link)?;
         self.forward_kinematics(states);
         Ok(())
     }
 
-    /// Writes the joints that follow that of `leader`, and those that follow these, in a chain of at most `longest`.
+    /// Writes the joints that mimic that of `leader`, which mimics none.
     fn move_followers(
         &self,
         states: &mut [State<S>],
         leader: BodyId,
-        longest: usize,
     ) -> Result<(), SimulationError> {
         let couplings = self.transmissions.couplings.iter();
-        for own in couplings.filter(|own| own.leader.link == leader && longest > 0) {
+        for own in couplings.filter(|own| own.leader.link == leader) {
             let joint = self.joint(states, leader)?;
-            let [&[position], &[velocity]] = [&joint.position[..], &joint.velocity] else {
-                continue;
-            };
-            let [position, velocity] =
-                [position.times(own.slope).plus(own.offset), velocity.times(own.slope)];
-            self.write_joint(states, own.follower.link, &[position], &[velocity])?;
-            self.move_followers(states, own.follower.link, longest - 1)?;
+            let position = joint.position.iter().map(|q| q.times(own.slope).plus(own.offset));
+            let velocity = joint.velocity.iter().map(|v| v.times(own.slope));
+            let [position, velocity]: [Vec<S>; 2] = [position.collect(), velocity.collect()];
+            self.write_joint(states, own.follower.link, &position, &velocity)?;
         }
         Ok(())
     }

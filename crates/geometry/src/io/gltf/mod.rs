@@ -17,6 +17,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use nalgebra::{Matrix4, Point3, Vector3};
 
 use self::accessor::Buffers;
+use super::folder::percent_decoded;
 use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
@@ -122,27 +123,6 @@ fn fetch(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
         return DATA_URI.decode(text).map_err(|e| format!("broken base64: {e}"));
     }
     texture::beside(path, &percent_decoded(uri))
-}
-
-fn percent_decoded(uri: &str) -> String {
-    let (mut out, mut rest) = (Vec::new(), uri.as_bytes());
-    while let Some((&first, tail)) = rest.split_first() {
-        let hex = tail
-            .get(..2)
-            .and_then(|h| std::str::from_utf8(h).ok())
-            .and_then(|h| u8::from_str_radix(h, 16).ok());
-        match (first, hex) {
-            (b'%', Some(byte)) => {
-                out.push(byte);
-                rest = &tail[2..];
-            }
-            _ => {
-                out.push(first);
-                rest = tail;
-            }
-        }
-    }
-    String::from_utf8_lossy(&out).into_owned()
 }
 
 fn load_buffer(

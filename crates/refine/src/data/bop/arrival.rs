@@ -1,6 +1,5 @@
 //! Images of a scene that somebody else is still writing.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -9,7 +8,6 @@ use std::time::SystemTime;
 use prehend_geometry::open_plain;
 
 use super::dataset::{Dataset, DatasetScene};
-use super::frame::DatasetImage;
 
 /// What tells a JSON file from what it was before: its size, and when it was written.
 pub type Stamp = Option<(u64, SystemTime)>;
@@ -39,7 +37,7 @@ impl Dataset {
     fn is_seen(&self, scene: &DatasetScene, im_id: u32) -> bool {
         let Ok(frame) = self.frame(scene.id(), im_id) else { return false };
         let color = !frame.has_color() || frame.rgb_path().is_ok_and(|file| is_whole(&file));
-        let depth = !frame.has_depth() || is_whole(&frame.depth_path());
+        let depth = !frame.has_depth() || frame.depth_path().is_ok_and(|file| is_whole(&file));
         let any = frame.has_color() || frame.has_depth();
         // Masks may still be missing.
         any && color && depth && frame.mask_listing().all(|file| is_whole(&file))
@@ -47,9 +45,7 @@ impl Dataset {
 
     /// Whether any of the image is there.
     pub fn has_begun(&self, scene_id: u32, im_id: u32) -> bool {
-        let there =
-            |frame: DatasetImage<'_>| frame.rgb_path().is_ok() || frame.depth_path().exists();
-        self.frame(scene_id, im_id).is_ok_and(there)
+        self.frame(scene_id, im_id).is_ok_and(|f| f.rgb_path().is_ok() || f.depth_path().is_ok())
     }
 }
 
@@ -75,9 +71,9 @@ fn is_whole(file: &Path) -> bool {
         Ok(tail)
     };
     let Ok(tail) = tail() else { return false };
-    match file.extension().and_then(OsStr::to_str) {
-        Some("png") => tail.windows(4).any(|word| word == b"IEND"),
-        _ => tail.ends_with(&[0xff, 0xd9]),
+    match file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        true => tail.windows(4).any(|word| word == b"IEND"),
+        false => tail.ends_with(&[0xff, 0xd9]),
     }
 }
 

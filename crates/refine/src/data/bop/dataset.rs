@@ -11,6 +11,7 @@ use serde_json::json;
 use serde_json::value::to_raw_value;
 
 use super::error::DatasetError;
+use super::files::names;
 use super::json::{JsonFile, UniqueMap, read_json};
 use super::models::Models;
 use super::numbers::{Positive, Real};
@@ -189,6 +190,12 @@ impl DatasetScene {
         &self.dir
     }
 
+    /// The folder of color images: `rgb/`, or else `gray/` if there is that.
+    pub(crate) fn color_dir(&self) -> PathBuf {
+        let [rgb, gray] = ["rgb", "gray"].map(|name| self.dir.join(name));
+        if gray.is_dir() && !rgb.is_dir() { gray } else { rgb }
+    }
+
     /// The dataset's folder, which paths inside the scene's files are relative to.
     pub(super) fn root(&self) -> &Path {
         &self.root
@@ -258,13 +265,8 @@ fn scene_id(name: &str) -> Option<u32> {
 
 /// The names of the folders in `dir`, sorted.
 fn subfolders(dir: &Path) -> Result<Vec<String>, DatasetError> {
-    let listing = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
-    let mut names: Vec<String> = listing
-        .flatten()
-        .filter(|f| f.path().is_dir())
-        .filter_map(|f| f.file_name().into_string().ok())
-        .collect();
-    names.sort_unstable();
+    let mut names = names(dir)?;
+    names.retain(|name| dir.join(name).is_dir());
     Ok(names)
 }
 
@@ -279,7 +281,7 @@ struct CameraFile {
 }
 
 /// The file `scene_camera.json` of the scene in `dir`; where there is none but the dataset's `camera` gives intrinsics, with an entry of those for each image
-/// in `rgb/`, or else in `depth/`.
+/// in `rgb/`, or else in `gray/` or `depth/`.
 pub(super) fn scene_camera(dir: &Path, camera: &JsonFile) -> JsonFile {
     let path = dir.join("scene_camera.json");
     if path.exists() {
@@ -291,7 +293,7 @@ pub(super) fn scene_camera(dir: &Path, camera: &JsonFile) -> JsonFile {
     };
     let k = [fx.0, 0.0, cx.0, 0.0, fy.0, cy.0, 0.0, 0.0, 1.0];
     let entry = json!({ "cam_K": k, "depth_scale": depth_scale.map_or(1.0, |scale| scale.0) });
-    let images = ["rgb", "depth"].map(|folder| image_ids(&dir.join(folder)));
+    let images = ["rgb", "gray", "depth"].map(|folder| image_ids(&dir.join(folder)));
     let images = images.into_iter().find(|ids| !ids.is_empty()).unwrap_or_default();
     let named = |id: u32| Some((id.to_string(), to_raw_value(&entry).ok()?));
     JsonFile::with_entries(path, UniqueMap(images.into_iter().filter_map(named).collect()))

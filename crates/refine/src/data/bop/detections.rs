@@ -2,30 +2,38 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::Mask;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
+use serde_json::value::RawValue;
 
 use super::error::DatasetError;
-use super::json::read_json;
+use super::json::{convert, read_entries};
 use super::numbers::{Numbers, Real};
 
 /// Detections of a results file (`[{"scene_id", "image_id", "category_id", "score", "bbox", "segmentation"}, …]`).
 #[derive(Clone, Debug)]
 pub struct Detections {
     file: PathBuf,
-    /// By scene and image, in the file's order.
-    by_image: BTreeMap<(u32, u32), Vec<Detection>>,
+    /// In the file's order; errors are of entries with numbers that are not finite.
+    by_object: BTreeMap<Ids, Vec<Result<Detection, DatasetError>>>,
+    /// A warning of a box that seems to be two corners was given.
+    is_told: Arc<AtomicBool>,
 }
+
+/// Scene, image and object.
+type Ids = (u32, u32, u32);
 
 /// An object that was detected in an image.
 #[derive(Clone, Debug)]
 pub(crate) struct Detection {
-    pub(crate) obj_id: u32,
     /// Confidence; higher is better.
-    pub(crate) score: f64,
+    score: f64,
     shape: DetectionShape,
 }
 
@@ -38,12 +46,17 @@ enum DetectionShape {
     Box([f64; 4]),
 }
 
-/// Entry of the file.
+/// What an entry of the file is about.
 #[derive(Deserialize)]
-struct Entry {
+struct Place {
     scene_id: u32,
     image_id: u32,
     category_id: u32,
+}
+
+/// Entry of the file.
+#[derive(Deserialize)]
+struct Entry {
     score: Option<Real>,
     bbox: Option<Numbers<4>>,
     segmentation: Option<Segmentation>,
@@ -73,23 +86,23 @@ enum Counts {
 }
 
 impl Detections {
-    /// Reads a file of detections.
+    /// Reads a file of detections. An entry with a number that is not finite costs its object in its image alone.
     ///
     /// # Errors
     /// When the file is absent or broken, and [`DatasetError::Unusable`] for an entry without a box or a mask, or with run lengths that do not fill its mask.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
-        let entries: Vec<Entry> = read_json(file)?;
-        let mut by_image: BTreeMap<_, Vec<Detection>> = BTreeMap::new();
-        for (k, entry) in entries.into_iter().enumerate() {
-            let fault = |(name, problem): (&str, String)| {
-                DatasetError::field(file, &format!("[{k}].{name}"), problem)
+        let entries: Vec<Box<RawValue>> = read_entries(file)?;
+        let mut by_object: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for (k, text) in entries.iter().enumerate() {
+            let name = format!("[{k}]");
+            let Place { scene_id, image_id, category_id } = convert(file, &name, text)?;
+            let found = match Detection::read(file, &name, text) {
+                Err(error) if serde_json::from_str::<Value>(text.get()).is_err() => Err(error),
+                read => Ok(read?),
             };
-            let score = entry.score.map_or(1.0, |score| score.0);
-            let (obj_id, image) = (entry.category_id, (entry.scene_id, entry.image_id));
-            let shape = entry.shape().map_err(fault)?;
-            by_image.entry(image).or_default().push(Detection { obj_id, score, shape });
+            by_object.entry((scene_id, image_id, category_id)).or_default().push(found);
         }
-        Ok(Self { file: file.to_owned(), by_image })
+        Ok(Self { file: file.to_owned(), by_object, is_told: Arc::default() })
     }
 
     /// The file.
@@ -98,11 +111,30 @@ impl Detections {
     }
 
     /// Detections of an object in an image, the best first.
-    pub(crate) fn of(&self, scene_id: u32, im_id: u32, obj_id: u32) -> Vec<&Detection> {
-        let all = self.by_image.get(&(scene_id, im_id)).into_iter().flatten();
-        let mut found: Vec<&Detection> = all.filter(|found| found.obj_id == obj_id).collect();
+    ///
+    /// # Errors
+    /// If one has a number that is not finite.
+    pub(crate) fn of(&self, ids: Ids) -> Result<Vec<&Detection>, DatasetError> {
+        let all = self.by_object.get(&ids).into_iter().flatten();
+        let all = all.map(|found| found.as_ref().map_err(Clone::clone));
+        let mut found: Vec<&Detection> = all.collect::<Result<_, _>>()?;
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
-        found
+        Ok(found)
+    }
+
+    /// Warning, once a file, of a box that leaves an image of `width` by `height` pixels as left, top, width and height but fits it as two corners.
+    pub(crate) fn corners(&self, found: &Detection, width: usize, height: usize) -> Option<String> {
+        let DetectionShape::Box(bbox) = found.shape else { return None };
+        let [x, y, right, bottom] = bbox;
+        // Boxes may be rounded up.
+        let leaves = x + right > width as f64 + 1.0 || y + bottom > height as f64 + 1.0;
+        let fits = |from: f64, to: f64, size: usize| from >= 0.0 && from < to && to <= size as f64;
+        let is_suspect = leaves && fits(x, right, width) && fits(y, bottom, height);
+        (is_suspect && !self.is_told.swap(true, Ordering::Relaxed)).then(|| {
+            format!(
+                "the box {bbox:?} leaves the image as [x, y, width, height], as which it is read, but fits it as [x1, y1, x2, y2] (other boxes are not named)"
+            )
+        })
     }
 }
 
@@ -133,6 +165,16 @@ impl Entry {
 }
 
 impl Detection {
+    /// The entry `name` of a file of that `text`.
+    fn read(file: &Path, name: &str, text: &RawValue) -> Result<Self, DatasetError> {
+        let entry: Entry = convert(file, name, text)?;
+        let score = entry.score.map_or(1.0, |score| score.0);
+        let shape = entry.shape().map_err(|(field, problem)| {
+            DatasetError::field(file, &format!("{name}.{field}"), problem)
+        })?;
+        Ok(Self { score, shape })
+    }
+
     /// Its mask, or its box as one, in an image of `width` by `height` pixels.
     ///
     /// # Errors
@@ -239,7 +281,7 @@ mod tests {
                 r#"[{{"scene_id": 1, "image_id": 2, "category_id": 5, "score": 0.5, "segmentation": {runs}, "bbox": [0,0,1,1], "time": -1}}]"#
             );
             let found = read(&entry).unwrap();
-            let found = found.of(1, 2, 5);
+            let found = found.of((1, 2, 5)).unwrap();
             assert_eq!(found[0].mask(4, 3).unwrap().pixels(), expected);
             assert_eq!(found[0].mask(3, 4).unwrap_err(), [3, 4]);
         }
@@ -253,7 +295,7 @@ mod tests {
             r#"[{{"scene_id": 1, "image_id": 2, "category_id": 5, "segmentation": {{"counts": {counts}, "size": [100, 3]}}}}]"#
         );
         let found = read(&entry).unwrap();
-        let mask = found.of(1, 2, 5)[0].mask(3, 100).unwrap();
+        let mask = found.of((1, 2, 5)).unwrap()[0].mask(3, 100).unwrap();
         for (x, rows) in [(1, 40..90), (2, 5..99)] {
             assert!((0..100).all(|y| mask.get(x, y) == Some(rows.contains(&y))));
         }
@@ -270,11 +312,47 @@ mod tests {
         let found =
             read(&format!("[{}, {}]", entry(0.2, "[0, 0, 4, 4]"), entry(0.9, "[1.2, -3, 2, 5]")))
                 .unwrap();
-        let best = found.of(1, 2, 5)[0].mask(6, 4).unwrap();
+        let of = |ids| found.of(ids).unwrap();
+        let best = of((1, 2, 5))[0].mask(6, 4).unwrap();
         assert_eq!(best.bounds(), Some([1, 0, 2, 2]));
-        assert!(best.is_box() && found.of(1, 2, 6).is_empty() && found.of(2, 2, 5).is_empty());
+        assert!(best.is_box() && of((1, 2, 6)).is_empty() && of((2, 2, 5)).is_empty());
         let error = read(&format!("[{}]", entry(0.2, "[0, 0, 0, 4]"))).unwrap_err().to_string();
         assert!(error.contains("[0].bbox: is [left, top"), "{error}");
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_costs_its_object_alone() {
+        let entry = |object: u32, more: &str| {
+            format!(r#"{{"scene_id": 1, "image_id": 2, "category_id": {object}, {more}}}"#)
+        };
+        let (bad, good) = (r#""bbox": [NaN, 0, 4, 4]"#, r#""bbox": [1, 0, 2, 2], "time": NaN"#);
+        let found = read(&format!("\u{feff}[{}, {}]", entry(5, bad), entry(6, good))).unwrap();
+        assert_eq!(found.of((1, 2, 6)).unwrap()[0].mask(4, 4).unwrap().count(), 4);
+        let error = found.of((1, 2, 5)).unwrap_err().to_string();
+        assert!(error.ends_with("found.json: [0].bbox[0]: number out of range"), "{error}");
+        let found = read(&format!("[{}]", entry(5, r#""score": NaN"#))).unwrap();
+        assert!(found.of((1, 2, 5)).is_err());
+        // Other faults are still told at once.
+        let error = read(&format!("[{}]", entry(5, r#""time": 1"#))).unwrap_err().to_string();
+        assert!(error.contains("[0].bbox: is missing"), "{error}");
+    }
+
+    #[test]
+    fn a_box_that_fits_as_two_corners_is_told_of_once() {
+        let told = |bbox: &str| {
+            let entry =
+                format!(r#"[{{"scene_id": 1, "image_id": 2, "category_id": 5, "bbox": {bbox}}}]"#);
+            let found = read(&entry).unwrap();
+            let detection = found.of((1, 2, 5)).unwrap()[0];
+            let warnings = [(); 2].map(|()| found.corners(detection, 640, 480));
+            assert_eq!(warnings[1], None);
+            warnings[0].clone().unwrap_or_default()
+        };
+        assert!(told("[300, 200, 400, 300]").starts_with("the box [300.0, 200.0, 400.0, 300.0]"));
+        // Within the image; rounded up; an object that is cut off at the right.
+        for bbox in ["[10, 20, 30, 40]", "[0.5, 0.5, 640, 480]", "[600, 20, 100, 40]"] {
+            assert_eq!(told(bbox), "", "{bbox}");
+        }
     }
 
     #[test]

@@ -14,6 +14,14 @@ pub enum DatasetError {
         /// The path looked for.
         file: PathBuf,
     },
+    /// An image that does not exist, though its folder holds something.
+    #[error("{}: no such file; the folder has {found}", file.display())]
+    NoImage {
+        /// The path looked for.
+        file: PathBuf,
+        /// The first names in its folder.
+        found: String,
+    },
     /// It is not what it has to be: broken JSON, a field that is absent, of another type or impossible, a dataset without
     /// scenes, a journal of another run; or it cannot be written, and nothing of it is left behind.
     #[error("{}: {problem}", file.display())]

@@ -26,6 +26,18 @@ pub(crate) fn read_text(file: &Path) -> Result<String, DatasetError> {
         .map_err(|_| DatasetError::unusable(file, "is no text in UTF-8"))
 }
 
+/// The names of what is in `folder`, sorted.
+///
+/// # Errors
+/// If it cannot be listed.
+pub(super) fn names(folder: &Path) -> Result<Vec<String>, DatasetError> {
+    let listing = fs::read_dir(folder).map_err(|e| DatasetError::reading(folder, &e))?;
+    let mut names: Vec<String> =
+        listing.flatten().filter_map(|file| file.file_name().into_string().ok()).collect();
+    names.sort_unstable();
+    Ok(names)
+}
+
 /// Writes `contents` to a new file beside `path` and renames it to `path`, replacing what was there.
 ///
 /// # Errors

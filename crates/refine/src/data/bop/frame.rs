@@ -1,6 +1,6 @@
 //! One image of a scene.
 
-use std::fs;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -11,6 +11,7 @@ use serde::Deserialize;
 use super::bodies::SceneBodies;
 use super::dataset::{Dataset, DatasetScene};
 use super::error::{DatasetError, Origin};
+use super::files::names;
 use super::json::JsonFile;
 use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
 use super::optics::{DepthCamera, DepthWarning, Optics, check_size};
@@ -117,17 +118,21 @@ impl DatasetImage<'_> {
         self.optics.camera(width, height)
     }
 
-    /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).
+    /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`), or a gray one in `gray/` where there is no `rgb/`. Its number may be without zeros before
+    /// it.
     ///
     /// # Errors
-    /// [`DatasetError::Missing`] naming the PNG file when there is none.
+    /// [`DatasetError::NoImage`] naming the PNG file when there is none, [`DatasetError::Missing`] when the folder holds nothing.
     pub fn rgb_path(&self) -> Result<PathBuf, DatasetError> {
-        first_image(&self.scene.dir().join("rgb").join(format!("{:06}", self.im_id)))
+        first_image(&self.scene.color_dir(), &format!("{:06}", self.im_id))
     }
 
-    /// The depth image, whether or not it exists.
-    pub(super) fn depth_path(&self) -> PathBuf {
-        self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
+    /// The depth image.
+    ///
+    /// # Errors
+    /// Those of [`DatasetImage::rgb_path`].
+    pub(super) fn depth_path(&self) -> Result<PathBuf, DatasetError> {
+        first_image(&self.scene.dir().join("depth"), &format!("{:06}", self.im_id))
     }
 
     /// The file of an object's mask; see [`DatasetImage::mask`].
@@ -137,25 +142,21 @@ impl DatasetImage<'_> {
             return Ok(only);
         }
         let name = format!("{:06}_{instance:06}", self.im_id);
-        first_image(&self.scene.dir().join("mask_visib").join(name))
+        first_image(&self.scene.dir().join("mask_visib"), &name).map_err(plainly)
     }
 
     /// The files of the image's masks, in any order.
     fn mask_files(&self) -> impl Iterator<Item = PathBuf> + use<> {
-        self.mask_listing().filter(|path| {
-            let name = path.file_name().and_then(|name| name.to_str()?.split_once('.'));
-            name.is_some_and(|(_, extension)| IMAGE_EXTENSIONS.contains(&extension))
-        })
+        self.mask_listing()
+            .filter(|path| path.file_name().and_then(OsStr::to_str).is_some_and(is_image))
     }
 
     /// All files in the folder of masks that begin as the image's do.
     pub(super) fn mask_listing(&self) -> impl Iterator<Item = PathBuf> + use<> {
-        let files = fs::read_dir(self.scene.dir().join("mask_visib")).into_iter().flatten();
-        let prefix = format!("{:06}_", self.im_id);
-        let is_of_image = move |path: &PathBuf| {
-            path.file_name().and_then(|name| name.to_str()).is_some_and(|n| n.starts_with(&prefix))
-        };
-        files.flatten().map(|file| file.path()).filter(is_of_image)
+        let (folder, im_id) = (self.scene.dir().join("mask_visib"), self.im_id);
+        let image = |name: &str| -> Option<u32> { name.split_once('_')?.0.parse().ok() };
+        let names = names(&folder).unwrap_or_default().into_iter();
+        names.filter(move |name| image(name) == Some(im_id)).map(move |name| folder.join(name))
     }
 
     /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.
@@ -166,7 +167,7 @@ impl DatasetImage<'_> {
         let beside = self.optics.depth_camera.is_some() && self.has_color();
         let color = if beside { Some(image_size(&self.rgb_path()?)?) } else { None };
         let warn = |file: &Path, kind, text: &str| self.warn_once(file, kind, text);
-        self.optics.depth(&self.depth_path(), color, &warn)
+        self.optics.depth(&self.depth_path().map_err(plainly)?, color, &warn)
     }
 
     /// Warns of the depth image in `file`, once a dataset of each kind.
@@ -233,7 +234,7 @@ impl DatasetImage<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
-        check_size(file, &if self.has_color() { self.rgb_path()? } else { self.depth_path() })?;
+        check_size(file, &if self.has_color() { self.rgb_path()? } else { self.depth_path()? })?;
         observation.mask = self.optics.mask(file)?;
         Ok(())
     }
@@ -249,7 +250,7 @@ impl DatasetImage<'_> {
 
     /// Whether the scene has a folder of color images.
     pub(super) fn has_color(&self) -> bool {
-        self.scene.dir().join("rgb").is_dir()
+        self.scene.color_dir().is_dir()
     }
 
     /// Width and height of the color image, or without color images of the camera that `camera.json` describes \[px\].
@@ -285,7 +286,7 @@ impl DatasetImage<'_> {
             return Err(self.scene.camera.fault(&format!("{}.depth_K", self.im_id), problem));
         }
         let color = if has_color { Some(self.rgb_path()?) } else { None };
-        let depth = self.has_depth().then(|| self.depth_path());
+        let depth = self.has_depth().then(|| self.depth_path()).transpose()?;
         self.optics.observation(color.as_deref(), depth.as_deref(), &|file, kind, text| {
             self.warn_once(file, kind, text);
         })
@@ -313,10 +314,9 @@ impl DatasetImage<'_> {
                 let problem = format!("is the place of image {} of the same rig, too", self.im_id);
                 return Err(self.scene.camera.fault(&format!("{image}.cam_t_w2c"), &problem));
             }
-            let file = self.scene.dir().join("mask_visib");
-            let Ok(file) = first_image(&file.join(format!("{image:06}_{number:06}"))) else {
-                continue;
-            };
+            let (folder, name) =
+                (self.scene.dir().join("mask_visib"), format!("{image:06}_{number:06}"));
+            let Ok(file) = first_image(&folder, &name) else { continue };
             let mut view = other.unsegmented()?;
             match other.segment_by(&mut view, &file) {
                 Err(DatasetError::EmptyMask { .. }) => continue,
@@ -373,14 +373,47 @@ impl DatasetImage<'_> {
 /// Extensions of images' names, in the order in which they are looked for.
 const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// The image that is called `stem` without its extension.
+/// So many names say how the files of a folder are called.
+const NAMED: usize = 3;
+
+/// The image in `folder` that is called `stem` without its extension, but for zeros before its numbers and the case of its extension.
 ///
 /// # Errors
-/// [`DatasetError::Missing`] naming the PNG file when there is none.
-fn first_image(stem: &Path) -> Result<PathBuf, DatasetError> {
-    let mut candidates = IMAGE_EXTENSIONS.into_iter().map(|e| stem.with_extension(e));
-    let found = candidates.find(|path| path.is_file());
-    found.ok_or_else(|| DatasetError::Missing { file: stem.with_extension("png") })
+/// Those of [`DatasetImage::rgb_path`].
+fn first_image(folder: &Path, stem: &str) -> Result<PathBuf, DatasetError> {
+    let mut usual = IMAGE_EXTENSIONS.into_iter().map(|e| folder.join(format!("{stem}.{e}")));
+    if let Some(file) = usual.find(|file| file.is_file()) {
+        return Ok(file);
+    }
+    let numbers = |name: &str| -> Option<Vec<u32>> {
+        name.split('.').next()?.split('_').map(|number| number.parse().ok()).collect()
+    };
+    let sought = numbers(stem);
+    let mut names = names(folder).unwrap_or_default();
+    if let Some(name) = names.iter().find(|name| is_image(name) && numbers(name) == sought) {
+        return Ok(folder.join(name));
+    }
+    let file = folder.join(format!("{stem}.png"));
+    if names.is_empty() {
+        return Err(DatasetError::Missing { file });
+    }
+    let more = if names.len() > NAMED { ", …" } else { "" };
+    names.truncate(NAMED);
+    Err(DatasetError::NoImage { file, found: names.join(", ") + more })
+}
+
+/// The error of a file that is absent, whatever else there is: what may be absent is known by it.
+fn plainly(error: DatasetError) -> DatasetError {
+    match error {
+        DatasetError::NoImage { file, .. } => DatasetError::Missing { file },
+        other => other,
+    }
+}
+
+/// Whether a file of that name is an image.
+fn is_image(name: &str) -> bool {
+    let extension = name.split_once('.').map_or("", |(_, extension)| extension);
+    IMAGE_EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension))
 }
 
 /// The number of the object that the mask in `file` is of.

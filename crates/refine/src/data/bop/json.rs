@@ -80,17 +80,12 @@ impl JsonFile {
         self.path.exists()
     }
 
-    /// The fields of the top-level object.
+    /// The fields of the top-level object; names that are numbers are without zeros before them.
     ///
     /// # Errors
-    /// When the file is absent, cannot be read, is not JSON, or its top level is no object.
+    /// When the file is absent, cannot be read, is not JSON, its top level is no object, or two names are the same number.
     pub(super) fn root(&self) -> Result<&BTreeMap<String, Box<RawValue>>, DatasetError> {
-        let read = || {
-            let text = read_bytes(&self.path)?;
-            // The complaint about the text as it is, unless non-finite numbers were all that stopped it.
-            from_text(&self.path, &text)
-                .or_else(|e| from_text(&self.path, &finite(&text)).map_err(|_| e))
-        };
+        let read = || by_number(&self.path, read_entries(&self.path)?);
         let root = self.root.get_or_init(read).as_ref();
         root.map(|entries| &entries.0).map_err(Clone::clone)
     }
@@ -101,7 +96,7 @@ impl JsonFile {
     /// Those of [`JsonFile::root`], and [`DatasetError::Unusable`] if it is not of its type.
     pub(super) fn field<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, DatasetError> {
         let text = self.root()?.get(name);
-        text.map(|text| self.convert(name, text)).transpose()
+        text.map(|text| convert(&self.path, name, text)).transpose()
     }
 
     /// The entry of an image or object id.
@@ -123,27 +118,15 @@ impl JsonFile {
         &self,
         id: u32,
     ) -> Result<Vec<(String, T)>, DatasetError> {
-        let one = |name: String, text: &RawValue| Ok((name.clone(), self.convert(&name, text)?));
+        let one =
+            |name: String, text: &RawValue| Ok((name.clone(), convert(&self.path, &name, text)?));
         let text: Box<RawValue> = self.entry(id)?;
         if !text.get().starts_with('[') {
             return Ok(vec![one(id.to_string(), &text)?]);
         }
-        let all: Vec<Box<RawValue>> = self.convert(&id.to_string(), &text)?;
+        let all: Vec<Box<RawValue>> = convert(&self.path, &id.to_string(), &text)?;
         let named = all.iter().enumerate();
         named.map(|(k, text)| one(format!("{id}[{k}]"), text)).collect()
-    }
-
-    fn convert<T: DeserializeOwned>(&self, name: &str, text: &RawValue) -> Result<T, DatasetError> {
-        let mut json = serde_json::Deserializer::from_str(text.get());
-        serde_path_to_error::deserialize(&mut json).map_err(|error| {
-            let (at, inner) = (error.path().to_string(), error.inner());
-            let dot = if at.starts_with('[') { "" } else { "." };
-            let field = if at == "." { name.to_owned() } else { format!("{name}{dot}{at}") };
-            // Places are those in the entry, not in the file.
-            let (line, column, problem) = (inner.line(), inner.column(), inner.to_string());
-            let place = format!(" at line {line} column {column}");
-            self.fault(&field, problem.trim_end_matches(&place))
-        })
     }
 
     /// Warns, once a file, of rotations that are not quite orthonormal.
@@ -160,6 +143,54 @@ impl JsonFile {
     }
 }
 
+/// The entry `name` of a file.
+///
+/// # Errors
+/// [`DatasetError::Unusable`] for the first field that is absent or not of its type.
+pub(super) fn convert<T: DeserializeOwned>(
+    file: &Path,
+    name: &str,
+    text: &RawValue,
+) -> Result<T, DatasetError> {
+    let mut json = serde_json::Deserializer::from_str(text.get());
+    serde_path_to_error::deserialize(&mut json).map_err(|error| {
+        let (at, inner) = (error.path().to_string(), error.inner());
+        let dot = if at.starts_with('[') { "" } else { "." };
+        let field = if at == "." { name.to_owned() } else { format!("{name}{dot}{at}") };
+        // Places are those in the entry, not in the file.
+        let (line, column, problem) = (inner.line(), inner.column(), inner.to_string());
+        let place = format!(" at line {line} column {column}");
+        DatasetError::field(file, &field, problem.trim_end_matches(&place))
+    })
+}
+
+/// Entries of a file as text, in which numbers need not be finite.
+///
+/// # Errors
+/// Those of [`read_json`].
+pub(super) fn read_entries<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
+    let text = read_bytes(file)?;
+    // The complaint about the text as it is, unless non-finite numbers were all that stopped it.
+    from_text(file, &text).or_else(|e| from_text(file, &finite(&text)).map_err(|_| e))
+}
+
+/// Entries whose names, if they are numbers, are as BOP spells them: some writers put zeros before them.
+///
+/// # Errors
+/// [`DatasetError::Unusable`] for two names of one number.
+fn by_number(file: &Path, entries: RawEntries) -> Result<RawEntries, DatasetError> {
+    let (mut all, mut names) = (BTreeMap::new(), BTreeMap::new());
+    for (name, entry) in entries.0 {
+        let number = name.parse::<u32>().map_or_else(|_| name.clone(), |n| n.to_string());
+        if let Some(other) = names.insert(number.clone(), name.clone()) {
+            let problem = format!("the entries {other:?} and {name:?} are of the same number");
+            return Err(DatasetError::unusable(file, problem));
+        }
+        all.insert(number, entry);
+    }
+    Ok(UniqueMap(all))
+}
+
 /// Content of a file of one layout.
 ///
 /// # Errors
@@ -169,8 +200,9 @@ pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetEr
     from_text(file, &read_bytes(file)?)
 }
 
-/// Content of a file of that `text`.
+/// Content of a file of that `text`, which may begin with a byte order mark.
 pub(super) fn from_text<T: DeserializeOwned>(file: &Path, text: &[u8]) -> Result<T, DatasetError> {
+    let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(text);
     let broken =
         |e: serde_json::Error| DatasetError::unusable(file, format!("not valid JSON: {e}"));
     let mut json = serde_json::Deserializer::from_slice(text);
@@ -250,7 +282,7 @@ mod tests {
         }
         type Of<T> = UniqueMap<T>;
         let f = file(
-            r#"{"3": {"a": [{"b": [1, 2]}]}, "4": {}, "5": {"s": 1}, "6": {"n": "x"}, "7": {"i": -1}}"#,
+            r#"{"3": {"a": [{"b": [1, 2]}]}, "4": {}, "5": {"s": 1}, "6": {"n": "x"}, "7": {"i": -1}, "8": {"k": ["500"]}}"#,
         );
         assert_eq!(fault::<A>(&f, 3), "3.a[0].b: expected 3 numbers, found 2");
         assert_eq!(fault::<A>(&f, 4), "4: missing field `a`");
@@ -266,8 +298,9 @@ mod tests {
             fault::<Of<Of<f64>>>(&f, 6),
             "6.n: invalid type: string \"x\", expected an object"
         );
-        let absent = f.entry::<A>(8).map(|_| ()).unwrap_err();
-        assert!(matches!(absent, DatasetError::NoEntry { key, .. } if key == "8"));
+        assert_eq!(fault::<Of<Numbers<1>>>(&f, 8), "8.k[0]: is not a number");
+        let absent = f.entry::<A>(9).map(|_| ()).unwrap_err();
+        assert!(matches!(absent, DatasetError::NoEntry { key, .. } if key == "9"));
     }
 
     #[test]
@@ -302,6 +335,24 @@ mod tests {
         assert_eq!(fault::<UniqueMap<f64>>(&f, 2), "2: duplicate field `b`");
         assert_eq!(fault::<Vec<f64>>(&f, 3), "3[0]: number out of range");
         assert_eq!(f.entries::<UniqueMap<serde::de::IgnoredAny>>(1).unwrap()[0].0, "1");
+    }
+
+    #[test]
+    fn a_byte_order_mark_says_nothing() {
+        let f = file("\u{feff}{\"1\": 7, \"2\": NaN}");
+        assert_eq!((f.entry(1), fault::<f64>(&f, 2).as_str()), (Ok(7), "2: number out of range"));
+        let read = from_text::<Vec<u32>>(Path::new("list.json"), "\u{feff}[3]".as_bytes());
+        assert_eq!(read, Ok(vec![3]));
+    }
+
+    #[test]
+    fn zeros_before_numbers_say_nothing() {
+        let f = file(r#"{"000000": 1, "000012": 2, "07": 3, "00x": 4}"#);
+        assert_eq!((f.entry(0), f.entry(12), f.entry(7)), (Ok(1), Ok(2), Ok(3)));
+        assert_eq!(f.root().unwrap().keys().collect::<Vec<_>>(), ["0", "00x", "12", "7"]);
+        let error = file(r#"{"7": 1, "007": 2}"#).root().unwrap_err().to_string();
+        let expected = "scene.json: the entries \"007\" and \"7\" are of the same number";
+        assert!(error.ends_with(expected), "{error}");
     }
 
     #[test]

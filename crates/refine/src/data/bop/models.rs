@@ -214,7 +214,10 @@ pub fn write_symmetries(
         Err(DatasetError::Missing { .. }) => UniqueMap::default(),
         read => read?,
     };
-    let fields = list.0.entry(obj_id.to_string()).or_insert_with(|| extent_to_bop(vertices));
+    // There may be zeros before its number.
+    let own = list.0.keys().find(|key| key.parse::<u32>() == Ok(obj_id)).cloned();
+    let key = own.unwrap_or_else(|| obj_id.to_string());
+    let fields = list.0.entry(key).or_insert_with(|| extent_to_bop(vertices));
     for name in ["symmetries_discrete", "symmetries_continuous"] {
         fields.remove(name);
     }
@@ -348,8 +351,8 @@ mod tests {
         let symmetries = Symmetries { discrete: vec![flip], ..Symmetries::default() };
         let vertices = [[0.0, 0.0, 0.0], [0.03, 0.04, 0.0]].map(Point3::from);
         let models = || Models::new(dir.path().to_path_buf());
-        fs::write(&file, r#"{"1": {"diameter": 7.5, "mass_kg": 2, "symmetries_continuous": [1]}}"#)
-            .unwrap();
+        let text = r#"{"001": {"diameter": 7.5, "mass_kg": 2, "symmetries_continuous": [1]}}"#;
+        fs::write(&file, text).unwrap();
         for id in [1, 2] {
             write_symmetries(&models(), id, &vertices, &symmetries).unwrap();
         }

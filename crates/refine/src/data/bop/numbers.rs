@@ -15,7 +15,7 @@ use super::pose::{
 pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "is not a finite number")]
+#[serde(untagged, expecting = "is not a number")]
 enum NumberOrRow {
     Number(f64),
     Row(Vec<f64>),

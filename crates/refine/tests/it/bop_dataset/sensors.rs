@@ -6,6 +6,7 @@ use image::{ImageBuffer, Luma};
 use nalgebra::Vector3;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{BodyKind, DatasetError, TactileReading};
+use prehend_refine::info::{DescribeOptions, describe};
 
 use super::Fixture;
 
@@ -60,7 +61,23 @@ fn a_scene_may_have_color_or_depth_alone() {
     // One file that is missing is an error.
     fs::remove_file(scene.join("depth/000000.png")).unwrap();
     let error = fixture.open().frame(4, 0).unwrap().observation(0).unwrap_err();
+    assert!(matches!(error, DatasetError::NoImage { found, .. } if found == "000003.png"));
+    let error = fixture.open().frame(4, 0).unwrap().depth().unwrap_err();
     assert!(matches!(error, DatasetError::Missing { .. }));
+}
+
+#[test]
+fn gray_images_stand_in_for_color() {
+    let fixture = Fixture::new();
+    let scene = fixture.root().join("test/000004");
+    fs::rename(scene.join("rgb"), scene.join("gray")).unwrap();
+    fixture.image("gray/000000.png", |p| {
+        ImageBuffer::from_pixel(4, 3, Luma([51u8])).save(p).unwrap();
+    });
+    let seen = fixture.open().frame(4, 0).unwrap().observation(0).unwrap();
+    assert!(seen.color.pixels().iter().flatten().all(|c| (c - 0.2).abs() < 1e-6));
+    let told = describe(fixture.root(), &DescribeOptions::default()).unwrap();
+    assert_eq!(told.fields["scenes"][0]["color"], 2);
 }
 
 #[test]

@@ -61,7 +61,10 @@ impl Chain {
                 && joint.anchor != Point3::origin();
             let name = name_of(joint, body, number);
             // The last link is the body.
-            let own = format!("{}/{name}", body.name);
+            let own = match joint.name.as_str() {
+                "" => format!("{}:{number}", body.name),
+                joint => format!("{}:{joint}", body.name),
+            };
             let link = self.push(&own, parent, place * t_body_joint, moves);
             self.links[link].armature = joint.armature;
             self.joints.push(ChainJoint { name, kind: joint.kind, link });
@@ -99,7 +102,7 @@ impl Chain {
 fn name_of(joint: &MjcfJoint, body: &Body, number: usize) -> String {
     match (joint.name.as_str(), body.joints.len()) {
         ("", 1) => body.name.clone(),
-        ("", _) => format!("{}/{number}", body.name),
+        ("", _) => format!("{}:{number}", body.name),
         (name, _) => name.to_owned(),
     }
 }

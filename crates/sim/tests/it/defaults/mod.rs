@@ -2,6 +2,7 @@
 
 mod bounces;
 mod holding;
+mod material;
 mod parcel;
 mod scene;
 mod scenes;

@@ -4,11 +4,13 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use parry3d_f64::math::Pose;
+use parry3d_f64::shape::{Compound, SharedShape};
 use prehend_autodiff::{Recording, Scalar};
 use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
     Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, DynContactLaw,
-    GapSmoothing, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
+    GapSmoothing, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State, StepCheckpointed,
     Surface, TimeSteps, World,
 };
 
@@ -181,6 +183,44 @@ fn fixed_steps_tell_what_passed_through() {
         assert!(missed.to_string().contains("'pebble' passed through 'ground' at 0.0050 s"));
         assert_eq!(fly(0.2, 1e-5, grouped).unwrap().passed, None);
     }
+}
+
+#[test]
+fn a_plate_that_is_driven_through_a_body_is_told() {
+    let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 1e-3), rounding: 1e-4 };
+    let mut world = World::new(Vector3::zeros());
+    let fly = |time: f64| {
+        let mut state = State::at_rest(at(0.0, 0.0, -0.11 + 20.0 * time));
+        state.linear.z = 20.0;
+        state
+    };
+    let plate = world.add(Body::kinematic("plate", fly).with_field(Arc::new(plate)));
+    let pebble = world.add(pebble());
+    world.add_contacts_between(&[plate], &[pebble], hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+    let start = [State::at_rest(at(0.0, 0.0, -0.11)), State::at_rest(Isometry3::identity())];
+    let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    assert_eq!(run.resolution.passed.unwrap().0, "pebble");
+}
+
+#[test]
+fn what_leaves_a_wall_for_the_next_has_not_passed_through() {
+    // Two walls with a slot of 4 cm between them, from one to the middle of which it flies within a step.
+    let wall = |x: f64| (Pose::translation(x, 0.0, 0.0), SharedShape::cuboid(0.01, 0.1, 0.1));
+    let slot = Shape::from_parry(&Compound::new(vec![wall(-0.03), wall(0.03)])).unwrap();
+    let mut world = World::new(Vector3::zeros());
+    world.add(Body::fixed_from_shape("slot", &slot));
+    let pebble = world.add(pebble());
+    let all: Vec<_> = world.body_ids().collect();
+    world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+    let start = [
+        State::at_rest(Isometry3::identity()),
+        state(at(-0.0201, 0.0, 0.0), [30.0, 0.0, 0.0], [0.0; 3]),
+    ];
+    let once = TimeSteps { dt: 1e-3, steps: 1 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, once, |_, _| ()).unwrap();
+    assert!(run.states[pebble].pose.translation.x > 0.0);
+    assert_eq!(run.resolution.passed, None);
 }
 
 /// Friction that drives.

@@ -127,7 +127,9 @@ fn a_body_of_several_joints_is_one_with_one_mass() {
     assert_eq!([mass(&world, "bob.mass"), mass(&world, "tail.mass")], [0.3, 1.0]);
     assert_eq!(world.body_named("bob"), robot.body("bob"));
     let joints: Vec<&str> = robot.joints.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(joints, ["bob/0", "bob/1", "turn", "lead"]);
+    assert_eq!(joints, ["bob:0", "bob:1", "turn", "lead"]);
+    let names: Vec<&str> = world.bodies.iter().map(|body| body.name.as_str()).collect();
+    assert_eq!(names, ["bob:0", "bob:1", "bob", "tail"]);
 }
 
 #[test]

@@ -55,6 +55,7 @@ fn what_mimics_is_set_with_its_leader() {
     let (tree, world, bodies) = arm(9.81);
     let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
     let mut states: Vec<State> = world.neutral_states();
+    assert_eq!(world.joint(&states, finger).unwrap().position, [0.02]);
     world.set_joint(&mut states, upper, &[0.4], &[0.7]).unwrap();
     let slide = world.joint(&states, finger).unwrap();
     assert!((slide.position[0] - 0.06).abs() < 1e-15 && (slide.velocity[0] - 0.07).abs() < 1e-15);
