@@ -10,8 +10,8 @@ use prehend_autodiff::{Recording, Scalar};
 use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
     Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, DynContactLaw,
-    GapSmoothing, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State, StepCheckpointed,
-    Surface, TimeSteps, World,
+    GapSmoothing, RigidBody, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
+    StepCheckpointed, Surface, TimeSteps, World,
 };
 
 use super::scenes::{
@@ -247,6 +247,19 @@ fn energy_from_nowhere_is_an_error_by_default() {
     let made = |error| matches!(error, SimulationError::Energy { .. });
     assert!(made(world.simulate(&start, 1.0).unwrap_err()));
     assert!(made(world.rollout(&start, TimeSteps { dt: 0.1, steps: 10 }).unwrap_err()));
+}
+
+#[test]
+fn energy_of_a_free_rotation_is_no_fault_of_contacts() {
+    let mut world = World::new(Vector3::zeros());
+    let rigid = RigidBody::cuboid(1.0, [0.1, 0.05, 0.02]).unwrap();
+    let brick = world.add(Body::dynamic("brick", rigid));
+    let mut start = [rigid.at_rest(&Isometry3::identity())];
+    start[brick].angular = Vector3::new(0.1, 20.0, 0.1);
+    let time_steps = TimeSteps { dt: 1e-2, steps: 400 };
+    let made = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
+    let made = made.unwrap_err().to_string();
+    assert!(made.starts_with("the motion has made"), "{made}");
 }
 
 #[test]
