@@ -200,7 +200,7 @@ def test_many_balls_touch_by_groups():
 def test_contacts_of_all_bodies_need_no_law():
     world = prehend.World()
     world.add_body("floor", prehend.Shape.half_space(), fixed=True)
-    cube = world.add_body("cube", prehend.Shape.cuboid([0.06, 0.06, 0.06]), density=500.0)
+    cube = world.add_body("cube", prehend.Shape.cuboid([0.03, 0.03, 0.03]), density=500.0)
     world.add_contacts(friction=0.5)
     states = world.neutral_states()
     world.set_pose(states, "cube", [0.0, 0.0, 0.03], velocity=[1.0, 0.0, 0.0])
