@@ -51,7 +51,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     join(parts, path)
 }
 
-/// What follows `key` in the lines that begin with it.
+/// Values of the lines that begin with `key`.
 fn values<'a>(text: &'a str, key: &'a str) -> impl Iterator<Item = &'a str> {
     text.lines().filter_map(move |line| {
         let (word, value) = line.trim().split_once(char::is_whitespace)?;

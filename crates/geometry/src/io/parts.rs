@@ -65,7 +65,7 @@ impl Tile {
         tile
     }
 
-    /// Whether it shows the same; the content counts for plain colors, of which each part makes its own image.
+    /// True if it shows the same; the content counts for plain colors, of which each part makes its own image.
     fn is(&self, other: &Self) -> bool {
         (self.low, self.high) == (other.low, other.high)
             && (Arc::ptr_eq(&self.image, &other.image) || self.image == other.image)

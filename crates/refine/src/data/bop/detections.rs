@@ -46,7 +46,7 @@ enum DetectionShape {
     Box([f64; 4]),
 }
 
-/// What an entry of the file is about.
+/// Scene, image and object of an entry of the file.
 #[derive(Deserialize)]
 struct Place {
     scene_id: u32,

@@ -373,7 +373,7 @@ impl DatasetImage<'_> {
 /// Extensions of images' names, in the order in which they are looked for.
 const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// So many names say how the files of a folder are called.
+/// Number of names that tell how the files of a folder are called.
 const NAMED: usize = 3;
 
 /// The image in `folder` that is called `stem` without its extension, but for zeros before its numbers and the case of its extension.
@@ -410,7 +410,7 @@ fn plainly(error: DatasetError) -> DatasetError {
     }
 }
 
-/// Whether a file of that name is an image.
+/// True of the name of an image file.
 fn is_image(name: &str) -> bool {
     let extension = name.split_once('.').map_or("", |(_, extension)| extension);
     IMAGE_EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension))
