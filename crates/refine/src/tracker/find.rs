@@ -8,7 +8,6 @@ use log::debug;
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 
-use super::appearance::Appearance;
 use super::clock::{Clock, Timing};
 use super::memory::{Moment, TrackState};
 use super::settings::Recovery;
@@ -106,23 +105,27 @@ impl Tracker {
         is_single: bool,
     ) -> Result<(), RefineError> {
         let object = Arc::clone(&self.object);
-        let about = is_single.then_some(initial);
-        let mut pose = *initial;
-        for _ in 0..self.settings.appearance.rounds {
-            self.appearance = Appearance::new(&self.settings);
-            if !self.appearance.look(sight, &object, &pose, about) {
-                return Err(RefineError::OutOfView);
+        let segment = |tracker: &mut Self, sight: &mut Sight, pose: &Isometry3<f64>| {
+            tracker.segment(sight, pose);
+            if is_single {
+                tracker.segmenter.add_prior(sight, &object, initial);
             }
-            self.appearance.learn(sight, &object, &pose);
-            self.appearance.look(sight, &object, &pose, about);
             // The pose may be far off.
             sight.focus = None;
+        };
+        let mut pose = *initial;
+        for _ in 0..self.settings.segmentation.rounds {
+            self.segmenter.forget();
+            if !self.segment(sight, &pose) {
+                return Err(RefineError::OutOfView);
+            }
+            self.segmenter.learn(sight, &object, &pose);
+            segment(self, sight, &pose);
             let frame = self.frame(sight, &object)?;
             let start = State::new(&frame, initial)?;
             pose = self.estimate(&frame, &start, None)?.0.solution.at.state.t_cam_object;
         }
-        self.appearance.look(sight, &object, &pose, about);
-        sight.focus = None;
+        segment(self, sight, &pose);
         Ok(())
     }
 
@@ -228,7 +231,7 @@ impl Tracker {
         expected: &Isometry3<f64>,
     ) -> Result<Option<Candidates>, RefineError> {
         if !sight.measured {
-            let found = self.appearance.find(sight, &self.object, expected);
+            let found = self.segmenter.find(sight, &self.object, expected);
             return Ok(found.map(|pose| (pose, None)));
         }
         let Some(mask) = self.segmenter.anywhere(sight) else {
@@ -247,29 +250,16 @@ impl Tracker {
 
     /// Learns colors where a pose was believed.
     pub(super) fn learn(&mut self, sight: &Sight, solved: &Solved) {
-        let pose = &solved.solution.at.state.t_cam_object;
-        match sight.measured {
-            true => self.segmenter.learn(sight, &self.object, pose),
-            false => self.appearance.learn(sight, &self.object, pose),
-        }
+        self.segmenter.learn(sight, &self.object, &solved.solution.at.state.t_cam_object);
     }
 
     /// Finds what of a frame shows the object, and whether anything does.
     pub(super) fn segment(&mut self, sight: &mut Sight, t_cam_object: &Isometry3<f64>) -> bool {
-        if sight.measured {
-            return self.segmenter.segment(sight, &self.object, t_cam_object);
-        }
-        if !self.appearance.is_known() {
-            self.appearance = Appearance::of(self.segmenter.colors(), &self.settings);
-        }
-        self.appearance.look(sight, &self.object, t_cam_object, None)
+        self.segmenter.segment(sight, &self.object, t_cam_object)
     }
 
     /// Share of the pixels which should show an object at `t_cam_object` that do; over the usual share, where colors alone tell.
     pub(super) fn shown(&self, sight: &Sight, t_cam_object: &Isometry3<f64>) -> f64 {
-        match sight.measured {
-            true => self.segmenter.shown(sight, &self.object, t_cam_object),
-            false => self.appearance.shown(sight, &self.object, t_cam_object),
-        }
+        self.segmenter.shown(sight, &self.object, t_cam_object)
     }
 }

@@ -1,6 +1,5 @@
 //! An object followed from frame to frame.
 
-mod appearance;
 mod clock;
 mod find;
 mod keyframe;
@@ -24,8 +23,6 @@ use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
 
-use self::appearance::Appearance;
-pub use self::appearance::AppearanceSettings;
 use self::clock::Clock;
 pub use self::clock::Timing;
 pub use self::keyframe::KeyframeSettings;
@@ -96,7 +93,6 @@ pub struct Tracker {
     /// Made when it is first needed.
     search: Option<PoseSearch>,
     segmenter: Segmenter,
-    appearance: Appearance,
     /// Of the frame before.
     images: Images,
 }
@@ -134,7 +130,6 @@ impl Tracker {
             last_time: None,
             search: None,
             segmenter: Segmenter::new(&settings),
-            appearance: Appearance::new(&settings),
             settings,
             images: Images::default(),
         })
@@ -161,7 +156,6 @@ impl Tracker {
         self.initial = Some(*t_cam_object);
         (self.track, self.last_time) = (None, None);
         self.segmenter = Segmenter::new(&self.settings);
-        self.appearance = Appearance::new(&self.settings);
     }
 
     /// [`push`](Self::push) of a copy.

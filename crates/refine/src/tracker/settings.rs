@@ -6,7 +6,6 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-use super::appearance::AppearanceSettings;
 use super::keyframe::KeyframeSettings;
 use super::segmentation::SegmentationSettings;
 use crate::defaults::settings;
@@ -112,10 +111,8 @@ settings! {
         pub time_constant: f64 = 0.2,
         /// Motion of the object by the images.
         pub keyframe: KeyframeSettings = KeyframeSettings::default(),
-        /// Segmentation of the object in frames with depth.
+        /// Segmentation: which pixels show the object.
         pub segmentation: SegmentationSettings = SegmentationSettings::default(),
-        /// Appearance of the object, which tells it in frames without depth.
-        pub appearance: AppearanceSettings = AppearanceSettings::default(),
         /// Gain of running means of costs, colors and masks: part of the way that they go to the next value.
         pub gain: f64 = 0.1,
         /// Number of frames between two times that colors are learnt or a lost object is looked for, and after which it may be held in another way than

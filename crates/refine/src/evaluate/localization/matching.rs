@@ -1,17 +1,17 @@
 //! Which true poses the estimates of one target find.
 
-use crate::evaluate::metrics::{NormalizedErrors, THRESHOLDS, VSD_TOLERANCES};
+use crate::evaluate::metrics::{NormalizedErrors, PIXEL_THRESHOLDS, THRESHOLDS, VSD_TOLERANCES};
 
 /// Number of times that true poses of one target are found by VSD (summed over its ten tolerances and ten thresholds), MSSD and MSPD (over their ten
 /// thresholds), from the errors of each estimate, in order of descending score, against each true pose.
 pub(super) fn count_found(errors: &[Vec<NormalizedErrors>]) -> [usize; 3] {
-    let over_thresholds = |error: &dyn Fn(&NormalizedErrors) -> f64| -> usize {
+    let over = |thresholds: &[f64], error: &dyn Fn(&NormalizedErrors) -> f64| -> usize {
         let of_metric = |row: &Vec<NormalizedErrors>| row.iter().map(error).collect();
         let errors: Vec<Vec<f64>> = errors.iter().map(of_metric).collect();
-        THRESHOLDS.iter().map(|&threshold| count_matches(&errors, threshold)).sum()
+        thresholds.iter().map(|&threshold| count_matches(&errors, threshold)).sum()
     };
-    let vsd = (0..VSD_TOLERANCES.len()).map(|k| over_thresholds(&|e| e.vsd[k])).sum();
-    [vsd, over_thresholds(&|e| e.mssd), over_thresholds(&|e| e.mspd)]
+    let vsd = (0..VSD_TOLERANCES.len()).map(|k| over(&THRESHOLDS, &|e| e.vsd[k])).sum();
+    [vsd, over(&THRESHOLDS, &|e| e.mssd), over(&PIXEL_THRESHOLDS, &|e| e.mspd)]
 }
 
 /// The number of true poses that are matched when each estimate in turn takes the one that is nearest, below `threshold`
@@ -31,7 +31,7 @@ fn count_matches(errors: &[Vec<f64>], threshold: f64) -> usize {
 mod tests {
     use super::*;
 
-    /// VSD, MSSD in diameters, MSPD in 100 px.
+    /// VSD, MSSD in diameters, MSPD \[px\].
     fn errors(vsd: f64, mssd: f64, mspd: f64) -> NormalizedErrors {
         NormalizedErrors { vsd: [vsd; 10], mssd, mspd }
     }
@@ -50,7 +50,7 @@ mod tests {
     #[test]
     fn each_metric_counts_its_own_settings() {
         // Below 0.35 … 0.5, below 0.15 … 0.5, and below none.
-        assert_eq!(count_found(&[vec![errors(0.31, 0.12, 0.5)]]), [40, 8, 0]);
+        assert_eq!(count_found(&[vec![errors(0.31, 0.12, 50.0)]]), [40, 8, 0]);
         assert_eq!(count_found(&[]), [0; 3]);
     }
 }

@@ -13,7 +13,7 @@ mod table;
 mod vsd;
 
 pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
-pub(crate) use recall::{NormalizedErrors, Recall, THRESHOLDS};
+pub(crate) use recall::{NormalizedErrors, PIXEL_THRESHOLDS, Recall, THRESHOLDS};
 #[cfg(feature = "cli")]
 pub(crate) use score::COLUMNS;
 pub(crate) use score::Contact;

@@ -11,19 +11,20 @@ use super::vsd::VSD_TOLERANCES;
 pub(crate) const THRESHOLDS: [f64; 10] =
     [0.05, 0.1, 0.15000000000000002, 0.2, 0.25, 0.3, 0.35000000000000003, 0.4, 0.45, 0.5];
 
-/// The width of the image in which MSPD's thresholds are 5, 10 … 50 px \[px\].
+/// The width of the image in which MSPD's thresholds are those below \[px\].
 const REFERENCE_WIDTH: f64 = 640.0;
-/// MSPD in an image of [`REFERENCE_WIDTH`] that counts as one \[px\].
-const REFERENCE_DISTANCE: f64 = 100.0;
+/// The thresholds that MSPD has to stay below \[px\].
+pub(crate) const PIXEL_THRESHOLDS: [f64; 10] =
+    [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0];
 
-/// Errors of one pose, scaled such that [`THRESHOLDS`] are the thresholds of all.
+/// Errors of one pose, scaled as their thresholds are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NormalizedErrors {
     /// VSD (0..=1) for each of its ten tolerances.
     pub(crate) vsd: [f64; VSD_TOLERANCES.len()],
     /// MSSD in diameters of the object.
     pub(crate) mssd: f64,
-    /// MSPD in units of 100 px in an image 640 px wide.
+    /// MSPD in an image 640 px wide \[px\].
     pub(crate) mspd: f64,
 }
 
@@ -36,20 +37,21 @@ impl NormalizedErrors {
         mspd: f64,
         width: usize,
     ) -> Self {
-        let mspd = mspd * (REFERENCE_WIDTH / width as f64) / REFERENCE_DISTANCE;
+        let mspd = mspd * (REFERENCE_WIDTH / width as f64);
         Self { vsd: *vsd, mssd: mssd / diameter, mspd }
     }
 
     /// The fractions of the thresholds that the errors stay below.
     pub(crate) fn recall(&self) -> Recall {
-        let recall = |error: f64| {
-            let below = THRESHOLDS.iter().filter(|&&threshold| error < threshold).count();
-            below as f64 / THRESHOLDS.len() as f64
+        let below = |error: f64, thresholds: &[f64]| {
+            let below = thresholds.iter().filter(|&&threshold| error < threshold).count();
+            below as f64 / thresholds.len() as f64
         };
+        let recall = |error: f64| below(error, &THRESHOLDS);
         Recall {
             vsd: self.vsd.iter().map(|&e| recall(e)).sum::<f64>() / self.vsd.len() as f64,
             mssd: recall(self.mssd),
-            mspd: recall(self.mspd),
+            mspd: below(self.mspd, &PIXEL_THRESHOLDS),
         }
     }
 }
@@ -93,5 +95,9 @@ mod tests {
         // An error that equals a threshold is above it.
         let at = recall(&[0.5; 10], 0.1, 50.0, 640);
         assert_eq!((at.vsd, at.mssd, at.mspd), (0.0, 0.0, 0.0));
+        for (k, pixels) in (0..10).zip(PIXEL_THRESHOLDS) {
+            let found = recall(&[1.0; 10], 1.0, pixels, 640).mspd;
+            assert!((found - f64::from(9 - k) / 10.0).abs() < 1e-12, "{pixels}: {found}");
+        }
     }
 }

@@ -6,7 +6,7 @@ mod smooth_field;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::Mask;
 use rayon::prelude::*;
@@ -55,8 +55,8 @@ settings! {
 /// Distances from the masked depth points to the planes that touch the surface where it is nearest to them (Chen and
 /// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCalibrationError`](crate::scene::CameraCalibrationError)).
 ///
-/// A depth point is not of a surface that looks away from the camera: such a match counts as it is far, and pulls nothing. What
-/// the points' errors have in common, a smooth field, is eliminated.
+/// A depth point is not of a surface that looks away from the camera: it belongs to what its line of sight meets first, or else counts as it is far, and pulls
+/// nothing. What the points' errors have in common, a smooth field, is eliminated.
 pub struct PointToPlaneFactor {
     object: Arc<Object>,
     points: Vec<Point>,
@@ -81,13 +81,18 @@ struct Point {
 /// Parameters of the object's pose and the camera together.
 const N: usize = 12;
 
+/// Distance from the surface within which a line of sight meets it \[m\], and steps to there at most.
+const MET: f64 = 1e-5;
+const STEPS: usize = 32;
+
 /// A point seen from the surface.
 struct Residual {
     /// Signed distance from the surface \[m\].
     distance: f64,
     /// Whether the point can be of the surface that is nearest: from 0, which looks away from the camera, to 1.
     facing: f64,
-    /// Nearest place of the surface \[m\], and the outward direction from there to the point (camera frame).
+    /// Nearest place of the surface \[m\], and the outward direction from there to the point (camera frame). Of a point behind what its line of sight meets
+    /// first: that place, and the normal there.
     surface: Vector3<f64>,
     away: Vector3<f64>,
 }
@@ -152,11 +157,47 @@ impl PointToPlaneFactor {
             let smooth: Vector3<f64> =
                 corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
             let facing = facing(&(state.t_cam_object * smooth), &surface, self.settings.grazing);
+            if facing == 0.0
+                && let Some(met) = self.first_met(&place, &state.t_cam_object, &t_object_cam)
+            {
+                return Some(met);
+            }
             let away =
                 if distance.abs() > f64::EPSILON.sqrt() { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
         self.points.par_iter().with_min_len(64).map(residual).collect()
+    }
+
+    /// Residual of the point at `place` (camera frame \[m\]) from the plane that its line of sight meets first, before that point: sphere tracing (Hart, 1996).
+    fn first_met(
+        &self,
+        place: &Point3<f64>,
+        t_cam_object: &Isometry3<f64>,
+        t_object_cam: &Isometry3<f64>,
+    ) -> Option<Residual> {
+        let Object { surface, normals, center, radius, .. } = &*self.object;
+        let (eye, direction) = (t_object_cam * Point3::origin(), t_object_cam * place.coords);
+        let length = direction.norm();
+        let direction = direction / length;
+        let mut along = ((center - eye).dot(&direction) - radius).max(0.0);
+        let mut face = u32::MAX;
+        for _ in 0..STEPS {
+            let closest =
+                surface.closest_with_hint(&(eye + direction * along), f64::INFINITY, face)?;
+            (along, face) = (along + closest.distance, closest.face);
+            if along >= length {
+                return None;
+            }
+            if closest.distance < MET {
+                let normal = t_cam_object * normals[face as usize];
+                let met = (t_cam_object * closest.point).coords;
+                let facing = facing(&normal, &met, self.settings.grazing);
+                let distance = normal.dot(&(place.coords - met));
+                return Some(Residual { distance, facing, surface: met, away: normal });
+            }
+        }
+        None
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.
@@ -279,8 +320,13 @@ mod tests {
     use super::super::gradient_check::{
         assert_by_patches, assert_gradient, fixture, patches, scene,
     };
+    use nalgebra::Translation3;
+    use prehend_geometry::shapes::cuboid;
+    use prehend_render::depth_map;
+
     use super::*;
     use crate::problem::Block;
+    use crate::scene::Frame;
 
     /// With a smooth field of this standard deviation \[m\].
     fn factor(frame: &PreparedFrame<'_>, gp_sigma: f64) -> PointToPlaneFactor {
@@ -314,7 +360,7 @@ mod tests {
         for (point, residual) in factor.points.iter().zip(factor.residuals(&state)) {
             let Residual { distance, surface, away, .. } = residual.unwrap();
             let place = state.camera.point(&point.ray, point.depth).coords;
-            assert!((surface + away * distance - place).norm() < 1e-12);
+            assert!((away.dot(&(place - surface)) - distance).abs() < 1e-12);
             assert!((away.norm() - 1.0).abs() < 1e-9);
         }
     }
@@ -341,6 +387,30 @@ mod tests {
         let costs: Vec<f64> = (0..400).map(turned).collect();
         let jump = costs.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
         assert!(jump < 0.02, "{jump} nat");
+    }
+
+    /// Points on a plate that is taken for nearer by its thickness lie on its far side.
+    #[test]
+    fn thin_objects_are_not_taken_for_nearer() {
+        let thickness = 5e-3;
+        let mesh = cuboid(Vector3::new(0.12, 0.09, thickness));
+        let plate = Arc::new(Object::with_mass("plate", mesh, None, 0).unwrap());
+        let truth = Isometry3::new(Vector3::new(0.01, -0.02, 0.5), Vector3::new(0.3, -0.2, 0.1));
+        let all = &scene().frame;
+        let depth = depth_map(&all.camera, &[(&plate.model, truth)]);
+        let set = depth.pixels().iter().map(|z| *z > 0.0).collect();
+        let mask = Mask::new(all.camera.width, all.camera.height, set).unwrap();
+        let observation = Frame { depth, mask, hand: None, ..all.clone() };
+        let frame = PreparedFrame::new(&observation, &plate).unwrap();
+        let factor = factor(&frame, 0.0);
+        let at = |distance: f64| {
+            let moved = truth * Translation3::new(0.0, 0.0, distance);
+            State::new(&frame, &moved).unwrap()
+        };
+        for near in [at(-thickness), at(thickness), at(-1.4 * thickness), at(1.4 * thickness)] {
+            assert!(factor.cost(&near) > 5.0 + 10.0 * factor.cost(&at(0.0)));
+            assert_gradient(&factor, &near, Block::ObjectPose, 1e-8, 0.03);
+        }
     }
 
     #[test]

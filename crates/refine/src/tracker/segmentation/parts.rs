@@ -1,21 +1,20 @@
 //! Connected parts of a mask.
 
-/// The pixels of the largest connected part of what is `set`, and of others that are not far smaller, for fingers part what they hold, in rows of so many columns.
-pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec<bool> {
-    let least = least_share as f32;
-    let mut part = vec![0_u32; set.len()];
-    let mut sizes = vec![0_u32];
-    let mut left = Vec::new();
+use std::mem;
+
+/// Indices of the pixels of each connected part of what is `set`, in rows of so many columns: of the largest, and of others that are not far smaller, for
+/// fingers part what they hold.
+pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec<Vec<usize>> {
+    let mut left = set.to_vec();
+    let mut parts: Vec<Vec<usize>> = Vec::new();
     for start in 0..set.len() {
-        if !set[start] || part[start] != 0 {
+        if !mem::take(&mut left[start]) {
             continue;
         }
-        let own = sizes.len() as u32;
-        let mut size = 0;
-        part[start] = own;
-        left.push(start);
-        while let Some(k) = left.pop() {
-            size += 1;
+        let mut part = vec![start];
+        let mut next = 0;
+        while let Some(&k) = part.get(next) {
+            next += 1;
             let column = k % columns;
             let neighbors = [
                 (column > 0).then(|| k - 1),
@@ -23,18 +22,13 @@ pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec
                 k.checked_sub(columns),
                 (k + columns < set.len()).then_some(k + columns),
             ];
-            for next in neighbors.into_iter().flatten().filter(|next| set[*next]) {
-                if part[next] == 0 {
-                    part[next] = own;
-                    left.push(next);
-                }
-            }
+            part.extend(neighbors.into_iter().flatten().filter(|k| mem::take(&mut left[*k])));
         }
-        sizes.push(size);
+        parts.push(part);
     }
-    let largest = sizes.iter().copied().max().unwrap_or_default();
-    let kept = |part: &u32| *part > 0 && sizes[*part as usize] as f32 >= least * largest as f32;
-    part.iter().map(kept).collect()
+    let largest = parts.iter().map(Vec::len).max().unwrap_or_default();
+    parts.retain(|part| part.len() as f64 >= least_share * largest as f64);
+    parts
 }
 
 #[cfg(test)]
@@ -51,14 +45,15 @@ mod tests {
         for k in [66, 67, 76, 77, 99] {
             set[k] = true;
         }
+        let sizes = |parts: &[Vec<usize>]| parts.iter().map(Vec::len).collect::<Vec<_>>();
         let kept = large_parts(&set, 10, 0.1);
-        assert_eq!(kept.iter().filter(|k| **k).count(), 20);
-        assert!(!kept[99] && kept[66] && kept[33]);
+        assert_eq!(sizes(&kept), [16, 4]);
+        assert!(kept[0].contains(&33) && kept[1].contains(&66));
         // The end of a row and the start of the next are no neighbors.
         let row = large_parts(&[true, true, true, false, false, true, true, false, false], 3, 0.1);
-        assert_eq!(row.iter().filter(|k| **k).count(), 5);
+        assert_eq!(sizes(&row), [4, 1]);
         let apart = large_parts(&[false, false, true, true, false, false], 3, 0.1);
-        assert_eq!(apart.iter().filter(|k| **k).count(), 2);
+        assert_eq!(sizes(&apart), [1, 1]);
         assert!(large_parts(&[], 1, 0.1).is_empty());
     }
 }

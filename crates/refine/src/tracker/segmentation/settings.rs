@@ -31,6 +31,14 @@ settings! {
         pub least_share: f64 = 0.1,
         /// Probability that a mask errs, at least.
         pub mask_error: f64 = 0.02,
+        /// Without depth: overlap of a given mask and the pixels that seem to show the object, as a share of the larger, from which the mask counts.
+        pub agreement: f64 = 0.5,
+        /// Without depth: standard deviation of the outline of a stated pose \[m\]. EXPERIMENTS: No mask, color only.
+        pub stated_sigma: f64 = 5e-3,
+        /// Without depth: standard deviation of the sides of a box that is given for a mask \[px\].
+        pub box_sigma: f64 = 5.0,
+        /// Without depth or mask: number of times that colors and pose are found in turns.
+        pub rounds: usize = 3,
     }
 }
 

@@ -115,11 +115,14 @@ impl Window {
         Some(())
     }
 
-    /// Of a whole picture, in which nothing is known of the object.
-    pub(super) fn whole(sight: &Sight, settings: &SegmentationSettings) -> Self {
+    /// Of a whole picture, in which nothing is known of the object but, where no depth is measured, its `depth` \[m\].
+    pub(super) fn whole(sight: &Sight, depth: f32, settings: &SegmentationSettings) -> Self {
         let (full, stride) = (&sight.frame.camera, settings.stride());
         let (columns, rows) = (full.width.div_ceil(stride), full.height.div_ceil(stride));
-        let pixel = |k: usize| Pixel::sensed(sight, [k % columns * stride, k / columns * stride]);
+        let pixel = |k: usize| Pixel {
+            object: depth,
+            ..Pixel::sensed(sight, [k % columns * stride, k / columns * stride])
+        };
         let range = [0..full.width, 0..full.height];
         let pixels = (0..columns * rows).map(pixel).collect();
         Self { pixels, range, camera: Some(*full), settings: *settings, ..Self::default() }
@@ -144,6 +147,14 @@ impl Window {
     /// Its columns and rows in the picture.
     pub(super) fn range(&self) -> [Range<usize>; 2] {
         self.range.clone()
+    }
+
+    /// Whether the whole object is at each pixel of the picture within its range.
+    pub(super) fn silhouette(&self) -> Vec<bool> {
+        let (stride, [columns, rows]) = (self.settings.stride(), self.range());
+        let width = columns.len() / stride;
+        let drawn = |x: usize, y: usize| self.drawn.pixels()[y / stride * width + x / stride] > 0.0;
+        (0..rows.len()).flat_map(|y| (0..columns.len()).map(move |x| drawn(x, y))).collect()
     }
 
     pub(super) fn pixels(&self) -> impl Iterator<Item = &Pixel> + Clone {
@@ -175,7 +186,8 @@ impl Pixel {
 
     /// The area of what is seen here, and of what should show the object, in squares of depth.
     pub(super) fn seen_area(&self) -> f32 {
-        self.sensor * self.sensor
+        let depth = if self.sensor > 0.0 { self.sensor } else { self.object };
+        depth * depth
     }
 
     /// See [`seen_area`](Self::seen_area).
@@ -221,11 +233,28 @@ impl Pixel {
         place: &Vector3<f32>,
         settings: &SegmentationSettings,
     ) -> f32 {
-        let Some(center) = center else { return 0.0 };
+        let hidden = self.sensor == 0.0 && self.hand > 0.0 && self.hand < self.object;
+        let Some(center) = center.filter(|_| !hidden) else {
+            return if hidden { -2.0 * settings.color_limit as f32 } else { 0.0 };
+        };
         let is_held = (place - center).norm() < settings.held as f32;
         match self.sensor > 0.0 && !self.is_on_hand(settings) && is_held {
             true => 0.0,
             false => -2.0 * settings.color_limit as f32,
+        }
+    }
+
+    /// Whether the object should be seen here.
+    pub(super) fn is_expected(&self) -> bool {
+        self.share > 0.5
+    }
+
+    /// Its label in a frame without depth: within the object it is that or not `by_color`.
+    pub(super) fn label_by(&self, by_color: bool) -> Option<Label> {
+        match self.share >= 1.0 {
+            true if by_color => Some(Label::Object),
+            true => Some(Label::Other),
+            false => (self.share == 0.0).then_some(Label::Other),
         }
     }
 
