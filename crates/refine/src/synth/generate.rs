@@ -232,7 +232,7 @@ impl SceneJob<'_> {
             let film = film.as_ref().map(|film| (film, share));
             let shot = rig.capture(moment, film, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
             let quality = sensor.color.jpeg_quality;
-            let entries = shot.write(&self.dir, im_id, obj_id, &robot.tree, quality)?;
+            let entries = shot.write(&self.dir, im_id, obj_id, quality)?;
             {
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
                 let (journal, done) = &mut *state;
