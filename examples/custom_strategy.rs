@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use prehend::geometry::SplitMix64;
-use prehend::refine::baselines::RobustIcp;
+use prehend::refine::baselines::Icp;
 use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend::refine::factor::{PointToPlaneFactor, PointToPlaneSettings};
 use prehend::refine::problem::{Block, Factor, State};
@@ -19,7 +19,7 @@ struct RandomRestarts {
     count: usize,
     /// Standard deviations of their displacement \[m\] and rotation \[rad\] about each axis.
     spread: (f64, f64),
-    icp: RobustIcp,
+    icp: Icp,
 }
 
 impl Strategy for RandomRestarts {
@@ -52,7 +52,7 @@ impl Strategy for RandomRestarts {
 pub(crate) fn main() -> anyhow::Result<()> {
     let scene = default_scene(1)?;
     let frame = PreparedFrame::new(&scene.frame, &scene.object)?;
-    let strategy = RandomRestarts { count: 300, spread: (0.01, 0.15), icp: RobustIcp::default() };
+    let strategy = RandomRestarts { count: 300, spread: (0.01, 0.15), icp: Icp::robust() };
     let errors = |pose| (pe_cm(pose, &scene.truth), oe_deg(pose, &scene.truth));
     let (pe, oe) = errors(&scene.initial);
     println!("initial pose: {pe:.2} cm, {oe:.1}°");

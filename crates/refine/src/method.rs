@@ -1,6 +1,6 @@
 //! Ways to refine a pose, and their names: what `--method` picks and what studies compare.
 
-use crate::baselines::{GradientKind, Heuristic, Icp, RobustIcp};
+use crate::baselines::{GradientKind, Heuristic, Icp, IcpMetric};
 use crate::error::RefineError;
 use crate::problem::State;
 use crate::scene::PreparedFrame;
@@ -13,10 +13,8 @@ pub enum Method {
     Fused(Box<Fused>),
     /// The paper's heuristic.
     Heuristic(Box<Heuristic>),
-    /// The paper's ICP, point to point; it uses depth alone.
+    /// The paper's ICP, or the robust one; they use depth alone.
     Icp(Icp),
-    /// Robust point-to-plane ICP; it uses depth alone.
-    RobustIcp(RobustIcp),
 }
 
 impl Default for Method {
@@ -40,7 +38,6 @@ impl Method {
             }
             Self::Heuristic(heuristic) => heuristic.iterations = iterations,
             Self::Icp(icp) => icp.iterations = iterations,
-            Self::RobustIcp(icp) => icp.iterations = iterations,
         }
     }
 
@@ -52,8 +49,11 @@ impl Method {
                 stages.for_each(|stage| stage.solver.min_decrease = 0.0);
             }
             Self::Heuristic(heuristic) => heuristic.exhaustive = true,
-            Self::Icp(icp) => icp.step_tolerance = f64::NEG_INFINITY,
-            Self::RobustIcp(_) => {}
+            Self::Icp(icp) => {
+                if icp.metric == IcpMetric::PointToPoint {
+                    icp.step_tolerance = f64::NEG_INFINITY;
+                }
+            }
         }
     }
 
@@ -62,7 +62,6 @@ impl Method {
             Self::Fused(fused) => fused.as_ref(),
             Self::Heuristic(heuristic) => heuristic.as_ref(),
             Self::Icp(icp) => icp,
-            Self::RobustIcp(icp) => icp,
         }
     }
 }
@@ -97,12 +96,6 @@ impl From<Heuristic> for Method {
 impl From<Icp> for Method {
     fn from(icp: Icp) -> Self {
         Self::Icp(icp)
-    }
-}
-
-impl From<RobustIcp> for Method {
-    fn from(icp: RobustIcp) -> Self {
-        Self::RobustIcp(icp)
     }
 }
 
@@ -158,7 +151,7 @@ impl Method {
         let checkpoint = name == "combined" || name.ends_with("-best");
         let gradients = match name.split('-').next()? {
             "icp" => return Some(Icp { checkpoint, ..Icp::default() }.into()),
-            "robust" => return Some(RobustIcp::default().into()),
+            "robust" => return Some(Icp::robust().into()),
             "combined" => GradientKind::ALL.to_vec(),
             gradient => vec![gradient.parse().ok()?],
         };

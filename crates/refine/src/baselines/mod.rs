@@ -4,15 +4,13 @@ mod chamfer_depth;
 mod heuristic;
 mod icp;
 mod matcher;
-mod robust_icp;
 mod stability;
 mod stability_loss;
 mod step;
 
 pub use self::chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
 pub use self::heuristic::{GradientKind, Heuristic};
-pub use self::icp::Icp;
-pub use self::robust_icp::RobustIcp;
+pub use self::icp::{Icp, IcpMetric};
 pub use self::stability::{StabilityFactor, StabilitySettings};
 
 use prehend_geometry::RobustKernel;

@@ -10,7 +10,7 @@ use prehend_sim::{
     StepError, Surface, TimeSteps, World,
 };
 
-use super::stability_loss::{StabilityLoss, StabilityWeights};
+use super::stability_loss::{StabilityLoss, weights_relative_to_fall};
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{PreparedFrame, check_gravity};
@@ -126,7 +126,7 @@ impl StabilityFactor {
             rigid,
             time_steps: TimeSteps { dt: settings.time / steps as f64, steps },
             perturbation: settings.perturbation,
-            weights: StabilityWeights::relative_to_fall(g, settings.time, object.radius),
+            weights: weights_relative_to_fall(g, settings.time, object.radius),
         };
         Ok(Self { stability, initial_center: initial.center(), settings })
     }

@@ -8,26 +8,12 @@ use prehend_sim::{
 };
 use rayon::prelude::*;
 
-/// Scales that make the residuals of [`StabilityLoss`] dimensionless.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct StabilityWeights {
-    /// Per linear velocity \[s/m\].
-    linear: f64,
-    /// Per angular velocity \[s/rad\].
-    angular: f64,
-    /// Per displacement of the center of mass \[1/m\].
-    displacement: f64,
-    /// Per rotation \[1/rad\].
-    rotation: f64,
-}
-
-impl StabilityWeights {
-    /// Weights relative to free fall under `gravity` \[m/s²\] for `time` \[s\], which velocity and displacement
-    /// then score 1 each at its end; rotations count as motion at `radius` \[m\] of the center of mass.
-    pub(super) fn relative_to_fall(gravity: f64, time: f64, radius: f64) -> Self {
-        let (linear, displacement) = (1.0 / (gravity * time), 2.0 / (gravity * time * time));
-        Self { linear, angular: linear * radius, displacement, rotation: displacement * radius }
-    }
+/// Scales of displacement \[1/m\], rotation \[1/rad\], linear velocity \[s/m\] and angular velocity \[s/rad\] that make the residuals of
+/// [`StabilityLoss`] dimensionless: relative to free fall under `gravity` \[m/s²\] for `time` \[s\], at whose end velocity and displacement score 1
+/// each; rotations count as motion at `radius` \[m\] of the center of mass.
+pub(super) fn weights_relative_to_fall(gravity: f64, time: f64, radius: f64) -> [f64; 4] {
+    let (linear, displacement) = (1.0 / (gravity * time), 2.0 / (gravity * time * time));
+    [displacement, displacement * radius, linear, linear * radius]
 }
 
 /// Simulated stability of a free object: the mean over three starts of the squared residuals (linear
@@ -47,8 +33,8 @@ pub(super) struct StabilityLoss {
     pub(super) time_steps: TimeSteps,
     /// Speed of the perturbed starts along each axis \[m/s\].
     pub(super) perturbation: f64,
-    /// Scales of the residuals.
-    pub(super) weights: StabilityWeights,
+    /// Scales of the residuals ([`weights_relative_to_fall`]).
+    pub(super) weights: [f64; 4],
 }
 
 /// Fraction of the longest stable step that is used, for semi-implicit Euler 1 of √5 − 1: derivatives of rollouts at the
@@ -132,7 +118,7 @@ impl StabilityLoss {
         states
     }
 
-    /// Velocities, displacement and rotation of the object since the start at the end of a rollout, scaled.
+    /// Displacement and rotation of the object since the start and its velocities, at the end of a rollout, scaled.
     fn residual<S: Scalar>(
         &self,
         world: &World<S>,
@@ -143,16 +129,10 @@ impl StabilityLoss {
         let end =
             world.simulate_controlled(&SemiImplicitEuler, &initial, self.time_steps, go_on)?;
         let state = &end[self.object];
-        let w = &self.weights;
         let shift = state.pose.translation.vector - start.pose.translation.vector;
         let turn = so3_log(&(state.pose.rotation * start.pose.rotation.inverse()));
-        let parts = [
-            (shift, w.displacement),
-            (turn, w.rotation),
-            (state.linear, w.linear),
-            (state.angular, w.angular),
-        ];
-        Ok(SVector::from_fn(|i, _| parts[i / 3].0[i % 3].times(parts[i / 3].1)))
+        let parts = [shift, turn, state.linear, state.angular];
+        Ok(SVector::from_fn(|i, _| parts[i / 3][i % 3].times(self.weights[i / 3])))
     }
 }
 
@@ -197,7 +177,7 @@ mod tests {
             rigid,
             time_steps: TimeSteps { dt: 1e-3, steps: 20 },
             perturbation: 0.01,
-            weights: StabilityWeights::relative_to_fall(9.81, 0.02, 0.02),
+            weights: weights_relative_to_fall(9.81, 0.02, 0.02),
         }
     }
 

@@ -148,7 +148,7 @@ impl Settings {
 }
 
 /// Puts `changes` in place of what `values` have: tables are merged, and elements of an array have their indices for names.
-fn merge(values: &mut Value, changes: Value) {
+pub(crate) fn merge(values: &mut Value, changes: Value) {
     match (values, changes) {
         (Value::Table(values), Value::Table(changes)) => {
             for (name, change) in changes {

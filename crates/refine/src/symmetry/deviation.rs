@@ -33,11 +33,11 @@ pub(super) struct SampledSurface {
     surface: ClosestPoints,
     /// Points of the surface relative to its centroid, each with its unit normal.
     samples: Vec<(Vector3<f64>, Vector3<f64>)>,
-    center: Point3<f64>,
+    pub(super) center: Point3<f64>,
     /// Second moments of the surface about its centroid, per area \[m²\].
     moments: Matrix3<f64>,
     /// Largest distance of a point \[m\], and number of those that may lie farther.
-    tolerance: f64,
+    pub(super) tolerance: f64,
     exempt: usize,
     paint: Option<Paint>,
 }
@@ -55,11 +55,6 @@ impl SampledSurface {
         let exempt = (settings.exempt * samples.len() as f64) as usize;
         let samples = samples.iter().map(place).collect();
         Ok(Self { surface, samples, center, moments, tolerance, exempt, paint })
-    }
-
-    /// The centroid of the surface, which every symmetry leaves where it is \[m\].
-    pub(super) fn center(&self) -> Point3<f64> {
-        self.center
     }
 
     /// Directions of the principal axes of the surface's second moments.
@@ -129,11 +124,6 @@ impl SampledSurface {
         let turn = turn.to_rotation_matrix();
         let moved = turn.matrix() * self.moments * turn.matrix().transpose();
         (moved - self.moments).norm() / self.moments.norm().max(f64::MIN_POSITIVE)
-    }
-
-    /// Largest distance of a sample \[m\].
-    pub(super) fn tolerance(&self) -> f64 {
-        self.tolerance
     }
 }
 

@@ -51,7 +51,7 @@ fn symmetries_of(shape: &SampledSurface) -> Symmetries {
         [axis] => discrete::flip(shape, axis).into_iter().collect(),
         _ => Vec::new(),
     };
-    let center = shape.center();
+    let center = shape.center;
     let continuous = axes.into_iter().map(|axis| ContinuousSymmetry { axis, point: center });
     Symmetries {
         continuous: continuous.collect(),
@@ -69,7 +69,7 @@ fn symmetric_rotations(shape: &SampledSurface) -> Vec<UnitQuaternion<f64>> {
                 return None;
             }
             let (rough, rms) = shape.drawn(start, 16, 8);
-            if rms > 2.0 * shape.tolerance() {
+            if rms > 2.0 * shape.tolerance {
                 return None;
             }
             let (turn, _) = shape.drawn(rough, 4, 6);

@@ -1,7 +1,5 @@
 //! Motions after which an object looks much the same by shape.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{Isometry3, Unit};
 use prehend_geometry::TriMesh;
 use prehend_geometry::closest::ClosestError;
@@ -9,7 +7,7 @@ use prehend_geometry::closest::ClosestError;
 use super::axes::turn;
 use super::deviation::SampledSurface;
 use super::symmetries::about;
-use super::{ContinuousSymmetry, Symmetries, SymmetrySettings, symmetries_of};
+use super::{SymmetrySettings, symmetries_of};
 
 /// The fraction of the surface that may be off by more than the tolerance: handles and spouts, which a hand may hide.
 const EXEMPT: f64 = 0.05;
@@ -30,22 +28,9 @@ pub(crate) fn near_symmetries(mesh: &TriMesh) -> Result<Vec<Isometry3<f64>>, Clo
     let mut symmetries = symmetries_of(&shape);
     let axes = shape.principal_axes();
     let half = |k: usize| turn(&Unit::new_normalize(axes.column(k).into_owned()), 0.5);
-    symmetries.discrete.extend((0..3).map(|k| about(&shape.center(), &half(k))));
-    Ok(representatives(&symmetries))
-}
-
-/// Motions that stand for `symmetries`, no two nearly the same.
-fn representatives(symmetries: &Symmetries) -> Vec<Isometry3<f64>> {
-    let spin = |k: usize| TAU * k as f64 / TURNS as f64;
-    let of_axis =
-        |axis: &ContinuousSymmetry| (0..TURNS).map(|k| axis.turn(spin(k))).collect::<Vec<_>>();
-    let mut spins = vec![Isometry3::identity()];
-    spins.extend(symmetries.continuous.iter().flat_map(of_axis));
-    let discrete: Vec<_> = symmetries.discrete_with_identity().collect();
-    let motions = discrete.iter().flat_map(|flip| spins.iter().map(move |spin| spin * flip));
-    let motions: Vec<_> = motions.collect();
-    let alternatives = alternatives(&[Isometry3::identity()], &motions);
-    alternatives.into_iter().map(|(_, motion)| motion).collect()
+    symmetries.discrete.extend((0..3).map(|k| about(&shape.center, &half(k))));
+    let alternatives = alternatives(&[Isometry3::identity()], &symmetries.sampled(TURNS));
+    Ok(alternatives.into_iter().map(|(_, motion)| motion).collect())
 }
 
 /// Poses that `motions` in object coordinates make of `poses`, each with the index of that which it comes from. One that is turned hardly
@@ -70,7 +55,7 @@ pub(crate) fn alternatives(
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
+    use std::f64::consts::{PI, TAU};
 
     use nalgebra::Vector3;
     use prehend_geometry::objects::YcbObject;

@@ -49,10 +49,15 @@ impl Symmetries {
     /// or, where there are axes of revolution, followed by each of many rotations about
     /// each axis. Axes are not combined with one another, as in BOP.
     pub fn transforms(&self) -> Vec<Isometry3<f64>> {
+        self.sampled(CONTINUOUS_STEPS)
+    }
+
+    /// [`transforms`](Self::transforms) of so many `turns` about each axis, all round.
+    pub(super) fn sampled(&self, turns: usize) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();
         for symmetry in &self.continuous {
-            let turn = |i| symmetry.turn(TAU * i as f64 / CONTINUOUS_STEPS as f64);
-            spins.extend((0..CONTINUOUS_STEPS).map(turn));
+            let turn = |k| symmetry.turn(TAU * k as f64 / turns as f64);
+            spins.extend((0..turns).map(turn));
         }
         if spins.is_empty() {
             return self.discrete_with_identity().collect();

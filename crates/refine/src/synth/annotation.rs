@@ -21,8 +21,8 @@ const FORCE_LIMIT: f64 = 10_000.0;
 pub(super) type ImageEntries = Map<String, Value>;
 
 impl Shot {
-    /// Entries of the image, which shows object `obj_id` and a hand whose joints have these names.
-    pub(super) fn entries(&self, obj_id: u32, names: &[String]) -> ImageEntries {
+    /// Entries of the image, which shows object `obj_id`.
+    pub(super) fn entries(&self, obj_id: u32) -> ImageEntries {
         let Self { told, visible, whole, .. } = self;
         let mut entries = ImageEntries::new();
         let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
@@ -45,7 +45,9 @@ impl Shot {
         camera.insert("depth_scale".into(), json!(DEPTH_SCALE));
         camera.extend(self.lens.as_ref().map(|model| ("cam_dist".into(), lens(model))));
         add("scene_camera.json", Value::Object(camera));
+        let Some(hand) = &told.hand else { return entries };
         let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
+            let names = hand.hand.tree.joint_names();
             let joints: BTreeMap<_, _> = names.iter().zip(joints).collect();
             let mut body = pose("b2c", t_cam_hand);
             body.insert("name".into(), json!("hand"));
@@ -53,11 +55,9 @@ impl Shot {
             body.insert("joints".into(), json!(joints));
             json!({ "gravity": told.gravity.unwrap_or_default().as_slice(), "bodies": [body] })
         };
-        if let Some(hand) = &told.hand {
-            add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
-            if !hand.forces.is_empty() {
-                add("scene_tactile.json", touch(&hand.forces));
-            }
+        add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
+        if !hand.forces.is_empty() {
+            add("scene_tactile.json", touch(&hand.forces));
         }
         if let Some((t_cam_hand, joints)) = &self.hand {
             add("scene_bodies_gt.json", bodies(t_cam_hand, joints));

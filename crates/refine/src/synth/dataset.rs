@@ -44,7 +44,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
             visible: seen.mask.clone(),
         };
         let obj_id = scene.obj_id;
-        let entries = shot.write(&scene_dir, im_id, obj_id, &scene.hand.tree, 0)?;
+        let entries = shot.write(&scene_dir, im_id, obj_id, 0)?;
         frames.insert(im_id as usize, entries);
         objects.insert(obj_id, &scene.object);
         let (scene_id, t_cam_model) = (SCENE_ID, scene.initial);

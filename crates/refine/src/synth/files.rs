@@ -6,7 +6,6 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 use prehend_geometry::TriMesh;
-use prehend_geometry::robot::KinematicTree;
 use prehend_render::{Distortion, Mask};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -72,7 +71,6 @@ impl Shot {
         scene_dir: &Path,
         im_id: u32,
         obj_id: u32,
-        hand: &KinematicTree,
         jpeg_quality: u8,
     ) -> Result<ImageEntries, AssetError> {
         let (image, instance) = (format!("{im_id:06}.png"), format!("{im_id:06}_000000.png"));
@@ -90,7 +88,7 @@ impl Shot {
         };
         mask("mask_visib", &self.told.mask)?;
         mask("mask", &self.whole)?;
-        Ok(self.entries(obj_id, hand.joint_names()))
+        Ok(self.entries(obj_id))
     }
 }
 

@@ -93,21 +93,11 @@ where
     write_models(&dir.join("models"), subjects.iter().map(|s| models(s, told(s))))?;
     let exact = subjects.iter().map(|s| models(s, s.object.mesh.clone()));
     write_models(&dir.join("models_eval"), exact)?;
-    let size = (settings.width.get(), settings.height.get());
-    let lens = settings
-        .lens
-        .map(|model| SimulatedLens::new(model, !settings.undeclared_lens, &settings.sensor, size));
+    let lens = settings.lens.map(|model| SimulatedLens::new(model, settings));
     let lens = lens.as_ref();
     if settings.sensor.calibration.shared > 0 {
         let mut noise = sequence(settings.seed, Use::Rig, 0, 0);
-        let rig = SensorRig::new(
-            &settings.sensor,
-            &subjects[0].object,
-            &hand.robot,
-            size,
-            lens,
-            &mut noise,
-        );
+        let rig = SensorRig::new(settings, &subjects[0].object, &hand.robot, lens, &mut noise);
         write_atomically(&dir.join("rig_gt.json"), format!("{}\n", rig.faults()).as_bytes())?;
     }
     let mut summary = DatasetSummary::default();
@@ -227,18 +217,14 @@ impl SceneJob<'_> {
         images: &[u32],
         state: &Mutex<(Journal, BTreeMap<usize, ImageEntries>)>,
     ) -> Result<(), SynthError> {
-        let &SynthSettings { width, height, seed, ref sensor, .. } = self.settings;
+        let &SynthSettings { seed, ref sensor, ref film, .. } = self.settings;
         let &SynthObject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
-        let size = (width.get(), height.get());
         let lasting = if sensor.calibration.shared > 0 { (0, 0) } else { (obj_id, grasp) };
         let mut noise = sequence(seed, Use::Rig, lasting.0, lasting.1);
-        let rig = SensorRig::new(sensor, object, robot, size, self.lens, &mut noise);
-        let film = self
-            .settings
-            .film
-            .as_ref()
-            .map(|film| rig.film(film, moments, &mut sequence(seed, Use::Film, obj_id, grasp)));
+        let rig = SensorRig::new(self.settings, object, robot, self.lens, &mut noise);
+        let mut noise = sequence(seed, Use::Film, obj_id, grasp);
+        let film = film.as_ref().map(|film| rig.film(film, moments, &mut noise));
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
             let share = im_id as usize % shares;
@@ -246,7 +232,7 @@ impl SceneJob<'_> {
             let film = film.as_ref().map(|film| (film, share));
             let shot = rig.capture(moment, film, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
             let quality = sensor.color.jpeg_quality;
-            let entries = shot.write(&self.dir, im_id, obj_id, &robot.tree, quality)?;
+            let entries = shot.write(&self.dir, im_id, obj_id, quality)?;
             {
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
                 let (journal, done) = &mut *state;

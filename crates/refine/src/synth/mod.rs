@@ -22,5 +22,8 @@ pub use grasp::{Grasp, GraspError, GraspSettings, GraspSnapshot, Grasper};
 pub use hand_files::HandFiles;
 pub use plan::{SynthObject, SynthSettings};
 pub use pose_noise::NoiseLevel;
+#[cfg(feature = "cli")]
+pub(crate) use pose_noise::random_direction;
+#[cfg(feature = "cli")]
 pub(crate) use sensor::smooth_field;
 pub use sensor::{FilmSettings, SensorSettings, SettingError};

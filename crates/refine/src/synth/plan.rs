@@ -5,7 +5,7 @@ use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::Path;
 
 use prehend_geometry::{SplitMix64, TriMesh};
-use prehend_render::Distortion;
+use prehend_render::{Camera, Distortion};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
@@ -50,6 +50,13 @@ pub struct SynthSettings {
     pub seed: u64,
     /// Settings of the grasp generator: only stored and compared.
     pub grasp: Value,
+}
+
+impl SynthSettings {
+    /// The camera without its lens.
+    pub(super) fn camera(&self) -> Camera {
+        self.sensor.viewpoint.camera(self.width.get(), self.height.get())
+    }
 }
 
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.

@@ -90,7 +90,7 @@ fn along_ray(place: &Vector3<f64>, random: &mut SplitMix64) -> (Vector3<f64>, Ve
 }
 
 /// A direction, uniform on the unit sphere.
-pub(super) fn random_direction(random: &mut SplitMix64) -> Vector3<f64> {
+pub(crate) fn random_direction(random: &mut SplitMix64) -> Vector3<f64> {
     let normal = Vector3::from_fn(|_, _| random.normal());
     normal.try_normalize(0.0).unwrap_or_else(Vector3::x)
 }

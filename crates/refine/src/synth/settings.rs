@@ -4,22 +4,15 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
+use crate::settings::merge;
+
 /// Settings of these files, each over those before it.
 pub(super) fn preset<T: DeserializeOwned>(files: &[&str]) -> T {
-    let mut all = Table::new();
-    files.iter().flat_map(|file| file.parse()).for_each(|changes| merge(&mut all, changes));
+    let mut all = Value::from(Table::new());
+    let changes = files.iter().flat_map(|file| file.parse::<Table>());
+    changes.for_each(|changes| merge(&mut all, changes.into()));
     // Files of these folders, which tests read.
     all.try_into().unwrap_or_else(|error| unreachable!("a preset is broken: {error}"))
-}
-
-/// Puts the values of `changes` in place of those that `settings` have.
-pub(super) fn merge(settings: &mut Table, changes: Table) {
-    for (name, change) in changes {
-        match (settings.get_mut(&name), change) {
-            (Some(Value::Table(known)), Value::Table(change)) => merge(known, change),
-            (_, change) => drop(settings.insert(name, change)),
-        }
-    }
 }
 
 /// Numbers of `settings`, each with its name, such as `depth.noise`.

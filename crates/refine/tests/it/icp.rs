@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Isometry3;
-use prehend_refine::baselines::{Icp, RobustIcp};
+use prehend_refine::baselines::Icp;
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::problem::Block;
 use prehend_refine::scene::{Scene, default_scene};
@@ -50,7 +50,7 @@ fn found(strategy: &dyn Strategy, scene: &Scene, offset: &[f64; 6]) -> (Isometry
 fn small_offsets_are_undone() {
     let scene = default_scene(1).unwrap();
     for offset in [[5e-3, 0.0, 0.0, 0.0, 0.08, 0.0], [0.0, -6e-3, 4e-3, 0.06, 0.0, -0.05]] {
-        let (found, iterations) = found(&RobustIcp::default(), &scene, &offset);
+        let (found, iterations) = found(&Icp::robust(), &scene, &offset);
         let (pe, oe) = (pe_cm(&found, &scene.truth), oe_deg(&found, &scene.truth));
         assert!(pe < 0.1 && oe < 1.0, "{pe} cm, {oe}°");
         assert_eq!(iterations, 61);
@@ -62,6 +62,6 @@ fn it_beats_the_weak_baseline() {
     let scene = default_scene(2).unwrap();
     let offset = [5e-3, 4e-3, -4e-3, 0.05, -0.04, 0.03];
     let (weak, _) = found(&Icp::default(), &scene, &offset);
-    let (strong, _) = found(&RobustIcp::default(), &scene, &offset);
+    let (strong, _) = found(&Icp::robust(), &scene, &offset);
     assert!(pe_cm(&strong, &scene.truth) < 0.3 * pe_cm(&weak, &scene.truth));
 }

@@ -11,9 +11,10 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use prehend_geometry::TriMesh;
 use prehend_render::RgbImage;
+use serde_json::json;
 
-use self::document::{Block, Document, LabeledPicture};
 pub use self::document::{Chart, Column, Figure, Series};
+use self::document::{Document, LabeledPicture};
 pub use self::frame::{DrawnFrame, FrameDrawing, FrameReport};
 use self::frame::{loss_chart, residuals};
 use self::scene::{encoded_hand, encoded_scene, object_mesh};
@@ -74,9 +75,10 @@ impl Report {
         headings: impl IntoIterator<Item = S>,
         rows: impl IntoIterator<Item = impl Into<Vec<String>>>,
     ) {
-        let headings = headings.into_iter().map(Into::into).collect();
-        let rows = rows.into_iter().map(Into::into).collect();
-        self.document.blocks.push(Block::Table { title: title.to_owned(), headings, rows });
+        let headings: Vec<String> = headings.into_iter().map(Into::into).collect();
+        let rows: Vec<Vec<String>> = rows.into_iter().map(Into::into).collect();
+        let table = json!({ "kind": "table", "title": title, "headings": headings, "rows": rows });
+        self.document.blocks.push(table);
     }
 
     /// Adds a picture with remarks.
@@ -89,8 +91,10 @@ impl Report {
         picture: &RgbImage,
         remarks: &[String],
     ) -> Result<(), RefineError> {
-        let (title, remarks, picture) = (title.to_owned(), remarks.to_vec(), jpeg(picture)?);
-        self.document.blocks.push(Block::Picture { title, remarks, picture });
+        let picture = jpeg(picture)?;
+        let block =
+            json!({ "kind": "picture", "title": title, "remarks": remarks, "picture": picture });
+        self.document.blocks.push(block);
         Ok(())
     }
 
@@ -104,13 +108,14 @@ impl Report {
         pictures: &[RgbImage; 2],
     ) -> Result<(), RefineError> {
         let pictures = labeled(["before", "after"], pictures)?;
-        self.document.blocks.push(Block::Comparison { title: title.to_owned(), pictures });
+        let block = json!({ "kind": "comparison", "title": title, "pictures": pictures });
+        self.document.blocks.push(block);
         Ok(())
     }
 
     /// Adds curves.
     pub fn add_chart(&mut self, chart: Chart) {
-        self.document.blocks.push(Block::Chart(chart));
+        self.document.charts.push(chart);
     }
 
     /// Adds a frame.

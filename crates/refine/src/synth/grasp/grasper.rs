@@ -8,13 +8,13 @@ use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
 use prehend_sim::contact::LawError;
 use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, RigidBody};
 
-use super::drive::Drive;
+use super::drive::levers;
 use super::error::GraspError;
 use super::placement::Placement;
 use super::preshape::Preshape;
+use super::self_collision::SelfCollision;
 use super::settings::GraspSettings;
-use super::simulation::{Setup, Simulation};
-use super::skin::Skin;
+use super::simulation::Simulation;
 use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
 use crate::scene::{Hand, Object};
@@ -41,13 +41,26 @@ pub struct Grasp {
     pub turn: f64,
 }
 
-/// Makes grasps of one object by one hand.
+/// Makes grasps of one object by one hand: all of both that stays the same.
 pub struct Grasper<'a> {
+    pub(super) robot: &'a Hand,
     pub(super) settings: GraspSettings,
-    preshape: Preshape,
-    pub(super) setup: Setup<'a>,
-    pub(super) drive: Drive<'a>,
-    pub(super) skin: Skin<'a>,
+    pub(super) preshape: Preshape,
+    pub(super) body: RigidBody,
+    /// Samples of its surface, object frame \[m\], and the area that each stands for \[m²\].
+    pub(super) samples: Vec<Point3<f64>>,
+    pub(super) area: f64,
+    pub(super) law: Arc<dyn DynContactLaw>,
+    /// Law with softer friction, for steps that cannot be solved otherwise.
+    pub(super) soft_law: Arc<dyn DynContactLaw>,
+    /// For each link the screws of the joints that move it.
+    pub(super) paths: Vec<Vec<usize>>,
+    pub(super) limits: Vec<(f64, f64)>,
+    /// Mean lever of the links that a joint moves \[m\]; 1 for those that slide.
+    pub(super) levers: Vec<f64>,
+    pub(super) self_collision: SelfCollision,
+    /// Links of the taxels.
+    pub(super) taxel_links: Vec<usize>,
     placement: Placement,
     contact: ContactModel,
 }
@@ -91,16 +104,24 @@ impl<'a> Grasper<'a> {
             let friction = Coulomb { friction: settings.friction, slip_scale };
             Ok(Arc::new(Law::new(spring, friction)?))
         };
-        let (law, soft_law) = (law(settings.slip_speed)?, law(SOFTER * settings.slip_speed)?);
-        let (time_step, damping_time) = (settings.time_step, settings.damping_time);
+        let paths = robot.tree.paths();
+        let open = robot.tree.forward_kinematics(&preshape.open);
         Ok(Self {
-            drive: Drive::new(robot, &preshape, settings),
-            skin: Skin::new(robot, settings.taxel_reach)?,
-            setup: Setup { robot, body, samples, area, law, soft_law, time_step, damping_time },
+            robot,
+            settings: settings.clone(),
+            body,
+            samples,
+            area,
+            law: law(settings.slip_speed)?,
+            soft_law: law(SOFTER * settings.slip_speed)?,
+            limits: robot.tree.joint_limits(),
+            levers: levers(robot, &preshape, &paths),
+            self_collision: SelfCollision::new(robot, &paths, &open),
+            taxel_links: robot.taxels.iter().map(|t| robot.link_of(t)).collect::<Result<_, _>>()?,
             placement: Placement::new(object),
             contact: ContactModel::new(&object.mesh),
-            settings: settings.clone(),
             preshape,
+            paths,
         })
     }
 
@@ -110,24 +131,23 @@ impl<'a> Grasper<'a> {
     /// The reason that there is none.
     pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspError> {
         let mut random = SplitMix64::new(seed);
-        let (robot, settings) = (self.setup.robot, &self.settings);
-        let (joints, t_hand_object) =
-            self.placement.draw(robot, &self.preshape, settings, &mut random)?;
-        let weight = self.setup.body.mass() * settings.gravity;
+        let settings = &self.settings;
+        let (joints, t_hand_object) = self.placement.draw(self, &mut random)?;
+        let weight = self.body.mass() * settings.gravity;
         let mut pace = |_: &f64| 1.0 + settings.speed_spread * (2.0 * random.uniform() - 1.0);
         let pace: Vec<f64> = self.preshape.speed.iter().map(&mut pace).collect();
         let grip = settings.grip + settings.grip_per_weight * weight;
-        let mut simulation = Simulation::new(&self.setup, &joints, &t_hand_object)?;
-        self.close(&mut simulation, &pace, grip)?;
+        let mut simulation = Simulation::new(self, &joints, &t_hand_object, grip)?;
+        simulation.pace = pace;
+        self.close(&mut simulation)?;
         self.check_links(&simulation)?;
-        let (drift, turn) = self.hold(&mut simulation, &pace, grip, &mut random)?;
+        let (drift, turn) = self.hold(&mut simulation, &mut random)?;
         self.check_rest(&simulation, 1.0)?;
         let links = self.check_links(&simulation)?;
-        let (joints, t_hand_object) = (simulation.joints().to_vec(), simulation.t_hand_object());
-        let (contact_area, intersection_volume) = self.measure(&joints, &t_hand_object)?;
+        let (contact_area, intersection_volume) = self.measure(&simulation)?;
         Ok(Grasp {
-            joints,
-            t_hand_object,
+            t_hand_object: simulation.t_hand_object(),
+            joints: simulation.joints,
             grip,
             links,
             contact_area,
@@ -171,20 +191,16 @@ impl<'a> Grasper<'a> {
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
     /// creeping, and whether the object is held will be seen.
-    fn close(
-        &self,
-        simulation: &mut Simulation<'_>,
-        pace: &[f64],
-        grip: f64,
-    ) -> Result<(), GraspError> {
+    fn close(&self, simulation: &mut Simulation<'_>) -> Result<(), GraspError> {
         let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
         let mut still = 0;
         for _ in 0..steps(self.settings.closing_time) {
-            let change = self.drive.change(simulation, pace, grip);
-            simulation.advance(&change, None)?;
+            let change = simulation.close(None)?;
             let (speed, spin) = simulation.speed();
-            let rests =
-                self.drive.is_at_rest(&change, STILL.0) && speed < STILL.1 && spin < STILL.2;
+            let slowest = |speed: &f64| STILL.0 * speed.abs() * self.settings.time_step;
+            let rests = change.iter().zip(&self.preshape.speed).all(|(c, s)| c.abs() <= slowest(s))
+                && speed < STILL.1
+                && spin < STILL.2;
             still = if rests { still + 1 } else { 0 };
             if still >= steps(STILL_TIME) {
                 return Ok(());
@@ -205,8 +221,6 @@ impl<'a> Grasper<'a> {
     fn hold(
         &self,
         simulation: &mut Simulation<'_>,
-        pace: &[f64],
-        grip: f64,
         random: &mut SplitMix64,
     ) -> Result<(f64, f64), GraspError> {
         let start = simulation.t_hand_object();
@@ -215,8 +229,7 @@ impl<'a> Grasper<'a> {
             let gravity = random_direction(random) * self.settings.gravity;
             let steps = (self.settings.hold_time / self.settings.time_step).ceil() as usize;
             for _ in 0..steps {
-                let change = self.drive.change(simulation, pace, grip);
-                simulation.advance(&change, Some(gravity))?;
+                simulation.close(Some(gravity))?;
                 let (distance, angle) = self.moved(&start, &simulation.t_hand_object())?;
                 drift = distance.max(drift);
                 turn = angle.max(turn);
@@ -231,7 +244,7 @@ impl<'a> Grasper<'a> {
         from: &Isometry3<f64>,
         to: &Isometry3<f64>,
     ) -> Result<(f64, f64), GraspError> {
-        let center: Point3<f64> = *self.setup.body.com();
+        let center: Point3<f64> = *self.body.com();
         let (distance, angle) =
             ((to * center - from * center).norm(), from.rotation.angle_to(&to.rotation));
         let stays = distance <= self.settings.slip_distance && angle <= self.settings.slip_angle;
@@ -244,7 +257,7 @@ impl<'a> Grasper<'a> {
 
     /// Links that touch, if they are enough.
     fn check_links(&self, simulation: &Simulation<'_>) -> Result<Vec<usize>, GraspError> {
-        let mut forces = vec![0.0; simulation.poses().len()];
+        let mut forces = vec![0.0; simulation.poses.len()];
         for touch in simulation.touches() {
             forces[touch.link] += touch.force.norm();
         }
@@ -256,12 +269,9 @@ impl<'a> Grasper<'a> {
     }
 
     /// Contact area \[cm²\] and shared volume \[cm³\], within their bounds.
-    fn measure(
-        &self,
-        joints: &[f64],
-        t_hand_object: &Isometry3<f64>,
-    ) -> Result<(f64, f64), GraspError> {
-        let hand = self.setup.robot.posed(&Isometry3::identity(), joints)?;
+    fn measure(&self, simulation: &Simulation<'_>) -> Result<(f64, f64), GraspError> {
+        let t_hand_object = &simulation.t_hand_object();
+        let hand = self.robot.posed(&Isometry3::identity(), &simulation.joints)?;
         let hand = SolidUnion::new(&hand.mesh_parts())?;
         let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
         if volume > self.settings.intersection_volume {

@@ -5,9 +5,8 @@ use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::PosedRobot;
 
 use super::error::GraspError;
-use super::preshape::Preshape;
-use super::settings::GraspSettings;
-use crate::scene::{Hand, Object};
+use super::grasper::Grasper;
+use crate::scene::Object;
 
 /// Points of the object that must stay clear of the hand.
 const PROBES: usize = 600;
@@ -55,11 +54,10 @@ impl Placement {
     /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
     pub(super) fn draw(
         &self,
-        robot: &Hand,
-        preshape: &Preshape,
-        settings: &GraspSettings,
+        grasper: &Grasper<'_>,
         random: &mut SplitMix64,
     ) -> Result<(Vec<f64>, Isometry3<f64>), GraspError> {
+        let Grasper { robot, preshape, settings, .. } = grasper;
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
             let both_ways = |random: &mut SplitMix64| 2.0 * random.uniform() - 1.0;

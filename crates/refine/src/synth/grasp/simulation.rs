@@ -8,11 +8,11 @@ use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
     BackwardEuler, Body, BodyId, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
-    GapSmoothing, Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Step,
-    SubStepped, Surface, World,
+    GapSmoothing, Integrator, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface,
+    World,
 };
 
-use crate::scene::Hand;
+use super::grasper::Grasper;
 
 /// Samples farther from the hand than this are left out until something has moved \[m\]. Links' grids reach farther.
 const NEAR: f64 = 10e-3;
@@ -23,21 +23,6 @@ const MOVED: f64 = 7e-3;
 const PARTS: usize = 8;
 /// Parts at most where steps are explicit.
 const EXPLICIT_PARTS: usize = 1 << 12;
-
-/// Setup that all simulations of an object in a hand share.
-pub(super) struct Setup<'a> {
-    pub(super) robot: &'a Hand,
-    pub(super) body: RigidBody,
-    /// Samples of its surface, object frame \[m\], and the area that each stands for \[m²\].
-    pub(super) samples: Vec<Point3<f64>>,
-    pub(super) area: f64,
-    pub(super) law: Arc<dyn DynContactLaw>,
-    /// Law with softer friction, for steps that cannot be solved otherwise.
-    pub(super) soft_law: Arc<dyn DynContactLaw>,
-    pub(super) time_step: f64,
-    /// Time in which a floating object loses its speed \[s\].
-    pub(super) damping_time: f64,
-}
 
 /// A sample of the object's surface in contact with a link.
 #[derive(Clone, Copy, Debug)]
@@ -55,15 +40,20 @@ pub(super) struct Touch {
 
 /// One hand and one object, at one moment.
 pub(super) struct Simulation<'a> {
-    setup: &'a Setup<'a>,
+    pub(super) grasper: &'a Grasper<'a>,
     world: World,
     /// States of the world's bodies.
     states: Vec<State>,
     object: BodyId,
     /// Links with a shape, in the order of their bodies.
     links: Vec<Solid>,
-    joints: Vec<f64>,
-    poses: Vec<Isometry3<f64>>,
+    pub(super) joints: Vec<f64>,
+    /// Pose of every link, hand frame.
+    pub(super) poses: Vec<Isometry3<f64>>,
+    /// Factors on the speeds of the joints that close.
+    pub(super) pace: Vec<f64>,
+    /// Force at which fingers stop at the mean lever \[N\].
+    pub(super) grip: f64,
     steps: usize,
 }
 
@@ -79,11 +69,12 @@ struct Solid {
 impl<'a> Simulation<'a> {
     /// Hand and object at rest.
     pub(super) fn new(
-        setup: &'a Setup<'a>,
+        grasper: &'a Grasper<'a>,
         joints: &[f64],
         t_hand_object: &Isometry3<f64>,
+        grip: f64,
     ) -> Result<Self, SimulationError> {
-        let robot = setup.robot;
+        let Grasper { robot, body: rigid, .. } = grasper;
         let poses = robot.tree.forward_kinematics(joints);
         let mut world = World::new(Vector3::zeros());
         let (mut links, mut fields, mut states) = (Vec::new(), Vec::new(), Vec::new());
@@ -101,29 +92,30 @@ impl<'a> Simulation<'a> {
             let (shape, corners) = (shape.clone(), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
         }
-        let object = world.add(Body::dynamic("object", setup.body));
-        states.push(setup.body.at_rest(t_hand_object));
-        let joints = joints.to_vec();
-        let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
+        let object = world.add(Body::dynamic("object", *rigid));
+        states.push(rigid.at_rest(t_hand_object));
+        let mut new = Self {
+            grasper,
+            world,
+            states,
+            object,
+            links,
+            joints: joints.to_vec(),
+            poses,
+            pace: vec![1.0; joints.len()],
+            grip,
+            steps: 0,
+        };
         new.update_broad_phase()?;
         for field in fields {
             let bodies = ContactBodies { samples: object, field };
-            new.world.add_contact(bodies, Arc::clone(&setup.law), GapSmoothing::Hard)?;
+            new.world.add_contact(bodies, Arc::clone(&grasper.law), GapSmoothing::Hard)?;
         }
         Ok(new)
     }
 
-    pub(super) fn joints(&self) -> &[f64] {
-        &self.joints
-    }
-
-    /// Pose of every link, hand frame.
-    pub(super) fn poses(&self) -> &[Isometry3<f64>] {
-        &self.poses
-    }
-
     pub(super) fn t_hand_object(&self) -> Isometry3<f64> {
-        self.setup.body.model_pose(&self.states[self.object].pose)
+        self.grasper.body.model_pose(&self.states[self.object].pose)
     }
 
     /// Speed of the object's center of mass \[m/s\] and its angular speed \[rad/s\].
@@ -138,9 +130,10 @@ impl<'a> Simulation<'a> {
         change: &[f64],
         gravity: Option<Vector3<f64>>,
     ) -> Result<(), SimulationError> {
-        let dt = self.setup.time_step;
+        let Grasper { robot, body: rigid, settings, .. } = self.grasper;
+        let dt = settings.time_step;
         self.joints.iter_mut().zip(change).for_each(|(q, d)| *q += d);
-        let poses = self.setup.robot.tree.forward_kinematics(&self.joints);
+        let poses = robot.tree.forward_kinematics(&self.joints);
         for (body, solid) in self.links.iter().enumerate() {
             let (from, to) = (&self.poses[solid.link], &poses[solid.link]);
             let turn = so3_log(&(to.rotation * from.rotation.inverse()));
@@ -155,9 +148,9 @@ impl<'a> Simulation<'a> {
         let mut load = Vector6::zeros();
         self.world.gravity = gravity.unwrap_or_default();
         if gravity.is_none() {
-            let rate = 1.0 / (self.setup.damping_time + dt);
-            let inertia = self.setup.body.world_inertia(&state.pose.rotation);
-            let drag = state.linear * (-rate * self.setup.body.mass());
+            let rate = 1.0 / (settings.damping_time + dt);
+            let inertia = rigid.world_inertia(&state.pose.rotation);
+            let drag = state.linear * (-rate * rigid.mass());
             load.fixed_rows_mut::<3>(0).copy_from(&drag);
             load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
         }
@@ -171,19 +164,19 @@ impl<'a> Simulation<'a> {
     /// The states one time step later: by the implicit equations as they are, or else with softer friction, or else by
     /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
     fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
-        let setup = self.setup;
-        let step = Step::new(self.steps, setup.time_step);
+        let grasper = self.grasper;
+        let step = Step::new(self.steps, grasper.settings.time_step);
         let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };
         let explicit = SubStepped { integrator: SemiImplicitEuler, max_substeps: EXPLICIT_PARTS };
         let unsolved = |done: &Result<_, _>| matches!(done, Err(SimulationError::Unsolved { .. }));
         let mut done = implicit.step(&self.world, &self.states, step);
         if unsolved(&done) {
-            self.set_friction_law(&setup.soft_law);
+            self.set_friction_law(&grasper.soft_law);
             done = implicit.step(&self.world, &self.states, step);
             if unsolved(&done) {
                 done = explicit.step(&self.world, &self.states, step);
             }
-            self.set_friction_law(&setup.law);
+            self.set_friction_law(&grasper.law);
         }
         done
     }
@@ -214,12 +207,12 @@ impl<'a> Simulation<'a> {
                 local.is_some_and(|local| solid.shape.distance(&local, NEAR).is_some())
             })
         };
-        let mut kept: Vec<_> = self.setup.samples.iter().filter(near).copied().collect();
+        let mut kept: Vec<_> = self.grasper.samples.iter().filter(near).copied().collect();
         // A surface must not be empty.
         if kept.is_empty() {
-            kept.extend(self.setup.samples.first());
+            kept.extend(self.grasper.samples.first());
         }
-        let surface = Surface::new(&kept, &vec![self.setup.area; kept.len()])
+        let surface = Surface::new(&kept, &vec![self.grasper.area; kept.len()])
             .map_err(|error| BuildError::Body { body: "object".to_owned(), error })?;
         self.world.bodies[self.object].surface = Some(Arc::new(surface));
         Ok(())
@@ -231,7 +224,7 @@ impl<'a> Simulation<'a> {
         let t_hand_object = self.t_hand_object();
         let mut touches = Vec::new();
         let Some(surface) = &self.world.bodies[self.object].surface else { return touches };
-        let law = &self.setup.law;
+        let law = &self.grasper.law;
         let stiffness = law.params()[0];
         for sample in surface.points() {
             let point = t_hand_object * sample.position;

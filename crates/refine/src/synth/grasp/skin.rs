@@ -4,54 +4,38 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::Taxel;
 
 use super::simulation::Touch;
-use crate::error::RefineError;
-use crate::scene::Hand;
 
-/// The taxels of a hand by link.
-pub(super) struct Skin<'a> {
-    taxels: &'a [Taxel],
-    /// Places in `taxels`.
-    by_link: Vec<Vec<usize>>,
+/// Force of the object on each taxel, in the frame of its link \[N\]; `links` are those of the taxels, `poses` those of all links.
+///
+/// Each contact spreads over the taxels of its link within `reach` r \[m\], by weights (1 − (d/r)²)²·(n·n_t)⁺ that sum to one;
+/// d is the distance, n the normal of the contact and n_t that of the taxel. Where there is none it is not felt.
+pub(super) fn taxel_forces(
+    taxels: &[Taxel],
+    links: &[usize],
     reach: f64,
-}
-
-impl<'a> Skin<'a> {
-    pub(super) fn new(robot: &'a Hand, reach: f64) -> Result<Self, RefineError> {
-        let mut by_link = vec![Vec::new(); robot.tree.links().len()];
-        for (number, taxel) in robot.taxels.iter().enumerate() {
-            by_link[robot.link_of(taxel)?].push(number);
+    touches: &[Touch],
+    poses: &[Isometry3<f64>],
+) -> Vec<Vector3<f64>> {
+    let mut forces = vec![Vector3::zeros(); taxels.len()];
+    for touch in touches {
+        let pose = &poses[touch.link];
+        let point = pose.inverse_transform_point(&touch.point);
+        let normal = pose.rotation.inverse() * touch.normal;
+        let weight = |number: usize| {
+            let taxel = &taxels[number];
+            let nearness = 1.0 - (taxel.position - point).norm_squared() / (reach * reach);
+            let facing = taxel.normal.dot(&normal);
+            let felt = links[number] == touch.link && nearness > 0.0 && facing > 0.0;
+            felt.then_some((number, nearness * nearness * facing))
+        };
+        let weights: Vec<(usize, f64)> = (0..taxels.len()).filter_map(weight).collect();
+        let sum: f64 = weights.iter().map(|(_, w)| w).sum();
+        let force = pose.rotation.inverse() * -touch.force;
+        for (number, weight) in weights {
+            forces[number] += force * (weight / sum);
         }
-        Ok(Self { taxels: &robot.taxels, by_link, reach })
     }
-
-    /// Force of the object on each taxel, in the frame of its link \[N\].
-    ///
-    /// Each contact spreads over the taxels of its link within reach r, by weights (1 − (d/r)²)²·(n·n_t)⁺ that sum to one;
-    /// d is the distance, n the normal of the contact and n_t that of the taxel. Where there is none it is not felt.
-    pub(super) fn forces(&self, touches: &[Touch], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
-        let mut forces = vec![Vector3::zeros(); self.taxels.len()];
-        for touch in touches {
-            let pose = &poses[touch.link];
-            let point = pose.inverse_transform_point(&touch.point);
-            let normal = pose.rotation.inverse() * touch.normal;
-            let weight = |&number: &usize| {
-                let taxel = &self.taxels[number];
-                let squared = (taxel.position - point).norm_squared();
-                let nearness = 1.0 - squared / (self.reach * self.reach);
-                let facing = taxel.normal.dot(&normal);
-                let felt = nearness > 0.0 && facing > 0.0;
-                felt.then_some((number, nearness * nearness * facing))
-            };
-            let near = self.by_link[touch.link].iter();
-            let weights: Vec<(usize, f64)> = near.filter_map(weight).collect();
-            let sum: f64 = weights.iter().map(|(_, w)| w).sum();
-            let force = pose.rotation.inverse() * -touch.force;
-            for (number, weight) in weights {
-                forces[number] += force * (weight / sum);
-            }
-        }
-        forces
-    }
+    forces
 }
 
 #[cfg(test)]
@@ -60,12 +44,15 @@ mod tests {
     use prehend_geometry::robot::KinematicTree as Tree;
 
     use super::*;
+    use crate::scene::Hand;
 
     #[test]
     fn contacts_on_pads_are_felt_whole_and_others_not_at_all() {
         let tree = Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
         let robot = Hand::new(tree, taxels()).unwrap();
-        let skin = Skin::new(&robot, 8e-3).unwrap();
+        let links: Vec<usize> = robot.taxels.iter().map(|t| robot.link_of(t).unwrap()).collect();
+        let forces =
+            |touch: Touch, poses: &[_]| taxel_forces(&robot.taxels, &links, 8e-3, &[touch], poses);
         let poses = robot.tree.forward_kinematics(&[0.3; 16]);
         let link = robot.tree.link_index("link_2.0").unwrap();
         let t = &poses[link];
@@ -77,14 +64,14 @@ mod tests {
             force: t.rotation * Vector3::new(1.0, 0.2, -0.3),
             stiffness: 1.0,
         };
-        let felt = skin.forces(&[touch(1e-3, taxel.normal)], &poses);
+        let felt = forces(touch(1e-3, taxel.normal), &poses);
         let sum: Vector3<f64> = felt.iter().sum();
         assert!((sum - Vector3::new(-1.0, -0.2, 0.3)).norm() < 1e-12);
         assert!(felt.iter().filter(|f| f.norm() > 0.0).count() > 3);
         let largest = (0..368).max_by(|&a, &b| felt[a].norm().total_cmp(&felt[b].norm()));
         assert_eq!(largest, Some(taxel.index));
         for unfelt in [touch(9e-3, taxel.normal), touch(0.0, -taxel.normal)] {
-            assert!(skin.forces(&[unfelt], &poses).iter().all(|f| *f == Vector3::zeros()));
+            assert!(forces(unfelt, &poses).iter().all(|f| *f == Vector3::zeros()));
         }
     }
 }

@@ -6,6 +6,7 @@ use prehend_geometry::SplitMix64;
 use super::error::GraspError;
 use super::grasper::{Grasp, Grasper};
 use super::simulation::Simulation;
+use super::skin::taxel_forces;
 use crate::synth::pose_noise::random_direction;
 
 /// One moment of an object held in a hand, as it truly is.
@@ -67,8 +68,8 @@ impl Grasper<'_> {
         let settings = &self.settings;
         let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(random));
         let squeezing = Waves::new(random);
-        let mut simulation = Simulation::new(&self.setup, &grasp.joints, &grasp.t_hand_object)?;
-        let pace = vec![1.0; grasp.joints.len()];
+        let Grasp { joints, t_hand_object, grip, .. } = grasp;
+        let mut simulation = Simulation::new(self, joints, t_hand_object, *grip)?;
         let dt = settings.time_step;
         let inner = (settings.frame_time / dt).round().max(1.0) as usize;
         let settling = (SETTLING / dt).ceil() as usize;
@@ -83,10 +84,9 @@ impl Grasper<'_> {
             let wave = squeezing.at(time) / Waves::LARGEST;
             let slipping =
                 step >= settling && slips.at(moments.len(), &simulation, settings.time_step);
-            let grip = grasp.grip * (1.0 + settings.squeeze * wave.max(0.0));
-            let grip = if slipping { LOOSE * grip } else { grip };
-            let change = self.drive.change(&simulation, &pace, grip);
-            simulation.advance(&change, Some(gravity))?;
+            let squeezed = grip * (1.0 + settings.squeeze * wave.max(0.0));
+            simulation.grip = if slipping { LOOSE * squeezed } else { squeezed };
+            simulation.close(Some(gravity))?;
             if step < settling {
                 continue;
             }
@@ -100,16 +100,22 @@ impl Grasper<'_> {
             if (step - settling).is_multiple_of(inner) && moments.len() < steps {
                 moments.push(GraspSnapshot {
                     t_hand_object,
-                    joints: simulation.joints().to_vec(),
+                    joints: simulation.joints.clone(),
                     gravity,
                     turn,
-                    taxel_forces: self.skin.forces(&simulation.touches(), simulation.poses()),
+                    taxel_forces: self.taxel_forces(&simulation),
                 });
             }
             let rate = Vector3::from_fn(|i, _| per_axis * turning[i].at(time));
             turn *= UnitQuaternion::from_scaled_axis(rate * dt);
         }
         Ok(moments)
+    }
+
+    /// Force of the object on each taxel, in the frame of its link \[N\].
+    fn taxel_forces(&self, simulation: &Simulation<'_>) -> Vec<Vector3<f64>> {
+        let (taxels, reach) = (&self.robot.taxels, self.settings.taxel_reach);
+        taxel_forces(taxels, &self.taxel_links, reach, &simulation.touches(), &simulation.poses)
     }
 }
 

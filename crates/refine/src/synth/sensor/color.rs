@@ -21,22 +21,18 @@ impl ColorSettings {
         noise: &mut SplitMix64,
     ) -> RgbImage {
         let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.uniform()));
-        for pixel in picture.pixels_mut() {
-            (0..3).for_each(|c| pixel[c] = (gain[c] * pixel[c]).min(1.0));
-        }
-        self.add_noise(&mut picture, noise);
-        picture
-    }
-
-    /// Adds noise to each channel, whose variance grows with its brightness.
-    pub(crate) fn add_noise(&self, picture: &mut RgbImage, noise: &mut SplitMix64) {
         let (dark, shot) = ((self.noise * self.noise) as f32, self.shot_noise as f32);
         let noisy = dark > 0.0 || shot > 0.0;
-        for level in picture.pixels_mut().iter_mut().flatten() {
-            let spread = (dark + shot * *level).sqrt();
-            let error = if noisy { spread * noise.normal() as f32 } else { 0.0 };
-            *level = (*level + error).clamp(0.0, 1.0);
+        for pixel in picture.pixels_mut() {
+            for (level, gain) in pixel.iter_mut().zip(gain) {
+                let exposed = (gain * *level).min(1.0);
+                // The variance grows with brightness.
+                let spread = (dark + shot * exposed).sqrt();
+                let error = if noisy { spread * noise.normal() as f32 } else { 0.0 };
+                *level = (exposed + error).clamp(0.0, 1.0);
+            }
         }
+        picture
     }
 }
 

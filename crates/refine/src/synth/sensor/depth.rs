@@ -27,36 +27,28 @@ impl DepthSettings {
         let mut depth = self.spread(truth, noise);
         let lost = self.lost(truth, camera, noise);
         self.fly(truth, &mut depth, noise);
-        self.add_noise(&mut depth, |i, z| z * bias.scale + bias.warp[i], noise);
+        let size = (depth.width(), depth.height());
+        let correlated = field(self.correlated_noise, size, self.correlation, noise);
+        // Noise grows with the squared depth.
+        let near = |fault: f64, z: f32| fault as f32 * (z / 0.5) * (z / 0.5);
         let steps = self.disparity_step > 0.0 && self.baseline > 0.0;
         let disparity = (camera.fx * self.baseline) as f32;
         let step = self.disparity_step as f32;
         for (i, z) in depth.pixels_mut().iter_mut().enumerate() {
+            let seen = *z;
+            if seen > 0.0 {
+                *z = seen * bias.scale + bias.warp[i];
+                *z += near(self.correlated_noise, seen) * correlated[i];
+                if self.noise > 0.0 {
+                    *z += near(self.noise, seen) * noise.normal() as f32;
+                }
+            }
             if steps && *z > 0.0 {
                 *z = disparity / (step * (disparity / *z / step).round().max(1.0));
             }
             *z = if lost[i] { 0.0 } else { z.max(0.0) };
         }
         depth
-    }
-
-    /// Adds white and correlated noise, which grow with the squared depth, to the pixels that have a depth once these are `biased`, by index and depth \[m\].
-    pub(crate) fn add_noise(
-        &self,
-        depth: &mut DepthImage,
-        biased: impl Fn(usize, f32) -> f32,
-        noise: &mut SplitMix64,
-    ) {
-        let size = (depth.width(), depth.height());
-        let correlated = field(self.correlated_noise, size, self.correlation, noise);
-        let near = |fault: f64, z: f32| fault as f32 * (z / 0.5) * (z / 0.5);
-        for (i, z) in depth.pixels_mut().iter_mut().enumerate().filter(|(_, z)| **z > 0.0) {
-            let true_z = *z;
-            *z = biased(i, true_z) + near(self.correlated_noise, true_z) * correlated[i];
-            if self.noise > 0.0 {
-                *z += near(self.noise, true_z) * noise.normal() as f32;
-            }
-        }
     }
 
     /// Grows what is near over what is behind, more in some places than in others.

@@ -3,7 +3,7 @@
 use prehend_render::{Camera, Distortion, DistortionError, Remap};
 
 use super::rig::TrueView;
-use super::settings::SensorSettings;
+use crate::synth::plan::SynthSettings;
 
 /// Pixels of the pinhole's image for one of the lens along each axis, which are averaged: a lens may
 /// show things smaller than a pinhole does.
@@ -25,14 +25,9 @@ pub(in crate::synth) struct SimulatedLens {
 }
 
 impl SimulatedLens {
-    /// Lens of the camera of `settings` with images of `width` by `height` pixels; datasets tell of it if it `is_declared`.
-    pub(in crate::synth) fn new(
-        model: Distortion,
-        is_declared: bool,
-        settings: &SensorSettings,
-        (width, height): (usize, usize),
-    ) -> Self {
-        let camera = &settings.viewpoint.camera(width, height);
+    /// Lens of the camera of `settings`.
+    pub(in crate::synth) fn new(model: Distortion, settings: &SynthSettings) -> Self {
+        let (camera, is_declared) = (&settings.camera(), !settings.undeclared_lens);
         let background = model.pinhole_that_covers(camera, WIDEST);
         let pinhole = background.scaled(FINE as f64);
         let color = Remap::distort(pinhole, camera.scaled(FINE as f64), &model);

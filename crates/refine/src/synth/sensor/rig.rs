@@ -22,6 +22,7 @@ use crate::scene::{Frame, Hand, Object};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
+use crate::synth::plan::SynthSettings;
 
 /// Sensors with the faults that stay the same through a grasp.
 pub(in crate::synth) struct SensorRig<'a> {
@@ -55,16 +56,15 @@ const GRID: usize = 20;
 const SAMPLES: usize = 3;
 
 impl<'a> SensorRig<'a> {
-    /// Sensors of `width` by `height` pixels, the camera behind a lens if there is one; `noise` decides their faults.
+    /// Sensors of a dataset, the camera behind a lens if there is one; `noise` decides their faults.
     pub(in crate::synth) fn new(
-        settings: &'a SensorSettings,
+        settings: &'a SynthSettings,
         object: &'a Object,
         robot: &'a Arc<Hand>,
-        (width, height): (usize, usize),
         lens: Option<&'a SimulatedLens>,
         noise: &mut SplitMix64,
     ) -> Self {
-        let camera = settings.viewpoint.camera(width, height);
+        let (camera, settings) = (settings.camera(), &settings.sensor);
         Self {
             errors: settings.calibration.draw(&slides(robot), noise),
             depth: settings.depth.bias(&camera, noise),

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-use toml::Table;
+use toml::{Table, Value};
 
-use crate::synth::settings::{merge, numbers, preset};
+use crate::settings::merge;
+use crate::synth::settings::{numbers, preset};
 
 /// Settings of all sensor models.
 ///
@@ -247,8 +248,8 @@ impl SensorSettings {
         let wrong =
             |problem: &dyn std::fmt::Display| SettingError(format!("{key}={value}: {problem}"));
         let changes: Table = format!("{key} = {value}").parse().map_err(|_| wrong(&"no number"))?;
-        let mut all = Table::try_from(&*self).map_err(|error| wrong(&error))?;
-        merge(&mut all, changes);
+        let mut all = Value::try_from(&*self).map_err(|error| wrong(&error))?;
+        merge(&mut all, changes.into());
         let changed: Self = all.try_into().map_err(|error| wrong(&error))?;
         for (name, number) in changed.names() {
             if !(number.is_finite() && number >= 0.0) {

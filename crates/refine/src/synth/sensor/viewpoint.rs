@@ -8,7 +8,7 @@ use super::settings::ViewpointSettings;
 
 impl ViewpointSettings {
     /// The true camera of an image of that size.
-    pub(super) fn camera(&self, width: usize, height: usize) -> Camera {
+    pub(in crate::synth) fn camera(&self, width: usize, height: usize) -> Camera {
         let focal = self.focal_width_ratio * width as f64;
         let (cx, cy) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
         Camera { fx: focal, fy: focal, cx, cy, width, height }

@@ -141,7 +141,6 @@ impl MethodOptions {
             match &mut method {
                 Method::Heuristic(heuristic) => heuristic.checkpoint = false,
                 Method::Icp(icp) => icp.checkpoint = false,
-                Method::RobustIcp(_) => {}
                 Method::Fused(_) => {
                     bail!("--no-checkpoint: the method {name} returns its last pose anyway")
                 }

@@ -1,6 +1,7 @@
 //! What the page's scripts read: plain data, which becomes JSON.
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::frame::FrameReport;
 use super::scene::{EncodedHand, EncodedMesh};
@@ -10,7 +11,9 @@ use super::scene::{EncodedHand, EncodedMesh};
 pub(super) struct Document {
     pub(super) title: String,
     pub(super) facts: Vec<[String; 2]>,
-    pub(super) blocks: Vec<Block>,
+    pub(super) charts: Vec<Chart>,
+    /// Tables and pictures, each of the `kind` that the scripts know it by.
+    pub(super) blocks: Vec<Value>,
     /// Those that a frame has a figure for, in their order there.
     pub(super) columns: Vec<Column>,
     pub(super) frames: Vec<FrameReport>,
@@ -19,30 +22,7 @@ pub(super) struct Document {
     pub(super) hands: Vec<EncodedHand>,
 }
 
-/// A part of a page.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub(super) enum Block {
-    Table {
-        title: String,
-        headings: Vec<String>,
-        rows: Vec<Vec<String>>,
-    },
-    /// Pictures are `data:` URIs.
-    Picture {
-        title: String,
-        remarks: Vec<String>,
-        picture: String,
-    },
-    /// Two pictures of the same, over each other.
-    Comparison {
-        title: String,
-        pictures: [LabeledPicture; 2],
-    },
-    Chart(Chart),
-}
-
-/// A picture and what it shows.
+/// A picture, a `data:` URI, and what it shows.
 #[derive(Serialize)]
 pub(super) struct LabeledPicture {
     pub(super) label: String,

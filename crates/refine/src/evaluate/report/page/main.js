@@ -1,7 +1,6 @@
 // Puts the page together.
 
 function drawBlock(block) {
-  if (block.kind === "chart") return drawChart(block);
   const heading = el("h2", {}, block.title);
   if (block.kind === "comparison") return el("section.card", {}, heading, drawSlider(block.pictures));
   if (block.kind === "picture") {
@@ -34,9 +33,8 @@ function start() {
   document.title = `${data.title} – Prehend`;
   byId("title").textContent = data.title;
   byId("facts").append(...data.facts.map(([what, value]) => el("div", {}, el("dt", {}, what), el("dd", {}, value))));
-  const [charts, others] = [true, false].map((is) => data.blocks.filter((b) => (b.kind === "chart") === is));
-  if (charts.length) byId("blocks").append(el("div.cards", {}, ...charts.map(drawBlock)));
-  byId("blocks").append(...others.map(drawBlock));
+  if (data.charts.length) byId("blocks").append(el("div.cards", {}, ...data.charts.map(drawChart)));
+  byId("blocks").append(...data.blocks.map(drawBlock));
   const toggleTheme = theme();
   byId("theme").addEventListener("click", toggleTheme);
   const help = byId("help");

@@ -36,10 +36,8 @@ const columns = (m) => new Float32Array([m[0], m[4], m[8], 0, m[1], m[5], m[9], 
 const IDENTITY = columns([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]);
 
 function decodeMesh(mesh) {
-  const parts = new Uint16Array(bytesOf(mesh.positions).buffer);
-  const positions = Float32Array.from(parts, (part, k) => mesh.low[k % 3] + (part / 65535) * mesh.size[k % 3]);
   const colors = Float32Array.from(bytesOf(mesh.colors), (c) => c / 255);
-  return { positions, colors, faces: new Uint16Array(bytesOf(mesh.faces).buffer) };
+  return { positions: new Float32Array(bytesOf(mesh.positions).buffer), colors, faces: new Uint16Array(bytesOf(mesh.faces).buffer) };
 }
 
 /** A sphere of radius one. */

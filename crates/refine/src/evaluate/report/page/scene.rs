@@ -18,12 +18,9 @@ const HAND_VERTICES: usize = 12_000;
 /// Unit of encoded distances \[m\]; a byte reaches 127 of them.
 const DISTANCE_UNIT: f64 = 1e-4;
 
-/// A mesh with numbers as base64: positions as 16-bit parts of the bounding box, colors as bytes, vertices of faces in 16 bits, all little-endian.
+/// A mesh with numbers as base64: positions in 32 bits \[m\], colors as bytes, vertices of faces in 16 bits, all little-endian.
 #[derive(Serialize)]
 pub(super) struct EncodedMesh {
-    /// Lowest corner, and sides \[m\].
-    low: [f32; 3],
-    size: [f32; 3],
     positions: String,
     colors: String,
     faces: String,
@@ -32,19 +29,11 @@ pub(super) struct EncodedMesh {
 impl EncodedMesh {
     /// Of a mesh of fewer than 65 536 vertices, with colors.
     fn new(mesh: &TriMesh) -> Self {
-        let (low, high) = mesh.bounds().unwrap_or_default();
-        let size = high - low;
-        let part = |v: &Point3<f64>, k: usize| {
-            let part = if size[k] > 0.0 { (v[k] - low[k]) / size[k] } else { 0.0 };
-            (part * f64::from(u16::MAX)).round() as u16
-        };
-        let positions = mesh.vertices.iter().flat_map(|v| [0, 1, 2].map(|k| part(v, k)));
+        let positions = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z].map(|c| c as f32));
         let colors = mesh.colors.iter().flatten().flatten().map(|c| (c * 255.0).round() as u8);
         let faces = mesh.faces.iter().flatten().map(|v| *v as u16);
         Self {
-            low: low.coords.cast().into(),
-            size: size.cast().into(),
-            positions: STANDARD.encode(positions.flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
+            positions: STANDARD.encode(positions.flat_map(f32::to_le_bytes).collect::<Vec<_>>()),
             colors: STANDARD.encode(colors.collect::<Vec<_>>()),
             faces: STANDARD.encode(faces.flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
         }
@@ -196,14 +185,13 @@ mod tests {
     }
 
     #[test]
-    fn positions_are_parts_of_the_bounding_box() {
-        let vertices = vec![Point3::new(-1.0, 0.0, 0.0), Point3::new(3.0, 0.0, 0.0)];
-        let mesh =
-            TriMesh { colors: Some(vec![[0.0, 1.0, 0.5]; 2]), ..TriMesh::new(vertices, vec![]) };
-        let encoded = EncodedMesh::new(&mesh);
-        assert_eq!((encoded.low, encoded.size), ([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0]));
+    fn meshes_are_encoded_as_the_scripts_read_them() {
+        let (vertices, faces) = (vec![Point3::new(-1.0, 0.0, 2.0); 3], vec![[0, 1, 2]]);
+        let colors = Some(vec![[0.0, 1.0, 0.5]; 3]);
+        let encoded = EncodedMesh::new(&TriMesh { colors, ..TriMesh::new(vertices, faces) });
         let bytes = STANDARD.decode(encoded.positions).unwrap();
-        assert_eq!(bytes, [0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 0, 0]);
-        assert_eq!(STANDARD.decode(encoded.colors).unwrap(), [0, 255, 128, 0, 255, 128]);
+        assert_eq!((bytes.len(), &bytes[8..12]), (36, &2f32.to_le_bytes()[..]));
+        assert_eq!(STANDARD.decode(encoded.colors).unwrap()[..3], [0, 255, 128]);
+        assert_eq!(STANDARD.decode(encoded.faces).unwrap(), [0, 0, 1, 0, 2, 0]);
     }
 }

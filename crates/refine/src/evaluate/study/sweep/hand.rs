@@ -3,35 +3,31 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use crate::scene::{Frame, HandMeasurement};
+use crate::scene::HandMeasurement;
+use crate::synth::random_direction;
 
 /// Shifts the hand by `distance` \[m\].
-pub(super) fn shift(observation: &mut Frame, distance: f64, random: &mut SplitMix64) {
-    let shift = Translation3::from(distance * direction(random));
-    if let Some(hand) = &mut observation.hand {
-        hand.t_cam_hand = shift * hand.t_cam_hand;
-    }
+pub(super) fn shift(hand: &mut HandMeasurement, distance: f64, random: &mut SplitMix64) {
+    hand.t_cam_hand = Translation3::from(distance * random_direction(random)) * hand.t_cam_hand;
 }
 
 /// Turns the hand by `angle` \[rad\] about its base.
-pub(super) fn turn(observation: &mut Frame, angle: f64, random: &mut SplitMix64) {
-    let turn = UnitQuaternion::new(angle * direction(random));
-    if let Some(hand) = &mut observation.hand {
-        let Isometry3 { rotation, translation } = hand.t_cam_hand;
-        hand.t_cam_hand = Isometry3::from_parts(translation, turn * rotation);
-    }
+pub(super) fn turn(hand: &mut HandMeasurement, angle: f64, random: &mut SplitMix64) {
+    let turn = UnitQuaternion::new(angle * random_direction(random));
+    let Isometry3 { rotation, translation } = hand.t_cam_hand;
+    hand.t_cam_hand = Isometry3::from_parts(translation, turn * rotation);
 }
 
 /// Moves every joint by `angle` \[rad\], one way or the other.
-pub(super) fn bend(observation: &mut Frame, angle: f64, random: &mut SplitMix64) {
-    for joint in observation.hand.iter_mut().flat_map(|hand| &mut hand.joints) {
+pub(super) fn bend(hand: &mut HandMeasurement, angle: f64, random: &mut SplitMix64) {
+    for joint in &mut hand.joints {
         *joint += if random.uniform() < 0.5 { angle } else { -angle };
     }
 }
 
 /// A share of the taxels feels nothing.
-pub(super) fn silence(observation: &mut Frame, share: f64, random: &mut SplitMix64) {
-    for force in observation.hand.iter_mut().flat_map(|hand| &mut hand.forces) {
+pub(super) fn silence(hand: &mut HandMeasurement, share: f64, random: &mut SplitMix64) {
+    for force in &mut hand.forces {
         if random.uniform() < share && !HandMeasurement::is_unknown(force) {
             *force = Vector3::zeros();
         }
@@ -39,35 +35,30 @@ pub(super) fn silence(observation: &mut Frame, share: f64, random: &mut SplitMix
 }
 
 /// A share of the taxels feels forces that are not there, in any direction and on average as large as those that are.
-pub(super) fn invent(observation: &mut Frame, share: f64, random: &mut SplitMix64) {
-    let Some(hand) = &mut observation.hand else { return };
+pub(super) fn invent(hand: &mut HandMeasurement, share: f64, random: &mut SplitMix64) {
     let sizes: Vec<f64> = hand.forces.iter().map(|f| f.norm()).filter(|&f| f > 0.0).collect();
     let mean = if sizes.is_empty() { 1.0 } else { sizes.iter().sum::<f64>() / sizes.len() as f64 };
     for force in &mut hand.forces {
         let (chosen, size) = (random.uniform() < share, -mean * (1.0 - random.uniform()).ln());
-        let invented = size * direction(random);
+        let invented = size * random_direction(random);
         if chosen {
             *force = invented;
         }
     }
 }
 
-/// Any direction, none more likely than another.
-fn direction(random: &mut SplitMix64) -> Vector3<f64> {
-    let drawn = Vector3::from_fn(|_, _| random.normal());
-    drawn.try_normalize(0.0).unwrap_or_else(Vector3::x)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tests::square;
     use super::*;
-    use crate::scene::HandMeasurement;
 
-    fn after(change: fn(&mut Frame, f64, &mut SplitMix64), amount: f64) -> HandMeasurement {
-        let mut observation = square();
-        change(&mut observation, amount, &mut SplitMix64::new(8));
-        observation.hand.unwrap()
+    fn after(
+        change: fn(&mut HandMeasurement, f64, &mut SplitMix64),
+        amount: f64,
+    ) -> HandMeasurement {
+        let mut hand = square().hand.unwrap();
+        change(&mut hand, amount, &mut SplitMix64::new(8));
+        hand
     }
 
     #[test]

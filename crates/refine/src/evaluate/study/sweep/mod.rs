@@ -67,23 +67,26 @@ impl Sweep {
         }
         let amount = f64::from(amount);
         let mut random = SplitMix64::new(seed);
-        let random = &mut random;
-        let share = 1e-2 * amount;
-        match self {
-            Self::DepthNoise => image::add_depth_noise(&mut observation.depth, amount, random),
-            Self::ColorNoise => image::add_color_noise(&mut observation.color, amount, random),
-            Self::Visibility => occlusion::block(observation, share, random),
-            Self::HandPosition => hand::shift(observation, 1e-3 * amount, random),
-            Self::HandRotation => hand::turn(observation, amount.to_radians(), random),
-            Self::Joints => hand::bend(observation, amount.to_radians(), random),
-            Self::DeadTaxels => hand::silence(observation, share, random),
-            Self::FalseTaxels => hand::invent(observation, share, random),
-            Self::MissingDepth => image::lose_depth(&mut observation.depth, share, random),
-            Self::MissingColor => image::lose_color(&mut observation.color, share, random),
-            Self::MissingTouch => {
-                observation.hand.iter_mut().for_each(|hand| hand.forces.clear());
+        let (random, share) = (&mut random, 1e-2 * amount);
+        let Frame { color, depth, .. } = observation;
+        let width = depth.width();
+        match (self, &mut observation.hand) {
+            (Self::DepthNoise, _) => image::add_depth_noise(depth, amount, random),
+            (Self::ColorNoise, _) => image::add_color_noise(color, amount, random),
+            (Self::Visibility, _) => occlusion::block(observation, share, random),
+            (Self::MissingDepth, _) => image::lose(depth.pixels_mut(), width, 0.0, share, random),
+            // Gray.
+            (Self::MissingColor, _) => {
+                image::lose(color.pixels_mut(), width, [0.5; 3], share, random);
             }
-            Self::MissingHand => observation.hand = None,
+            (_, None) => {}
+            (Self::HandPosition, Some(hand)) => hand::shift(hand, 1e-3 * amount, random),
+            (Self::HandRotation, Some(hand)) => hand::turn(hand, amount.to_radians(), random),
+            (Self::Joints, Some(hand)) => hand::bend(hand, amount.to_radians(), random),
+            (Self::DeadTaxels, Some(hand)) => hand::silence(hand, share, random),
+            (Self::FalseTaxels, Some(hand)) => hand::invent(hand, share, random),
+            (Self::MissingTouch, Some(hand)) => hand.forces.clear(),
+            (Self::MissingHand, Some(_)) => observation.hand = None,
         }
     }
 
