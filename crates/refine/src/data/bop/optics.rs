@@ -122,8 +122,8 @@ impl Optics<'_> {
         self.undistorted(file, stored, size, Remap::rgb)
     }
 
-    /// Reads a depth image, registered to a color image of that size; of the depth image's without one. None when it measures nothing, which the largest
-    /// value of 16 bits is.
+    /// Reads a depth image, registered to a color image of that size; of the depth image's without one. None when it measures nothing; the largest value of
+    /// 16 bits is no measurement.
     ///
     /// # Errors
     /// When it is absent or does not decode.
