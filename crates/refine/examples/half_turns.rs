@@ -67,9 +67,9 @@ fn main() -> anyhow::Result<()> {
     let trial = |&(row, turn): &(&ResultRow, &'static str)| -> anyhow::Result<Outcome> {
         let &ResultRow { scene_id, im_id, obj_id, .. } = row;
         let target = Target { scene_id, im_id, obj_id, instance: 0 };
-        let input = assets.lock().unwrap_or_else(PoisonError::into_inner).load_at(
+        let input = assets.lock().unwrap_or_else(PoisonError::into_inner).load(
             &target,
-            &row.t_cam_model,
+            Some(&row.t_cam_model),
             &[],
         )?;
         let frame = PreparedFrame::new(&input.frame, &input.object)?;

@@ -42,10 +42,10 @@ pub(crate) fn _calibrate(
     let passes = at_least_one(passes, "passes")?;
     let window = window.map(|window| at_least_one(window, "window")).transpose()?;
     let settings = self::settings(settings.as_ref())?.calibration();
-    let source = Arc::clone(&dataset.dataset);
+    // Frames as they are, whatever rig the dataset is read with.
+    let assets = Assets::new(&dataset.dataset, 0);
     let learn = move || -> Result<Calibrated, AssetError> {
-        // Frames as they are, whatever rig the dataset is read with.
-        let mut assets = Assets::owning(source, 0).with_cache(user_cache()).with_optional_masks();
+        let mut assets = assets.with_cache(user_cache()).with_optional_masks();
         let numbers: BTreeSet<u32> = told.iter().map(|(target, _)| target.obj_id).collect();
         let objects: BTreeMap<_, _> = numbers
             .into_iter()

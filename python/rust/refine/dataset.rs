@@ -17,12 +17,12 @@ use crate::threads::detached;
 /// A split of a BOP dataset: `prehend.datasets.Bop` is made of it.
 #[pyclass(frozen, subclass, module = "prehend")]
 pub(crate) struct Dataset {
-    pub(super) dataset: Arc<bop::Dataset>,
-    assets: Mutex<Assets<'static>>,
+    pub(super) dataset: bop::Dataset,
+    assets: Mutex<Assets>,
 }
 
 impl Dataset {
-    pub(super) fn assets(&self) -> MutexGuard<'_, Assets<'static>> {
+    pub(super) fn assets(&self) -> MutexGuard<'_, Assets> {
         self.assets.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -42,11 +42,11 @@ impl Dataset {
             Some(split) => bop::Dataset::open_split(&path, split),
             None => bop::Dataset::open(&path),
         };
-        let dataset = Arc::new(dataset.raise()?);
+        let dataset = dataset.raise()?;
         let detections = detections.map(|file| Detections::load(&file)).transpose().raise()?;
         let masks =
             detections.map_or(MaskSource::Files, |found| MaskSource::Detections(Arc::new(found)));
-        let assets = Assets::owning(Arc::clone(&dataset), seed)
+        let assets = Assets::new(&dataset, seed)
             .with_cache(user_cache())
             .with_masks(masks)
             .with_rig(rig.map(|rig| Arc::clone(&rig.rig)))
@@ -95,7 +95,7 @@ impl Dataset {
     ) -> PyResult<Frame> {
         let target = Target { scene_id: scene, im_id: image, obj_id: object, instance };
         // Python's lock first let go: another thread may wait for it with the assets in hand.
-        let input = detached(py, || self.assets().load(&target, &[]))?.raise()?;
+        let input = detached(py, || self.assets().load(&target, None, &[]))?.raise()?;
         Ok(Frame { input, target: Some(target) })
     }
 

@@ -225,7 +225,7 @@ fn scene(small: &SmallDataset, bytes: &[u8], name: &str) -> Result<()> {
         let target = Target { scene_id: 1, im_id: 0, obj_id: 1, instance: 0 };
         // Distance grids are made once.
         let cache = Some(GridCache::new(small.path("cache")));
-        let input = Assets::new(dataset, 0).with_cache(cache).load(&target, &[])?;
+        let input = Assets::new(dataset, 0).with_cache(cache).load(&target, None, &[])?;
         look(&input, &Isometry3::translation(0.0, 0.0, 0.3))
     })
 }

@@ -59,7 +59,7 @@ fn main() -> anyhow::Result<()> {
     let load = |row: &ResultRow| {
         let &ResultRow { scene_id, im_id, obj_id, .. } = row;
         let target = Target { scene_id, im_id, obj_id, instance: 0 };
-        assets.lock().unwrap_or_else(PoisonError::into_inner).load(&target, &[])
+        assets.lock().unwrap_or_else(PoisonError::into_inner).load(&target, None, &[])
     };
     let trial = |index: usize, kind: Option<&String>| -> anyhow::Result<Outcome> {
         let mut input = load(&rows[index])?;

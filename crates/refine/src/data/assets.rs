@@ -1,7 +1,6 @@
 //! Objects and hands of a dataset, each loaded once and shared by all frames.
 
-use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
@@ -87,8 +86,8 @@ impl Sensor {
 }
 
 /// The objects and hands of a dataset.
-pub struct Assets<'a> {
-    dataset: Cow<'a, Dataset>,
+pub struct Assets {
+    dataset: Dataset,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
     robots: Robots,
@@ -99,20 +98,11 @@ pub struct Assets<'a> {
     neighbors: HashMap<(u32, u32), Vec<Body>>,
 }
 
-impl<'a> Assets<'a> {
+impl Assets {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
-    pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
-        Self::of(Cow::Borrowed(dataset), seed)
-    }
-
-    /// As [`Self::new`] has it, of a dataset that is kept as long as this is.
-    pub fn owning(dataset: Arc<Dataset>, seed: u64) -> Assets<'static> {
-        Assets::of(Cow::Owned(Dataset::clone(&dataset)), seed)
-    }
-
-    fn of(dataset: Cow<'a, Dataset>, seed: u64) -> Self {
+    pub fn new(dataset: &Dataset, seed: u64) -> Self {
         Self {
-            dataset,
+            dataset: dataset.clone(),
             seed,
             objects: HashMap::new(),
             robots: Robots::default(),
@@ -141,6 +131,7 @@ impl<'a> Assets<'a> {
             bodies.push(Body {
                 name: format!("object {obj_id}, {}", bodies.len()),
                 kind: BodyKind::Object { obj_id: *obj_id },
+                joints: BTreeMap::new(),
                 t_cam_base: *t_cam_model,
                 sigmas: NEIGHBOR_SIGMAS.map(Some),
                 origin: Origin::new(self.dataset.models().dir(), format!("object {obj_id}")),
@@ -165,8 +156,8 @@ impl<'a> Assets<'a> {
     }
 
     /// Goes on with the same dataset as it is by now ([`Dataset::reread`]): objects and hands stay what they are.
-    pub fn replace_dataset(&mut self, dataset: Arc<Dataset>) {
-        self.dataset = Cow::Owned(Dataset::clone(&dataset));
+    pub fn replace_dataset(&mut self, dataset: Dataset) {
+        self.dataset = dataset;
     }
 
     /// The model of object `id`, in meters.
@@ -184,28 +175,12 @@ impl<'a> Assets<'a> {
         })
     }
 
-    /// The object of `target`, and what its image shows: see [`Assets::observation`].
+    /// The object of `target`, and what its image shows: see [`Assets::observation`]. Where the object is about known to be, `t_cam_object` \[m\] tells masks that
+    /// are of something else ([`MaskSource`]).
     ///
     /// # Errors
     /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
-    pub fn load(&mut self, target: &Target, required: &[Sensor]) -> Result<FrameInput, AssetError> {
-        self.load_about(target, None, required)
-    }
-
-    /// As [`load`](Self::load), of an object about at `t_cam_object` \[m\], which tells masks that are of something else ([`MaskSource`]).
-    ///
-    /// # Errors
-    /// Those of [`Assets::load`].
-    pub fn load_at(
-        &mut self,
-        target: &Target,
-        t_cam_object: &Isometry3<f64>,
-        required: &[Sensor],
-    ) -> Result<FrameInput, AssetError> {
-        self.load_about(target, Some(t_cam_object), required)
-    }
-
-    fn load_about(
+    pub fn load(
         &mut self,
         target: &Target,
         t_cam_object: Option<&Isometry3<f64>>,
@@ -213,11 +188,10 @@ impl<'a> Assets<'a> {
     ) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
         let dataset = self.dataset.clone();
-        let frame = dataset.frame(target.scene_id, target.im_id)?;
+        let image = dataset.frame(target.scene_id, target.im_id)?;
         let sought = Sought { target, object: &object, t_cam_object };
-        let observation =
-            self.corrected(&frame, sought.target.instance, Some(&sought), required)?;
-        Ok(FrameInput { frame: observation, object, rig: self.rig.clone() })
+        let stated = self.stated(&image, target.instance, Some(&sought), required)?;
+        Ok(FrameInput { frame: self.corrected(stated)?, object, rig: self.rig.clone() })
     }
 
     /// The frame with every sensor that it brings. A sensor whose file or
@@ -227,27 +201,23 @@ impl<'a> Assets<'a> {
     /// If a file that is there is broken, or a required one is missing.
     pub fn observation(
         &mut self,
-        frame: &DatasetImage<'_>,
+        image: &DatasetImage<'_>,
         instance: usize,
         required: &[Sensor],
     ) -> Result<Frame, AssetError> {
-        self.corrected(frame, instance, None, required)
+        let stated = self.stated(image, instance, None, required)?;
+        self.corrected(stated)
     }
 
-    /// The frame with the mask of the object that is `sought`, or else with mask `number`, corrected by the rig.
-    fn corrected(
-        &mut self,
-        frame: &DatasetImage<'_>,
-        number: usize,
-        sought: Option<&Sought<'_>>,
-        required: &[Sensor],
-    ) -> Result<Frame, AssetError> {
-        let observation = self.stated(frame, number, sought, required)?;
-        let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
-        Ok(corrected.unwrap_or(observation))
+    /// The frame as the rig corrects it, if that is known.
+    fn corrected(&self, stated: Frame) -> Result<Frame, AssetError> {
+        Ok(match &self.rig {
+            Some(rig) => rig.corrected(&stated)?,
+            None => stated,
+        })
     }
 
-    /// The frame as its files state it.
+    /// The frame as its files state it, with the mask of the object that is `sought`, or else with mask `number`.
     fn stated(
         &mut self,
         frame: &DatasetImage<'_>,
@@ -264,16 +234,12 @@ impl<'a> Assets<'a> {
             None => (Some(number), frame.segment(&mut observation, number)),
         };
         match segmented {
-            Err(
-                DatasetError::Missing { .. }
-                | DatasetError::EmptyMask { .. }
-                | DatasetError::NoDetection { .. },
-            ) if self.masks_optional => {}
+            Err(DatasetError::NoMask { .. }) if self.masks_optional => {}
             segmented => segmented?,
         }
         // Masks of other cameras have the same number; without one, what these saw does not count.
         if let Some(number) = number {
-            for (view, t_cam_view) in frame.taken_together(&self.dataset, number)? {
+            for (view, t_cam_view) in frame.taken_together(number)? {
                 observation = observation.with_view(view, t_cam_view);
             }
         }
@@ -300,8 +266,8 @@ impl<'a> Assets<'a> {
             }
         }
         let tactile = tactile.unwrap_or_default();
-        let (bodies, tactile) = ((&bodies[..], &origin), (&tactile[..], "force"));
-        observation.hand = self.robots.combined(bodies, tactile, &self.objects)?;
+        observation.hand =
+            self.robots.combined(&bodies, &tactile, &self.objects, &origin, "force")?;
         if observation.hand.is_none() && !required.is_empty() {
             return Err(origin.fault("bodies", "expected one hand, found 0").into());
         }
@@ -313,7 +279,7 @@ impl<'a> Assets<'a> {
 /// What was read; `None` where the file or its entry is absent and need not be there.
 fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>, DatasetError> {
     match read {
-        Err(DatasetError::Missing { .. } | DatasetError::NoEntry { .. }) if !required => Ok(None),
+        Err(DatasetError::Missing { .. }) if !required => Ok(None),
         read => read.map(Some),
     }
 }
@@ -331,7 +297,7 @@ fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError
     let info = match models.info(id) {
         Ok(info) => Some(info),
         // BOP does not require the list of an estimator's models.
-        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => None,
+        Err(DatasetError::Missing { .. }) => None,
         Err(broken) => return Err(broken.into()),
     };
     let mass = info.as_ref().and_then(|info| info.mass);

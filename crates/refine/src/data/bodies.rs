@@ -143,12 +143,12 @@ impl<'b> Bodies<'b> {
             found.ok_or_else(|| format!("the robot has no link {name:?}"))
         };
         Ok(Some(match &tactile.reading {
-            TactileReading::Force { .. } => return Ok(None),
-            TactileReading::Binary { contact, .. } => {
+            TactileReading::Force(_) => return Ok(None),
+            TactileReading::Binary(contact) => {
                 let probe = |link, position, touched| BinaryContact { link, position, touched };
                 TouchReading::Binary(probes(layout, contact, link, probe)?)
             }
-            TactileReading::Proximity { distance, .. } => {
+            TactileReading::Proximity(distance) => {
                 let probe =
                     |link, position, distance| ProximityReading { link, position, distance };
                 TouchReading::Proximity(probes(layout, distance, link, probe)?)
@@ -195,10 +195,11 @@ mod tests {
     use crate::data::bop::{BodyKind, Origin};
 
     fn body(name: &str, is_hand: bool, t_cam_base: Isometry3<f64>) -> Body {
-        let hand = BodyKind::Hand { urdf: PathBuf::new(), joints: BTreeMap::new() };
+        let hand = BodyKind::Hand { urdf: PathBuf::new() };
         let kind = if is_hand { hand } else { BodyKind::Plane };
         let sigmas = [Some(1e-3), None];
-        Body { name: name.into(), kind, t_cam_base, sigmas, origin: Origin::default() }
+        let (joints, origin) = (BTreeMap::new(), Origin::default());
+        Body { name: name.into(), kind, joints, t_cam_base, sigmas, origin }
     }
 
     fn placed(body: &Body) -> PlacedBody<'_> {

@@ -20,10 +20,10 @@ const SETTLED: f64 = 0.05;
 const ROUGH_PASSES: usize = 2;
 
 /// Frames of a dataset, each with a rough pose (object → camera \[m\]); they are read when they are visited.
-pub struct CalibrationFrames<'a> {
+pub struct CalibrationFrames {
     /// What each shows, and where that is said to be.
     pub poses: Vec<(Target, Isometry3<f64>)>,
-    assets: Mutex<Assets<'a>>,
+    assets: Mutex<Assets>,
 }
 
 /// Results of a calibration.
@@ -43,9 +43,9 @@ pub struct Calibrated {
 /// Hears how many of the visits that there are at most have been made, or will not have to be.
 type VisitProgress<'a> = dyn FnMut(usize) + 'a;
 
-impl<'a> CalibrationFrames<'a> {
+impl CalibrationFrames {
     /// Of these objects and hands. Masks may be missing where `assets` has them [optional](Assets::with_optional_masks).
-    pub fn new(assets: Assets<'a>, poses: Vec<(Target, Isometry3<f64>)>) -> Self {
+    pub fn new(assets: Assets, poses: Vec<(Target, Isometry3<f64>)>) -> Self {
         Self { poses, assets: Mutex::new(assets) }
     }
 
@@ -63,7 +63,7 @@ impl<'a> CalibrationFrames<'a> {
         let (held, free): (Vec<_>, Vec<_>) = self.poses.iter().partition(has_bodies);
         let mut fault = None;
         for (target, _) in held.into_iter().chain(free) {
-            match assets.load(&target, &[]) {
+            match assets.load(&target, None, &[]) {
                 Ok(FrameInput { frame: Frame { camera, hand, .. }, .. }) => {
                     let joints = hand.map(|measured| measured.hand.tree.joint_names().len());
                     return Ok((joints, (camera.width, camera.height)));
@@ -88,7 +88,7 @@ impl<'a> CalibrationFrames<'a> {
     ) -> Result<CalibrationFrame, AssetError> {
         let Target { obj_id, .. } = self.poses[index].0;
         let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-        let frame = assets.load(&self.poses[index].0, &[])?.frame;
+        let frame = assets.load(&self.poses[index].0, None, &[])?.frame;
         Ok(CalibrationFrame { frame, obj_id, initial: *pose, is_refined: false })
     }
 

@@ -15,12 +15,12 @@ use serde::Deserialize;
 use crate::data::assets::{AssetError, FrameInput};
 use crate::data::bop::{
     Body, BodyEntry, BodyKind, DatasetError, DepthCamera, FramePose, Intrinsics, LengthUnit, Lens,
-    NonNegative, Numbers, Optics, Origin, Positive, Real, Rotation, Tactile, TactileEntry,
-    TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
+    LensedCamera, NonNegative, Numbers, Optics, Origin, Positive, Real, Rotation, SharedOptics,
+    Tactile, TactileEntry, TactileReading, UniqueMap, check_size, read_bodies, read_json, sigmas,
 };
 use crate::data::robots::Robots;
 use crate::rig::Rig;
-use crate::scene::{Frame, HandMeasurement, Object, RemapCache, check_gravity};
+use crate::scene::{Frame, HandMeasurement, Object, check_gravity};
 
 /// Name of the robot of a frame file beside other bodies.
 const ROBOT: &str = "robot";
@@ -56,14 +56,14 @@ macro_rules! with_images {
         impl $name {
             fn images(&self) -> CameraImages<'_> {
                 CameraImages {
-                    intrinsics: self.intrinsics,
-                    lens: self.lens,
+                    camera: LensedCamera::new(self.intrinsics, self.lens),
                     depth_unit: self.depth_unit_m.map(|unit| unit.0),
                     files: [&self.rgb, &self.depth, &self.mask].map(Option::as_deref),
-                    depth_camera: DepthCamera::new(
+                    depth_camera: DepthCamera::stated(
                         self.depth_intrinsics,
                         self.depth_lens,
-                        (self.depth_rotation, self.depth_translation),
+                        self.depth_rotation,
+                        self.depth_translation,
                     ),
                 }
             }
@@ -115,14 +115,13 @@ struct RobotLayout {
 
 /// CameraImages of one camera, and how they were taken.
 struct CameraImages<'a> {
-    intrinsics: Intrinsics,
-    lens: Option<Lens>,
+    camera: LensedCamera,
     /// Meters of one unit of the depth image.
     depth_unit: Option<f64>,
     /// Color, depth and mask.
     files: [Option<&'a Path>; 3],
     /// Depth camera of its own, or the field that is missing.
-    depth_camera: Result<Option<DepthCamera>, &'static str>,
+    depth_camera: Result<Option<DepthCamera>, String>,
 }
 
 impl CameraImages<'_> {
@@ -130,15 +129,21 @@ impl CameraImages<'_> {
     ///
     /// # Errors
     /// If an image is missing or broken, or does not fit the others; an empty mask if it is `required` to show the object.
-    fn read(self, file: &Path, prefix: &str, required: bool) -> Result<Frame, DatasetError> {
+    fn read(
+        self,
+        file: &Path,
+        prefix: &str,
+        required: bool,
+        shared: &SharedOptics,
+    ) -> Result<Frame, DatasetError> {
         let field = |name: &str, problem: &str| {
             DatasetError::field(file, &format!("{prefix}{name}"), problem)
         };
-        let missing = |name: &'static str| field(name, "is missing");
+        let missing = |name: &str| field(name, "is missing");
         let named = |error: DatasetError| DatasetError::unusable(file, error);
         let folder = file.parent().unwrap_or(Path::new("."));
         let [color, depth, mask] = self.files.map(|path| path.map(|path| folder.join(path)));
-        let depth_camera = self.depth_camera.map_err(missing)?;
+        let depth_camera = self.depth_camera.map_err(|name| missing(&name))?;
         let depth_unit = match (&color, &depth, self.depth_unit) {
             (None, None, _) => return Err(field("rgb", "is missing, and so is depth")),
             (_, Some(_), None) => return Err(missing("depth_unit_m")),
@@ -146,22 +151,11 @@ impl CameraImages<'_> {
             (_, None, _) if depth_camera.is_some() => return Err(missing("depth")),
             (.., unit) => unit.unwrap_or(1.0),
         };
-        let remaps = &RemapCache::default();
-        let optics = Optics {
-            camera: self.intrinsics.0,
-            lens: self.lens.map(|lens| lens.0),
-            depth_camera,
-            depth_unit,
-            remaps,
-            depth_remaps: &RemapCache::default(),
-        };
+        let optics = Optics { color: self.camera, depth_camera, depth_unit, shared };
         if let (Some(mask), Some(other)) = (&mask, color.as_ref().or(depth.as_ref())) {
             check_size(mask, other).map_err(named)?;
         }
-        let observation =
-            optics.observation(color.as_deref(), depth.as_deref(), &|file, _, text| {
-                log::warn!("{}: {text}", file.display());
-            });
+        let observation = optics.observation(color.as_deref(), depth.as_deref());
         let mut observation = observation.map_err(named)?;
         if depth_camera.is_some() && !observation.has_depth() {
             let problem = "nothing that depth measured is in the color image";
@@ -170,8 +164,8 @@ impl CameraImages<'_> {
         if let Some(mask) = mask {
             match optics.mask(&mask) {
                 // Of other cameras those are left out that do not see the object.
-                Err(DatasetError::EmptyMask { .. }) if !required => {}
-                Err(DatasetError::EmptyMask { .. }) => {
+                Err(DatasetError::NoMask { .. }) if !required => {}
+                Err(DatasetError::NoMask { .. }) => {
                     return Err(field("mask", "the mask is empty"));
                 }
                 read => observation.mask = read.map_err(named)?,
@@ -243,7 +237,8 @@ impl FrameParts {
     pub(crate) fn read(file: &Path) -> Result<Self, DatasetError> {
         let mut layout: FrameLayout = read_json(file)?;
         let folder = file.parent().unwrap_or(Path::new("."));
-        let mut observation = layout.images().read(file, "", true)?;
+        let shared = SharedOptics::default();
+        let mut observation = layout.images().read(file, "", true, &shared)?;
         let mesh_file = folder.join(&layout.mesh);
         let mesh = TriMesh::load(&mesh_file).map_err(|e| DatasetError::unusable(file, e))?;
         let mesh = mesh.scaled(layout.mesh_unit.meters());
@@ -258,7 +253,7 @@ impl FrameParts {
         let entries = std::mem::take(&mut layout.bodies);
         read_bodies(&mut bodies, entries, folder, |k| Origin::new(file, format!("bodies[{k}]")))?;
         for (k, camera) in layout.cameras.iter().enumerate() {
-            let view = camera.images().read(file, &format!("cameras[{k}]."), false)?;
+            let view = camera.images().read(file, &format!("cameras[{k}]."), false, &shared)?;
             observation = observation.with_view(view, camera.pose.0);
         }
         Ok(Self {
@@ -280,10 +275,10 @@ impl FrameParts {
         file: &Path,
         cache: Option<&GridCache>,
     ) -> Result<Option<HandMeasurement>, DatasetError> {
-        let (bodies, tactile) =
-            ((&self.bodies[..], &Origin::new(file, "")), (&self.tactile[..], "forces"));
+        let (objects, origin) = (HashMap::new(), Origin::new(file, ""));
         let mut robots = Robots::cached(cache.cloned());
-        robots.combined(bodies, tactile, &HashMap::new()).map_err(|error| match error {
+        let all = robots.combined(&self.bodies, &self.tactile, &objects, &origin, "forces");
+        all.map_err(|error| match error {
             AssetError::Dataset(error) => error,
             other => DatasetError::unusable(file, other),
         })
@@ -303,7 +298,8 @@ impl RobotLayout {
         let urdf = folder.join(self.urdf);
         bodies.push(Body {
             name: ROBOT.to_owned(),
-            kind: BodyKind::Hand { urdf, joints: self.joints.positions() },
+            kind: BodyKind::Hand { urdf },
+            joints: self.joints.positions(),
             t_cam_base: self.base_pose.0,
             sigmas: sigmas(self.sigma_mm, self.sigma_deg),
             origin: origin.clone(),
@@ -311,8 +307,13 @@ impl RobotLayout {
         let force: Vec<_> = self.forces.into_iter().flatten().map(|f| Vector3::from(f.0)).collect();
         match self.taxels {
             Some(taxels) => {
-                let reading = TactileReading::Force { taxels: folder.join(taxels), force };
-                tactile.push(Tactile { body: ROBOT.to_owned(), reading, origin });
+                let (body, taxels) = (ROBOT.to_owned(), Some(folder.join(taxels)));
+                tactile.push(Tactile {
+                    body,
+                    taxels,
+                    reading: TactileReading::Force(force),
+                    origin,
+                });
             }
             None if force.is_empty() => {}
             None => return Err(origin.fault("taxels", "is missing")),
@@ -320,7 +321,7 @@ impl RobotLayout {
         for (k, entry) in self.touch.into_iter().enumerate() {
             let origin = Origin::new(file, format!("{ROBOT}.touch[{k}]"));
             let sensor = entry.read(folder, Some(ROBOT), origin)?;
-            if let TactileReading::Force { .. } = &sensor.reading {
+            if let TactileReading::Force(_) = &sensor.reading {
                 let problem = "is missing or force, which is what robot.forces are";
                 return Err(sensor.origin.fault("kind", problem));
             }

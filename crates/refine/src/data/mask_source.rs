@@ -24,11 +24,11 @@ pub enum MaskSource {
     /// Masks, or else boxes, that a detector found: of those of the object the one that overlaps it most at its pose, or without a pose the most
     /// confident one.
     Detections(Arc<Detections>),
-    /// Boxes of the detections; without any, no masks: the pose tells as much as a box around it.
-    Boxes(Option<Arc<Detections>>),
+    /// Boxes of the detections.
+    Boxes(Arc<Detections>),
     /// The object at its pose.
     Silhouettes,
-    /// No masks.
+    /// No masks: the pose tells as much as a box around it.
     None,
 }
 
@@ -60,14 +60,14 @@ impl MaskSource {
         let (mask, is_box) = match self {
             Self::Files => return frame.segment(observation, number.unwrap_or_default()),
             Self::Detections(detections) => sought.detected(detections, observation)?,
-            Self::Boxes(Some(detections)) => (sought.detected(detections, observation)?.0, true),
+            Self::Boxes(detections) => (sought.detected(detections, observation)?.0, true),
             Self::Silhouettes => {
                 if let Some(silhouette) = sought.silhouette(observation) {
                     observation.mask = silhouette;
                 }
                 return Ok(());
             }
-            Self::Boxes(None) | Self::None => return Ok(()),
+            Self::None => return Ok(()),
         };
         // Behind a lens a box is none any more.
         let mask = frame.undistorted_mask(mask)?;
@@ -152,8 +152,11 @@ impl Sought<'_> {
         let Target { scene_id, im_id, obj_id, .. } = *self.target;
         let file = detections.file();
         let (width, height) = (observation.camera.width, observation.camera.height);
-        let mut all = Vec::new();
-        for found in detections.of((scene_id, im_id, obj_id))? {
+        let all = detections.of((scene_id, im_id, obj_id))?;
+        let drawn = if all.len() > 1 { self.drawn(observation) } else { None };
+        let mut best: Option<(f64, Mask, bool)> = None;
+        // The most confident one first: it is taken unless another overlaps more.
+        for found in all {
             if let Some(warning) = detections.corners(found, width, height) {
                 log::warn!("{}: {}: {warning}", file.display(), self.target);
             }
@@ -164,21 +167,18 @@ impl Sought<'_> {
                 );
                 DatasetError::unusable(file, problem)
             })?;
-            all.push((mask, found.is_box()));
-        }
-        // The most confident one first.
-        let best = match self.drawn(observation).filter(|_| all.len() > 1) {
-            None => 0,
-            Some(drawn) => {
-                let overlap =
-                    |(mask, _): &(Mask, bool)| intersection_over_union(mask, drawn.pixels());
-                let overlaps: Vec<f64> = all.iter().map(overlap).collect();
-                (1..all.len())
-                    .fold(0, |best, k| if overlaps[k] > overlaps[best] { k } else { best })
+            let overlap =
+                drawn.as_ref().map_or(0.0, |d| intersection_over_union(&mask, d.pixels()));
+            if best.as_ref().is_none_or(|(most, ..)| overlap > *most) {
+                best = Some((overlap, mask, found.is_box()));
             }
-        };
-        let none = || DatasetError::NoDetection { file: file.to_owned(), scene_id, im_id, obj_id };
-        all.into_iter().nth(best).ok_or_else(none)
+        }
+        let (_, mask, is_box) = best.ok_or_else(|| {
+            let place = format!("scene {scene_id} image {im_id}");
+            let problem = format!("{place}: no detection of object {obj_id} (category_id)");
+            DatasetError::no_mask(file, problem)
+        })?;
+        Ok((mask, is_box))
     }
 }
 

@@ -98,12 +98,10 @@ impl Rig {
     /// If the file is missing or broken, naming the field.
     pub fn load(file: &Path) -> Result<Self, DatasetError> {
         let layout: RigLayout = read_json(file)?;
-        let range = match out_of_range(&read_json(file)?) {
-            Some(name) => Err((name, format!("is beyond ±{MAX_NUMBER:e}"))),
-            None => Ok(()),
-        };
-        let rig = range.and_then(|()| layout.rig());
-        rig.map_err(|(name, problem)| DatasetError::field(file, &name, problem))
+        if let Some(name) = out_of_range(&read_json(file)?) {
+            return Err(DatasetError::field(file, &name, format!("is beyond ±{MAX_NUMBER:e}")));
+        }
+        layout.rig(file)
     }
 
     /// Writes the rig; the file appears whole or not at all.
@@ -158,32 +156,31 @@ impl Rig {
     }
 }
 
-/// Field at fault, and the problem.
-type Fault = (String, String);
-
-/// # Errors
-/// The field of that `name`, unless all `holds`.
-fn require(holds: bool, name: &str, problem: impl Into<String>) -> Result<(), Fault> {
-    if holds { Ok(()) } else { Err((name.to_owned(), problem.into())) }
-}
-
 impl RigLayout {
-    fn rig(self) -> Result<Rig, Fault> {
+    /// # Errors
+    /// The field of `file` at fault.
+    fn rig(self, file: &Path) -> Result<Rig, DatasetError> {
+        let require = |holds: bool, name: &str, problem: &str| {
+            if holds { Ok(()) } else { Err(DatasetError::field(file, name, problem)) }
+        };
         let RigLayout { image_size: [width, height], camera, hand, play, covariance, objects } =
             self;
         let is_size = |size: &usize| (1..=MOST_PIXELS).contains(size);
         require([width, height].iter().all(is_size), "image_size", "no image is of that size")?;
         let expected = format!("expected 1 to {MOST_CELLS}");
         let cells = camera.depth_cells;
-        require((1..=MOST_CELLS).contains(&cells), "camera.depth_cells", expected)?;
+        require((1..=MOST_CELLS).contains(&cells), "camera.depth_cells", &expected)?;
         let positive = camera.depth_scale > 0.0 && camera.focal_scale - camera.aspect.abs() > -1.0;
         require(positive, "camera", "no depth or focal length is negative")?;
         let warp = ImageWarp { depth: DepthField::new(width, height, cells) };
         let (found, expected) = (camera.depth_offsets_m.len(), warp.depth.len());
         let problem = format!("expected {expected} coefficients, found {found}");
-        require(found == expected, "camera.depth_offsets_m", problem)?;
-        let deviation =
-            |(id, object): (u32, ObjectLayout)| Ok::<_, Fault>((id, object.deviation(id)?));
+        require(found == expected, "camera.depth_offsets_m", &problem)?;
+        let deviation = |(id, object): (u32, ObjectLayout)| {
+            let field = object.deviation();
+            let fault = |problem| DatasetError::field(file, &format!("objects.{id}"), problem);
+            Ok((id, field.map_err(fault)?))
+        };
         let rig = Rig {
             camera: CameraCalibrationError {
                 depth_scale: camera.depth_scale,
@@ -201,21 +198,23 @@ impl RigLayout {
             joints: hand.joints,
             play,
             covariance: covariance.0,
-            objects: objects.into_iter().map(deviation).collect::<Result<_, Fault>>()?,
+            objects: objects.into_iter().map(deviation).collect::<Result<_, DatasetError>>()?,
         };
         let n = rig.len();
         let expected = format!("expected {n} rows of {n} numbers");
-        require(rig.covariance.nrows() == n, "covariance", expected)?;
+        require(rig.covariance.nrows() == n, "covariance", &expected)?;
         Ok(rig)
     }
 }
 
 impl ObjectLayout {
-    /// Deviation of the surface of object `id`.
-    fn deviation(self, id: u32) -> Result<SurfaceDeviation, Fault> {
-        let name = format!("objects.{id}");
+    /// # Errors
+    /// What is wrong with it.
+    fn deviation(self) -> Result<SurfaceDeviation, String> {
         let count = self.nodes_m.len();
-        require(count <= MOST_NODES, &name, format!("expected up to {MOST_NODES} nodes"))?;
+        if count > MOST_NODES {
+            return Err(format!("expected up to {MOST_NODES} nodes"));
+        }
         let settings = ModelErrorSettings {
             sigma: self.sigma_m,
             length_scale: self.length_scale_m,
@@ -227,10 +226,11 @@ impl ObjectLayout {
             self.coefficients.into_iter().flatten(),
         );
         let field = SurfaceDeviation::from_parts(settings, nodes, coefficients, self.covariance.0);
-        let problem = format!(
-            "expected one coefficient for each node, {count} rows of covariance, and positive deviations"
-        );
-        field.ok_or((name, problem))
+        field.ok_or_else(|| {
+            format!(
+                "expected one coefficient for each node, {count} rows of covariance, and positive deviations"
+            )
+        })
     }
 }
 

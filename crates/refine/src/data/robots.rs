@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::hash::Hash;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use prehend_geometry::hand::{Taxel, load_taxels};
@@ -15,24 +15,14 @@ use crate::data::bodies::{Bodies, PlacedBody, plane, solid};
 use crate::data::bop::{Body, BodyKind, Origin, Tactile, TactileReading};
 use crate::scene::{Hand, HandMeasurement, Object};
 
-/// Of what shape a body is.
-#[derive(Clone, PartialEq, Eq, Hash)]
-enum BodyShape {
-    Robot(PathBuf),
-    Plate,
-    Object(u32),
-    /// With its unit's bits.
-    Mesh(PathBuf, u64),
-}
-
 /// Names and shapes of bodies, and the body and the layout of the sensor of forces.
-type HandKey = (Vec<(String, BodyShape)>, Option<(String, PathBuf)>);
+type HandKey = (Vec<(String, BodyKind)>, Option<(String, Option<PathBuf>)>);
 
 /// What is shared by frames.
 #[derive(Default)]
 pub(super) struct Robots {
     /// Robots and other bodies, each alone.
-    trees: HashMap<BodyShape, Arc<KinematicTree>>,
+    trees: HashMap<BodyKind, Arc<KinematicTree>>,
     /// All bodies of frames together.
     hands: HashMap<HandKey, Arc<Hand>>,
     /// Layouts of taxels.
@@ -53,17 +43,56 @@ impl Robots {
     /// If a file that is named is missing or broken, or what the frame has does not fit it.
     pub(super) fn combined(
         &mut self,
-        (bodies, origin): (&[Body], &Origin),
-        (tactile, forces): (&[Tactile], &str),
+        bodies: &[Body],
+        tactile: &[Tactile],
         objects: &HashMap<u32, Arc<Object>>,
+        origin: &Origin,
+        forces: &str,
     ) -> Result<Option<HandMeasurement>, AssetError> {
-        let mut placed = Vec::with_capacity(bodies.len());
-        for body in bodies {
-            placed.push(self.placed(body, objects)?);
+        let placed = bodies.iter().map(|body| self.placed(body, objects));
+        let Some(all) = Bodies::new(placed.collect::<Result<_, _>>()?) else { return Ok(None) };
+        for Tactile { body, origin, .. } in tactile {
+            if !all.has(body) {
+                let problem = format!("names {body:?}, the bodies are {}", all.names());
+                return Err(origin.fault("body", problem).into());
+            }
         }
-        let Some(all) = Bodies::new(placed) else { return Ok(None) };
-        let shapes = bodies.iter().map(|body| (body.name.clone(), BodyShape::of(body))).collect();
-        self.felt(&all, origin, shapes, (tactile, forces)).map(Some)
+        let layouts = tactile.iter().map(|sensor| self.layout(sensor));
+        let layouts = layouts.collect::<Result<Vec<_>, _>>()?;
+        let sensors = || tactile.iter().zip(&layouts);
+        let force = sensors().find_map(|(sensor, layout)| match &sensor.reading {
+            TactileReading::Force(force) => Some((sensor, layout, force)),
+            _ => None,
+        });
+        let shapes = bodies.iter().map(|body| (body.name.clone(), body.kind.clone())).collect();
+        let key = (shapes, force.map(|(sensor, ..)| (sensor.body.clone(), sensor.taxels.clone())));
+        let hand = kept(&mut self.hands, key, || -> Result<_, AssetError> {
+            let mut skin = Vec::new();
+            if let Some((sensor, layout, _)) = force {
+                let file = sensor.taxels.clone().unwrap_or_default();
+                let fault = |e| sensor.origin.fault("taxels", format!("{}: {e}", file.display()));
+                skin = all.skin(&sensor.body, layout).map_err(fault)?;
+            }
+            let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
+            Ok(Arc::new(made.map_err(|e| origin.fault("bodies", e))?))
+        })?;
+        let mut measured = all.measured(Arc::clone(&hand));
+        if let Some((sensor, layout, force)) = force {
+            let (expected, found) = (layout.len(), force.len());
+            if found != 0 && found != expected {
+                let file = sensor.taxels.clone().unwrap_or_default();
+                let file = file.display();
+                let problem =
+                    format!("expected {expected} forces, one a taxel of {file}, found {found}");
+                return Err(sensor.origin.fault(forces, problem).into());
+            }
+            measured.forces.clone_from(force);
+        }
+        for (sensor, layout) in sensors() {
+            let reading = all.reading(&hand.tree, sensor, layout);
+            measured.touch.extend(reading.map_err(|e| sensor.origin.fault("", e))?);
+        }
+        Ok(Some(measured))
     }
 
     /// A body with its shape.
@@ -72,81 +101,25 @@ impl Robots {
         body: &'b Body,
         objects: &HashMap<u32, Arc<Object>>,
     ) -> Result<PlacedBody<'b>, AssetError> {
-        let tree = kept(&mut self.trees, BodyShape::of(body), || -> Result<_, AssetError> {
+        let tree = kept(&mut self.trees, body.kind.clone(), || -> Result<_, AssetError> {
             Ok(Arc::new(match &body.kind {
-                BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
+                BodyKind::Hand { urdf } => KinematicTree::from_urdf_file(urdf)?,
                 BodyKind::Plane => plane(),
                 BodyKind::Object { obj_id } => match objects.get(obj_id) {
                     Some(object) => solid(&object.mesh),
                     None => return Err(body.origin.fault("obj_id", "has no model here").into()),
                 },
-                BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(*unit)),
+                BodyKind::Mesh { file, unit } => solid(&TriMesh::load(file)?.scaled(unit.meters())),
             }))
         })?;
-        let joints = match body.as_hand() {
-            None => Vec::new(),
-            Some((_, joints)) => {
-                tree.joint_vector(joints).map_err(|e| body.origin.fault("joints", e))?
-            }
-        };
+        let joints = tree.joint_vector(&body.joints).map_err(|e| body.origin.fault("joints", e))?;
         Ok(PlacedBody { body, joints, tree })
     }
 
-    /// All bodies as one robot with its skin, and what that measures.
-    fn felt(
-        &mut self,
-        all: &Bodies<'_>,
-        origin: &Origin,
-        shapes: Vec<(String, BodyShape)>,
-        (tactile, forces): (&[Tactile], &str),
-    ) -> Result<HandMeasurement, AssetError> {
-        for Tactile { body, origin, .. } in tactile {
-            if !all.has(body) {
-                let problem = format!("names {body:?}, the bodies are {}", all.names());
-                return Err(origin.fault("body", problem).into());
-            }
-        }
-        let force = tactile.iter().find_map(|sensor| match &sensor.reading {
-            TactileReading::Force { taxels, force } => Some((sensor, taxels, force)),
-            _ => None,
-        });
-        let key = (shapes, force.map(|(sensor, taxels, _)| (sensor.body.clone(), taxels.clone())));
-        let layout = force.map(|(_, taxels, _)| self.layout(taxels)).transpose()?;
-        let hand = kept(&mut self.hands, key, || -> Result<_, AssetError> {
-            let mut skin = Vec::new();
-            if let (Some((sensor, taxels, _)), Some(layout)) = (force, &layout) {
-                let named = |e| format!("{}: {e}", taxels.display());
-                let made = all.skin(&sensor.body, layout).map_err(named);
-                skin = made.map_err(|problem| sensor.origin.fault("taxels", problem))?;
-            }
-            let made = all.tree().and_then(|all| Hand::cached(all, skin, self.cache.as_ref()));
-            Ok(Arc::new(made.map_err(|e| origin.fault("bodies", e))?))
-        })?;
-        let mut measured = all.measured(Arc::clone(&hand));
-        if let (Some((sensor, taxels, force)), Some(layout)) = (force, layout) {
-            let (expected, found) = (layout.len(), force.len());
-            if found != 0 && found != expected {
-                let file = taxels.display();
-                let problem =
-                    format!("expected {expected} forces, one a taxel of {file}, found {found}");
-                return Err(sensor.origin.fault(forces, problem).into());
-            }
-            measured.forces.clone_from(force);
-        }
-        for sensor in tactile {
-            if let TactileReading::Force { .. } = sensor.reading {
-                continue;
-            }
-            let layout = sensor.reading.taxels().map(|taxels| self.layout(taxels)).transpose()?;
-            let reading = all.reading(&hand.tree, sensor, layout.as_deref().unwrap_or_default());
-            measured.touch.extend(reading.map_err(|e| sensor.origin.fault("", e))?);
-        }
-        Ok(measured)
-    }
-
-    /// A layout of taxels.
-    fn layout(&mut self, file: &Path) -> Result<Arc<[Taxel]>, AssetError> {
-        kept(&mut self.layouts, file.to_owned(), || Ok(load_taxels(file)?.into()))
+    /// The layout of a sensor's taxels, if it has such.
+    fn layout(&mut self, sensor: &Tactile) -> Result<Arc<[Taxel]>, AssetError> {
+        let Some(file) = &sensor.taxels else { return Ok(Arc::default()) };
+        kept(&mut self.layouts, file.clone(), || Ok(load_taxels(file)?.into()))
     }
 }
 
@@ -163,15 +136,4 @@ pub(super) fn kept<K: Hash + Eq, V: ?Sized, E>(
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => unknown.insert(make()?),
     }))
-}
-
-impl BodyShape {
-    fn of(body: &Body) -> Self {
-        match &body.kind {
-            BodyKind::Hand { urdf, .. } => Self::Robot(urdf.clone()),
-            BodyKind::Plane => Self::Plate,
-            BodyKind::Object { obj_id } => Self::Object(*obj_id),
-            BodyKind::Mesh { file, unit } => Self::Mesh(file.clone(), unit.to_bits()),
-        }
-    }
 }

@@ -16,7 +16,7 @@ use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vs
 pub(super) fn model_info(models: &Models, obj_id: u32) -> Result<Option<ModelInfo>, DatasetError> {
     match models.info(obj_id) {
         Ok(info) => Ok(Some(info)),
-        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => Ok(None),
+        Err(DatasetError::Missing { .. }) => Ok(None),
         Err(broken) => Err(broken),
     }
 }

@@ -67,9 +67,7 @@ impl<'a> Scorer<'a> {
     /// If a file with the truth is broken, or the image shows no such object.
     pub fn pose_error(&self, row: &ResultRow) -> Result<Option<[f64; 2]>, AssetError> {
         let truth = match self.true_pose(row) {
-            Err(AssetError::Dataset(
-                DatasetError::Missing { .. } | DatasetError::NoEntry { .. },
-            )) => return Ok(None),
+            Err(AssetError::Dataset(DatasetError::Missing { .. })) => return Ok(None),
             found => found?,
         };
         let info = model_info(self.truth.models(), row.obj_id)?;
@@ -122,7 +120,7 @@ impl<'a> Scorer<'a> {
         }
         let depth = match self.dataset.frame(scene, image)?.depth() {
             Ok(depth) => Some(depth),
-            Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
+            Err(DatasetError::Missing { .. }) => None,
             Err(broken) => return Err(broken),
         };
         Ok(Image { scene_and_image: (scene, image), hand: None, depth })

@@ -92,7 +92,7 @@ fn of_scene(
         };
         let mut known = |found: Result<(), DatasetError>| match found {
             Ok(()) => 1,
-            Err(DatasetError::Missing { .. } | DatasetError::NoEntry { .. }) => 0,
+            Err(DatasetError::Missing { .. }) => 0,
             Err(error) => {
                 faults.insert(error.to_string());
                 0

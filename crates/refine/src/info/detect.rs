@@ -20,7 +20,7 @@ pub(super) fn read(
         return Ok(("dataset", dataset::read(path, split, warnings)?));
     }
     if !path.exists() {
-        return Err(DatasetError::Missing { file: path.into() }.into());
+        return Err(DatasetError::absent(path).into());
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     Ok(match extension.to_ascii_lowercase().as_str() {

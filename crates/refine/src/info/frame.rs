@@ -7,7 +7,7 @@ use prehend_geometry::hand::load_taxels;
 use serde_json::{Value, json};
 
 use super::mesh;
-use crate::data::bop::{Body, DatasetError, TactileReading};
+use crate::data::bop::{Body, DatasetError, Tactile, TactileReading};
 use crate::data::{AssetError, FrameParts};
 
 /// From this force on a taxel counts as touched \[N\].
@@ -24,7 +24,8 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Ass
     let FrameParts { frame: observation, mesh, mesh_file, bodies, tactile, .. } = &parts;
     let (camera, depth) = (&observation.camera, observation.depth.pixels());
     let (mut taxels, mut touched) = (0, None);
-    if let Some(TactileReading::Force { taxels: file, force }) = tactile.first().map(|t| &t.reading)
+    if let [Tactile { taxels: Some(file), reading: TactileReading::Force(force), .. }, ..] =
+        &tactile[..]
     {
         taxels = load_taxels(file).map_err(|e| DatasetError::unusable(path, e))?.len();
         let feels = force.iter().filter(|force| force.norm() > TOUCH).count();

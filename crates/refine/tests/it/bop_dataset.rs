@@ -104,6 +104,13 @@ impl Fixture {
     }
 }
 
+/// What is said of a file that is absent.
+const ABSENT: &str = "no such file or folder";
+
+fn missing(file: &Path, problem: &str) -> DatasetError {
+    DatasetError::Missing { file: file.to_owned(), problem: problem.to_owned() }
+}
+
 #[test]
 fn reads_everything_in_meters_and_newtons() {
     let fixture = Fixture::new();
@@ -121,7 +128,7 @@ fn reads_everything_in_meters_and_newtons() {
     assert_eq!(seen.mask.count(), 1);
     let bodies: SceneBodies = frame.bodies().unwrap();
     assert_eq!(bodies.gravity, Some(Vector3::new(0.0, 9.81, 0.0)));
-    let hand = bodies.body("hand").unwrap();
+    let [hand] = &bodies.bodies[..] else { panic!("not one body") };
     let (urdf, joints) = hand.as_hand().unwrap();
     assert_eq!(urdf, fixture.root().join("hand/hand.urdf"));
     assert!((hand.t_cam_base.translation.vector - Vector3::new(0.001, 0.002, 0.5)).norm() < 1e-18);
@@ -129,14 +136,18 @@ fn reads_everything_in_meters_and_newtons() {
         joints.iter().map(|(n, &q)| (n.as_str(), q)).collect::<Vec<_>>(),
         [("a", -1.0), ("b", 0.5)]
     );
-    let [Tactile { reading: TactileReading::Force { taxels, force }, .. }] =
+    let [Tactile { taxels, reading: TactileReading::Force(force), .. }] =
         &frame.tactile().unwrap()[..]
     else {
         panic!("not one sensor of force")
     };
     assert_eq!(force[1] * UNITS_PER_NEWTON, Vector3::new(100.0, -250.0, 10000.0));
-    assert_eq!(*taxels, fixture.root().join("hand/taxels.csv"));
+    assert_eq!(*taxels, Some(fixture.root().join("hand/taxels.csv")));
     assert!(dataset.frame(4, 3).unwrap().rgb_path().unwrap().ends_with("rgb/000003.jpg"));
+}
+
+fn no_mask(file: &Path, problem: &str) -> DatasetError {
+    DatasetError::NoMask { file: file.to_owned(), problem: problem.to_owned() }
 }
 
 #[test]
@@ -150,7 +161,7 @@ fn the_only_mask_serves_any_row_and_several_go_by_row() {
     assert_eq!((count(0, 0), count(0, 2)), (Ok(1), Ok(1)));
     assert_eq!((count(3, 0), count(3, 1)), (Ok(2), Ok(3)));
     let absent = fixture.root().join("test/000004/mask_visib/000003_000002.png");
-    assert_eq!(count(3, 2), Err(DatasetError::Missing { file: absent }));
+    assert_eq!(count(3, 2), Err(no_mask(&absent, ABSENT)));
 }
 
 #[test]
@@ -213,39 +224,33 @@ fn estimator_input_survives_without_the_truth() {
     let frame = dataset.frame(4, 3).unwrap();
     assert!(frame.observation(1).is_ok() && frame.bodies().is_ok());
     let error = GroundTruth::new(&dataset).objects(4, 3).unwrap_err();
-    assert!(matches!(error, DatasetError::Missing { file } if file.ends_with("scene_gt.json")));
+    assert!(matches!(error, DatasetError::Missing { file, .. } if file.ends_with("scene_gt.json")));
 }
 
 #[test]
 fn splits_scenes_and_images_that_are_not_there() {
     let fixture = Fixture::new();
     let absent = fixture.root().join("none");
-    assert_eq!(Dataset::open(&absent).unwrap_err(), DatasetError::Missing { file: absent.clone() });
-    assert_eq!(
-        Dataset::open_split(fixture.root(), "none").unwrap_err(),
-        DatasetError::Missing { file: absent }
-    );
+    assert_eq!(Dataset::open(&absent).unwrap_err(), missing(&absent, ABSENT));
+    let error = Dataset::open_split(fixture.root(), "none").unwrap_err();
+    assert_eq!(error, missing(&absent, ABSENT));
     let error = Dataset::open_split(fixture.root(), "models").unwrap_err().to_string();
     assert!(error.contains("/models: no scene folders"), "{error}");
     let dataset = fixture.open();
     let error = dataset.frame(5, 0).unwrap_err().to_string();
     assert!(error.ends_with("/test: no scene 5"), "{error}");
     let error = dataset.frame(4, 1).unwrap_err();
-    assert!(
-        matches!(error, DatasetError::NoEntry { file, key } if file.ends_with("scene_camera.json") && key == "1")
-    );
+    let camera = fixture.root().join("test/000004/scene_camera.json");
+    assert_eq!(error, missing(&camera, "no entry \"1\""));
     let truth = GroundTruth::new(&dataset);
     let error = truth.objects(9, 0).unwrap_err().to_string();
     assert!(error.ends_with("/test: no scene 9"), "{error}");
-    let error = truth.pose(4, 0, 8, &Isometry3::identity()).unwrap_err();
-    assert!(
-        matches!(error, DatasetError::UnknownObject { file, obj_id: 8 } if file.ends_with("scene_gt.json"))
-    );
-    assert!(matches!(dataset.models().info(8), Err(DatasetError::UnknownObject { obj_id: 8, .. })));
-    assert!(matches!(
-        dataset.models().mesh_path(8),
-        Err(DatasetError::UnknownObject { obj_id: 8, .. })
-    ));
+    let error = truth.pose(4, 0, 8, &Isometry3::identity()).unwrap_err().to_string();
+    assert!(error.ends_with("scene_gt.json: unknown object id 8"), "{error}");
+    let error = dataset.models().info(8).unwrap_err().to_string();
+    assert!(error.ends_with("models_info.json: no entry \"8\""), "{error}");
+    let error = dataset.models().mesh_path(8).unwrap_err().to_string();
+    assert!(error.ends_with("obj_000008.ply: unknown object id 8"), "{error}");
 }
 
 #[test]
@@ -271,10 +276,10 @@ fn an_absent_or_broken_file_spoils_only_what_needs_it() {
     let rgb = fixture.remove("rgb/000000.png");
     let dataset = fixture.open();
     let frame = dataset.frame(4, 0).unwrap();
-    assert_eq!(frame.bodies(), Err(DatasetError::Missing { file: bodies }));
+    assert_eq!(frame.bodies(), Err(missing(&bodies, ABSENT)));
     assert!(matches!(frame.tactile(), Err(DatasetError::Unusable { file, .. }) if file == tactile));
-    let found = "000003.jpg".to_owned();
-    assert_eq!(frame.rgb_path(), Err(DatasetError::NoImage { file: rgb, found }));
+    let problem = "no such file; the folder has 000003.jpg".to_owned();
+    assert_eq!(frame.rgb_path(), Err(DatasetError::Unusable { file: rgb, problem }));
     assert!(frame.depth().is_ok() && frame.mask(0).is_ok());
     assert!(dataset.frame(4, 3).unwrap().rgb_path().is_ok());
 }
@@ -363,10 +368,10 @@ fn images_that_cannot_serve() {
     });
     let dataset = fixture.open();
     let frame = dataset.frame(4, 0).unwrap();
-    assert_eq!(frame.depth(), Err(DatasetError::NoDepth { file: depth }));
-    assert_eq!(frame.mask(0), Err(DatasetError::EmptyMask { file: mask.clone() }));
+    assert_eq!(frame.depth(), Err(missing(&depth, "every depth is zero")));
+    assert_eq!(frame.mask(0), Err(no_mask(&mask, "the mask is empty")));
     // Without depth there is color.
-    assert_eq!(frame.observation(0).unwrap_err(), DatasetError::EmptyMask { file: mask });
+    assert_eq!(frame.observation(0).unwrap_err(), no_mask(&mask, "the mask is empty"));
     let error = dataset.frame(4, 3).unwrap().observation(0).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}: is 3x4 pixels but ", odd.display())), "{error}");
     assert!(error.ends_with("000003.jpg is 4x3"), "{error}");

@@ -103,13 +103,11 @@ fn every_frame_of_both_grasp_sets_reads() {
                 assert!((mean - row.t_cam_model.translation.vector.z).abs() < 0.15, "{mean}");
                 let bodies = frame.bodies().unwrap();
                 assert!((bodies.gravity.unwrap().norm() - 9.81).abs() < 0.02);
-                let hand = bodies.body("hand").unwrap();
+                let hand = &bodies.bodies[0];
                 let (urdf, joints) = hand.as_hand().unwrap();
                 assert!(urdf.is_file() && joints.len() == 16);
                 let tactile = frame.tactile().unwrap();
-                let TactileReading::Force { force, .. } = &tactile[0].reading else {
-                    panic!("no forces")
-                };
+                let TactileReading::Force(force) = &tactile[0].reading else { panic!("no forces") };
                 assert_eq!(force.len(), 368);
                 assert!(
                     force.iter().any(|f| f.norm() > 0.1) && force.iter().all(|f| f.amax() <= 10.0)
@@ -121,8 +119,7 @@ fn every_frame_of_both_grasp_sets_reads() {
                 assert!(truth.models().mesh_path(row.obj_id).is_ok());
                 let told = hand.t_cam_base.translation.vector;
                 let true_bodies = truth.bodies(row.scene_id, row.im_id).unwrap();
-                let off =
-                    (told - true_bodies.body("hand").unwrap().t_cam_base.translation.vector).norm();
+                let off = (told - true_bodies.bodies[0].t_cam_base.translation.vector).norm();
                 assert_eq!(off > 0.0, name == "mujoco_real");
             }
         }

@@ -106,7 +106,7 @@ fn rows_of_an_image_share_its_time() {
 fn absent_and_empty_files_and_rows_that_are_not_finite_are_errors() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("none.csv");
-    assert!(matches!(read_results(&path), Err(DatasetError::Missing { file }) if file == path));
+    assert!(matches!(read_results(&path), Err(DatasetError::Missing { file, .. }) if file == path));
     fs::write(&path, "\n").unwrap();
     assert!(
         matches!(read_results(&path), Err(DatasetError::Unusable { file, .. }) if file == path)

@@ -88,7 +88,7 @@ impl Check {
         let bar = progress(jobs.len(), "drawing");
         for job in bar.wrap_iter(jobs.iter()) {
             let Job { target, row, .. } = job;
-            let checked = assets.load_at(target, &row.t_cam_model, &[]).map(|input| {
+            let checked = assets.load(target, Some(&row.t_cam_model), &[]).map(|input| {
                 without(&dataset, &input, target);
                 drawn(&input, &row.t_cam_model)
             });
@@ -130,12 +130,12 @@ impl Check {
 }
 
 /// Mistakes that many of the frames have in common, each with the targets that it was found in. Frames that cannot be read are left out.
-fn mistakes(assets: &mut Assets<'_>, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)> {
+fn mistakes(assets: &mut Assets, jobs: &[Job]) -> Vec<(Vec<Target>, Finding)> {
     let settings = CorrectionSettings::default();
     let stride = jobs.len().div_ceil(settings.frames).max(1);
     let bar = progress(jobs.len() / stride, "comparing");
     let attempt = |Job { target, row, .. }: &Job| {
-        let input = assets.load_at(target, &row.t_cam_model, &[]).ok()?;
+        let input = assets.load(target, Some(&row.t_cam_model), &[]).ok()?;
         let FrameInput { frame, object, .. } = &input;
         let trial = CorrectionTrial::new(frame, object, &row.t_cam_model, &settings);
         Some((*target, trial.ok()?))

@@ -218,13 +218,13 @@ impl Initial {
 }
 
 fn search_one(
-    assets: &mut Assets<'_>,
+    assets: &mut Assets,
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
     settings: &SearchSettings,
     backend: &Arc<dyn Backend>,
 ) -> Result<Vec<PoseCandidate>, AssetError> {
-    let input = assets.load(target, &[])?;
+    let input = assets.load(target, None, &[])?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => {

@@ -87,9 +87,9 @@ impl Masks {
         Ok(match (self.mask_source, detections.map(Arc::new)) {
             (MaskKind::Files, None) => MaskSource::Files,
             (MaskKind::Files, Some(detections)) => MaskSource::Detections(detections),
-            (MaskKind::Box, detections) => MaskSource::Boxes(detections),
+            (MaskKind::Box, Some(detections)) => MaskSource::Boxes(detections),
             (MaskKind::Silhouette, None) => MaskSource::Silhouettes,
-            (MaskKind::None, None) => MaskSource::None,
+            (MaskKind::Box | MaskKind::None, None) => MaskSource::None,
             (kind, Some(_)) => bail!("--mask-source {kind}: does not use --detections"),
         })
     }

@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 use super::error::{DatasetError, Origin};
 use super::json::{JsonFile, UniqueMap};
-use super::numbers::{FramePose, LengthUnit, NonNegative, Numbers, Real, Rotation, pose};
+use super::numbers::{LengthUnit, NonNegative, Numbers, Real};
+use super::pose::{FramePose, Rotation, stated_pose};
 
 /// A body whose shape is known, and its pose as well as is said.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +18,8 @@ pub struct Body {
     pub name: String,
     /// Its shape.
     pub kind: BodyKind,
+    /// Joint positions of a hand by name \[rad or m\].
+    pub joints: BTreeMap<String, f64>,
     /// Its coordinates (a robot's base link) → camera coordinates \[m\].
     pub t_cam_base: Isometry3<f64>,
     /// Standard deviations of that, in each direction and about each axis \[m, rad\], where they are said.
@@ -25,14 +28,12 @@ pub struct Body {
 }
 
 /// Shape of a body.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum BodyKind {
     /// A robot hand, or another articulated body.
     Hand {
         /// Its URDF file.
         urdf: PathBuf,
-        /// Joint positions by name \[rad or m\].
-        joints: BTreeMap<String, f64>,
     },
     /// The half-space below z = 0 of its own frame.
     Plane,
@@ -45,8 +46,8 @@ pub enum BodyKind {
     Mesh {
         /// Its file.
         file: PathBuf,
-        /// Meters of one unit of the mesh.
-        unit: f64,
+        /// Unit of the mesh.
+        unit: LengthUnit,
     },
 }
 
@@ -54,7 +55,7 @@ impl Body {
     /// URDF file and joint positions \[rad or m\] of a hand.
     pub fn as_hand(&self) -> Option<(&Path, &BTreeMap<String, f64>)> {
         match &self.kind {
-            BodyKind::Hand { urdf, joints } => Some((urdf, joints)),
+            BodyKind::Hand { urdf } => Some((urdf, &self.joints)),
             BodyKind::Plane | BodyKind::Object { .. } | BodyKind::Mesh { .. } => None,
         }
     }
@@ -125,30 +126,30 @@ impl BodyEntry {
     /// # Errors
     /// If a field is missing.
     fn read(self, folder: &Path, origin: Origin) -> Result<Body, DatasetError> {
-        let missing = |field| origin.fault(field, "is missing");
+        let missing = |field: &str| origin.fault(field, "is missing");
+        let mut joints = BTreeMap::new();
         let kind = match (self.kind, self.obj_id, self.mesh) {
-            (BodyKindName::Hand, ..) => BodyKind::Hand {
-                urdf: folder.join(self.urdf.ok_or_else(|| missing("urdf"))?),
-                joints: self.joints.ok_or_else(|| missing("joints"))?.positions(),
-            },
+            (BodyKindName::Hand, ..) => {
+                let urdf = folder.join(self.urdf.ok_or_else(|| missing("urdf"))?);
+                joints = self.joints.ok_or_else(|| missing("joints"))?.positions();
+                BodyKind::Hand { urdf }
+            }
             (BodyKindName::Plane, ..) => BodyKind::Plane,
             (BodyKindName::Object, Some(obj_id), _) => BodyKind::Object { obj_id },
             (BodyKindName::Object, None, Some(mesh)) => BodyKind::Mesh {
                 file: folder.join(mesh),
-                unit: self.mesh_unit.ok_or_else(|| missing("mesh_unit"))?.meters(),
+                unit: self.mesh_unit.ok_or_else(|| missing("mesh_unit"))?,
             },
             (BodyKindName::Object, None, None) => {
                 return Err(missing(if self.pose.is_some() { "mesh" } else { "obj_id" }));
             }
         };
-        let t_cam_base = match (self.pose, self.rotation, self.translation) {
-            (Some(pose), ..) => pose.0,
-            (None, Some(rotation), Some(mm)) => pose(&rotation, &mm),
-            (None, None, _) => return Err(missing("cam_R_b2c")),
-            (None, Some(_), None) => return Err(missing("cam_t_b2c")),
-        };
+        let said = stated_pose(self.rotation, self.translation, "b2c");
+        let said = said.map_err(|name| missing(&name))?;
+        let t_cam_base = self.pose.map(|pose| pose.0).or(said);
+        let t_cam_base = t_cam_base.ok_or_else(|| missing("cam_R_b2c"))?;
         let sigmas = sigmas(self.sigma_mm, self.sigma_deg);
-        Ok(Body { name: self.name, kind, t_cam_base, sigmas, origin })
+        Ok(Body { name: self.name, kind, joints, t_cam_base, sigmas, origin })
     }
 }
 
@@ -183,10 +184,5 @@ impl SceneBodies {
         let origin = |k| Origin::new(file.path(), format!("{im_id}.bodies[{k}]"));
         read_bodies(&mut bodies, entry.bodies, root, origin)?;
         Ok(Self { gravity: entry.gravity.map(|g| g.0.into()), bodies })
-    }
-
-    /// The body called `name`.
-    pub fn body(&self, name: &str) -> Option<&Body> {
-        self.bodies.iter().find(|b| b.name == name)
     }
 }

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
@@ -15,7 +14,7 @@ use super::files::names;
 use super::json::{JsonFile, UniqueMap, read_json};
 use super::models::Models;
 use super::numbers::{Positive, Real};
-use crate::scene::RemapCache;
+use super::optics::SharedOptics;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
 /// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the world poses of cameras are ever opened, but for images that a rig took together.
@@ -28,6 +27,8 @@ pub struct Dataset {
     models: Arc<Models>,
     /// What all cameras have in common.
     pub(super) camera: Arc<JsonFile>,
+    /// What the images of all scenes have in common.
+    pub(super) optics: Arc<SharedOptics>,
 }
 
 /// One scene of a split; its files are read when first needed.
@@ -35,7 +36,6 @@ pub struct Dataset {
 pub struct DatasetScene {
     id: u32,
     dir: PathBuf,
-    root: PathBuf,
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
@@ -44,18 +44,8 @@ pub struct DatasetScene {
     /// `scene_gt_info.json` and `scene_bodies_gt.json`, for [`super::GroundTruth`] alone.
     pub(super) visibility: JsonFile,
     pub(super) true_bodies: JsonFile,
-    pub(super) shared: Arc<SceneCaches>,
     /// Images by the name of the rig that took them together.
     rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
-}
-
-/// State that all scenes of a dataset share, kept where it is read again.
-#[derive(Debug, Default)]
-pub(super) struct SceneCaches {
-    pub(super) remaps: RemapCache,
-    pub(super) depth_remaps: RemapCache,
-    /// Warnings of depth images that were given: of values that are none, and of images that measure nothing.
-    pub(super) told_of_depth: [AtomicBool; 2],
 }
 
 /// The name of a rig, which may be a number.
@@ -104,7 +94,7 @@ impl Dataset {
         let scenes: Vec<_> = subfolders(&split_dir)?.into_iter().filter_map(named).collect();
         match scenes.is_empty() {
             true => Err(no_scenes(&split_dir)),
-            false => Ok(Self::of(root, &split_dir, scenes, &Arc::default())),
+            false => Ok(Self::of(root, &split_dir, scenes, Arc::default())),
         }
     }
 
@@ -112,21 +102,19 @@ impl Dataset {
         root: &Path,
         split_dir: &Path,
         scenes: Vec<(u32, PathBuf)>,
-        shared: &Arc<SceneCaches>,
+        optics: Arc<SharedOptics>,
     ) -> Self {
         let camera = JsonFile::new(root.join("camera.json"));
         let scene = |(id, dir): (u32, PathBuf)| {
             let file = |name: &str| JsonFile::new(dir.join(name));
             let scene = DatasetScene {
                 id,
-                root: root.to_owned(),
                 camera: scene_camera(&dir, &camera),
                 bodies: file("scene_bodies.json"),
                 tactile: file("scene_tactile.json"),
                 objects: file("scene_gt.json"),
                 visibility: file("scene_gt_info.json"),
                 true_bodies: file("scene_bodies_gt.json"),
-                shared: Arc::clone(shared),
                 rigs: OnceLock::new(),
                 dir,
             };
@@ -138,14 +126,14 @@ impl Dataset {
             scenes: Arc::new(scenes.into_iter().map(scene).collect()),
             models: Arc::new(Models::new(root.join("models"))),
             camera: Arc::new(camera),
+            optics,
         }
     }
 
     /// The same with files that are read anew, for somebody may have gone on writing them.
     pub fn reread(&self) -> Self {
         let scenes = self.scenes.values().map(|scene| (scene.id, scene.dir.clone())).collect();
-        let shared = self.scenes.values().next().map(|scene| Arc::clone(&scene.shared));
-        Self::of(&self.root, &self.split_dir, scenes, &shared.unwrap_or_default())
+        Self::of(&self.root, &self.split_dir, scenes, Arc::clone(&self.optics))
     }
 
     /// The dataset's folder.
@@ -194,11 +182,6 @@ impl DatasetScene {
     pub(crate) fn color_dir(&self) -> PathBuf {
         let [rgb, gray] = ["rgb", "gray"].map(|name| self.dir.join(name));
         if gray.is_dir() && !rgb.is_dir() { gray } else { rgb }
-    }
-
-    /// The dataset's folder, which paths inside the scene's files are relative to.
-    pub(super) fn root(&self) -> &Path {
-        &self.root
     }
 
     /// The images that begin a moment: those that `scene_camera.json` lists, and of a rig that took several together the first, ascending.

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use prehend_geometry::limits::MAX_PIXELS;
 use prehend_render::Mask;
@@ -22,8 +21,8 @@ pub struct Detections {
     file: PathBuf,
     /// In the file's order; errors are of entries with numbers that are not finite.
     by_object: BTreeMap<Ids, Vec<Result<Detection, DatasetError>>>,
-    /// A warning of a box that seems to be two corners was given.
-    is_told: Arc<AtomicBool>,
+    /// Set when a box was warned of that seems to be two corners.
+    told: Arc<OnceLock<()>>,
 }
 
 /// Scene, image and object.
@@ -102,7 +101,7 @@ impl Detections {
             };
             by_object.entry((scene_id, image_id, category_id)).or_default().push(found);
         }
-        Ok(Self { file: file.to_owned(), by_object, is_told: Arc::default() })
+        Ok(Self { file: file.to_owned(), by_object, told: Arc::default() })
     }
 
     /// The file.
@@ -130,7 +129,7 @@ impl Detections {
         let leaves = x + right > width as f64 + 1.0 || y + bottom > height as f64 + 1.0;
         let fits = |from: f64, to: f64, size: usize| from >= 0.0 && from < to && to <= size as f64;
         let is_suspect = leaves && fits(x, right, width) && fits(y, bottom, height);
-        (is_suspect && !self.is_told.swap(true, Ordering::Relaxed)).then(|| {
+        (is_suspect && self.told.set(()).is_ok()).then(|| {
             format!(
                 "the box {bbox:?} leaves the image as [x, y, width, height], as which it is read, but fits it as [x1, y1, x2, y2] (other boxes are not named)"
             )

@@ -8,21 +8,23 @@ use thiserror::Error;
 /// A fault of one file or folder, which the message names, with the field where there is one.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum DatasetError {
-    /// It does not exist.
-    #[error("{}: no such file or folder", file.display())]
+    /// Something that some datasets lack: a file, a folder or a mesh, the entry of an image or object, a measurement of depth.
+    #[error("{}: {problem}", file.display())]
     Missing {
-        /// The path looked for.
+        /// The path looked for, or that of the file that lacks it.
         file: PathBuf,
+        /// What is missing.
+        problem: String,
     },
-    /// An image that does not exist, though its folder holds something.
-    #[error("{}: no such file; the folder has {found}", file.display())]
-    NoImage {
-        /// The path looked for.
+    /// An object without a mask in an image: no file of one, or one in which nothing is set, or no detection.
+    #[error("{}: {problem}", file.display())]
+    NoMask {
+        /// The mask, or the file of detections.
         file: PathBuf,
-        /// The first names in its folder.
-        found: String,
+        /// What is missing.
+        problem: String,
     },
-    /// It is not what it has to be: broken JSON, a field that is absent, of another type or impossible, a dataset without
+    /// It is not what it has to be: an image that is absent from a folder of others, broken JSON, a field that is absent, of another type or impossible, a dataset without
     /// scenes, a journal of another run; or it cannot be written, and nothing of it is left behind.
     #[error("{}: {problem}", file.display())]
     Unusable {
@@ -34,55 +36,33 @@ pub enum DatasetError {
     /// An image that does not decode; the message names the file.
     #[error("{0}")]
     Image(String),
-    /// A mask in which nothing is set.
-    #[error("{}: the mask is empty", file.display())]
-    EmptyMask {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A file of detections lacks an object of an image.
-    #[error("{}: scene {scene_id} image {im_id}: no detection of object {obj_id} (category_id)", file.display())]
-    NoDetection {
-        /// The file of detections.
-        file: PathBuf,
-        /// Scene.
-        scene_id: u32,
-        /// Image of the scene.
-        im_id: u32,
-        /// Object.
-        obj_id: u32,
-    },
-    /// A file that lists things by key lacks this one.
-    #[error("{}: no entry {key:?}", file.display())]
-    NoEntry {
-        /// The path read.
-        file: PathBuf,
-        /// The absent key, an image or object id as BOP spells it.
-        key: String,
-    },
-    /// No pixel of the depth image holds a measurement.
-    #[error("{}: every depth is zero", file.display())]
-    NoDepth {
-        /// The depth image.
-        file: PathBuf,
-    },
-    /// The object id has no model.
-    #[error("{}: unknown object id {obj_id}", file.display())]
-    UnknownObject {
-        /// The model or list of models that was looked for.
-        file: PathBuf,
-        /// The id asked for.
-        obj_id: u32,
-    },
 }
+
+/// What is said of a file that is absent.
+pub(super) const ABSENT: &str = "no such file or folder";
 
 impl DatasetError {
     /// The error of reading `file`, with absence told apart from other failures.
     pub(crate) fn reading(file: &Path, error: &std::io::Error) -> Self {
         match error.kind() {
-            std::io::ErrorKind::NotFound => Self::Missing { file: file.into() },
+            std::io::ErrorKind::NotFound => Self::absent(file),
             _ => Self::unusable(file, format!("cannot be read: {error}")),
         }
+    }
+
+    /// The error that there is no `file`.
+    pub(crate) fn absent(file: &Path) -> Self {
+        Self::missing(file, ABSENT)
+    }
+
+    /// A [`DatasetError::NoMask`].
+    pub(crate) fn no_mask(file: &Path, problem: impl Into<String>) -> Self {
+        Self::NoMask { file: file.into(), problem: problem.into() }
+    }
+
+    /// A [`DatasetError::Missing`].
+    pub(crate) fn missing(file: &Path, problem: impl Into<String>) -> Self {
+        Self::Missing { file: file.into(), problem: problem.into() }
     }
 
     /// The error of writing `file`, from anything that can be printed.

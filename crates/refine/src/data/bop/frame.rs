@@ -1,20 +1,18 @@
 //! One image of a scene.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 use nalgebra::Isometry3;
-use prehend_render::{Camera, CameraError, DepthImage, Mask, Remap, image_size};
+use prehend_render::{Camera, DepthImage, Mask, Remap, image_size};
 use serde::Deserialize;
 
 use super::bodies::SceneBodies;
 use super::dataset::{Dataset, DatasetScene};
-use super::error::{DatasetError, Origin};
+use super::error::{ABSENT, DatasetError, Origin};
 use super::files::names;
-use super::json::JsonFile;
-use super::numbers::{Lens, Numbers, Positive, Rotation, pose};
-use super::optics::{DepthCamera, DepthWarning, Optics, check_size};
+use super::numbers::{Intrinsics, Lens, Numbers, Positive};
+use super::optics::{DepthCamera, LensedCamera, NO_DEPTH, Optics, check_size};
+use super::pose::{Rotation, stated_pose};
 use super::touch::Tactile;
 use crate::scene::Frame;
 
@@ -25,9 +23,8 @@ use crate::scene::Frame;
 /// they are handed out as a pinhole camera of the same matrix and size sees them. Depth of a camera of its own is registered to the color camera.
 #[derive(Clone, Copy, Debug)]
 pub struct DatasetImage<'a> {
+    dataset: &'a Dataset,
     scene: &'a DatasetScene,
-    /// `camera.json`.
-    dataset_camera: &'a JsonFile,
     im_id: u32,
     optics: Optics<'a>,
     /// Millimeters per stored depth value.
@@ -66,19 +63,6 @@ struct ListedObject {
     obj_id: u32,
 }
 
-/// Row-major 3×3 intrinsics of a camera of unknown size.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(try_from = "Numbers<9>")]
-pub(crate) struct Intrinsics(pub(crate) Camera);
-
-impl TryFrom<Numbers<9>> for Intrinsics {
-    type Error = CameraError;
-
-    fn try_from(k: Numbers<9>) -> Result<Self, CameraError> {
-        Camera::from_k(k.0, 1, 1).map(Self)
-    }
-}
-
 impl Dataset {
     /// The image `im_id` of the scene `scene_id`.
     ///
@@ -93,22 +77,21 @@ impl Dataset {
             lens = self.camera.field("cam_dist")?;
         }
         scene.camera.check_rotations(entry.depth_rotation.iter());
-        let depth_camera = DepthCamera::new(
+        let depth_camera = DepthCamera::stated(
             entry.depth_intrinsics,
             entry.depth_lens,
-            (entry.depth_rotation, entry.depth_translation),
+            entry.depth_rotation,
+            entry.depth_translation,
         );
-        let lacks = |name| scene.camera.fault(&format!("{im_id}.{name}"), "is missing");
         let depth_scale = depth_scale.map_or(1.0, |scale| scale.0);
         let optics = Optics {
-            camera: intrinsics.0,
-            lens: lens.map(|lens| lens.0),
-            depth_camera: depth_camera.map_err(lacks)?,
+            color: LensedCamera::new(intrinsics, lens),
+            depth_camera: depth_camera
+                .map_err(|name| scene.camera.fault(&format!("{im_id}.{name}"), "is missing"))?,
             depth_unit: depth_scale * 1e-3,
-            remaps: &scene.shared.remaps,
-            depth_remaps: &scene.shared.depth_remaps,
+            shared: &self.optics,
         };
-        Ok(DatasetImage { scene, dataset_camera: &self.camera, im_id, optics, depth_scale })
+        Ok(DatasetImage { dataset: self, scene, im_id, optics, depth_scale })
     }
 }
 
@@ -122,9 +105,9 @@ impl DatasetImage<'_> {
     /// it.
     ///
     /// # Errors
-    /// [`DatasetError::NoImage`] naming the PNG file when there is none, [`DatasetError::Missing`] when the folder holds nothing.
+    /// [`DatasetError::Unusable`] naming the PNG file and what there is instead, [`DatasetError::Missing`] when the folder holds nothing.
     pub fn rgb_path(&self) -> Result<PathBuf, DatasetError> {
-        first_image(&self.scene.color_dir(), &format!("{:06}", self.im_id))
+        first_image(&self.scene.color_dir(), &[self.im_id]).map_err(|file| instead_of(&file))
     }
 
     /// The depth image.
@@ -132,7 +115,7 @@ impl DatasetImage<'_> {
     /// # Errors
     /// Those of [`DatasetImage::rgb_path`].
     pub(super) fn depth_path(&self) -> Result<PathBuf, DatasetError> {
-        first_image(&self.scene.dir().join("depth"), &format!("{:06}", self.im_id))
+        first_image(&self.depth_dir(), &[self.im_id]).map_err(|file| instead_of(&file))
     }
 
     /// The file of an object's mask; see [`DatasetImage::mask`].
@@ -141,14 +124,15 @@ impl DatasetImage<'_> {
         if let (Some(only), None) = (masks.next(), masks.next()) {
             return Ok(only);
         }
-        let name = format!("{:06}_{instance:06}", self.im_id);
-        first_image(&self.scene.dir().join("mask_visib"), &name).map_err(plainly)
+        let numbers = [self.im_id, instance as u32];
+        let found = first_image(&self.scene.dir().join("mask_visib"), &numbers);
+        found.map_err(|file| DatasetError::no_mask(&file, ABSENT))
     }
 
     /// The files of the image's masks, in any order.
     fn mask_files(&self) -> impl Iterator<Item = PathBuf> + use<> {
         self.mask_listing()
-            .filter(|path| path.file_name().and_then(OsStr::to_str).is_some_and(is_image))
+            .filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_image))
     }
 
     /// All files in the folder of masks that begin as the image's do.
@@ -162,19 +146,13 @@ impl DatasetImage<'_> {
     /// Reads the depth image, registered to the color image. The largest value of 16 bits is no measurement, of which is warned once a dataset.
     ///
     /// # Errors
-    /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
+    /// When it does not decode, and [`DatasetError::Missing`] when it is absent or measures nothing.
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
         let beside = self.optics.depth_camera.is_some() && self.has_color();
         let color = if beside { Some(image_size(&self.rgb_path()?)?) } else { None };
-        let warn = |file: &Path, kind, text: &str| self.warn_once(file, kind, text);
-        self.optics.depth(&self.depth_path().map_err(plainly)?, color, &warn)
-    }
-
-    /// Warns of the depth image in `file`, once a dataset of each kind.
-    fn warn_once(&self, file: &Path, kind: DepthWarning, text: &str) {
-        if !self.scene.shared.told_of_depth[kind as usize].swap(true, Ordering::Relaxed) {
-            log::warn!("{}: {text} (other images are not named)", file.display());
-        }
+        let file = first_image(&self.depth_dir(), &[self.im_id]);
+        let file = file.map_err(|file| DatasetError::absent(&file))?;
+        self.optics.depth(&file, color)?.ok_or_else(|| DatasetError::missing(&file, NO_DEPTH))
     }
 
     /// The number of the mask of the object `obj_id`. Masks are numbered as `scene_gt.json` lists the objects, of which nothing else is read. Of several
@@ -196,7 +174,7 @@ impl DatasetImage<'_> {
     /// The numbers of the image's masks, in order.
     pub(crate) fn mask_numbers(&self) -> Vec<usize> {
         let mut numbers: Vec<usize> =
-            self.mask_files().filter_map(|file| number_of(&file)).collect();
+            self.mask_files().filter_map(|file| Some(number_of(&file)? as usize)).collect();
         numbers.sort_unstable();
         numbers
     }
@@ -262,8 +240,9 @@ impl DatasetImage<'_> {
             return Ok(image_size(&self.rgb_path()?)?);
         }
         let of_camera = |name: &str| {
-            let size = self.dataset_camera.field::<u32>(name)?;
-            let missing = || self.dataset_camera.fault(name, "is missing, and there are no images");
+            let file = &self.dataset.camera;
+            let size = file.field::<u32>(name)?;
+            let missing = || file.fault(name, "is missing, and there are no images");
             size.map(|size| size as usize).ok_or_else(missing)
         };
         Ok((of_camera("width")?, of_camera("height")?))
@@ -271,7 +250,11 @@ impl DatasetImage<'_> {
 
     /// Whether the scene has a folder of depth images.
     pub(crate) fn has_depth(&self) -> bool {
-        self.scene.dir().join("depth").is_dir()
+        self.depth_dir().is_dir()
+    }
+
+    fn depth_dir(&self) -> PathBuf {
+        self.scene.dir().join("depth")
     }
 
     /// The same with an empty mask. A scene without color has black pictures, one without depth measures nothing, and so do depth images of zeros beside
@@ -287,9 +270,7 @@ impl DatasetImage<'_> {
         }
         let color = if has_color { Some(self.rgb_path()?) } else { None };
         let depth = self.has_depth().then(|| self.depth_path()).transpose()?;
-        self.optics.observation(color.as_deref(), depth.as_deref(), &|file, kind, text| {
-            self.warn_once(file, kind, text);
-        })
+        self.optics.observation(color.as_deref(), depth.as_deref())
     }
 
     /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
@@ -299,27 +280,27 @@ impl DatasetImage<'_> {
     /// Those of [`DatasetImage::observation`] of each, and if one lacks its place.
     pub(crate) fn taken_together(
         &self,
-        dataset: &Dataset,
         instance: usize,
     ) -> Result<Vec<(Frame, Isometry3<f64>)>, DatasetError> {
         let Some(together) = self.scene.taken_together(self.im_id)? else { return Ok(Vec::new()) };
         let t_cam_world = self.place()?;
         let number = self.mask_path(instance).ok().and_then(|file| number_of(&file));
-        let number = number.unwrap_or(instance);
+        let number = number.unwrap_or(instance as u32);
         let mut seen = Vec::new();
         for image in together.into_iter().filter(|image| *image != self.im_id) {
-            let other = dataset.frame(self.scene.id(), image)?;
+            let other = self.dataset.frame(self.scene.id(), image)?;
             let t_cam_other = t_cam_world * other.place()?.inverse();
             if t_cam_other == Isometry3::identity() {
                 let problem = format!("is the place of image {} of the same rig, too", self.im_id);
                 return Err(self.scene.camera.fault(&format!("{image}.cam_t_w2c"), &problem));
             }
-            let (folder, name) =
-                (self.scene.dir().join("mask_visib"), format!("{image:06}_{number:06}"));
-            let Ok(file) = first_image(&folder, &name) else { continue };
+            let Ok(file) = first_image(&self.scene.dir().join("mask_visib"), &[image, number])
+            else {
+                continue;
+            };
             let mut view = other.unsegmented()?;
             match other.segment_by(&mut view, &file) {
-                Err(DatasetError::EmptyMask { .. }) => continue,
+                Err(DatasetError::NoMask { .. }) => continue,
                 segmented => segmented?,
             }
             seen.push((view, t_cam_other));
@@ -332,20 +313,19 @@ impl DatasetImage<'_> {
     /// # Errors
     /// If what is said is broken, or one of rotation and translation is absent.
     pub fn t_cam_world(&self) -> Result<Option<Isometry3<f64>>, DatasetError> {
-        match self.scene.camera.entry(self.im_id)? {
-            PlaceEntry { rotation: None, translation: None } => Ok(None),
-            _ => self.place().map(Some),
-        }
+        let PlaceEntry { rotation, translation } = self.scene.camera.entry(self.im_id)?;
+        self.scene.camera.check_rotations(rotation.iter());
+        stated_pose(rotation, translation, "w2c").map_err(|name| self.lacks(&name))
     }
 
     /// World → camera \[m\].
     fn place(&self) -> Result<Isometry3<f64>, DatasetError> {
-        let PlaceEntry { rotation, translation } = self.scene.camera.entry(self.im_id)?;
-        self.scene.camera.check_rotations(rotation.iter());
-        let lacks = |name| self.scene.camera.fault(&format!("{}.{name}", self.im_id), "is missing");
-        let rotation = rotation.ok_or_else(|| lacks("cam_R_w2c"))?;
-        let translation = translation.ok_or_else(|| lacks("cam_t_w2c"))?;
-        Ok(pose(&rotation, &translation))
+        self.t_cam_world()?.ok_or_else(|| self.lacks("cam_R_w2c"))
+    }
+
+    /// The error that the image's entry of `scene_camera.json` is without a field.
+    fn lacks(&self, field: &str) -> DatasetError {
+        self.scene.camera.fault(&format!("{}.{field}", self.im_id), "is missing")
     }
 
     /// Gravity, the known robots and other bodies, from `scene_bodies.json`.
@@ -353,7 +333,7 @@ impl DatasetImage<'_> {
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn bodies(&self) -> Result<SceneBodies, DatasetError> {
-        SceneBodies::read(&self.scene.bodies, self.im_id, self.scene.root())
+        SceneBodies::read(&self.scene.bodies, self.im_id, self.dataset.root())
     }
 
     /// What is felt, from `scene_tactile.json`.
@@ -361,7 +341,7 @@ impl DatasetImage<'_> {
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn tactile(&self) -> Result<Vec<Tactile>, DatasetError> {
-        Tactile::read(&self.scene.tactile, self.im_id, self.scene.root())
+        Tactile::read(&self.scene.tactile, self.im_id, self.dataset.root())
     }
 
     /// This image's entry of `scene_bodies.json`.
@@ -376,38 +356,32 @@ const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
 /// Number of names that tell how the files of a folder are called.
 const NAMED: usize = 3;
 
-/// The image in `folder` that is called `stem` without its extension, but for zeros before its numbers and the case of its extension.
+/// The image in `folder` with these numbers in its name, such as `000003_000002.png`, which may be without zeros before them and in capital letters behind them.
 ///
 /// # Errors
-/// Those of [`DatasetImage::rgb_path`].
-fn first_image(folder: &Path, stem: &str) -> Result<PathBuf, DatasetError> {
-    let mut usual = IMAGE_EXTENSIONS.into_iter().map(|e| folder.join(format!("{stem}.{e}")));
-    if let Some(file) = usual.find(|file| file.is_file()) {
-        return Ok(file);
+/// The PNG file if there is none.
+fn first_image(folder: &Path, numbers: &[u32]) -> Result<PathBuf, PathBuf> {
+    let stem = numbers.iter().map(|number| format!("{number:06}")).collect::<Vec<_>>().join("_");
+    let usual = IMAGE_EXTENSIONS.map(|extension| folder.join(format!("{stem}.{extension}")));
+    if let Some(file) = usual.iter().find(|file| file.is_file()) {
+        return Ok(file.clone());
     }
-    let numbers = |name: &str| -> Option<Vec<u32>> {
-        name.split('.').next()?.split('_').map(|number| number.parse().ok()).collect()
-    };
-    let sought = numbers(stem);
-    let mut names = names(folder).unwrap_or_default();
-    if let Some(name) = names.iter().find(|name| is_image(name) && numbers(name) == sought) {
-        return Ok(folder.join(name));
-    }
-    let file = folder.join(format!("{stem}.png"));
+    let names = names(folder).unwrap_or_default();
+    let is_same = |name: &str| is_image(name) && numbers_in(name).as_deref() == Some(numbers);
+    let found = names.iter().find(|name| is_same(name)).map(|name| folder.join(name));
+    found.ok_or_else(|| usual[0].clone())
+}
+
+/// The error that `file` is not among the files of its folder, which are not called as they have to be.
+fn instead_of(file: &Path) -> DatasetError {
+    let mut names = file.parent().and_then(|folder| names(folder).ok()).unwrap_or_default();
     if names.is_empty() {
-        return Err(DatasetError::Missing { file });
+        return DatasetError::absent(file);
     }
     let more = if names.len() > NAMED { ", …" } else { "" };
     names.truncate(NAMED);
-    Err(DatasetError::NoImage { file, found: names.join(", ") + more })
-}
-
-/// The error of a file that is absent, whatever else there is: what may be absent is known by it.
-fn plainly(error: DatasetError) -> DatasetError {
-    match error {
-        DatasetError::NoImage { file, .. } => DatasetError::Missing { file },
-        other => other,
-    }
+    let problem = format!("no such file; the folder has {}{more}", names.join(", "));
+    DatasetError::unusable(file, problem)
 }
 
 /// True of the name of an image file.
@@ -416,7 +390,12 @@ fn is_image(name: &str) -> bool {
     IMAGE_EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension))
 }
 
+/// The numbers that make up the name of an image without its extension.
+fn numbers_in(name: &str) -> Option<Vec<u32>> {
+    name.split('.').next()?.split('_').map(|number| number.parse().ok()).collect()
+}
+
 /// The number of the object that the mask in `file` is of.
-fn number_of(file: &Path) -> Option<usize> {
-    file.file_stem()?.to_str()?.split_once('_')?.1.parse().ok()
+fn number_of(file: &Path) -> Option<u32> {
+    numbers_in(file.file_name()?.to_str()?)?.get(1).copied()
 }

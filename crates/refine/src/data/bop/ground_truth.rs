@@ -8,7 +8,8 @@ use super::dataset::Dataset;
 use super::error::DatasetError;
 use super::json::JsonFile;
 use super::models::Models;
-use super::numbers::{Numbers, Rotation, pose};
+use super::numbers::Numbers;
+use super::pose::{Rotation, pose};
 
 /// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
 /// `models_eval/`.
@@ -72,7 +73,7 @@ impl<'a> GroundTruth<'a> {
     /// The true pose of the object `obj_id`; among several such objects, of the one nearest to `estimate`.
     ///
     /// # Errors
-    /// Those of [`GroundTruth::objects`], and [`DatasetError::UnknownObject`] when the image shows no such
+    /// Those of [`GroundTruth::objects`], and [`DatasetError::Unusable`] when the image shows no such
     /// object.
     pub fn pose(
         &self,
@@ -90,7 +91,9 @@ impl<'a> GroundTruth<'a> {
             .filter(|o| o.obj_id == obj_id)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .map(|o| o.t_cam_model)
-            .ok_or_else(|| DatasetError::UnknownObject { file: file.path().into(), obj_id })
+            .ok_or_else(|| {
+                DatasetError::unusable(file.path(), format!("unknown object id {obj_id}"))
+            })
     }
 
     /// Whether a scene says where its robots are.

@@ -8,15 +8,13 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 use super::error::DatasetError;
 use super::files::read_bytes;
-use super::numbers::Rotation;
-use super::pose::rotations_off;
+use super::pose::{Rotation, rotations_off};
 
 /// A JSON object in which no key is there twice: which of two values is meant, nobody knows.
 #[derive(Debug, Default)]
@@ -57,13 +55,13 @@ impl<'de, V: Deserialize<'de>> Visitor<'de> for UniqueVisitor<V> {
 pub(super) struct JsonFile {
     path: PathBuf,
     root: OnceLock<Result<RawEntries, DatasetError>>,
-    /// A warning of rotations that are not quite orthonormal was given.
-    is_told: AtomicBool,
+    /// Set when rotations were warned of that are not quite orthonormal.
+    told: OnceLock<()>,
 }
 
 impl JsonFile {
     pub(super) fn new(path: PathBuf) -> Self {
-        Self { path, root: OnceLock::new(), is_told: AtomicBool::new(false) }
+        Self { path, root: OnceLock::new(), told: OnceLock::new() }
     }
 
     /// File with `entries` in place of its content.
@@ -102,12 +100,12 @@ impl JsonFile {
     /// The entry of an image or object id.
     ///
     /// # Errors
-    /// Those of [`JsonFile::root`], [`DatasetError::NoEntry`], and [`DatasetError::Unusable`] for the first field that is
+    /// Those of [`JsonFile::root`], [`DatasetError::Missing`] without an entry, and [`DatasetError::Unusable`] for the first field that is
     /// absent or not of its type.
     pub(super) fn entry<T: DeserializeOwned>(&self, id: u32) -> Result<T, DatasetError> {
         let key = id.to_string();
         let entry = self.field(&key)?;
-        entry.ok_or_else(|| DatasetError::NoEntry { file: self.path.clone(), key })
+        entry.ok_or_else(|| DatasetError::missing(&self.path, format!("no entry {key:?}")))
     }
 
     /// The entries of an image that has one or a list of them, each with the name of its field.
@@ -131,9 +129,9 @@ impl JsonFile {
 
     /// Warns, once a file, of rotations that are not quite orthonormal.
     pub(super) fn check_rotations<'r>(&self, rotations: impl Iterator<Item = &'r Rotation>) {
-        let largest = rotations.filter_map(|rotation| rotation.1).reduce(f64::max);
-        if let Some(deviation) = largest.filter(|_| !self.is_told.swap(true, Ordering::Relaxed)) {
-            log::warn!("{}", rotations_off(&self.path, deviation));
+        if let Some(largest) = rotations.filter_map(|rotation| rotation.deviation).reduce(f64::max)
+        {
+            self.told.get_or_init(|| log::warn!("{}", rotations_off(&self.path, largest)));
         }
     }
 
@@ -299,8 +297,7 @@ mod tests {
             "6.n: invalid type: string \"x\", expected an object"
         );
         assert_eq!(fault::<Of<Numbers<1>>>(&f, 8), "8.k[0]: is not a number");
-        let absent = f.entry::<A>(9).map(|_| ()).unwrap_err();
-        assert!(matches!(absent, DatasetError::NoEntry { key, .. } if key == "9"));
+        assert!(fault::<A>(&f, 9).ends_with("scene.json: no entry \"9\""));
     }
 
     #[test]

@@ -32,19 +32,17 @@ pub(crate) use error::Origin;
 pub use files::{check_writable, create_folder, write_atomically};
 pub(crate) use files::{lock, open_locked, read_bytes, read_text};
 pub use frame::DatasetImage;
-pub(crate) use frame::Intrinsics;
 pub use ground_truth::{GroundTruth, TrueObject};
 pub(crate) use json::{UniqueMap, read_json};
 pub(crate) use models::extent_to_bop;
 pub use models::{ModelInfo, Models, write_symmetries};
-pub(crate) use numbers::{
-    FramePose, LengthUnit, Lens, NonNegative, Numbers, Positive, Real, Rotation,
-};
+pub use numbers::LengthUnit;
+pub(crate) use numbers::{Intrinsics, Lens, NonNegative, Numbers, Positive, Real};
 #[cfg(feature = "mcap")]
 pub(crate) use optics::drop_saturated;
-pub(crate) use optics::{DepthCamera, Optics, check_size};
+pub(crate) use optics::{DepthCamera, LensedCamera, Optics, SharedOptics, check_size};
 pub use pose::pose_from_matrix;
-pub(crate) use pose::{rotation_to_row_major, translation_to_mm};
+pub(crate) use pose::{FramePose, Rotation, rotation_to_row_major, translation_to_mm};
 pub use results::{
     ReadResults, ResultRow, ResultsWriter, read_hypotheses, read_results, share_image_times,
     write_results,

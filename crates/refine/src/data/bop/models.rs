@@ -1,6 +1,5 @@
 //! The folder of object models: meshes, and `models_info.json`, which is read and written.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
@@ -9,7 +8,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::error::DatasetError;
-use super::files::write_atomically;
+use super::files::{names, write_atomically};
 use super::json::{JsonFile, UniqueMap, read_json};
 use super::numbers::{Numbers, Positive, Real};
 use super::pose::{pose_from_matrix, rotation_to_row_major, translation_to_mm};
@@ -55,10 +54,13 @@ impl Models {
     /// The mesh file of an object \[mm\].
     ///
     /// # Errors
-    /// [`DatasetError::UnknownObject`] naming the file that is not there.
+    /// [`DatasetError::Missing`] naming the file that is not there.
     pub fn mesh_path(&self, obj_id: u32) -> Result<PathBuf, DatasetError> {
         let file = self.dir.join(format!("obj_{obj_id:06}.ply"));
-        if file.is_file() { Ok(file) } else { Err(DatasetError::UnknownObject { file, obj_id }) }
+        match file.is_file() {
+            true => Ok(file),
+            false => Err(DatasetError::missing(&file, format!("unknown object id {obj_id}"))),
+        }
     }
 
     /// The ids of all objects with a mesh, ascending.
@@ -66,10 +68,8 @@ impl Models {
     /// # Errors
     /// When the folder cannot be listed.
     pub fn object_ids(&self) -> Result<Vec<u32>, DatasetError> {
-        let listing = fs::read_dir(&self.dir).map_err(|e| DatasetError::reading(&self.dir, &e))?;
-        let id = |name: &str| name.strip_prefix("obj_")?.strip_suffix(".ply")?.parse().ok();
-        let mut ids: Vec<u32> =
-            listing.flatten().filter_map(|f| id(f.file_name().to_str()?)).collect();
+        let id = |name: &String| name.strip_prefix("obj_")?.strip_suffix(".ply")?.parse().ok();
+        let mut ids: Vec<u32> = names(&self.dir)?.iter().filter_map(id).collect();
         ids.sort_unstable();
         Ok(ids)
     }
@@ -77,14 +77,9 @@ impl Models {
     /// What is known of an object.
     ///
     /// # Errors
-    /// When `models_info.json` is absent or broken, [`DatasetError::UnknownObject`] when it does not list
-    /// the object, or a field is malformed.
+    /// [`DatasetError::Missing`] when `models_info.json` is absent or does not list the object; when it is broken, or a field is malformed.
     pub fn info(&self, obj_id: u32) -> Result<ModelInfo, DatasetError> {
-        let entry: InfoEntry = self.info.entry(obj_id).map_err(|e| match e {
-            DatasetError::NoEntry { file, .. } => DatasetError::UnknownObject { file, obj_id },
-            other => other,
-        })?;
-        Ok(entry.into())
+        self.info.entry::<InfoEntry>(obj_id).map(ModelInfo::from)
     }
 }
 

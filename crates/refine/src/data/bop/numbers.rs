@@ -1,16 +1,13 @@
-//! Numbers, lists of numbers and poses, in range where they are read.
+//! Numbers, lists of numbers, lenses and units, in range where they are read.
 
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
-use prehend_render::{Distortion, DistortionError};
+use std::str::FromStr;
+
+use prehend_geometry::limits::MAX_NUMBER;
+use prehend_render::{Camera, CameraError, Distortion, DistortionError};
 use serde::Deserialize;
 
-use super::pose::{
-    deviation_from_rotation, exactly, pose_from_matrix, require_in_range, rotation_from_row_major,
-    translation_from_mm,
-};
-
 /// `N` numbers; a matrix may also be a list of rows.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Vec<NumberOrRow>")]
 pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
 
@@ -30,7 +27,54 @@ impl<const N: usize> TryFrom<Vec<NumberOrRow>> for Numbers<N> {
             NumberOrRow::Row(values) => values,
         });
         let flat: Vec<f64> = flat.map(require_in_range).collect::<Result<_, _>>()?;
-        exactly(flat).map(Self)
+        Self::try_from(flat)
+    }
+}
+
+/// `N` numbers separated by spaces.
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is not a number"));
+        let values: Vec<f64> = text.split_whitespace().map(number).collect::<Result<_, _>>()?;
+        let numbers = Self::try_from(values)?;
+        numbers.require_in_range()?;
+        Ok(numbers)
+    }
+}
+
+impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
+    type Error = String;
+
+    fn try_from(values: Vec<f64>) -> Result<Self, String> {
+        let numbers = values.try_into().map(Self);
+        numbers.map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
+    }
+}
+
+impl<const N: usize> Numbers<N> {
+    /// Refuses what [`require_in_range`] refuses, by its index.
+    ///
+    /// # Errors
+    /// What is wrong with one.
+    pub(crate) fn require_in_range(&self) -> Result<(), String> {
+        self.0.iter().enumerate().try_for_each(|(index, value)| {
+            let checked = require_in_range(*value);
+            checked.map(|_| ()).map_err(|problem| format!("value {index} {problem}"))
+        })
+    }
+}
+
+/// Refuses a number that is not finite or beyond [`MAX_NUMBER`].
+///
+/// # Errors
+/// What is wrong with it.
+pub(crate) fn require_in_range(value: f64) -> Result<f64, String> {
+    match value.abs() {
+        _ if !value.is_finite() => Err("is not finite".into()),
+        size if size > MAX_NUMBER => Err(format!("is {value:e}, beyond ±{MAX_NUMBER:e}")),
+        _ => Ok(value),
     }
 }
 
@@ -62,27 +106,17 @@ impl<const LEAST: usize> TryFrom<f64> for Bounded<LEAST> {
     }
 }
 
-/// A rotation of nine row-major entries.
-#[derive(Clone, Copy, Deserialize)]
+/// Row-major 3×3 intrinsics of a camera of unknown size.
+#[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Numbers<9>")]
-pub(crate) struct Rotation(
-    pub(crate) UnitQuaternion<f64>,
-    /// Deviation of the matrix from orthonormality, where that was more than rounding.
-    pub(crate) Option<f64>,
-);
+pub(crate) struct Intrinsics(pub(crate) Camera);
 
-impl TryFrom<Numbers<9>> for Rotation {
-    type Error = String;
+impl TryFrom<Numbers<9>> for Intrinsics {
+    type Error = CameraError;
 
-    fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
-        let rotation = rotation_from_row_major(&numbers.0)?;
-        Ok(Self(rotation, deviation_from_rotation(&numbers.0)))
+    fn try_from(k: Numbers<9>) -> Result<Self, CameraError> {
+        Camera::from_k(k.0, 1, 1).map(Self)
     }
-}
-
-/// The pose \[m\] of a rotation and a translation \[mm\].
-pub(crate) fn pose(rotation: &Rotation, translation: &Numbers<3>) -> Isometry3<f64> {
-    Isometry3::from_parts(translation_from_mm(&translation.0), rotation.0)
 }
 
 /// A lens: the name of its model, and the coefficients in the order of OpenCV.
@@ -106,16 +140,19 @@ impl TryFrom<LensEntry> for Lens {
 }
 
 /// Unit of a length.
-#[derive(Clone, Copy, Deserialize)]
-pub(crate) enum LengthUnit {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+pub enum LengthUnit {
+    /// m.
     #[serde(rename = "m")]
     Meter,
+    /// mm.
     #[serde(rename = "mm")]
     Millimeter,
 }
 
 impl LengthUnit {
-    pub(crate) fn meters(self) -> f64 {
+    /// Meters of one unit.
+    pub fn meters(self) -> f64 {
         match self {
             Self::Meter => 1.0,
             Self::Millimeter => 1e-3,
@@ -123,45 +160,21 @@ impl LengthUnit {
     }
 }
 
-/// A pose into the camera frame \[m\].
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "PoseEntry")]
-pub(crate) struct FramePose(pub(crate) Isometry3<f64>);
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A 4×4 matrix, or a quaternion whose name says its order.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PoseEntry {
-    unit: LengthUnit,
-    matrix: Option<Numbers<16>>,
-    quaternion_wxyz: Option<Numbers<4>>,
-    quaternion_xyzw: Option<Numbers<4>>,
-    translation: Option<Numbers<3>>,
-}
-
-impl TryFrom<PoseEntry> for FramePose {
-    type Error = String;
-
-    fn try_from(entry: PoseEntry) -> Result<Self, String> {
-        let wxyz = match (entry.matrix, entry.quaternion_wxyz, entry.quaternion_xyzw) {
-            (Some(m), None, None) => {
-                let mut pose = pose_from_matrix(&m.0)?;
-                pose.translation.vector *= entry.unit.meters();
-                return Ok(Self(pose));
-            }
-            (None, Some(wxyz), None) => wxyz.0,
-            (None, None, Some(Numbers([x, y, z, w]))) => [w, x, y, z],
-            _ => return Err("give exactly one of matrix, quaternion_wxyz, quaternion_xyzw".into()),
-        };
-        let [w, x, y, z] = wxyz;
-        let q = Quaternion::new(w, x, y, z);
-        let norm = q.norm();
-        if (norm - 1.0).abs() > 1e-3 {
-            return Err(format!("the quaternion has norm {norm}, not 1"));
+    #[test]
+    fn numbers_are_counted_and_named() {
+        assert_eq!(" 1 2.5  -3e-2 ".parse::<Numbers<3>>().map(|n| n.0), Ok([1.0, 2.5, -0.03]));
+        for (text, expected) in [
+            ("1 2", "expected 3 numbers, found 2"),
+            ("1 2 3 4", "expected 3 numbers, found 4"),
+            ("1 2x 3", "\"2x\" is not a number"),
+            ("nan 2 3", "value 0 is not finite"),
+            ("1 2 -1e308", "value 2 is -1e308, beyond ±1e9"),
+        ] {
+            assert_eq!(text.parse::<Numbers<3>>().unwrap_err(), expected);
         }
-        let translation = entry.translation.ok_or("a quaternion needs a translation")?;
-        let translation = Vector3::from(translation.0) * entry.unit.meters();
-        let rotation = UnitQuaternion::new_normalize(q);
-        Ok(Self(Isometry3::from_parts(translation.into(), rotation)))
     }
 }

@@ -1,6 +1,7 @@
 //! Images of one camera, read as a pinhole camera of the same matrix and size sees them, with depth of it or of a camera beside it.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use nalgebra::Isometry3;
 use prehend_render::{
@@ -9,38 +10,109 @@ use prehend_render::{
 };
 
 use super::error::DatasetError;
-use super::frame::Intrinsics;
-use super::numbers::{Lens, Numbers, Rotation, pose};
+use super::numbers::{Intrinsics, Lens, Numbers};
+use super::pose::{Rotation, stated_pose};
 use crate::scene::{Frame, RemapCache};
+
+/// A camera and its lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LensedCamera {
+    /// Intrinsics; of unknown size where a dataset says them.
+    pub(crate) camera: Camera,
+    pub(crate) lens: Option<Distortion>,
+}
+
+/// A camera of its own that measured depth, beside that of color.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthCamera {
+    pub(crate) own: LensedCamera,
+    /// Its coordinates → those of the color camera \[m\].
+    pub(crate) t_color_depth: Isometry3<f64>,
+}
 
 /// Optics of a camera: intrinsics, lens, depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Optics<'a> {
-    /// Intrinsics; of unknown size.
-    pub(crate) camera: Camera,
-    pub(crate) lens: Option<Distortion>,
+    pub(crate) color: LensedCamera,
     /// Camera of depth that is not registered.
     pub(crate) depth_camera: Option<DepthCamera>,
     /// Meters of one unit of stored depth.
     pub(crate) depth_unit: f64,
-    pub(crate) remaps: &'a RemapCache,
-    pub(crate) depth_remaps: &'a RemapCache,
+    pub(crate) shared: &'a SharedOptics,
 }
 
-/// Kind of a warning about a depth image: values that are none, or nothing measured.
-#[derive(Clone, Copy)]
-pub(crate) enum DepthWarning {
-    Saturated,
-    Empty,
+/// What images have in common: maps from lenses, and warnings that are given once.
+#[derive(Debug, Default)]
+pub(crate) struct SharedOptics {
+    remaps: RemapCache,
+    told_of_saturated_depth: OnceLock<()>,
+    told_of_empty_depth: OnceLock<()>,
 }
 
-/// Hears of a warning about the depth image in a file.
-pub(crate) type Warn<'a> = &'a dyn Fn(&Path, DepthWarning, &str);
+impl LensedCamera {
+    /// Of what a file says.
+    pub(crate) fn new(Intrinsics(camera): Intrinsics, lens: Option<Lens>) -> Self {
+        Self { camera, lens: lens.map(|lens| lens.0) }
+    }
+
+    /// An image of that size that is `stored`, as a pinhole camera of the same matrix sees it.
+    ///
+    /// # Errors
+    /// Those of a lens.
+    pub(crate) fn undistorted<T>(
+        &self,
+        stored: T,
+        (width, height): (usize, usize),
+        remaps: &RemapCache,
+        apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
+    ) -> Result<T, DistortionError> {
+        let Some(lens) = self.lens else { return Ok(stored) };
+        let camera = Camera { width, height, ..self.camera };
+        apply(&remaps.get(camera, lens), &stored)
+    }
+}
+
+impl DepthCamera {
+    /// Depth camera of what a file says: intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
+    ///
+    /// # Errors
+    /// The name of what is missing beside what is there.
+    pub(crate) fn stated(
+        intrinsics: Option<Intrinsics>,
+        lens: Option<Lens>,
+        rotation: Option<Rotation>,
+        translation: Option<Numbers<3>>,
+    ) -> Result<Option<Self>, String> {
+        let t_color_depth = stated_pose(rotation, translation, "d2c")?;
+        let Some(intrinsics) = intrinsics else {
+            let nothing = lens.is_none() && t_color_depth.is_none();
+            return if nothing { Ok(None) } else { Err("depth_K".to_owned()) };
+        };
+        let own = LensedCamera::new(intrinsics, lens);
+        Ok(Some(Self { own, t_color_depth: t_color_depth.unwrap_or_default() }))
+    }
+
+    /// `depth`, which it measured \[m\], as the pinhole camera `camera` would have.
+    ///
+    /// # Errors
+    /// Those of a lens.
+    pub(crate) fn register(
+        &self,
+        depth: DepthImage,
+        camera: &Camera,
+        remaps: &RemapCache,
+    ) -> Result<DepthImage, DistortionError> {
+        let (width, height) = (depth.width(), depth.height());
+        let depth = self.own.undistorted(depth, (width, height), remaps, Remap::depth)?;
+        let own = Camera { width, height, ..self.own.camera };
+        Ok(register_depth(&depth, &own, &self.t_color_depth, camera))
+    }
+}
 
 impl Optics<'_> {
     /// The camera of an image of `width` by `height` pixels.
     pub(crate) fn camera(&self, width: usize, height: usize) -> Camera {
-        Camera { width, height, ..self.camera }
+        Camera { width, height, ..self.color.camera }
     }
 
     /// Reads a color image.
@@ -50,46 +122,43 @@ impl Optics<'_> {
         self.undistorted(file, stored, size, Remap::rgb)
     }
 
-    /// Reads a depth image, registered to a color image of that size; of the depth image's without one. The largest value of 16 bits is no measurement.
+    /// Reads a depth image, registered to a color image of that size; of the depth image's without one. None when it measures nothing; the largest value of
+    /// 16 bits is no measurement.
     ///
     /// # Errors
-    /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
+    /// When it is absent or does not decode.
     pub(crate) fn depth(
         &self,
         file: &Path,
         color: Option<(usize, usize)>,
-        warn: Warn<'_>,
-    ) -> Result<DepthImage, DatasetError> {
+    ) -> Result<Option<DepthImage>, DatasetError> {
         let mut stored = DepthImage::load(file, self.depth_unit)?;
         if let Some(warning) = drop_saturated(&mut stored, self.depth_unit) {
-            warn(file, DepthWarning::Saturated, &warning);
+            warn_once(&self.shared.told_of_saturated_depth, file, &warning);
         }
         let size = (stored.width(), stored.height());
         let depth = match &self.depth_camera {
             None => self.undistorted(file, stored, size, Remap::depth)?,
             Some(own) => {
                 let (width, height) = color.unwrap_or(size);
-                let registered =
-                    own.register(stored, &self.camera(width, height), self.depth_remaps);
+                let camera = self.camera(width, height);
+                let registered = own.register(stored, &camera, &self.shared.remaps);
                 registered.map_err(|e| DatasetError::unusable(file, e))?
             }
         };
-        match depth.pixels().iter().all(|&z| z == 0.0) {
-            true => Err(DatasetError::NoDepth { file: file.to_owned() }),
-            false => Ok(depth),
-        }
+        Ok(depth.pixels().iter().any(|&z| z != 0.0).then_some(depth))
     }
 
     /// Reads a mask.
     ///
     /// # Errors
-    /// When it is absent or does not decode, and [`DatasetError::EmptyMask`] when no pixel is set.
+    /// When it is absent or does not decode, and [`DatasetError::NoMask`] when no pixel is set.
     pub(crate) fn mask(&self, file: &Path) -> Result<Mask, DatasetError> {
         let stored = Mask::load(file)?;
         let size = (stored.width(), stored.height());
         let mask = self.undistorted(file, stored, size, Remap::mask)?;
         match mask.count() {
-            0 => Err(DatasetError::EmptyMask { file: file.to_owned() }),
+            0 => Err(DatasetError::no_mask(file, "the mask is empty")),
             _ => Ok(mask),
         }
     }
@@ -99,12 +168,11 @@ impl Optics<'_> {
         &self,
         file: &Path,
         stored: T,
-        (width, height): (usize, usize),
+        size: (usize, usize),
         apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
     ) -> Result<T, DatasetError> {
-        let Some(lens) = self.lens else { return Ok(stored) };
-        let remap = self.remaps.get(self.camera(width, height), lens);
-        apply(&remap, &stored).map_err(|e| DatasetError::unusable(file, e))
+        let seen = self.color.undistorted(stored, size, &self.shared.remaps, apply);
+        seen.map_err(|e| DatasetError::unusable(file, e))
     }
 
     /// Color and depth, of which there is one at least, with an empty mask. Without color, pictures are black; without depth, and of depth images of zeros beside
@@ -116,7 +184,6 @@ impl Optics<'_> {
         &self,
         color: Option<&Path>,
         depth: Option<&Path>,
-        warn: Warn<'_>,
     ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
@@ -124,21 +191,32 @@ impl Optics<'_> {
             check_size(depth, color)?;
         }
         let color = color.map(|file| self.color(file)).transpose()?;
-        let depth = depth.map(|file| self.depth(file, size, warn)).transpose();
-        let depth = match depth {
-            Err(DatasetError::NoDepth { file }) if color.is_some() => {
-                warn(&file, DepthWarning::Empty, "every depth is zero: color alone is used");
-                None
+        let mut measured = None;
+        if let Some(file) = depth {
+            measured = self.depth(file, size)?;
+            if measured.is_none() && color.is_none() {
+                return Err(DatasetError::missing(file, NO_DEPTH));
             }
-            read => read?,
-        };
-        let size = size.or(depth.as_ref().map(|depth| (depth.width(), depth.height())));
+            if measured.is_none() {
+                let warning = format!("{NO_DEPTH}: color alone is used");
+                warn_once(&self.shared.told_of_empty_depth, file, &warning);
+            }
+        }
+        let size = size.or(measured.as_ref().map(|depth| (depth.width(), depth.height())));
         let (width, height) = size.unwrap_or_default();
-        let depth = depth.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
+        let depth = measured.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
         let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let mask = Mask::filled(width, height, false);
         Ok(Frame::new(self.camera(width, height)).color(color).depth(depth).mask(mask))
     }
+}
+
+/// What is wrong with a depth image that measures nothing.
+pub(super) const NO_DEPTH: &str = "every depth is zero";
+
+/// Warns of the depth image in `file` unless others were warned of.
+fn warn_once(told: &OnceLock<()>, file: &Path, text: &str) {
+    told.get_or_init(|| log::warn!("{}: {text} (other images are not named)", file.display()));
 }
 
 /// Refuses an image in `file` of another size than that in `other`.
@@ -173,72 +251,8 @@ pub(crate) fn drop_saturated(depth: &mut DepthImage, unit: f64) -> Option<String
     })
 }
 
-/// A camera of its own, that measured depth.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct DepthCamera {
-    /// Of unknown size.
-    camera: Camera,
-    lens: Option<Distortion>,
-    /// Its coordinates → those of the color camera \[m\].
-    t_color_depth: Isometry3<f64>,
-}
-
-impl DepthCamera {
-    /// Depth camera of intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
-    ///
-    /// # Errors
-    /// The name of what is missing beside what is there.
-    pub(crate) fn new(
-        camera: Option<Intrinsics>,
-        lens: Option<Lens>,
-        place: (Option<Rotation>, Option<Numbers<3>>),
-    ) -> Result<Option<Self>, &'static str> {
-        let t_color_depth = match place {
-            (None, None) => None,
-            (Some(rotation), Some(mm)) => Some(pose(&rotation, &mm)),
-            (None, Some(_)) => return Err("cam_R_d2c"),
-            (Some(_), None) => return Err("cam_t_d2c"),
-        };
-        let Some(Intrinsics(camera)) = camera else {
-            let nothing = lens.is_none() && t_color_depth.is_none();
-            return if nothing { Ok(None) } else { Err("depth_K") };
-        };
-        let t_color_depth = t_color_depth.unwrap_or_else(Isometry3::identity);
-        Ok(Some(Self::beside(camera, lens.map(|lens| lens.0), t_color_depth)))
-    }
-
-    /// Behind `lens`, in that place beside the color camera \[m\].
-    pub(crate) fn beside(
-        camera: Camera,
-        lens: Option<Distortion>,
-        t_color_depth: Isometry3<f64>,
-    ) -> Self {
-        Self { camera, lens, t_color_depth }
-    }
-
-    /// `depth`, which it measured \[m\], as the pinhole camera `camera` would have.
-    ///
-    /// # Errors
-    /// Those of a lens.
-    pub(crate) fn register(
-        &self,
-        mut depth: DepthImage,
-        camera: &Camera,
-        remaps: &RemapCache,
-    ) -> Result<DepthImage, DistortionError> {
-        let (width, height) = (depth.width(), depth.height());
-        let own = Camera { width, height, ..self.camera };
-        if let Some(lens) = self.lens {
-            depth = remaps.get(own, lens).depth(&depth)?;
-        }
-        Ok(register_depth(&depth, &own, &self.t_color_depth, camera))
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
-
     use super::*;
 
     #[test]
@@ -255,20 +269,5 @@ mod tests {
             assert_eq!(depth.pixels().iter().filter(|z| **z > 0.0).count(), 2);
             assert_eq!(drop_saturated(&mut depth, unit), None);
         }
-    }
-
-    #[test]
-    fn what_is_missing_is_named() {
-        let camera = Camera::from_k([400.0, 0.0, 20.0, 0.0, 400.0, 15.0, 0.0, 0.0, 1.0], 1, 1);
-        let camera = camera.ok().map(Intrinsics);
-        let place =
-            (Some(Rotation(UnitQuaternion::identity(), None)), Some(Numbers([10.0, 0.0, 0.0])));
-        let missing = |camera, place| DepthCamera::new(camera, None, place).err();
-        assert_eq!(missing(camera, (None, place.1)), Some("cam_R_d2c"));
-        assert_eq!(missing(camera, (place.0, None)), Some("cam_t_d2c"));
-        assert_eq!(missing(None, place), Some("depth_K"));
-        assert!(DepthCamera::new(None, None, (None, None)).unwrap().is_none());
-        let known = DepthCamera::new(camera, None, place).unwrap().unwrap();
-        assert_eq!(known.t_color_depth.translation.x, 0.01);
     }
 }

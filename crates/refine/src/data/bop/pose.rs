@@ -1,23 +1,24 @@
-//! Poses as BOP writes them: nine row-major rotation entries and a translation in millimeters.
+//! Poses in files: nine row-major rotation entries and a translation in millimeters, as BOP writes them, or matrices and quaternions with their units.
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
-use prehend_geometry::limits::MAX_NUMBER;
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+use super::numbers::{LengthUnit, Numbers, require_in_range};
 
 /// Largest entry of RᵀR − I with which a matrix still counts as a rotation: published ground truth is up to 9e-3 off (LM-O).
 const ROTATION_TOLERANCE: f64 = 2e-2;
 /// Largest entry of RᵀR − I that is rounding, of which nobody needs to be told.
 const ROUNDING: f64 = 1e-3;
 
-/// Largest entry of RᵀR − I.
-fn deviation(matrix: &Matrix3<f64>) -> f64 {
-    (matrix.transpose() * matrix - Matrix3::identity()).amax()
-}
-
-/// Largest entry of RᵀR − I of nine row-major entries, where it is more than rounding.
-pub(crate) fn deviation_from_rotation(r: &[f64; 9]) -> Option<f64> {
-    Some(deviation(&Matrix3::from_row_slice(r))).filter(|deviation| *deviation > ROUNDING)
+/// A rotation of nine row-major entries: that nearest to them (polar factor).
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "Numbers<9>")]
+pub(crate) struct Rotation {
+    pub(crate) nearest: UnitQuaternion<f64>,
+    /// Largest entry of RᵀR − I of the entries R, where it is more than rounding.
+    pub(crate) deviation: Option<f64>,
 }
 
 /// Warning about a file whose rotations are up to `deviation` from orthonormal.
@@ -28,24 +29,27 @@ pub(crate) fn rotations_off(file: &Path, deviation: f64) -> String {
     )
 }
 
-/// The rotation nearest to nine row-major entries (polar factor).
-///
-/// # Errors
-/// What is wrong with entries that are not finite, not orthonormal, or a reflection.
-pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, String> {
-    require_all_in_range(r)?;
-    let matrix = Matrix3::from_row_slice(r);
-    let deviation = deviation(&matrix);
-    if deviation > ROTATION_TOLERANCE {
-        return Err(format!(
-            "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"
-        ));
+impl TryFrom<Numbers<9>> for Rotation {
+    type Error = String;
+
+    /// # Errors
+    /// What is wrong with entries that are not finite, not orthonormal, or a reflection.
+    fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
+        numbers.require_in_range()?;
+        let matrix = Matrix3::from_row_slice(&numbers.0);
+        let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
+        if deviation > ROTATION_TOLERANCE {
+            return Err(format!(
+                "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"
+            ));
+        }
+        if matrix.determinant() < 0.0 {
+            return Err("a reflection (determinant -1), not a rotation".into());
+        }
+        let nearest = Rotation3::from_matrix_unchecked(polar_factor(matrix));
+        let nearest = UnitQuaternion::from_rotation_matrix(&nearest);
+        Ok(Self { nearest, deviation: Some(deviation).filter(|deviation| *deviation > ROUNDING) })
     }
-    if matrix.determinant() < 0.0 {
-        return Err("a reflection (determinant -1), not a rotation".into());
-    }
-    let nearest = polar_factor(matrix);
-    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nearest)))
 }
 
 /// The orthogonal polar factor of a nearly orthonormal matrix, by Newton's iteration
@@ -65,22 +69,32 @@ pub(crate) fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] 
     std::array::from_fn(|i| m[(i / 3, i % 3)])
 }
 
-/// A translation \[m\] of three millimeter values.
-pub(crate) fn translation_from_mm(t_mm: &[f64; 3]) -> Translation3<f64> {
-    t_mm.map(|v| v / 1000.0).into()
-}
-
 /// The millimeter values of a translation \[m\].
 pub(crate) fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
     (translation.vector * 1000.0).into()
 }
 
-/// The pose \[m\] of a row-major rotation and a millimeter translation.
+/// The pose \[m\] of a rotation and a translation \[mm\].
+pub(crate) fn pose(rotation: &Rotation, translation: &Numbers<3>) -> Isometry3<f64> {
+    let translation = translation.0.map(|mm| mm / 1000.0);
+    Isometry3::from_parts(translation.into(), rotation.nearest)
+}
+
+/// The pose \[m\] of `cam_R_…` and `cam_t_…` \[mm\], whose names end in `between`; `None` where neither is said.
 ///
 /// # Errors
-/// Those of [`rotation_from_row_major`].
-pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f64>, String> {
-    Ok(Isometry3::from_parts(translation_from_mm(t_mm), rotation_from_row_major(r)?))
+/// The name of the one that is missing.
+pub(crate) fn stated_pose(
+    rotation: Option<Rotation>,
+    translation: Option<Numbers<3>>,
+    between: &str,
+) -> Result<Option<Isometry3<f64>>, String> {
+    match (rotation, translation) {
+        (None, None) => Ok(None),
+        (Some(rotation), Some(mm)) => Ok(Some(pose(&rotation, &mm))),
+        (None, Some(_)) => Err(format!("cam_R_{between}")),
+        (Some(_), None) => Err(format!("cam_t_{between}")),
+    }
 }
 
 /// The pose \[m\] of a 4×4 matrix in row-major order. A rotation that is up to 0.02 from orthonormal is replaced by the nearest one.
@@ -95,47 +109,57 @@ pub fn pose_from_matrix(m: &[f64; 16]) -> Result<Isometry3<f64>, String> {
     for value in translation {
         require_in_range(value).map_err(|problem| format!("the translation {problem}"))?;
     }
-    let row_major = std::array::from_fn(|i| m[4 * (i / 3) + i % 3]);
-    let rotation = rotation_from_row_major(&row_major)?;
+    let row_major = Numbers(std::array::from_fn(|i| m[4 * (i / 3) + i % 3]));
+    let rotation = Rotation::try_from(row_major)?.nearest;
     Ok(Isometry3::from_parts(Translation3::from(translation), rotation))
 }
 
-/// `N` finite numbers separated by spaces.
-pub(crate) fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is not a number"));
-    let values = exactly(text.split_whitespace().map(number).collect::<Result<_, _>>()?)?;
-    require_all_in_range(&values)?;
-    Ok(values)
+/// A pose into the camera frame \[m\].
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "PoseEntry")]
+pub(crate) struct FramePose(pub(crate) Isometry3<f64>);
+
+/// A 4×4 matrix, or a quaternion whose name says its order.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PoseEntry {
+    unit: LengthUnit,
+    matrix: Option<Numbers<16>>,
+    quaternion_wxyz: Option<Numbers<4>>,
+    quaternion_xyzw: Option<Numbers<4>>,
+    translation: Option<Numbers<3>>,
 }
 
-/// The values if there are `N`.
-pub(super) fn exactly<const N: usize>(values: Vec<f64>) -> Result<[f64; N], String> {
-    values.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
-}
+impl TryFrom<PoseEntry> for FramePose {
+    type Error = String;
 
-/// Refuses a number that is not finite or beyond [`MAX_NUMBER`].
-///
-/// # Errors
-/// What is wrong with it.
-pub(crate) fn require_in_range(value: f64) -> Result<f64, String> {
-    match value.abs() {
-        _ if !value.is_finite() => Err("is not finite".into()),
-        size if size > MAX_NUMBER => Err(format!("is {value:e}, beyond ±{MAX_NUMBER:e}")),
-        _ => Ok(value),
+    fn try_from(entry: PoseEntry) -> Result<Self, String> {
+        let wxyz = match (entry.matrix, entry.quaternion_wxyz, entry.quaternion_xyzw) {
+            (Some(m), None, None) => {
+                let mut pose = pose_from_matrix(&m.0)?;
+                pose.translation.vector *= entry.unit.meters();
+                return Ok(Self(pose));
+            }
+            (None, Some(wxyz), None) => wxyz.0,
+            (None, None, Some(Numbers([x, y, z, w]))) => [w, x, y, z],
+            _ => return Err("give exactly one of matrix, quaternion_wxyz, quaternion_xyzw".into()),
+        };
+        let [w, x, y, z] = wxyz;
+        let q = Quaternion::new(w, x, y, z);
+        let norm = q.norm();
+        if (norm - 1.0).abs() > 1e-3 {
+            return Err(format!("the quaternion has norm {norm}, not 1"));
+        }
+        let translation = entry.translation.ok_or("a quaternion needs a translation")?;
+        let translation = Vector3::from(translation.0) * entry.unit.meters();
+        let rotation = UnitQuaternion::new_normalize(q);
+        Ok(Self(Isometry3::from_parts(translation.into(), rotation)))
     }
-}
-
-fn require_all_in_range(values: &[f64]) -> Result<(), String> {
-    values.iter().enumerate().try_for_each(|(index, value)| {
-        let checked = require_in_range(*value);
-        checked.map(|_| ()).map_err(|problem| format!("value {index} {problem}"))
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     fn some_rotation() -> UnitQuaternion<f64> {
         UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -1.9, 0.4))
@@ -145,7 +169,7 @@ mod tests {
     fn rows_and_poses_convert_both_ways() {
         let r = rotation_to_row_major(&some_rotation());
         let t_mm = [17.495194, -6.548735, 437.915208];
-        let pose = pose_from_bop(&r, &t_mm).unwrap();
+        let pose = pose(&Numbers(r).try_into().unwrap(), &Numbers(t_mm));
         assert!(pose.rotation.angle_to(&some_rotation()) < 1e-15);
         assert!((pose.translation.vector.z - 0.437915208).abs() < 1e-16);
         let back = translation_to_mm(&pose.translation);
@@ -159,8 +183,8 @@ mod tests {
         let m = some_rotation().to_rotation_matrix().into_inner();
         let symmetric = Matrix3::new(1.0002, 1e-4, 0.0, 1e-4, 0.9998, -5e-5, 0.0, -5e-5, 1.0001);
         let noisy = m * symmetric;
-        let rotation =
-            rotation_from_row_major(&std::array::from_fn(|i| noisy[(i / 3, i % 3)])).unwrap();
+        let entries = Numbers(std::array::from_fn(|i| noisy[(i / 3, i % 3)]));
+        let rotation = Rotation::try_from(entries).unwrap().nearest;
         // m·symmetric is a polar decomposition already, so the factor must be m itself.
         assert!(rotation.angle_to(&some_rotation()) < 1e-14);
     }
@@ -169,9 +193,11 @@ mod tests {
     fn published_truth_is_made_a_rotation() {
         // Row lengths of 1 + 4e-3, as LM-O has them.
         let r = rotation_to_row_major(&some_rotation()).map(|v| v * 1.004);
-        assert!(rotation_from_row_major(&r).unwrap().angle_to(&some_rotation()) < 1e-14);
-        assert!((deviation_from_rotation(&r).unwrap() - 0.008).abs() < 1e-4);
-        assert_eq!(deviation_from_rotation(&rotation_to_row_major(&some_rotation())), None);
+        let read = Rotation::try_from(Numbers(r)).unwrap();
+        assert!(read.nearest.angle_to(&some_rotation()) < 1e-14);
+        assert!((read.deviation.unwrap() - 0.008).abs() < 1e-4);
+        let exact = Numbers(rotation_to_row_major(&some_rotation()));
+        assert_eq!(Rotation::try_from(exact).unwrap().deviation, None);
     }
 
     #[test]
@@ -184,7 +210,7 @@ mod tests {
             (r.map(|v| -v), "a reflection"),
             (nan, "value 4 is not finite"),
         ] {
-            assert!(rotation_from_row_major(&entries).unwrap_err().starts_with(expected));
+            assert!(Rotation::try_from(Numbers(entries)).unwrap_err().starts_with(expected));
         }
     }
 
@@ -201,16 +227,14 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_counted_and_named() {
-        assert_eq!(parse_numbers(" 1 2.5  -3e-2 "), Ok([1.0, 2.5, -0.03]));
-        for (text, expected) in [
-            ("1 2", "expected 3 numbers, found 2"),
-            ("1 2 3 4", "expected 3 numbers, found 4"),
-            ("1 2x 3", "\"2x\" is not a number"),
-            ("nan 2 3", "value 0 is not finite"),
-            ("1 2 -1e308", "value 2 is -1e308, beyond ±1e9"),
-        ] {
-            assert_eq!(parse_numbers::<3>(text).unwrap_err(), expected);
-        }
+    fn the_missing_part_of_a_pose_is_named() {
+        let rotation = Rotation::try_from(Numbers(rotation_to_row_major(&some_rotation()))).ok();
+        let translation = Some(Numbers([10.0, 0.0, 0.0]));
+        let missing = |rotation, translation| stated_pose(rotation, translation, "d2c").err();
+        assert_eq!(missing(None, translation), Some("cam_R_d2c".to_owned()));
+        assert_eq!(missing(rotation, None), Some("cam_t_d2c".to_owned()));
+        assert_eq!(stated_pose(None, None, "d2c"), Ok(None));
+        let known = stated_pose(rotation, translation, "d2c").unwrap().unwrap();
+        assert_eq!(known.translation.x, 0.01);
     }
 }

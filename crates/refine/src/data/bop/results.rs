@@ -10,10 +10,8 @@ use prehend_geometry::plain_target;
 
 use super::error::DatasetError;
 use super::files::{read_bytes, write_atomically};
-use super::pose::{
-    deviation_from_rotation, parse_numbers, pose_from_bop, rotation_to_row_major, rotations_off,
-    translation_to_mm,
-};
+use super::numbers::Numbers;
+use super::pose::{Rotation, pose, rotation_to_row_major, rotations_off, translation_to_mm};
 
 const COLUMNS: [&str; 7] = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"];
 
@@ -111,18 +109,19 @@ fn parse_row(fields: &[&str]) -> Result<(ResultRow, Option<f64>), (&'static str,
     };
     let id =
         |field, text: &str| text.parse().map_err(|_| (field, format!("{text:?} is not an id")));
-    let number = |field, text: &str| parse_numbers(text).map(|[v]| v).map_err(|e| (field, e));
-    let r = parse_numbers(r).map_err(|e| ("R", e))?;
-    let t_mm = parse_numbers(t).map_err(|e| ("t", e))?;
+    let number = |field, text: &str| text.parse().map(|Numbers([v])| v).map_err(|e| (field, e));
+    let r: Numbers<9> = r.parse().map_err(|e| ("R", e))?;
+    let t_mm = t.parse().map_err(|e| ("t", e))?;
+    let rotation = Rotation::try_from(r).map_err(|e| ("R", e))?;
     let row = ResultRow {
         scene_id: id("scene_id", scene_id)?,
         im_id: id("im_id", im_id)?,
         obj_id: id("obj_id", obj_id)?,
         score: number("score", score)?,
-        t_cam_model: pose_from_bop(&r, &t_mm).map_err(|e| ("R", e))?,
+        t_cam_model: pose(&rotation, &t_mm),
         time: number("time", time)?,
     };
-    Ok((row, deviation_from_rotation(&r)))
+    Ok((row, rotation.deviation))
 }
 
 /// Gives all rows of an image the sum of their times, or −1 where one is unknown: BOP wants the time spent

@@ -18,35 +18,22 @@ pub const UNITS_PER_NEWTON: f64 = 1000.0;
 pub struct Tactile {
     /// Name of the body that carries it.
     pub body: String,
+    /// Layout: a table of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of the readings; none of a patch.
+    pub taxels: Option<PathBuf>,
     /// What it says.
     pub reading: TactileReading,
     pub(crate) origin: Origin,
 }
 
-/// What a sensor of touch says. Layouts are tables of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of the readings.
+/// What a sensor of touch says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TactileReading {
     /// Force of the object on the body at each taxel, in the frame of the taxel's link \[N\].
-    Force {
-        /// The layout.
-        taxels: PathBuf,
-        /// One a taxel.
-        force: Vec<Vector3<f64>>,
-    },
+    Force(Vec<Vector3<f64>>),
     /// Whether each taxel is touched, where that is known.
-    Binary {
-        /// The layout.
-        taxels: PathBuf,
-        /// One a taxel.
-        contact: Vec<Option<bool>>,
-    },
-    /// How far the object is from each taxel \[m\], where it is in range.
-    Proximity {
-        /// The layout.
-        taxels: PathBuf,
-        /// One a taxel.
-        distance: Vec<Option<f64>>,
-    },
+    Binary(Vec<Option<bool>>),
+    /// Distance of the object from each taxel \[m\], where it is in range.
+    Proximity(Vec<Option<f64>>),
     /// The object's surface where it presses into a soft skin.
     Patch {
         /// The link that carries the skin.
@@ -56,18 +43,6 @@ pub enum TactileReading {
         /// The skin's outward unit normals there, link frame.
         normals: Vec<Vector3<f64>>,
     },
-}
-
-impl TactileReading {
-    /// The layout, where there is one.
-    pub fn taxels(&self) -> Option<&Path> {
-        match self {
-            Self::Force { taxels, .. }
-            | Self::Binary { taxels, .. }
-            | Self::Proximity { taxels, .. } => Some(taxels),
-            Self::Patch { .. } => None,
-        }
-    }
 }
 
 /// A sensor in a file.
@@ -123,23 +98,21 @@ impl TactileEntry {
     ) -> Result<Tactile, DatasetError> {
         let at = &origin;
         let missing = |name| move || at.fault(name, "is missing");
-        let taxels = || self.taxels.map(|taxels| folder.join(taxels)).ok_or_else(missing("taxels"));
         let reading = match self.kind {
             SensorKindName::Force => {
                 let force = self.force.filter(|force| !force.is_empty());
                 let force = force.ok_or_else(missing("force"))?.into_iter();
-                let force = force.map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect();
-                TactileReading::Force { taxels: taxels()?, force }
+                TactileReading::Force(
+                    force.map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect(),
+                )
             }
             SensorKindName::Binary => {
                 let contact = self.contact.ok_or_else(missing("contact"))?.into_iter();
-                let contact = contact.map(|flag| flag.map(|flag| flag.0)).collect();
-                TactileReading::Binary { taxels: taxels()?, contact }
+                TactileReading::Binary(contact.map(|flag| flag.map(|flag| flag.0)).collect())
             }
             SensorKindName::Proximity => {
                 let distance = self.distance.ok_or_else(missing("distance"))?.into_iter();
-                let distance = distance.map(|mm| mm.map(|mm| mm.0 * 1e-3)).collect();
-                TactileReading::Proximity { taxels: taxels()?, distance }
+                TactileReading::Proximity(distance.map(|mm| mm.map(|mm| mm.0 * 1e-3)).collect())
             }
             SensorKindName::Patch => {
                 let points = self.points.ok_or_else(missing("points"))?;
@@ -160,8 +133,12 @@ impl TactileEntry {
                 }
             }
         };
+        let taxels = match (&reading, self.taxels) {
+            (TactileReading::Patch { .. }, _) => None,
+            (_, taxels) => Some(folder.join(taxels.ok_or_else(missing("taxels"))?)),
+        };
         let body = self.body.or_else(|| default.map(str::to_owned)).ok_or_else(missing("body"))?;
-        Ok(Tactile { body, reading, origin })
+        Ok(Tactile { body, taxels, reading, origin })
     }
 }
 
@@ -175,7 +152,7 @@ impl Tactile {
         let mut read: Vec<Self> = Vec::new();
         for (name, entry) in file.entries::<TactileEntry>(im_id)? {
             let sensor = entry.read(root, None, Origin::new(file.path(), &name))?;
-            let is_force = |sensor: &Self| matches!(sensor.reading, TactileReading::Force { .. });
+            let is_force = |sensor: &Self| matches!(sensor.reading, TactileReading::Force(_));
             if is_force(&sensor) && read.iter().any(is_force) {
                 return Err(file.fault(&name, "there are two sensors of kind force"));
             }

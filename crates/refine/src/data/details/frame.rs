@@ -42,7 +42,7 @@ pub struct TrackDetails {
 
 /// The columns of `frames`, in their order.
 ///
-/// Those of what no frame has, initial poses or how it was followed, are left out; `docs/EXPORT.md` lists them all.
+/// Those of what no frame has, initial poses, weights or how it was followed, are left out; `docs/EXPORT.md` lists them all.
 pub(super) fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter();
     let id = |name, of: fn(&Target) -> i64| {
@@ -67,6 +67,8 @@ pub(super) fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
     columns.extend(of_tracks(frames));
     let warnings = rows().map(|frame| frame.warnings.join("\n"));
     columns.push(TableColumn::new("warnings", warnings, Values::Texts));
+    // A column without anything in a row has as many rows as nobody can tell.
+    columns.retain(|column| column.width() > 0);
     columns
 }
 

@@ -14,7 +14,7 @@ pub(super) fn archive(columns: &[TableColumn]) -> Result<Vec<u8>, Box<dyn Error>
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::default());
-    for column in columns.iter().filter(|column| column.width() > 0) {
+    for column in columns {
         archive.start_file(format!("{}.npy", column.name), options)?;
         archive.write_all(&array(column))?;
     }
@@ -35,8 +35,7 @@ fn array(column: &TableColumn) -> Vec<u8> {
         Values::Numbers(_) => "<f8".to_owned(),
         Values::Texts(_) => format!("<U{longest}"),
     };
-    // A column without anything in a row has as many rows as nobody can tell: it is not written.
-    let rows = column.values.count() / column.width().max(1);
+    let rows = column.values.count() / column.width();
     // A tuple of one number has a comma behind it.
     let mut shape = format!("{rows}{}", if column.shape.is_empty() { "," } else { "" });
     column.shape.iter().for_each(|n| shape += &format!(", {n}"));

@@ -13,8 +13,7 @@ use super::column::{TableColumn, Values};
 
 /// The content of the file. Arrays of a row are lists, row-major: their lengths are the same in all rows, their shapes are not kept.
 pub(super) fn file(columns: &[TableColumn]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let columns: Vec<&TableColumn> = columns.iter().filter(|column| column.width() > 0).collect();
-    let fields: String = columns.iter().map(|column| field(column)).collect();
+    let fields: String = columns.iter().map(field).collect();
     let schema = Arc::new(parse_message_type(&format!("message frames {{ {fields} }}"))?);
     let properties = Arc::new(WriterProperties::builder().build());
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties)?;

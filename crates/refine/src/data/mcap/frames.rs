@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use prehend_render::{Camera, DistortionError, Remap};
 
-use super::camera::Lensed;
 use super::images::{self, describe};
 use super::reader::MessageReader;
 use super::recording::{Recording, messages, moment, type_of};
@@ -115,51 +114,56 @@ impl<'a> Frames<'a> {
         mask: Option<&[u8]>,
     ) -> Result<Frame, DatasetError> {
         let recording = self.recording;
+        let Recording { camera: lensed, remaps, .. } = recording;
         let fault = |topic: &str, problem: String| {
             let field = format!("{topic} at {:.3} s", at as f64 * 1e-9);
             DatasetError::field(&recording.file, &field, problem)
         };
         let of = |stream: &Stream, problem| fault(&stream.topic.name, problem);
-        let of_first = |problem| of(&self.first, problem);
-        let lens_fault = |e: DistortionError| of_first(e.to_string());
-        let check_size = |stream: &Stream, width, height, camera: &Camera| {
+        let lens_fault = |e: DistortionError| of(&self.first, e.to_string());
+        let check_size = |stream: &Stream, (width, height), camera: &Camera| {
             let (w, h) = (camera.width, camera.height);
             let problem = format!("{width}x{height} pixels, its camera_info is of {w}x{h}");
             if (w, h) == (width, height) { Ok(()) } else { Err(of(stream, problem)) }
         };
-        let Lensed { camera, lens } = recording.camera;
-        let mut frame = Frame::new(camera);
-        let kind = &self.first.topic.kind;
-        if recording.topics.has_color {
-            frame.color = images::color(kind, first).map_err(of_first)?;
-            check_size(&self.first, frame.color.width(), frame.color.height(), &camera)?;
+        let mut frame = Frame::new(lensed.camera);
+        let depth = if recording.topics.has_color {
+            let color = images::color(&self.first.topic.kind, first);
+            let color = color.map_err(|e| of(&self.first, e))?;
+            let size = (color.width(), color.height());
+            check_size(&self.first, size, &lensed.camera)?;
+            let color = lensed.undistorted(color, size, remaps, Remap::rgb);
+            frame.color = color.map_err(lens_fault)?;
+            self.depth.as_ref().zip(depth)
         } else {
-            frame.depth = images::depth(kind, first).map_err(of_first)?;
-            check_size(&self.first, frame.depth.width(), frame.depth.height(), &camera)?;
-        }
-        let mut registered = false;
-        if let (Some(data), Some(stream)) = (depth, &self.depth) {
-            frame.depth = images::depth(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
-            if let Some(own) = &recording.depth_camera {
-                check_size(stream, frame.depth.width(), frame.depth.height(), &own.camera)?;
-                let place = recording.in_camera(&stream.topic.frame_id, at);
-                let place = place.map_err(|e| of(stream, e))?;
-                let own = DepthCamera::beside(own.camera, own.lens, place);
-                let depth = own.register(frame.depth, &camera, &recording.depth_remaps);
-                frame.depth = depth.map_err(|e| of(stream, e.to_string()))?;
-                registered = true;
+            Some((&self.first, first))
+        };
+        if let Some((stream, data)) = depth {
+            let depth = images::depth(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
+            let size = (depth.width(), depth.height());
+            // Without a camera of its own, depth is checked with the other images.
+            let own = recording.depth_camera;
+            if own.is_some() || !recording.topics.has_color {
+                check_size(stream, size, &own.unwrap_or(*lensed).camera)?;
             }
+            frame.depth = match own {
+                None => {
+                    lensed.undistorted(depth, size, remaps, Remap::depth).map_err(lens_fault)?
+                }
+                Some(own) => {
+                    let place = recording.in_camera(&stream.topic.frame_id, at);
+                    let t_color_depth = place.map_err(|e| of(stream, e))?;
+                    let depth =
+                        DepthCamera { own, t_color_depth }.register(depth, &lensed.camera, remaps);
+                    depth.map_err(|e| of(stream, e.to_string()))?
+                }
+            };
         }
-        if let (Some(data), Some(stream)) = (mask, &self.mask) {
-            frame.mask = images::mask(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
-        }
-        if let Some(lens) = lens {
-            let remap: &Remap = &recording.remaps.get(camera, lens);
-            frame.color = remap.rgb(&frame.color).map_err(lens_fault)?;
-            frame.mask = remap.mask(&frame.mask).map_err(lens_fault)?;
-            if !registered {
-                frame.depth = remap.depth(&frame.depth).map_err(lens_fault)?;
-            }
+        if let Some((stream, data)) = self.mask.as_ref().zip(mask) {
+            let mask = images::mask(&stream.topic.kind, data).map_err(|e| of(stream, e))?;
+            let size = (mask.width(), mask.height());
+            let mask = lensed.undistorted(mask, size, remaps, Remap::mask);
+            frame.mask = mask.map_err(lens_fault)?;
         }
         frame.check_sizes().map_err(|(image, problem)| fault(image, problem))?;
         frame.gravity = recording.gravity(at);

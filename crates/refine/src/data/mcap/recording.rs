@@ -10,7 +10,7 @@ use prehend_geometry::hand::Taxel;
 use prehend_geometry::open_plain;
 use serde::Deserialize;
 
-use super::camera::Lensed;
+use super::camera::camera_of;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
@@ -21,7 +21,7 @@ use super::reader::MessageReader;
 use super::series::TimeSeries;
 use super::topics::{Chosen, ImageTopic, ImageTopics, Known, OURS, camera_topics};
 use super::transforms::{Transforms, plain};
-use crate::data::bop::DatasetError;
+use crate::data::bop::{DatasetError, LensedCamera};
 use crate::scene::{Hand, HandMeasurement, RemapCache, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
@@ -31,14 +31,13 @@ pub struct Recording {
     pub(super) file: PathBuf,
     pub(super) topics: Chosen,
     /// Of the images that are the frames, and of depth if that has one of its own.
-    pub(super) camera: Lensed,
-    pub(super) depth_camera: Option<Lensed>,
+    pub(super) camera: LensedCamera,
+    pub(super) depth_camera: Option<LensedCamera>,
     readings: Readings,
     world: String,
     count: usize,
     faults: Vec<String>,
     pub(super) remaps: RemapCache,
-    pub(super) depth_remaps: RemapCache,
 }
 
 /// Forces belong to an image if they are not farther from it than this \[ns\].
@@ -124,7 +123,6 @@ impl Recording {
             topics,
             readings: found.readings,
             remaps: RemapCache::default(),
-            depth_remaps: RemapCache::default(),
         })
     }
 
@@ -263,7 +261,9 @@ impl RecordingIndex {
             *self.counts.entry(topic.to_owned()).or_default() += 1;
             if !self.images.contains_key(topic) {
                 let (header, content) = describe(kind, data)?;
-                self.images.insert(topic.to_owned(), (kind.to_owned(), header, content));
+                let (name, kind) = (topic.to_owned(), kind.to_owned());
+                let found = ImageTopic { name, kind, frame_id: header.frame_id, content };
+                self.images.insert(topic.to_owned(), found);
             }
         } else if kind == CAMERA_INFO {
             if !self.cameras.contains_key(topic) {
@@ -308,10 +308,10 @@ impl RecordingIndex {
     }
 
     /// The camera of the images of `topic`, if anything is said of it.
-    fn camera(&self, topic: &ImageTopic) -> Result<Option<Lensed>, (String, String)> {
+    fn camera(&self, topic: &ImageTopic) -> Result<Option<LensedCamera>, (String, String)> {
         let info = camera_topics(&topic.name).find_map(|name| self.cameras.get_key_value(&name));
         let Some((name, info)) = info else { return Ok(None) };
-        let camera = Lensed::new(info, &topic.name);
+        let camera = camera_of(info, &topic.name);
         camera.map(Some).map_err(|problem| (name.clone(), problem))
     }
 }

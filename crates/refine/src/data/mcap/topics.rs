@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::images::Content;
-use super::messages::Header;
 
 /// Everything that this program writes besides what it has read is below it, and is not read again.
 pub(super) const OURS: &str = "/prehend/";
@@ -26,6 +25,7 @@ pub(super) struct ImageTopic {
     /// Type of the messages.
     pub(super) kind: String,
     pub(super) frame_id: String,
+    pub(super) content: Content,
 }
 
 /// The topics of images that are read.
@@ -39,8 +39,8 @@ pub(super) struct Chosen {
     pub(super) mask: Option<ImageTopic>,
 }
 
-/// Topics of images by name: type of the messages, and what the first one says.
-pub(super) type Known = BTreeMap<String, (String, Header, Content)>;
+/// Topics of images by name.
+pub(super) type Known = BTreeMap<String, ImageTopic>;
 
 impl Chosen {
     /// Of the topics that a recording has, those that are `wanted`.
@@ -50,10 +50,11 @@ impl Chosen {
     pub(super) fn new(known: &Known, wanted: &ImageTopics) -> Result<Self, (String, String)> {
         let is_mask = |name: &str| name.ends_with("mask");
         let among = |content: Content, masks: bool| {
-            let fits = move |(name, found): &(&String, &(String, Header, Content))| {
-                found.2 == content && is_mask(name) == masks && !name.starts_with(OURS)
+            let fits = move |topic: &&ImageTopic| {
+                let name = &topic.name;
+                topic.content == content && is_mask(name) == masks && !name.starts_with(OURS)
             };
-            known.iter().filter(fits).map(|(name, _)| name.as_str()).collect::<Vec<_>>()
+            known.values().filter(fits).map(|topic| topic.name.as_str()).collect::<Vec<_>>()
         };
         let mut colors = among(Content::Color, false);
         if colors.is_empty() {
@@ -69,13 +70,12 @@ impl Chosen {
                     return Err((format!("the topic of {what}"), problem));
                 }
             };
-            let Some((kind, header, _)) = known.get(name) else {
+            let topic = known.get(name).cloned().ok_or_else(|| {
                 let names: Vec<&str> = known.keys().map(String::as_str).collect();
                 let problem = format!("there are no images of this name, but {}", names.join(", "));
-                return Err((name.to_owned(), problem));
-            };
-            let (name, kind) = (name.to_owned(), kind.clone());
-            Ok(Some(ImageTopic { name, kind, frame_id: header.frame_id.clone() }))
+                (name.to_owned(), problem)
+            });
+            topic.map(Some)
         };
         let color = pick("color", &wanted.color, &colors)?;
         let depth = pick("depth", &wanted.depth, &among(Content::Depth, false))?;
@@ -113,7 +113,8 @@ mod tests {
 
     fn known(topics: &[(&str, Content)]) -> Known {
         let entry = |(name, content): &(&str, Content)| {
-            ((*name).to_owned(), ("kind".to_owned(), Header::default(), *content))
+            let (name, kind, frame_id) = ((*name).to_owned(), String::new(), String::new());
+            (name.clone(), ImageTopic { name, kind, frame_id, content: *content })
         };
         topics.iter().map(entry).collect()
     }

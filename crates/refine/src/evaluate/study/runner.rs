@@ -21,7 +21,7 @@ use crate::strategy::Posterior;
 /// Runs the methods of a study frame by frame; several runners may share the assets.
 pub struct Runner<'a> {
     design: &'a Design,
-    assets: &'a Mutex<Assets<'a>>,
+    assets: &'a Mutex<Assets>,
     scorer: Scorer<'a>,
 }
 
@@ -54,7 +54,7 @@ impl Refined {
 
 impl<'a> Runner<'a> {
     /// A runner of the methods of `design` on the dataset that `assets` are of.
-    pub fn new(design: &'a Design, dataset: &'a Dataset, assets: &'a Mutex<Assets<'a>>) -> Self {
+    pub fn new(design: &'a Design, dataset: &'a Dataset, assets: &'a Mutex<Assets>) -> Self {
         Self { design, assets, scorer: Scorer::new(dataset) }
     }
 
@@ -110,7 +110,7 @@ impl<'a> Runner<'a> {
         let target = Target { scene_id, im_id, obj_id, instance: initial.instance };
         let mut input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load_at(&target, &row.t_cam_model, &Sensor::required_by(method))?
+            assets.load(&target, Some(&row.t_cam_model), &Sensor::required_by(method))?
         };
         if let Some((sweep, amount)) = fault {
             sweep.perturb(&mut input.frame, amount, sweep.seed(row));

@@ -42,7 +42,7 @@ pub(super) fn parameter_rows(calibrator: &Calibrator) -> Vec<[String; 4]> {
 /// Writes the report of `done`, which began with the `nominal` rig, of images of this size, and returns its page; of frames that cannot be shown `failures` hears.
 pub(super) fn write(
     mut report: Report,
-    frames: &CalibrationFrames<'_>,
+    frames: &CalibrationFrames,
     (nominal, size): (&Calibrator, (usize, usize)),
     done: &Calibrated,
     failures: &mut Vec<String>,
@@ -113,7 +113,7 @@ pub(super) fn write(
 
 /// The frame of that index before and after.
 fn compare(
-    frames: &CalibrationFrames<'_>,
+    frames: &CalibrationFrames,
     nominal: &Calibrator,
     done: &Calibrated,
     index: usize,
@@ -127,7 +127,7 @@ fn compare(
 
 /// The frame of that index with the nominal rig and the pose that it has by itself, and with the rig that was found.
 fn draw(
-    frames: &CalibrationFrames<'_>,
+    frames: &CalibrationFrames,
     nominal: &Calibrator,
     done: &Calibrated,
     index: usize,

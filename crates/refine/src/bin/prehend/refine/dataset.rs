@@ -195,10 +195,14 @@ impl DatasetRun<'_> {
     }
 
     /// Refines one frame; also returns the seconds that it took.
-    fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(RefinedFrame, f64)> {
+    fn refine(&self, assets: &Mutex<Assets>, job: &Job) -> anyhow::Result<(RefinedFrame, f64)> {
         let input = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load_at(&job.target, &job.row.t_cam_model, &Sensor::required_by(&self.method))?
+            assets.load(
+                &job.target,
+                Some(&job.row.t_cam_model),
+                &Sensor::required_by(&self.method),
+            )?
         };
         let estimator = input.estimator(&self.method).backend(Arc::clone(&self.backend));
         let hypotheses = job.hypotheses();
@@ -228,7 +232,7 @@ impl DatasetRun<'_> {
     fn draw(
         &self,
         mut report: Report,
-        (dataset, assets): (&Dataset, &Mutex<Assets<'_>>),
+        (dataset, assets): (&Dataset, &Mutex<Assets>),
         jobs: &[Job],
         (refined, seconds): (&BTreeMap<usize, RefinedFrame>, &dyn Fn(usize) -> Option<f64>),
         failures: &mut Vec<String>,
@@ -251,7 +255,7 @@ impl DatasetRun<'_> {
             let mut draw = || -> Result<_, AssetError> {
                 let initial = &job.row.t_cam_model;
                 let required = Sensor::required_by(&self.method);
-                let input = assets.load_at(&job.target, initial, &required)?;
+                let input = assets.load(&job.target, Some(initial), &required)?;
                 report.draw(&FrameDrawing {
                     input: &input.estimator(&self.method).input(&input.frame, initial)?,
                     initial: Some(initial),
@@ -273,16 +277,12 @@ impl DatasetRun<'_> {
 
 /// Advice where there is no mask.
 fn hint(error: &anyhow::Error) -> &'static str {
-    let lacks_mask = match error.downcast_ref::<AssetError>() {
-        Some(AssetError::Dataset(
-            DatasetError::EmptyMask { .. } | DatasetError::NoDetection { .. },
-        )) => true,
-        Some(AssetError::Dataset(DatasetError::Missing { file })) => {
-            file.components().any(|part| part.as_os_str() == "mask_visib")
+    match error.downcast_ref() {
+        Some(AssetError::Dataset(DatasetError::NoMask { .. })) => {
+            " (--mask-source none does without)"
         }
-        _ => false,
-    };
-    if lacks_mask { " (--mask-source none does without)" } else { "" }
+        _ => "",
+    }
 }
 
 /// Frames that are drawn at most: pages stay small enough to be opened.

@@ -58,7 +58,7 @@ impl Watch {
 
     /// Waits for the next image until all of it is there. One that is overtaken by a later one comes as it is, and so does what has been
     /// begun when the time is up: reading it says what is wrong.
-    pub(super) fn next(&mut self, assets: &mut Assets<'_>) -> Option<u32> {
+    pub(super) fn next(&mut self, assets: &mut Assets) -> Option<u32> {
         let mut last_look = Instant::now();
         let start = last_look;
         while !self.stop.load(Ordering::Relaxed) {
@@ -87,7 +87,7 @@ impl Watch {
     }
 
     /// Reads the scene's JSON files if they are not what they were.
-    fn reread(&mut self, assets: &mut Assets<'_>) {
+    fn reread(&mut self, assets: &mut Assets) {
         let stamps = assets.dataset().scene(self.scene_id).map(DatasetScene::stamps).ok();
         if stamps == self.stamps {
             return;
@@ -97,7 +97,7 @@ impl Watch {
         // One that is being written is not readable for a moment.
         let listed = dataset.scene(self.scene_id).and_then(DatasetScene::moments);
         self.listed = listed.unwrap_or_default();
-        assets.replace_dataset(Arc::new(dataset));
+        assets.replace_dataset(dataset);
     }
 }
 

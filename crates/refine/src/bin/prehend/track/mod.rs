@@ -345,7 +345,7 @@ impl Tracking<'_> {
                     let target = Target { im_id, ..start };
                     let seconds = f64::from(im_id - first) / *rate;
                     let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-                    let input = assets.load(&target, &[]).map_err(anyhow::Error::from);
+                    let input = assets.load(&target, None, &[]).map_err(anyhow::Error::from);
                     Some(Moment { target, time, stamp: None, input })
                 });
                 self.follow(&mut film, count, &object, initial)
