@@ -95,6 +95,7 @@ impl Inputs {
             }
             Correction::MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
             Correction::Translation => Self { is_placed: false, ..self },
+            Correction::ChannelsSwapped => self,
         }
     }
 }
