@@ -93,16 +93,17 @@ impl Images<'_> {
             return self.compare(&view, t_cam_object, false);
         }
         let mask = view.mask(Pixel::shows_object);
-        let is_seen = mask.count() > 0;
+        if mask.count() == 0 {
+            let mut found = Warnings::default();
+            let message = "no pixel should show the object at this pose: wrong pose, or cam_K?";
+            found.add(Subject::Pose, message);
+            return found;
+        }
         let observation = &Frame { mask, ..self.observation.clone() };
         let drawn = self.drawn.clone();
         let assumed = Images { observation, object: self.object, drawn, touch: None };
         let mut found = assumed.compare(&assumed.view(t_cam_object), t_cam_object, false);
         found.0.retain(|warning| warning.subject != Subject::Mask);
-        if !is_seen {
-            let message = "no pixel should show the object at this pose: wrong pose, or cam_K?";
-            found.add(Subject::Pose, message);
-        }
         found
     }
 

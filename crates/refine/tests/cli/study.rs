@@ -196,7 +196,8 @@ fn masks_come_from_the_source_that_is_asked_for() {
         "study noise --dataset ds --poses low=ds/init.csv --image 0 --methods fused --iterations 2";
     place.succeed(&format!("{study} --out files.csv"));
     place.remove("ds/test/000001/mask_visib");
-    place.succeed(&format!("{study} --mask-source none --out none.csv"));
+    let said = place.prehend(&format!("{study} --mask-source none --out none.csv"));
+    assert_eq!(said.code, 0, "{}", said.err);
     let [files, none] = ["files.csv", "none.csv"].map(|file| rows(&place, file));
     assert_eq!(row(&none, 0, "fused")["status"], "ok");
     assert_ne!(row(&files, 0, "fused")["tx_m"], row(&none, 0, "fused")["tx_m"]);
