@@ -1,10 +1,7 @@
 //! The mask against the object at the pose, and against what depth shows under it and across its border: where that runs, one thing ends before another.
 
-use super::limits::{
-    HAND_REACH, HAND_REACH_AT_OBJECT, MASK_AREA, MASK_BEHIND, MASK_CUT, MASK_ON_HAND, MASK_OVERLAP,
-    MASK_SHIFT,
-};
-use super::warning::{Subject, Warning};
+use super::limits;
+use super::warning::{Subject, Warning, Warnings};
 use crate::scene::{Object, View, median};
 
 /// Distance from the border at which depth is read on both sides: cameras blur depth at edges \[px\].
@@ -33,70 +30,67 @@ pub(super) fn at_pose(
     let overlap = both.count() as f64;
     let area = mask / model;
     // An inverted mask has the border of a right one.
-    let (subject, hint) = if mask_fits && MASK_AREA.contains(&area) {
+    let (subject, cause) = if mask_fits && limits::MASK_AREA.contains(&area) {
         (Subject::Pose, "the mask fits depth: is the pose right, and the mesh of this object?")
     } else {
-        let hint = "wrong pose, another mesh, or a mask that is inverted or of something else?";
-        (Subject::Mask, hint)
+        let cause = "wrong pose, another mesh, or a mask that is inverted or of something else?";
+        (Subject::Mask, cause)
     };
     if overlap == 0.0 {
-        let finding = "the object at this pose does not touch its mask";
-        return Some(Warning::new(subject, (0.0, ""), finding, "wrong frame or pose?"));
+        let message = "the object at this pose does not touch its mask: wrong frame or pose?";
+        return Some(Warning { subject, message: message.into() });
     }
     let share = overlap / (mask + model - overlap);
     let pixels = (of_mask.xy() / mask - of_model.xy() / model).norm();
     let shift = pixels * z / view.frame.camera.fx;
-    let value = if hand_wrong {
-        return None;
-    } else if !MASK_AREA.contains(&area) {
-        (area, "")
-    } else if shift > MASK_SHIFT {
-        (pixels, "px")
-    } else if share < MASK_OVERLAP {
-        (share, "")
-    } else {
-        return None;
-    };
-    let finding = format!(
-        "the object at this pose overlaps its mask by {:.0} %: the mask's center is {pixels:.0} px ({:.1} cm) \
-         beside that of what should be seen, its area {area:.2} times",
+    let message = format!(
+        "the object at this pose overlaps its mask by {:.0} %: the mask's center is {pixels:.0} px ({:.1} cm) beside that of what \
+         should be seen, its area {area:.2} times: {cause}",
         share * 1e2,
         shift * 1e2
     );
-    Some(Warning::new(subject, value, finding, hint))
+    let is_off = !limits::MASK_AREA.contains(&area)
+        || shift > limits::MASK_SHIFT
+        || share < limits::MASK_OVERLAP;
+    (is_off && !hand_wrong).then_some(Warning { subject, message })
 }
 
-/// Warning of what depth shows under the mask, and across its border, that is not the object; and whether all of this was asked and nothing found. The hand is not asked
-/// unless `hand_fits`.
+/// Adds what depth shows under the mask, and across its border, that is not the object to `found`; true if all of this was asked and nothing found. The hand is
+/// not asked unless `hand_fits`.
 pub(super) fn off_object(
     view: &View<'_>,
     object: &Object,
     hand_fits: bool,
-) -> (Option<Warning>, bool) {
+    found: &mut Warnings,
+) -> bool {
     let masked = || view.pixels().map(|(_, p)| p).filter(|p| p.masked && p.sensor > 0.0);
     let count = masked().count() as f64;
-    let Some(middle) = median(masked().map(|p| f64::from(p.sensor))) else { return (None, false) };
+    let Some(middle) = median(masked().map(|p| f64::from(p.sensor))) else { return false };
     let beyond = middle + 2.0 * object.radius;
     let share = |count_of: usize| count_of as f64 / count;
     let behind = share(masked().filter(|p| f64::from(p.sensor) > beyond).count());
-    let of_hand = || masked().filter(|p| p.is_on_hand(HAND_REACH_AT_OBJECT) && !p.shows_object());
+    let of_hand =
+        || masked().filter(|p| p.is_on_hand(limits::HAND_REACH_AT_OBJECT) && !p.shows_object());
     let on_hand = if hand_fits { share(of_hand().count()) } else { 0.0 };
-    if behind > MASK_BEHIND || on_hand > MASK_ON_HAND {
-        let finding = format!(
-            "{:.0} % of the mask's pixels are on the hand and {:.0} % on what is behind the object",
-            on_hand * 1e2,
-            behind * 1e2
-        );
-        let hint = "does it leak, is it shifted, or of the whole object (mask, not mask_visib)?";
-        return (Some(Warning::new(Subject::Mask, (on_hand + behind, ""), finding, hint)), false);
-    }
     let cut = if hand_fits { cut_share(view) } else { None };
-    let Some(cut) = cut.filter(|cut| *cut > MASK_CUT) else { return (None, cut.is_some()) };
-    let percent = cut * 1e2;
-    let finding =
-        format!("along {percent:.0} % of the mask's border the same surface goes on outside of it");
-    let hint = "is the mask shifted, or too small?";
-    (Some(Warning::new(Subject::Mask, (cut, ""), finding, hint)), false)
+    if behind > limits::MASK_BEHIND || on_hand > limits::MASK_ON_HAND {
+        let [on_hand, behind] = [on_hand, behind].map(|share| share * 1e2);
+        let message = format!(
+            "{on_hand:.0} % of the mask's pixels are on the hand and {behind:.0} % on what is behind the object: does it leak, \
+             is it shifted, or of the whole object (mask, not mask_visib)?"
+        );
+        found.add(Subject::Mask, message);
+        return false;
+    }
+    if let Some(cut) = cut.filter(|cut| *cut > limits::MASK_CUT) {
+        let message = format!(
+            "along {:.0} % of the mask's border the same surface goes on outside of it: is the mask shifted, or too small?",
+            cut * 1e2
+        );
+        found.add(Subject::Mask, message);
+        return false;
+    }
+    cut.is_some()
 }
 
 /// Part of the mask's border along which the surface goes on outside of the mask, and is not the hand's; none if depth tells too
@@ -133,7 +127,7 @@ fn near_hand(view: &View<'_>, index: usize, sensor: f32) -> bool {
     steps.iter().any(|dy| {
         steps.iter().any(|dx| {
             let hand = view.pixel(index.wrapping_add_signed(dy * width + dx)).hand;
-            hand > 0.0 && f64::from((hand - sensor).abs()) < HAND_REACH
+            hand > 0.0 && f64::from((hand - sensor).abs()) < limits::HAND_REACH
         })
     })
 }

@@ -14,6 +14,8 @@ mod tests;
 mod touch;
 mod warning;
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Translation3};
 use prehend_render::DepthImage;
 
@@ -22,78 +24,118 @@ pub use self::correction::{
 };
 pub(crate) use self::model::{check as check_object, likely_unit};
 pub use self::warning::{Subject, Warning};
-use crate::scene::{Frame, HandMeasurement, Object, View};
+use crate::scene::{Frame, HandMeasurement, Object, Pixel, View};
 
 use self::correction::settled_pose;
+use self::warning::Warnings;
 
 /// Warnings of an observation, and of the object at a pose (object → camera) in it; none if all looks well. Those of the object alone are
 /// [`check_object`]'s.
 pub(crate) fn check_frame(
     observation: &Frame,
-    object: &Object,
+    object: &Arc<Object>,
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<Warning> {
+    let mut found = Warnings::default();
+    let z = (t_cam_object * object.center).z;
     if let Err((image, problem)) = observation.check_sizes() {
         let subject = if image == "mask" { Subject::Mask } else { Subject::Depth };
-        return vec![Warning::new(subject, (0.0, ""), format!("the {image} has {problem}"), "")];
+        found.add(subject, format!("the {image} has {problem}"));
+        return found.0;
     }
-    let mut warnings = Vec::new();
-    let (mut drawn, mut touch) = (None, None);
-    if let Some(measured) = &observation.hand {
-        let (of_hand, image) = hand::check(measured, &observation.camera);
-        let (of_forces, readable) = touch::check(measured);
-        warnings.extend(of_hand.into_iter().chain(of_forces));
-        (drawn, touch) = (image, readable.then_some(measured));
-    }
-    let z = (t_cam_object * object.center).z;
+    let hand = observation.hand.as_ref();
+    let drawn = hand.and_then(|hand| hand::check(hand, &observation.camera, &mut found));
+    let touch = hand.filter(|hand| touch::check(hand, &mut found));
     if z.is_nan() || z <= 0.0 {
-        let finding = format!("the object is behind the camera (z = {z:.3} m)");
-        let hint = "does the pose map the object into the camera frame, z forward?";
-        warnings.push(Warning::new(Subject::Pose, (z, "m"), finding, hint));
-        return warnings;
+        let message = format!(
+            "the object is behind the camera (z = {z:.3} m): does the pose map the object into the camera frame, z forward?"
+        );
+        found.add(Subject::Pose, message);
+    } else if model::is_plausible(object) {
+        let images = Images { observation, object, drawn, touch };
+        found.0.extend(images.check(t_cam_object).0);
     }
-    if !model::is_plausible(object) {
-        return warnings;
-    }
-    let compare = |pose: &Isometry3<f64>, is_settled: bool| {
-        compare(observation, object, (drawn.as_ref(), touch), pose, is_settled)
-    };
-    let found = compare(t_cam_object, false);
-    let of_pose = |w: &Warning| matches!(w.subject, Subject::Pose | Subject::Mask);
-    // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
-    let settled = found
-        .iter()
-        .any(of_pose)
-        .then(|| settled_pose(observation, object, t_cam_object, &CorrectionSettings::default()));
-    warnings.extend(settled.flatten().map_or(found, |pose| compare(&pose, true)));
-    warnings
+    found.0
 }
 
-/// Warnings of the images of a frame with the object at a pose, against the depth of the hand \[m\], unless that is at fault, and the hand whose forces have
-/// places. A pose that `is_settled` where mask and depth have it fits.
-fn compare(
-    observation: &Frame,
-    object: &Object,
-    (drawn, touch): (Option<&DepthImage>, Option<&HandMeasurement>),
-    t_cam_object: &Isometry3<f64>,
-    is_settled: bool,
-) -> Vec<Warning> {
-    let z = (t_cam_object * object.center).z;
-    let view = View::new(observation, &observation.camera, object, drawn.cloned(), t_cam_object);
-    let mut warnings = depth::check(&view, object);
-    let blamed = |subject| warnings.iter().any(|warning| warning.subject == subject);
-    let hand_fits = drawn.is_some() && warnings.is_empty();
-    let hand_wrong = observation.hand.is_some() && drawn.is_none() || blamed(Subject::Hand);
-    let (off_object, mask_fits) = match blamed(Subject::Depth) {
-        true => (None, false),
-        false => mask::off_object(&view, object, hand_fits),
-    };
-    let at_pose = if is_settled { None } else { mask::at_pose(&view, z, mask_fits, hand_wrong) };
-    let pose_fits = at_pose.is_none();
-    warnings.extend(at_pose.into_iter().chain(off_object));
-    if let Some(measured) = touch.filter(|_| hand_fits && pose_fits) {
-        let seen = Translation3::from(view.toward_seen(z).unwrap_or_default()) * t_cam_object;
-        warnings.extend(touch::check_places(measured, object, &seen));
+/// Images of a frame, to be compared with the object at poses.
+struct Images<'a> {
+    observation: &'a Frame,
+    object: &'a Arc<Object>,
+    /// Depth of the hand \[m\], unless that is at fault.
+    drawn: Option<DepthImage>,
+    /// The hand whose forces have places.
+    touch: Option<&'a HandMeasurement>,
+}
+
+impl Images<'_> {
+    fn check(&self, t_cam_object: &Isometry3<f64>) -> Warnings {
+        let Self { observation, object, .. } = *self;
+        if !observation.is_segmented() {
+            return self.check_without_mask(t_cam_object);
+        }
+        let found = self.compare(&self.view(t_cam_object), t_cam_object, false);
+        if !found.blame(Subject::Pose) && !found.blame(Subject::Mask) {
+            return found;
+        }
+        // Poses to start from are off: what is left at the pose that mask and depth have is not the pose's.
+        let settings = CorrectionSettings::default();
+        let settled = settled_pose(observation, object, t_cam_object, &settings);
+        settled.map_or(found, |pose| self.compare(&self.view(&pose), &pose, true))
     }
-    warnings
+
+    /// Warnings of a frame without a mask, or with a box: pixels that should show the object at its pose count as masked, unless the box is elsewhere.
+    fn check_without_mask(&self, t_cam_object: &Isometry3<f64>) -> Warnings {
+        let view = self.view(t_cam_object);
+        let is_elsewhere = self.observation.mask.count() > 0
+            && !view.pixels().any(|(_, pixel)| pixel.masked && pixel.shows_object());
+        if is_elsewhere {
+            return self.compare(&view, t_cam_object, false);
+        }
+        let mask = view.mask(Pixel::shows_object);
+        if mask.count() == 0 {
+            let mut found = Warnings::default();
+            let message = "no pixel should show the object at this pose: wrong pose, or cam_K?";
+            found.add(Subject::Pose, message);
+            return found;
+        }
+        let observation = &Frame { mask, ..self.observation.clone() };
+        let drawn = self.drawn.clone();
+        let assumed = Images { observation, object: self.object, drawn, touch: None };
+        let mut found = assumed.compare(&assumed.view(t_cam_object), t_cam_object, false);
+        found.0.retain(|warning| warning.subject != Subject::Mask);
+        found
+    }
+
+    fn view(&self, t_cam_object: &Isometry3<f64>) -> View<'_> {
+        let Self { observation, object, drawn, .. } = self;
+        View::new(observation, &observation.camera, object, drawn.clone(), t_cam_object)
+    }
+
+    /// Warnings of what `view` shows of the object at a pose. One that `is_settled` where mask and depth have it fits.
+    fn compare(
+        &self,
+        view: &View<'_>,
+        t_cam_object: &Isometry3<f64>,
+        is_settled: bool,
+    ) -> Warnings {
+        let Self { observation, object, drawn, touch } = self;
+        let z = (t_cam_object * object.center).z;
+        let mut found = Warnings::default();
+        depth::check(view, object, &mut found);
+        let hand_fits = drawn.is_some() && found.0.is_empty();
+        let hand_wrong =
+            observation.hand.is_some() && drawn.is_none() || found.blame(Subject::Hand);
+        let mut under = Warnings::default();
+        let mask_fits =
+            !found.blame(Subject::Depth) && mask::off_object(view, object, hand_fits, &mut under);
+        let at_pose = mask::at_pose(view, z, mask_fits, hand_wrong).filter(|_| !is_settled);
+        let pose_fits = at_pose.is_none();
+        found.0.extend(at_pose.into_iter().chain(under.0));
+        if let Some(measured) = touch.filter(|_| hand_fits && pose_fits) {
+            let seen = Translation3::from(view.toward_seen(z).unwrap_or_default()) * t_cam_object;
+            touch::check_places(measured, object, &seen, &mut found);
+        }
+        found
+    }
 }

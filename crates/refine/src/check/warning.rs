@@ -2,16 +2,13 @@
 
 use std::fmt;
 
-use serde::Serialize;
-use strum::{Display, IntoStaticStr};
-
-/// Subject of a [`Warning`], by the word that names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Display, IntoStaticStr, Serialize)]
-#[strum(serialize_all = "lowercase")]
-#[serde(rename_all = "lowercase")]
+/// Subject of a [`Warning`]: the most likely fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
-    /// The object's mesh, its size and mass.
+    /// The object's mesh, its size against the dataset's, and its mass.
     Model,
+    /// The unit of the object's mesh.
+    ModelUnit,
     /// The object's stated pose.
     Pose,
     /// The object's mask.
@@ -22,40 +19,36 @@ pub enum Subject {
     Hand,
     /// Forces on the hand's taxels.
     Touch,
+    /// Places of these forces, against the object's.
+    TouchPlace,
 }
 
 /// One thing that looks wrong with an input; [`Display`](fmt::Display) makes a sentence of it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// Most likely fault.
     pub subject: Subject,
-    /// Figure that tells, in `unit`.
-    pub value: f64,
-    /// Unit of `value`; empty for ratios and shares of one.
-    pub unit: &'static str,
-    /// Finding with all figures.
-    pub finding: String,
-    /// Likely cause; may be empty.
-    pub hint: &'static str,
-}
-
-impl Warning {
-    /// A figure with its unit, what was found, and the likely cause.
-    pub(super) fn new(
-        subject: Subject,
-        (value, unit): (f64, &'static str),
-        finding: impl Into<String>,
-        hint: &'static str,
-    ) -> Self {
-        Self { subject, value, unit, finding: finding.into(), hint }
-    }
+    /// Finding with all figures, and the likely cause where there is one.
+    pub message: String,
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.hint {
-            "" => f.write_str(&self.finding),
-            hint => write!(f, "{}: {hint}", self.finding),
-        }
+        f.write_str(&self.message)
+    }
+}
+
+/// Things that look wrong, in the order in which they were found.
+#[derive(Default)]
+pub(super) struct Warnings(pub(super) Vec<Warning>);
+
+impl Warnings {
+    pub(super) fn add(&mut self, subject: Subject, message: impl Into<String>) {
+        self.0.push(Warning { subject, message: message.into() });
+    }
+
+    /// True if any is on `subject`.
+    pub(super) fn blame(&self, subject: Subject) -> bool {
+        self.0.iter().any(|warning| warning.subject == subject)
     }
 }

@@ -186,7 +186,7 @@ mod tests {
         let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
         let warnings = check_frame(&observation, &scene.object, &scene.initial);
-        assert!(warnings.iter().any(|w| w.finding.contains("15 joint positions")), "{warnings:?}");
+        assert!(warnings.iter().any(|w| w.message.contains("15 joint positions")), "{warnings:?}");
     }
 
     #[test]

@@ -69,11 +69,15 @@ impl<'a> View<'a> {
 
     /// Where the object should be seen, and nothing else was measured.
     pub(crate) fn likely_mask(&self) -> Mask {
+        self.mask(|pixel| pixel.shows_object() && !pixel.is_off_object(ELSEWHERE))
+    }
+
+    /// Mask of those of [`pixels`](Self::pixels) of which `is_set`.
+    pub(crate) fn mask(&self, is_set: impl Fn(&Pixel) -> bool) -> Mask {
         let (width, height) = self.size();
         let mut mask = Mask::filled(width, height, false);
         for ([x, y], pixel) in self.pixels() {
-            mask.pixels_mut()[y * width + x] =
-                pixel.shows_object() && !pixel.is_off_object(ELSEWHERE);
+            mask.pixels_mut()[y * width + x] = is_set(&pixel);
         }
         mask
     }

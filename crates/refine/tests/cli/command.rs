@@ -4,6 +4,7 @@ use std::fs;
 use std::process::Stdio;
 
 use prehend_refine::data::bop::write_results;
+use prehend_render::RgbImage;
 use serde_json::{Value, json};
 
 use crate::fixture::Workplace;
@@ -247,6 +248,15 @@ fn check_names_mistakes_by_file_and_field() {
     write_results(&place.path("meters.csv"), &meters).unwrap();
     let told = check("meters.csv");
     assert!(told.contains("meters.csv: t: ") && told.contains("multiply t by 1000"), "{told}");
+    for image in 0..2 {
+        let file = place.path(&format!("ds/test/000001/rgb/{image:06}.png"));
+        let mut color = RgbImage::load(&file).unwrap();
+        color.pixels_mut().iter_mut().for_each(|pixel| pixel.reverse());
+        color.save(&file).unwrap();
+    }
+    let told = check("ds/init.csv");
+    let expected = "warning: ds/test/000001/rgb: red and blue are swapped (BGR was taken for RGB)";
+    assert!(told.starts_with(expected), "{told}");
 }
 
 /// BOP folders of one camera have nothing but camera.json.
@@ -348,6 +358,10 @@ fn a_frame_file_is_as_good_as_a_dataset() {
     place.write("ds/frame.json", &frame.to_string());
     let told = place.succeed("check --frame ds/frame.json --report look");
     assert!(told.contains("1 picture; open look/index.html"), "{told}");
+    let mut unmasked = frame.clone();
+    unmasked.as_object_mut().unwrap().remove("mask");
+    place.write("ds/unmasked.json", &unmasked.to_string());
+    place.succeed("check --frame ds/unmasked.json --report look");
     place.replace("ds/frame.json", "\"depth_unit_m\":0.0001", "\"depth_unit_m\":0.001");
     let said = place.prehend("check --frame ds/frame.json --report look");
     let expected = "warning: ds/frame.json: depth_unit_m: depth is in another unit; multiply depth_unit_m by 0.1";

@@ -77,6 +77,41 @@ fn masks_come_from_files_detections_boxes_or_the_pose() {
     assert!(said.err.contains("no detection of object"), "{}", said.err);
 }
 
+/// Masks that the pose makes say nothing about the pose: then depth and hand alone are compared.
+#[test]
+fn a_check_takes_masks_from_the_same_sources() {
+    let place = Workplace::new();
+    const CHECK: &str = "check --dataset ds --poses ds/init.csv --image 0 --report look";
+    let mask = Mask::load(&place.path(MASK)).unwrap();
+    let bbox = mask.bounds().unwrap();
+    let mut detection = json!({"scene_id": 1, "image_id": 0, "category_id": 5, "score": 1, "bbox": bbox, "time": -1});
+    place.write("boxes.json", &json!([detection]).to_string());
+    let size = [mask.height(), mask.width()];
+    detection["segmentation"] = json!({"counts": run_lengths(&mask), "size": size});
+    place.write("masks.json", &json!([detection]).to_string());
+    // Of something else.
+    let counts = json!([0, 5000, mask.height() * mask.width() - 5000]);
+    detection["segmentation"] = json!({"counts": counts, "size": size});
+    place.write("others.json", &json!([detection]).to_string());
+    place.remove(MASK);
+    let said = place.prehend(CHECK);
+    assert!(said.code != 0 && said.err.contains("000000_000000.png"), "{}", said.err);
+    for source in [
+        "--detections masks.json",
+        "--mask-source box --detections boxes.json",
+        "--mask-source box",
+        "--mask-source silhouette",
+        "--mask-source none",
+    ] {
+        place.succeed(&format!("{CHECK} {source}"));
+    }
+    let said = place.prehend(&format!("{CHECK} --detections others.json"));
+    assert!(said.err.contains("does not touch its mask"), "{}", said.err);
+    place.replace("ds/test/000001/scene_camera.json", "\"depth_scale\":0.1", "\"depth_scale\":100");
+    let said = place.prehend(&format!("{CHECK} --mask-source none"));
+    assert!(said.err.contains("check depth_scale and units"), "{}", said.err);
+}
+
 #[test]
 fn an_object_is_not_its_own_neighbor() {
     let place = Workplace::new();

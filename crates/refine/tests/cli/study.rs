@@ -190,6 +190,23 @@ fn all_steps_are_of_one_run() {
 }
 
 #[test]
+fn masks_come_from_the_source_that_is_asked_for() {
+    let place = Workplace::new();
+    let study =
+        "study noise --dataset ds --poses low=ds/init.csv --image 0 --methods fused --iterations 2";
+    place.succeed(&format!("{study} --out files.csv"));
+    place.remove("ds/test/000001/mask_visib");
+    let said = place.prehend(&format!("{study} --mask-source none --out none.csv"));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let [files, none] = ["files.csv", "none.csv"].map(|file| rows(&place, file));
+    assert_eq!(row(&none, 0, "fused")["status"], "ok");
+    assert_ne!(row(&files, 0, "fused")["tx_m"], row(&none, 0, "fused")["tx_m"]);
+    // Rows of other masks do not go into the same table.
+    let said = place.prehend(&format!("{study} --mask-source none --out files.csv"));
+    assert!(said.code == 1 && said.err.contains("inputs: "), "{}", said.err);
+}
+
+#[test]
 fn evidence_is_left_out_as_the_methods_say() {
     let place = Workplace::new();
     let said = place.succeed(

@@ -9,14 +9,14 @@ use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::EstimatorInput;
 use prehend_refine::check::{
-    CorrectionSettings, CorrectionTrial, FieldNames, Finding, Subject, Warning, find_corrections,
+    CorrectionSettings, CorrectionTrial, FieldNames, Finding, Warning, find_corrections,
 };
 use prehend_refine::data::bop::{Dataset, DatasetError};
-use prehend_refine::data::{Assets, FrameInput, Target, load_frame_file};
+use prehend_refine::data::{Assets, FrameInput, MaskSource, Target, load_frame_file};
 use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_render::RgbImage;
 
-use crate::options::{Job, Selection};
+use crate::options::{Job, Masks, Selection};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -30,8 +30,10 @@ pub(crate) struct Check {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     poses: Option<PathBuf>,
+    #[command(flatten)]
+    masks: Masks,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "Masks", "poses"])]
     frame: Option<PathBuf>,
     /// Write the pictures and a web page of them here
     #[arg(long, value_name = "DIR", default_value = "out/check", help_heading = "Output")]
@@ -61,7 +63,7 @@ impl Check {
             findings.iter().map(|found| found.message(&names)).collect();
         let (picture, others) = drawn(&input, &t_cam_object);
         let told = |warning: &Warning| findings.iter().any(|found| found.explains(warning));
-        warnings.extend(others.iter().filter(|w| !told(w)).map(Warning::to_string));
+        warnings.extend(others.concat().iter().filter(|w| !told(w)).map(Warning::to_string));
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         report.add_picture(&file.display().to_string(), &picture, &warnings)?;
         say(format!("1 picture; open {}", report.finish()?.display()))?;
@@ -72,7 +74,12 @@ impl Check {
     fn dataset(&self, selection: &Selection, poses: &Path) -> anyhow::Result<ExitCode> {
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses)?;
-        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        let masks = match self.masks.source()? {
+            // A pose is not checked by what is made of it.
+            MaskSource::Silhouettes => MaskSource::None,
+            masks => masks,
+        };
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_masks(masks);
         let findings = mistakes(&mut assets, &jobs);
         let named = |(targets, found): (Vec<Target>, Finding)| {
             let message = found.message(&names_of_dataset(&dataset, poses, &targets)?);
@@ -104,18 +111,18 @@ impl Check {
                     let own = findings.iter().filter(|(_, targets, _)| is_meant(targets));
                     let (found, mut remarks): (Vec<_>, Vec<_>) =
                         own.map(|(found, _, message)| (found, message.clone())).unzip();
-                    for warning in &warnings {
-                        if found.iter().any(|found| found.explains(warning)) {
-                            continue;
+                    let untold = |warnings: &[Warning]| -> Vec<String> {
+                        let told = |w: &&Warning| found.iter().any(|found| found.explains(w));
+                        warnings.iter().filter(|w| !told(w)).map(Warning::to_string).collect()
+                    };
+                    let [of_object, of_frame] = warnings.map(|warnings| untold(&warnings));
+                    for text in &of_object {
+                        if introduced.insert((target.obj_id, text.clone())) {
+                            warn(&bar, format!("object {}", target.obj_id), text);
                         }
-                        let text = warning.to_string();
-                        if warning.subject != Subject::Model {
-                            warn(&bar, target, &text);
-                        } else if introduced.insert((target.obj_id, text.clone())) {
-                            warn(&bar, format!("object {}", target.obj_id), &text);
-                        }
-                        remarks.push(text);
                     }
+                    of_frame.iter().for_each(|text| warn(&bar, target, text));
+                    remarks.extend(of_object.into_iter().chain(of_frame));
                     report.add_picture(&target.to_string(), &picture, &remarks)?;
                     done += 1;
                 }
@@ -192,6 +199,7 @@ fn names_of_dataset(
         intrinsics: "cam_K",
         depth_scale: "depth_scale",
         masks: scene.join("mask_visib").display().to_string(),
+        colors: scene.join("rgb").display().to_string(),
     })
 }
 
@@ -207,12 +215,13 @@ fn names_of_frame(file: &Path) -> FieldNames {
         intrinsics: "K",
         depth_scale: "depth_unit_m",
         masks: format!("{file}: mask"),
+        colors: format!("{file}: rgb"),
     }
 }
 
-/// The object at a pose, and the hand, over their image; and what looks wrong.
-fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, Vec<Warning>) {
+/// The object at a pose, and the hand, over their image; and what looks wrong with the object, and with the frame.
+fn drawn(input: &FrameInput, t_cam_object: &Isometry3<f64>) -> (RgbImage, [Vec<Warning>; 2]) {
     let FrameInput { frame, object, .. } = input;
-    let warnings = EstimatorInput::new(frame, object).warnings(t_cam_object).concat();
+    let warnings = EstimatorInput::new(frame, object).warnings(t_cam_object);
     (outline_picture(frame, object, t_cam_object), warnings)
 }

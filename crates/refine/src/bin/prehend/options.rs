@@ -94,6 +94,11 @@ impl Masks {
         })
     }
 
+    /// True of the default.
+    pub(crate) fn are_files(&self) -> bool {
+        matches!(self.mask_source, MaskKind::Files) && self.detections.is_none()
+    }
+
     /// Refuses masks that poses would have to tell.
     pub(crate) fn require_files_or_detections(&self) -> anyhow::Result<()> {
         match self.mask_source {

@@ -15,7 +15,7 @@ use prehend_refine::evaluate::study::{
     Design, InitialPose, Kind, Record, Runner, StudyFile, Sweep, tables, write_page,
 };
 
-use crate::options::{Selection, limit_threads, named, open_rig};
+use crate::options::{Masks, Selection, limit_threads, named, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
 
 /// The table has a row a frame and method with pose, scores, stated posterior and run time. Rows that it has already are
@@ -33,6 +33,8 @@ pub(crate) struct Study {
     /// [default: init_low.csv and init_high.csv of the dataset]
     #[arg(long, value_name = "[LEVEL=]FILE", help_heading = "Input")]
     poses: Vec<String>,
+    #[command(flatten)]
+    masks: Masks,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     rig: Option<PathBuf>,
@@ -79,7 +81,8 @@ impl Study {
         let missing = |frame| Ok((frame, table.missing(design.rows(frame))?));
         let mut open = frames.iter().map(missing).collect::<anyhow::Result<Vec<_>>>()?;
         open.retain(|(_, rows)| !rows.is_empty());
-        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig));
+        let assets = Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig);
+        let assets = Mutex::new(assets.with_masks(self.masks.source()?));
         let bar = progress(frames.len(), "study");
         bar.set_position((frames.len() - open.len()) as u64);
         bar.reset_eta();
@@ -129,7 +132,11 @@ impl Study {
         let is_chosen = |sweep: &&Sweep| self.sweeps.as_ref().is_none_or(|s| s.contains(sweep));
         let sweeps = Sweep::value_variants().iter().filter(is_chosen).copied().collect();
         let (kind, rig) = (self.kind, self.rig.as_deref());
-        Ok(Design::new(kind, dataset, methods, sweeps, rig, self.seed)?)
+        let design = Design::new(kind, dataset, methods, sweeps, rig, self.seed)?;
+        Ok(match self.masks.are_files() {
+            true => design,
+            false => design.with_masks(&self.masks.identity()?),
+        })
     }
 
     /// The initial poses of all levels, and what is wrong with rows that cannot be read.

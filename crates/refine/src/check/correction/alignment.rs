@@ -1,6 +1,8 @@
 //! A pose that is moved to where mask and depth have the object: poses to start from are off, and that is nothing to correct.
 
-use nalgebra::{Isometry3, Point3, SVector, Vector2, Vector3};
+use std::borrow::Cow;
+
+use nalgebra::{Isometry3, Point3, SVector, Vector2, Vector3, Vector6};
 use prehend_autodiff::Quadratic;
 use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
@@ -19,31 +21,41 @@ const DAMPING: f64 = 1e-3;
 /// Pixels beyond a mask's border at which depth tells what the border is of \[px\].
 const BEYOND: f64 = 3.0;
 
-/// The object where mask and depth have it.
-pub(super) struct Aligned {
-    pub(super) inputs: Inputs,
-    /// Sum of squares of outline, depth and pose by the unknowns, there.
-    pub(super) sum: Quadratic<UNKNOWNS>,
-}
+/// Sum of squares by the unknowns.
+pub(super) type Sum = Quadratic<UNKNOWNS>;
 
 /// A fit of inputs to what a frame shows.
-pub(super) struct PoseFit<'a> {
-    pub(super) evidence: &'a FrameImages<'a>,
-    pub(super) hand: Option<&'a DepthImage>,
+pub(super) struct Fitted {
+    /// Agreement with the frame times the plausibility of the move, 0 to 1.
+    pub(super) agreement: f64,
+    /// With the object where mask and depth have it.
+    pub(super) inputs: Inputs,
+    /// Sum of squares of outline, depth and pose there.
+    pub(super) sum: Sum,
+}
+
+/// Images of a frame with the hand before a camera.
+struct PoseFit<'a> {
+    evidence: &'a FrameImages<'a>,
+    hand: Option<Cow<'a, DepthImage>>,
+}
+
+impl FrameImages<'_> {
+    /// `start` with the object moved to where mask and depth have it, and, if `sized`, with depth scaled; none where the object is not in view.
+    pub(super) fn fit(&self, start: &Inputs, sized: bool) -> Option<Fitted> {
+        let fit = PoseFit { evidence: self, hand: self.hand_drawn(start) };
+        let (inputs, sum) = fit.align(start, sized)?;
+        let plausible = fit.plausibility(start, &inputs.t_cam_object);
+        let agreement = plausible * self.agreement(&inputs, fit.hand.as_deref());
+        Some(Fitted { agreement, inputs, sum })
+    }
 }
 
 impl PoseFit<'_> {
-    /// Inputs with the object moved to where mask and depth have it, and their agreement with the frame there times the plausibility of the move, 0 to 1.
-    pub(super) fn fit(&self, inputs: &Inputs, sized: bool) -> Option<(f64, Aligned)> {
-        let aligned = self.align(inputs, sized)?;
-        let plausible = self.plausibility(inputs, &aligned.inputs.t_cam_object);
-        Some((plausible * self.evidence.agreement(&aligned.inputs, self.hand), aligned))
-    }
-
-    /// With `start` moved and turned to where mask and depth have the object, and, if `sized`, with depth scaled; none where the object is not in view.
-    fn align(&self, start: &Inputs, sized: bool) -> Option<Aligned> {
+    /// The inputs of a fit, and their sum of squares.
+    fn align(&self, start: &Inputs, sized: bool) -> Option<(Inputs, Sum)> {
         let start = self.placed(start)?;
-        let radius = self.evidence.object().radius;
+        let radius = self.evidence.object.radius;
         let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
         // Steps in units of the radius.
         let units = SVector::from([radius, radius, radius, 1.0, 1.0, 1.0, size, 0.0]);
@@ -67,8 +79,7 @@ impl PoseFit<'_> {
                 return None;
             }
         }
-        let sum = self.sum(&inputs, &start, 1.0)?;
-        Some(Aligned { inputs, sum })
+        Some((inputs, self.sum(&inputs, &start, 1.0)?))
     }
 
     /// With the object moved to where the mask is, and where depth has it.
@@ -76,7 +87,7 @@ impl PoseFit<'_> {
         let mut inputs = *start;
         let camera = inputs.camera;
         let is_masked = |index: &usize| self.evidence.is_masked(&inputs, *index);
-        let pixels = 0..self.evidence.mask.pixels().len();
+        let pixels = 0..self.evidence.frame.mask.pixels().len();
         let masked = centroid(camera.width, pixels.filter(is_masked))?;
         let measured = median(self.evidence.masked_points(&inputs).map(|(_, depth)| depth));
         // That the object is in view where it is sought, it is put before the mask.
@@ -85,7 +96,7 @@ impl PoseFit<'_> {
             return None;
         }
         if !inputs.is_placed {
-            let z = measured.unwrap_or(center.z.abs().max(2.0 * self.evidence.object().radius));
+            let z = measured.unwrap_or(center.z.abs().max(2.0 * self.evidence.object.radius));
             let sought = camera.unproject(masked.x, masked.y, z);
             inputs.t_cam_object.translation.vector += sought - center;
             center = sought;
@@ -112,24 +123,17 @@ impl PoseFit<'_> {
     }
 
     /// Sum of squares at `inputs`, kernels so many times as wide as errors are.
-    fn sum(&self, inputs: &Inputs, start: &Inputs, width: f64) -> Option<Quadratic<UNKNOWNS>> {
-        let center = self.evidence.center(inputs).coords;
+    fn sum(&self, inputs: &Inputs, start: &Inputs, width: f64) -> Option<Sum> {
         let mut sum = Quadratic::zeros();
-        self.add_depth(inputs, &center, width, &mut sum);
-        self.add_outline(inputs, &center, width, &mut sum)?;
-        self.add_prior(inputs, start, &center, &mut sum);
+        self.add_depth(inputs, width, &mut sum);
+        self.add_outline(inputs, width, &mut sum)?;
+        self.add_prior(inputs, start, &mut sum);
         Some(sum)
     }
 
-    fn add_depth(
-        &self,
-        inputs: &Inputs,
-        center: &Vector3<f64>,
-        width: f64,
-        sum: &mut Quadratic<UNKNOWNS>,
-    ) {
+    fn add_depth(&self, inputs: &Inputs, width: f64, sum: &mut Sum) {
         let FrameImages { settings, .. } = self.evidence;
-        let object = self.evidence.object();
+        let (object, center) = (&self.evidence.object, self.evidence.center(inputs));
         let inverse = inputs.t_cam_object.inverse();
         let sigma = settings.depth * object.radius;
         let kernel = RobustKernel::Cauchy { scale: width };
@@ -144,22 +148,18 @@ impl PoseFit<'_> {
             let normal = inputs.t_cam_object.rotation * object.normals[closest.face as usize];
             let to = point - inputs.t_cam_object * closest.point;
             let residual = normal.dot(&to) / sigma;
-            let twist = twist_row(&(point.coords - center), &-normal);
+            let twist = twist_row(&(point - center), &-normal);
             let by_focal = -(normal.x * point.x + normal.y * point.y);
             let row = joined(&twist, normal.dot(&point.coords), by_focal) / sigma;
             sum.add_row(&row, residual, share * kernel.weight(residual * residual));
         }
     }
 
-    fn add_outline(
-        &self,
-        inputs: &Inputs,
-        center: &Vector3<f64>,
-        width: f64,
-        sum: &mut Quadratic<UNKNOWNS>,
-    ) -> Option<()> {
+    /// None of an object that is not in view.
+    fn add_outline(&self, inputs: &Inputs, width: f64, sum: &mut Sum) -> Option<()> {
         let FrameImages { settings, .. } = self.evidence;
-        let (object, camera) = (self.evidence.object(), &inputs.camera);
+        let (object, camera) = (&self.evidence.object, &inputs.camera);
+        let center = self.evidence.center(inputs);
         let outline = outline_points(camera, &object.model, &inputs.t_cam_object);
         if outline.is_empty() {
             return None;
@@ -178,8 +178,8 @@ impl PoseFit<'_> {
                 -(camera.fx * outward.x * x + camera.fy * outward.y * y) / (z * z),
             );
             let by_focal = -outward.dot(&(at.pixel - Vector2::new(camera.cx, camera.cy)));
-            let row = joined(&-twist_row(&(point.coords - center), &gradient), 0.0, by_focal)
-                / settings.outline;
+            let twist = -twist_row(&(point - center), &gradient);
+            let row = joined(&twist, 0.0, by_focal) / settings.outline;
             let residual = border / settings.outline;
             let weight = settings.measurements * at.length / length;
             sum.add_row(&row, residual, weight * kernel.weight(residual * residual));
@@ -212,23 +212,18 @@ impl PoseFit<'_> {
         let beyond = index(border + BEYOND)?;
         let tolerance = self.evidence.tolerance();
         let hides = |depth: f64| depth > 0.0 && depth < at.point.z - tolerance;
-        let hand = self.hand.map_or(0.0, |hand| f64::from(hand.pixels()[beyond]) / inputs.meters);
-        (!hides(self.evidence.sensor(inputs, beyond)) && !hides(hand)).then_some(border)
+        let hand = self.hand.as_ref().map_or(0.0, |hand| f64::from(hand.pixels()[beyond]));
+        (!hides(self.evidence.sensor(inputs, beyond)) && !hides(hand / inputs.meters))
+            .then_some(border)
     }
 
     /// Adds the prior of poses: they are about where they are stated.
-    fn add_prior(
-        &self,
-        inputs: &Inputs,
-        start: &Inputs,
-        center: &Vector3<f64>,
-        sum: &mut Quadratic<UNKNOWNS>,
-    ) {
+    fn add_prior(&self, inputs: &Inputs, start: &Inputs, sum: &mut Sum) {
         let turn = self.evidence.settings.turn;
         let off =
             (inputs.t_cam_object.rotation * start.t_cam_object.rotation.inverse()).scaled_axis();
         let shift = self.shift_sigma(start);
-        let moved = center - self.evidence.center(start).coords;
+        let moved = self.evidence.center(inputs) - self.evidence.center(start);
         for axis in 0..3 {
             for (k, residual, sigma) in [(axis, moved[axis], shift), (axis + 3, off[axis], turn)] {
                 let mut row = SVector::zeros();
@@ -241,8 +236,7 @@ impl PoseFit<'_> {
     /// Standard deviation of the translation.
     fn shift_sigma(&self, inputs: &Inputs) -> f64 {
         let [of_distance, of_radius] = self.evidence.settings.shift;
-        of_distance * self.evidence.center(inputs).z.abs()
-            + of_radius * self.evidence.object().radius
+        of_distance * self.evidence.center(inputs).z.abs() + of_radius * self.evidence.object.radius
     }
 
     /// Plausibility that `start` is in truth at `to`, 0 to 1.
@@ -251,7 +245,7 @@ impl PoseFit<'_> {
         let turned = turned / self.evidence.settings.turn;
         let moved = match start.is_placed {
             true => {
-                let moved = to * self.evidence.object().center - self.evidence.center(start);
+                let moved = to * self.evidence.object.center - self.evidence.center(start);
                 moved.norm() / self.shift_sigma(start)
             }
             false => 0.0,
@@ -262,7 +256,8 @@ impl PoseFit<'_> {
     }
 }
 
-fn joined(twist: &nalgebra::Vector6<f64>, by_depth: f64, by_focal: f64) -> SVector<f64, UNKNOWNS> {
+/// Row of derivatives by the unknowns.
+fn joined(twist: &Vector6<f64>, by_depth: f64, by_focal: f64) -> SVector<f64, UNKNOWNS> {
     let mut row = SVector::<f64, UNKNOWNS>::zeros();
     row.fixed_rows_mut::<6>(0).copy_from(twist);
     row[6] = by_depth;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::kind::{Correction, FieldNames, Scope, candidate_count};
+use super::kind::{Correction, FieldNames};
 use super::settings::CorrectionSettings;
 use super::size::find_sizes;
 use super::trial::{CorrectionTrial, Tried};
@@ -27,128 +27,121 @@ pub struct Finding {
 }
 
 /// Corrections that make `trials`, each of a target, agree with what they show: first what all have in common, then what those of an object or of a scene
-/// have, then single ones. Nothing for frames that agree, and for those that no correction helps.
+/// have, then single ones. Nothing for frames that agree, and for those that no correction helps. Colors and sizes are compared where these corrections are not
+/// needed.
 pub fn find_corrections(
     trials: &[(Target, CorrectionTrial)],
     settings: &CorrectionSettings,
 ) -> Vec<Finding> {
-    let mut found = Vec::new();
-    let mut explained = vec![false; trials.len()];
-    let admits_all = |_: &Attempt| true;
-    let of_object = |a: &Attempt| a.correction.scope() == Scope::Object;
-    let of_scene = |a: &Attempt| a.correction.scope() == Scope::Scene;
+    let (found, explained) = (Vec::new(), vec![false; trials.len()]);
+    let mut search = Search { trials, settings, found, explained };
+    let of_color = |t: &Tried| t.correction == Correction::ChannelsSwapped;
+    search.level(|_, _| 0, &|t| !of_color(t));
+    search.level(|_, target| target.obj_id, &|t| t.correction == Correction::ModelUnit);
+    search.level(|_, target| target.scene_id, &|t| t.correction.is_of_scene());
     // Of one frame alone only what nothing else could be.
-    let of_frame = |a: &Attempt| {
-        let is_vague = a.correction.is_rotation() || a.correction.is_unnamed();
-        !is_vague && a.agreement >= settings.good && a.given < settings.least
-    };
-    let alone = (0..trials.len()).map(|k| vec![k]).collect();
-    let levels: [(Admits<'_>, Vec<Vec<usize>>); 4] = [
-        (&admits_all, groups(trials, |_| 0)),
-        (&of_object, groups(trials, |target| target.obj_id)),
-        (&of_scene, groups(trials, |target| target.scene_id)),
-        (&of_frame, alone),
-    ];
-    for (admits, groups) in levels {
-        for group in groups {
-            let open: Vec<usize> = group.into_iter().filter(|&k| !explained[k]).collect();
-            if let Some(finding) = explain(trials, &open, admits, settings) {
-                finding.frames.iter().for_each(|&k| explained[k] = true);
-                found.push(finding);
+    search.level(|k, _| k as u32, &|t| {
+        let is_vague = t.correction.is_rotation() || t.correction.is_unnamed() || of_color(t);
+        let [given, corrected] = t.agreement;
+        !is_vague && corrected >= settings.good && given < settings.least
+    });
+    let sizes = find_sizes(trials, &search.explained, settings);
+    search.level(|_, _| 0, &of_color);
+    search.level(|_, target| target.scene_id, &of_color);
+    search.found.extend(sizes);
+    search.found
+}
+
+/// Corrections found, and which of the trials they explain.
+struct Search<'a> {
+    trials: &'a [(Target, CorrectionTrial)],
+    settings: &'a CorrectionSettings,
+    found: Vec<Finding>,
+    explained: Vec<bool>,
+}
+
+impl Search<'_> {
+    /// Adds what explains those trials of one `key`, of their index and target, that are not explained yet, of the corrections that `admits` lets through.
+    fn level(&mut self, key: impl Fn(usize, &Target) -> u32, admits: &dyn Fn(&Tried) -> bool) {
+        for mut group in groups(self.trials, key) {
+            group.retain(|&k| !self.explained[k]);
+            if let Some(finding) = explain(self.trials, &group, admits, self.settings) {
+                group.iter().for_each(|&k| self.explained[k] = true);
+                self.found.push(finding);
             }
         }
     }
-    found.extend(find_sizes(trials, &explained, settings));
-    found
 }
 
 /// Indices of the trials of each `key`.
 pub(super) fn groups(
     trials: &[(Target, CorrectionTrial)],
-    key: impl Fn(&Target) -> u32,
+    key: impl Fn(usize, &Target) -> u32,
 ) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (k, (target, _)) in trials.iter().enumerate() {
-        groups.entry(key(target)).or_default().push(k);
+        groups.entry(key(k, target)).or_default().push(k);
     }
     groups.into_values().collect()
-}
-
-/// Attempts that are looked at.
-type Admits<'a> = &'a dyn Fn(&Attempt) -> bool;
-
-/// A correction of a group of frames, with means over those in which it was tried.
-struct Attempt {
-    correction: Correction,
-    factor: f64,
-    frames: Vec<usize>,
-    given: f64,
-    agreement: f64,
-    oddness: f64,
 }
 
 /// The correction that explains a group best, if one of those that `admits` lets through does.
 fn explain(
     trials: &[(Target, CorrectionTrial)],
     group: &[usize],
-    admits: Admits<'_>,
+    admits: &dyn Fn(&Tried) -> bool,
     settings: &CorrectionSettings,
 ) -> Option<Finding> {
-    let attempts: Vec<Attempt> =
-        (0..candidate_count()).filter_map(|c| attempt(trials, group, c)).collect();
-    let [always, of_one] = settings.gain;
-    let helps = |a: &&Attempt| {
-        let count = a.frames.len();
-        let gain = match a.correction.is_unnamed() {
-            true => settings.unnamed_gain,
-            false => always + of_one / (count as f64).sqrt(),
+    let candidates = group.iter().map(|&k| trials[k].1.tried.len()).max()?;
+    let helps = |(tried, count): &(Tried, usize)| {
+        let [given, corrected] = tried.agreement;
+        // Most of the group must need it; few have colors.
+        let (most, [always, of_one]) = match tried.correction {
+            Correction::ChannelsSwapped => (0, settings.color_gain),
+            unnamed if unnamed.is_unnamed() => (group.len() / 2, [settings.unnamed_gain, 0.0]),
+            _ => (group.len() / 2, settings.gain),
         };
-        // Most of the group must need it.
-        2 * count > group.len()
-            && a.agreement >= settings.least
-            && a.agreement - a.given >= gain
-            && admits(a)
+        *count > most
+            && corrected >= settings.least
+            && corrected - given >= always + of_one / (*count as f64).sqrt()
+            && admits(tried)
     };
-    let helpful: Vec<&Attempt> = attempts.iter().filter(helps).collect();
-    let most = helpful.iter().map(|a| a.agreement).reduce(f64::max)?;
-    let mut best: Vec<&Attempt> =
-        helpful.into_iter().filter(|a| most - a.agreement < settings.tie).collect();
+    let means = (0..candidates).filter_map(|c| mean(trials, group, c)).filter(helps);
+    let mut best: Vec<Tried> = means.map(|(tried, _)| tried).collect();
+    let most = best.iter().map(|t| t.agreement[1]).reduce(f64::max)?;
+    best.retain(|t| most - t.agreement[1] < settings.tie);
     // Equal ones stay in their order.
     best.sort_by(|a, b| {
         let unnamed = a.correction.is_unnamed().cmp(&b.correction.is_unnamed());
         unnamed.then(a.oddness.total_cmp(&b.oddness))
     });
     let first = best[0];
-    let other = best[1..].iter().find(|a| {
-        let differs = a.correction != first.correction;
-        differs && !a.correction.is_unnamed() && a.oddness - first.oddness < settings.oddness
+    let other = best[1..].iter().find(|t| {
+        let differs = t.correction != first.correction;
+        differs && !t.correction.is_unnamed() && t.oddness - first.oddness < settings.oddness
     });
     Some(Finding {
         correction: first.correction,
-        factor: first.factor,
-        alternative: other.map(|a| (a.correction, a.factor)),
+        factor: first.value,
+        alternative: other.map(|t| (t.correction, t.value)),
         frames: group.to_vec(),
-        agreement: Some([first.given, first.agreement]),
+        agreement: Some(first.agreement),
         sigma: None,
     })
 }
 
-/// Candidate number `c` on the frames of a group in which it was tried, if there are any.
-fn attempt(trials: &[(Target, CorrectionTrial)], group: &[usize], c: usize) -> Option<Attempt> {
-    let tried = |&k: &usize| Some((k, trials[k].1.tried.get(c).copied().flatten()?));
-    let tried: Vec<(usize, Tried)> = group.iter().filter_map(tried).collect();
-    let (_, Tried { correction, .. }) = tried.first()?;
-    let mean = |of: &dyn Fn(&(usize, Tried)) -> f64| {
-        tried.iter().map(of).sum::<f64>() / tried.len() as f64
+/// Candidate number `c` on average over the frames of a group in which it was tried, and their number, if there are any.
+fn mean(trials: &[(Target, CorrectionTrial)], group: &[usize], c: usize) -> Option<(Tried, usize)> {
+    let tried = |&k: &usize| trials[k].1.tried.get(c).copied().flatten();
+    let tried: Vec<Tried> = group.iter().filter_map(tried).collect();
+    let mean = |of: &dyn Fn(&Tried) -> f64| tried.iter().map(of).sum::<f64>() / tried.len() as f64;
+    let mean = Tried {
+        correction: tried.first()?.correction,
+        value: median(tried.iter().map(|t| t.value))?,
+        agreement: [0, 1].map(|k| mean(&|t| t.agreement[k])),
+        oddness: mean(&|t| t.oddness),
     };
-    Some(Attempt {
-        correction: *correction,
-        factor: median(tried.iter().map(|(_, tried)| tried.value))?,
-        frames: tried.iter().map(|(k, _)| *k).collect(),
-        given: mean(&|(k, _)| trials[*k].1.given),
-        agreement: mean(&|(_, tried)| tried.agreement),
-        oddness: mean(&|(_, tried)| tried.oddness),
-    })
+    Some((mean, tried.len()))
 }
 
 impl Finding {
@@ -161,8 +154,12 @@ impl Finding {
         let count = self.frames.len();
         let frames = if count == 1 { "frame" } else { "frames" };
         if let Some([given, corrected]) = self.agreement.map(|shares| shares.map(|s| 1e2 * s)) {
+            let what = match self.correction {
+                Correction::ChannelsSwapped => "colors of model and images",
+                _ => "object, mask and depth",
+            };
             text += &format!(
-                " (object, mask and depth of {count} {frames} then agree by {corrected:.0} %, as they are by {given:.0} %)"
+                " ({what} of {count} {frames} then agree by {corrected:.0} %, as they are by {given:.0} %)"
             );
         }
         if let Some(sigma) = self.sigma {
@@ -173,14 +170,16 @@ impl Finding {
 
     /// True of a warning about what the correction would mend.
     pub fn explains(&self, warning: &Warning) -> bool {
+        use Correction::*;
         let (kind, by_agreement) = (self.correction, self.agreement.is_some());
-        let is_unit = matches!(kind, Correction::ModelUnit | Correction::ModelAndPoseUnit);
+        let is_of_place = kind != ChannelsSwapped;
         match warning.subject {
-            Subject::Model => is_unit && warning.unit == "m",
-            // Where the object is, not how hard it is felt.
-            Subject::Touch => by_agreement && warning.unit == "cm",
-            Subject::Hand => kind == Correction::FocalLength || by_agreement,
-            Subject::Pose | Subject::Mask | Subject::Depth => true,
+            // What is felt where the object is, not how hard.
+            Subject::Model | Subject::Touch => false,
+            Subject::ModelUnit => matches!(kind, ModelUnit | ModelAndPoseUnit),
+            Subject::Hand => is_of_place && (kind == FocalLength || by_agreement),
+            Subject::TouchPlace => is_of_place && by_agreement,
+            Subject::Pose | Subject::Mask | Subject::Depth => is_of_place,
         }
     }
 }

@@ -61,40 +61,37 @@ impl Inputs {
         Self { t_cam_object: t_cv_gl * self.t_cam_object, ..self }
     }
 
+    fn seen_by(self, camera: Camera) -> Self {
+        Self { camera, ..self }
+    }
+
     /// With a correction, whose factor is `value`.
     pub(super) fn corrected(self, correction: Correction, value: f64) -> Self {
+        use Correction::*;
         let Self { camera, t_cam_object: pose, .. } = self;
+        let Camera { fx, fy, cx, cy, width, height } = camera;
         let q = pose.rotation.into_inner().coords;
         let inverse = Self { t_cam_object: pose.inverse(), ..self };
         let quaternion = |w, x, y, z| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
         match correction {
-            Correction::PoseUnit => self.moved(value),
-            Correction::ModelUnit | Correction::ModelScale => self.sized(value),
-            Correction::ModelAndPoseUnit => self.moved(value).sized(value),
-            Correction::DepthUnit | Correction::DepthScale => {
-                Self { depth_scale: self.depth_scale * value, ..self }
-            }
-            Correction::PoseInverted => inverse,
-            Correction::PoseInvertedOpenGl => inverse.flipped(),
-            Correction::RotationTransposed => self.turned(pose.rotation.inverse()),
+            PoseUnit => self.moved(value),
+            ModelUnit | ModelScale => self.sized(value),
+            ModelAndPoseUnit => self.moved(value).sized(value),
+            DepthUnit | DepthScale => Self { depth_scale: self.depth_scale * value, ..self },
+            PoseInverted => inverse,
+            PoseInvertedOpenGl => inverse.flipped(),
+            RotationTransposed => self.turned(pose.rotation.inverse()),
             // (x, y, z, w) was read as (w, x, y, z), and the other way round.
-            Correction::QuaternionXyzw => self.turned(quaternion(q.z, q.w, q.x, q.y)),
-            Correction::QuaternionWxyz => self.turned(quaternion(q.x, q.y, q.z, q.w)),
-            Correction::OpenGlAxes => self.flipped(),
-            Correction::OpenGlRotation => self.turned(self.flipped().t_cam_object.rotation),
-            Correction::PrincipalPointSwapped => {
-                Self { camera: Camera { cx: camera.cy, cy: camera.cx, ..camera }, ..self }
-            }
-            Correction::CameraOfOtherSize => {
-                let Camera { width, height, .. } = camera;
-                Self { camera: Camera { width, height, ..camera.scaled(value) }, ..self }
-            }
-            Correction::FocalLength => {
-                let (fx, fy) = (camera.fx * value, camera.fy * value);
-                Self { camera: Camera { fx, fy, ..camera }, ..self }
-            }
-            Correction::MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
-            Correction::Translation => Self { is_placed: false, ..self },
+            QuaternionXyzw => self.turned(quaternion(q.z, q.w, q.x, q.y)),
+            QuaternionWxyz => self.turned(quaternion(q.x, q.y, q.z, q.w)),
+            OpenGlAxes => self.flipped(),
+            OpenGlRotation => self.turned(self.flipped().t_cam_object.rotation),
+            PrincipalPointSwapped => self.seen_by(Camera { cx: cy, cy: cx, ..camera }),
+            CameraOfOtherSize => self.seen_by(Camera { width, height, ..camera.scaled(value) }),
+            FocalLength => self.seen_by(Camera { fx: fx * value, fy: fy * value, ..camera }),
+            MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
+            Translation => Self { is_placed: false, ..self },
+            ChannelsSwapped => self,
         }
     }
 }

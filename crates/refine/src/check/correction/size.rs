@@ -24,7 +24,7 @@ pub(super) fn find_sizes(
         let open = group.iter().filter(|&&k| !explained[k]);
         open.filter_map(|&k| Some((k, trials[k].1.size?))).collect()
     };
-    let objects = groups(trials, |target| target.obj_id);
+    let objects = groups(trials, |_, target| target.obj_id);
     let objects: Vec<_> = objects.iter().map(|group| sizes_of(group)).collect();
     let all: Vec<usize> = (0..trials.len()).collect();
     let together = estimate(&sizes_of(&all), settings, true);

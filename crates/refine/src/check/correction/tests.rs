@@ -176,6 +176,47 @@ fn masks_and_cameras() {
     }
 }
 
+/// Whatever the light: bright, dark, or tinted.
+#[test]
+fn channels_that_are_swapped() {
+    for gains in [[1.0; 3], [1.6; 3], [0.3; 3], [0.8, 1.0, 1.2], [1.2, 1.0, 0.8]] {
+        let lit = |scene: &mut Scene| {
+            for color in scene.frame.color.pixels_mut() {
+                *color = [0, 1, 2].map(|c| (color[c] * gains[c]).min(1.0));
+            }
+        };
+        let right = found(false, &lit);
+        assert!(right.is_empty(), "{gains:?}: {right:#?}");
+        for bare in [false, true] {
+            named_of(bare, Correction::ChannelsSwapped, 1.0, &|scene| {
+                lit(scene);
+                scene.frame.color.pixels_mut().iter_mut().for_each(|color| color.reverse());
+            });
+        }
+    }
+    // Gray pictures, and models without colors, tell nothing.
+    let gray = found(false, &|scene| {
+        scene.frame.color.pixels_mut().iter_mut().for_each(|color| *color = [color[1]; 3]);
+    });
+    assert!(gray.is_empty(), "{gray:#?}");
+    let plain = found(false, &|scene| {
+        let mut mesh = scene.object.mesh.clone();
+        (mesh.colors, mesh.texture) = (None, None);
+        let inertial = Some(scene.object.inertial.clone());
+        scene.object = Arc::new(Object::new("plain", mesh, inertial, 0).unwrap());
+    });
+    assert!(plain.is_empty(), "{plain:#?}");
+}
+
+#[test]
+fn without_a_mask_nothing_is_tried() {
+    let found = found(false, &|scene| {
+        scene.frame.mask.pixels_mut().fill(false);
+        scene.initial = scene.initial.inverse();
+    });
+    assert!(found.is_empty(), "{found:#?}");
+}
+
 #[test]
 fn sizes_of_models_and_focal_lengths() {
     for factor in [0.83, 0.95, 1.05, 1.2] {
@@ -199,6 +240,7 @@ fn messages_name_file_field_and_edit() {
         intrinsics: "cam_K",
         depth_scale: "depth_scale",
         masks: "mask_visib".into(),
+        colors: "rgb".into(),
     };
     let said = |correction: Correction, factor| correction.message(names, factor);
     for (correction, factor, words) in [
@@ -212,6 +254,7 @@ fn messages_name_file_field_and_edit() {
         (Correction::ModelScale, 0.9524, ["obj_000005.ply: ", "too large", "by 0.952"]),
         (Correction::FocalLength, 1.1, ["scene_camera.json: cam_K: ", "too short", "by 1.1"]),
         (Correction::PrincipalPointSwapped, 1.0, ["cam_K: ", "cx and cy are swapped", "exchange"]),
+        (Correction::ChannelsSwapped, 1.0, ["rgb: ", "red and blue are swapped", "exchange"]),
     ] {
         let said = said(correction, factor);
         assert!(words.iter().all(|word| said.contains(word)), "{said}");

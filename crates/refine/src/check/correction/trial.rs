@@ -1,10 +1,12 @@
 //! Corrections of one frame's inputs, each tried.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix2, Matrix6, Matrix6x2, Vector2};
 use prehend_autodiff::Quadratic;
 use rayon::prelude::*;
 
-use super::alignment::{Aligned, PoseFit};
+use super::alignment::Fitted;
 use super::evidence::FrameImages;
 use super::inputs::Inputs;
 use super::kind::{Correction, candidates};
@@ -13,22 +15,21 @@ use crate::error::RefineError;
 use crate::scene::{Frame, Object};
 
 /// A frame with each correction tried.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct CorrectionTrial {
-    /// Agreement of the inputs as they are with what the frame shows, 0 to 1.
-    pub(super) given: f64,
     /// The candidates; none of those that the frame needs not.
     pub(super) tried: Vec<Option<Tried>>,
     /// Information about the model's scale and the focal length.
     pub(super) size: Option<Size>,
 }
 
-/// One correction of a frame.
+/// One correction of a frame, or of several on average.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tried {
     pub(super) correction: Correction,
     pub(super) value: f64,
-    pub(super) agreement: f64,
+    /// Agreement of the inputs with what the frame shows as they are, and corrected, 0 to 1.
+    pub(super) agreement: [f64; 2],
     /// Logarithm of the object's extent over a common one, without its sign.
     pub(super) oddness: f64,
 }
@@ -46,80 +47,70 @@ pub(super) struct Size {
 }
 
 impl CorrectionTrial {
-    /// Tries what would make `observation` show `object` about at `t_cam_object` \[m\].
+    /// Tries what would make `observation` show `object` about at `t_cam_object` \[m\]. Without a mask, or with a box, nothing is tried.
     ///
     /// # Errors
     /// If images have not the camera's size, or the object's mesh cannot be used at another scale.
     pub fn new(
         observation: &Frame,
-        object: &Object,
+        object: &Arc<Object>,
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
+        if !observation.is_segmented() {
+            return Ok(Self::default());
+        }
         let evidence = FrameImages::new(observation, object, t_cam_object, settings)?;
         let given = evidence.given;
-        let hand_drawn = evidence.hand_drawn(&given);
-        let fit = |inputs: &Inputs, sized: bool| {
-            // The hand is seen by another camera elsewhere.
-            let own =
-                (inputs.camera != given.camera).then(|| evidence.hand_drawn(inputs)).flatten();
-            let hand = own.as_ref().or(hand_drawn.as_ref());
-            PoseFit { evidence: &evidence, hand }.fit(inputs, sized)
-        };
-        let agreement = fit(&given, false).map_or(0.0, |(agreement, _)| agreement);
-        let sized = fit(&given, true);
-        let sized_agreement = sized.as_ref().map_or(0.0, |(agreement, _)| *agreement);
-        let sized = sized.filter(|_| evidence.has_depth && sized_agreement >= settings.sized);
-        let size = sized.and_then(|(_, aligned)| {
-            let size = Size::of(&aligned, &given)?;
-            let focal = given.corrected(Correction::FocalLength, size.scale.exp());
-            let share =
-                |inputs: &Inputs| evidence.hand_share(inputs, &evidence.hand_drawn(inputs)?);
-            let gain = share(&focal).zip(share(&given)).map(|(focal, given)| focal - given);
-            Some(Size { hand_gain: gain, ..size })
-        });
+        let agreement = |fitted: &Option<Fitted>| fitted.as_ref().map_or(0.0, |f| f.agreement);
+        let [plain, sized] = [false, true].map(|sized| evidence.fit(&given, sized));
         // A model of another size is no other mistake.
-        let given_agreement = agreement.max(sized_agreement);
+        let as_given = agreement(&plain).max(agreement(&sized));
+        let is_sized = |fitted: &Fitted| evidence.has_depth && fitted.agreement >= settings.sized;
+        let size = sized.filter(is_sized).and_then(|fitted| Size::of(&fitted, &evidence));
         let to_fit = 0.5 * given.camera.width as f64 / given.camera.cx;
         let attempt = |&(correction, value): &(Correction, f64)| {
-            let needed = given_agreement < settings.good || correction.is_rotation();
+            let tried = |agreement, meters: f64| {
+                // How far the object's size is from what is common.
+                let extent = 2.0 * evidence.object.radius * meters;
+                let oddness = (extent / settings.extent).ln().abs();
+                Some(Tried { correction, value, agreement, oddness })
+            };
+            if correction == Correction::ChannelsSwapped {
+                let fitted = plain.as_ref().filter(|f| f.agreement >= settings.fair)?;
+                let colors = evidence.color_agreement(&fitted.inputs)?;
+                return tried([colors, 1.0 - colors], fitted.inputs.meters);
+            }
+            let needed = as_given < settings.good || correction.is_rotation();
             if !(needed && value.is_finite() && value > 0.0) {
                 return None;
             }
             let inputs = given.corrected(correction, value);
-            let (agreement, meters) = match fit(&inputs, false) {
-                Some((agreement, aligned)) => (agreement, aligned.inputs.meters),
-                None => (0.0, inputs.meters),
-            };
-            // How far the object's size is from what is common.
-            let extent = 2.0 * evidence.object().radius * meters;
-            let oddness = (extent / settings.extent).ln().abs();
-            Some(Tried { correction, value, agreement, oddness })
+            let fitted = evidence.fit(&inputs, false);
+            let meters = fitted.as_ref().map_or(inputs.meters, |f| f.inputs.meters);
+            tried([as_given, agreement(&fitted)], meters)
         };
         let tried = candidates(to_fit, evidence.depth_ratio()).par_iter().map(attempt).collect();
-        Ok(Self { given: given_agreement, tried, size })
+        Ok(Self { tried, size })
     }
 }
 
 /// The pose that mask and depth have, within what poses to start from are off, if object and `observation` agree there.
 pub(in crate::check) fn settled_pose(
     observation: &Frame,
-    object: &Object,
+    object: &Arc<Object>,
     t_cam_object: &Isometry3<f64>,
     settings: &CorrectionSettings,
 ) -> Option<Isometry3<f64>> {
     let evidence = FrameImages::new(observation, object, t_cam_object, settings).ok()?;
-    let hand = evidence.hand_drawn(&evidence.given);
-    let fit = PoseFit { evidence: &evidence, hand: hand.as_ref() };
-    let (agreement, aligned) = fit.fit(&evidence.given, false)?;
-    let Inputs { meters, t_cam_object, .. } = aligned.inputs;
-    (agreement >= settings.fair && meters == 1.0).then_some(t_cam_object)
+    let Fitted { agreement, inputs, .. } = evidence.fit(&evidence.given, false)?;
+    (agreement >= settings.fair && inputs.meters == 1.0).then_some(inputs.t_cam_object)
 }
 
 impl Size {
     /// Schur complement of the sum of squares once the pose is eliminated; none where outline and depth leave the pose open.
-    fn of(aligned: &Aligned, given: &Inputs) -> Option<Self> {
-        let Quadratic { hessian, gradient, .. } = &aligned.sum;
+    fn of(fitted: &Fitted, evidence: &FrameImages<'_>) -> Option<Self> {
+        let Quadratic { hessian, gradient, .. } = &fitted.sum;
         let pose: Matrix6<f64> = hessian.fixed_view::<6, 6>(0, 0).into_owned();
         let cross: Matrix6x2<f64> = hessian.fixed_view::<6, 2>(0, 6).into_owned();
         let factor = pose.cholesky()?;
@@ -130,8 +121,15 @@ impl Size {
         // Depth that has to be nearer is a model that has to be larger.
         let sign = Matrix2::new(-1.0, 0.0, 0.0, 1.0);
         let (information, gradient) = (sign * information * sign, sign * gradient);
-        let scale = (given.depth_scale / aligned.inputs.depth_scale).ln();
+        let given = evidence.given;
+        let scale = (given.depth_scale / fitted.inputs.depth_scale).ln();
         let vector = information * Vector2::new(scale, 0.0) - gradient;
-        Some(Self { scale, information, vector, hand_gain: None })
+        let focal = given.corrected(Correction::FocalLength, scale.exp());
+        let share = |inputs: &Inputs| {
+            let hand = evidence.hand_drawn(inputs)?;
+            evidence.hand_share(inputs, &hand)
+        };
+        let hand_gain = share(&focal).zip(share(&given)).map(|(focal, given)| focal - given);
+        Some(Self { scale, information, vector, hand_gain })
     }
 }

@@ -25,7 +25,7 @@ pub struct Design {
     /// Iterations after which poses are compared; in the steps study.
     pub(super) steps: Vec<usize>,
     program: String,
-    /// Fingerprints of annotations and rig.
+    /// Fingerprints of annotations and rig, and the source of masks.
     inputs: String,
     seed: u64,
 }
@@ -57,6 +57,11 @@ impl Design {
             inputs: format!("{} {rig}", dataset_fingerprint(dataset, &annotations)?),
             seed,
         })
+    }
+
+    /// With masks of another source than the dataset's files, which `identity` tells from others.
+    pub fn with_masks(self, identity: &str) -> Self {
+        Self { inputs: format!("{} {identity}", self.inputs), ..self }
     }
 
     /// The rows of an initial pose in the order of the tables, without results.
