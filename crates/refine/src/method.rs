@@ -99,32 +99,27 @@ impl From<Icp> for Method {
     }
 }
 
-/// Names of the methods with what each is, in the order of the paper's tables.
-const METHODS: [(&str, &str); 17] = [
-    ("fused", "all evidence in one least-squares problem, with calibrations estimated"),
-    ("combined", "all four gradients, checkpointing"),
-    ("combined-last", "all four gradients, the last pose"),
-    ("combined-free", "all four gradients, no regularization, the last pose"),
-    ("combined-free-best", "all four gradients, no regularization, checkpointing"),
-    ("depth", "this gradient alone, the last pose"),
-    ("depth-best", "this gradient alone, checkpointing"),
-    ("tactile", "this gradient alone, the last pose"),
-    ("tactile-best", "this gradient alone, checkpointing"),
-    ("rendering", "this gradient alone, the last pose"),
-    ("rendering-best", "this gradient alone, checkpointing"),
-    ("physics", "this gradient alone, the last pose"),
-    ("physics-best", "this gradient alone, checkpointing"),
-    ("physics-free", "this gradient alone, no regularization, the last pose"),
-    ("icp", "the paper's ICP, point to point, the last pose"),
-    ("icp-best", "the paper's ICP, point to point, checkpointing"),
-    ("robust-icp", "robust point-to-plane ICP, a strong baseline, the last pose"),
-];
-
 impl Method {
     /// Names of the methods with what each is, in the order of the paper's tables.
-    pub fn all() -> &'static [(&'static str, &'static str)] {
-        &METHODS
-    }
+    pub const ALL: [(&str, &str); 17] = [
+        ("fused", "all evidence in one least-squares problem, with calibrations estimated"),
+        ("combined", "all four gradients, checkpointing"),
+        ("combined-last", "all four gradients, the last pose"),
+        ("combined-free", "all four gradients, no regularization, the last pose"),
+        ("combined-free-best", "all four gradients, no regularization, checkpointing"),
+        ("depth", "this gradient alone, the last pose"),
+        ("depth-best", "this gradient alone, checkpointing"),
+        ("tactile", "this gradient alone, the last pose"),
+        ("tactile-best", "this gradient alone, checkpointing"),
+        ("rendering", "this gradient alone, the last pose"),
+        ("rendering-best", "this gradient alone, checkpointing"),
+        ("physics", "this gradient alone, the last pose"),
+        ("physics-best", "this gradient alone, checkpointing"),
+        ("physics-free", "this gradient alone, no regularization, the last pose"),
+        ("icp", "the paper's ICP, point to point, the last pose"),
+        ("icp-best", "the paper's ICP, point to point, checkpointing"),
+        ("robust-icp", "robust point-to-plane ICP, a strong baseline, the last pose"),
+    ];
 
     /// Names of the fused estimator with less than all evidence, or with quantities believed that it would estimate: what each of them is worth.
     #[cfg(any(feature = "cli", test))]
@@ -136,7 +131,7 @@ impl Method {
         without.chain(only).chain(fixed).chain(["fused-fixed-all".to_owned()]).collect()
     }
 
-    /// The method called `name`, of default settings: one of [`all`](Self::all), or `fused-without-M` and `fused-only-M` of a [`Modality`],
+    /// The method called `name`, of default settings: one of [`ALL`](Self::ALL), or `fused-without-M` and `fused-only-M` of a [`Modality`],
     /// `fused-fixed-N` of a [`Nuisance`] and `fused-fixed-all`.
     pub fn named(name: &str) -> Option<Self> {
         Self::with_settings(name, &FusedSettings::default())
@@ -147,7 +142,7 @@ impl Method {
         if let Some(ablation) = name.strip_prefix("fused") {
             return ablated(settings.clone(), ablation).map(|settings| Fused::new(settings).into());
         }
-        METHODS.iter().find(|(known, _)| *known == name)?;
+        Self::ALL.iter().find(|(known, _)| *known == name)?;
         let checkpoint = name == "combined" || name.ends_with("-best");
         let gradients = match name.split('-').next()? {
             "icp" => return Some(Icp { checkpoint, ..Icp::default() }.into()),
@@ -189,7 +184,7 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_found() {
-        let names = Method::all().iter().map(|(name, _)| (*name).to_owned());
+        let names = Method::ALL.iter().map(|(name, _)| (*name).to_owned());
         let mut all: Vec<String> = names.chain(Method::ablations()).collect();
         for name in &all {
             assert!(Method::named(name).is_some(), "{name}");
@@ -231,7 +226,7 @@ mod tests {
 
     #[test]
     fn iterations_are_set() {
-        for (name, _) in Method::all() {
+        for (name, _) in Method::ALL {
             let mut method = Method::named(name).unwrap();
             method.set_iterations(7);
             match &method {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
@@ -58,18 +58,16 @@ impl Workers {
         W: FnMut(&J) -> T,
     {
         let next = AtomicUsize::new(0);
-        let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let (sender, results) = mpsc::channel();
             for pool in &self.pools {
-                let (sender, next, stop, worker) = (sender.clone(), &next, &stop, &worker);
+                let (sender, next, worker) = (sender.clone(), &next, &worker);
                 scope.spawn(move || {
                     pool.install(move || {
                         let mut work = worker();
-                        while !stop.load(Ordering::Relaxed) {
-                            let index = next.fetch_add(1, Ordering::Relaxed);
-                            let Some(job) = jobs.get(index) else { break };
-                            if sender.send((index, work(job))).is_err() {
+                        while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                            // Nobody listens once `done` has failed.
+                            if sender.send((job, work(job))).is_err() {
                                 break;
                             }
                         }
@@ -77,14 +75,7 @@ impl Workers {
                 });
             }
             drop(sender);
-            let mut outcome = Ok(());
-            for (index, result) in results {
-                if outcome.is_ok() {
-                    outcome = done(&jobs[index], result);
-                    stop.store(outcome.is_err(), Ordering::Relaxed);
-                }
-            }
-            outcome
+            results.into_iter().try_for_each(|(job, result)| done(job, result))
         })
     }
 

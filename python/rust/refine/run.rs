@@ -32,7 +32,7 @@ pub(super) fn method(
     given: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Method> {
     let unknown = || {
-        let names: Vec<_> = Method::all().iter().map(|(name, _)| *name).collect();
+        let names: Vec<_> = Method::ALL.iter().map(|(name, _)| *name).collect();
         wrong(format!("method: '{name}' is unknown: one of {}", names.join(", ")))
     };
     let estimator = settings(given)?.estimator;
@@ -56,7 +56,7 @@ pub(super) fn method(
 /// The names of all methods, and what each is.
 #[pyfunction]
 pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
-    Method::all().iter().copied().collect()
+    Method::ALL.into_iter().collect()
 }
 
 /// Refines many frames side by side, each from its pose (n × 4 × 4, camera ← object [m]): a list of one `Estimate` a frame, in their order. In place

@@ -35,6 +35,6 @@ pub use mask_source::MaskSource;
 pub use pose::PlainPose;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
-pub use times::Times;
+pub use times::{timed_methods, write_times};
 
 pub use crate::scene::Target;

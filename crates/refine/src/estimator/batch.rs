@@ -30,19 +30,13 @@ pub fn refine_all<'a>(
     let threads = threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
     let workers = Workers::new(jobs.len(), threads)?;
     let indices: Vec<usize> = (0..jobs.len()).collect();
-    let mut done: Vec<Option<Result<Refined<'_>, RefineError>>> = Vec::new();
-    done.resize_with(jobs.len(), || None);
-    let keep = |&index: &usize, outcome| -> Result<(), RefineError> {
-        done[index] = Some(outcome);
-        Ok(())
-    };
-    let run = |&index: &usize| {
+    let run = |index: usize| {
         let RefineJob { estimator, frame, hypotheses } = &jobs[index];
         guard(|| estimator.run(frame, hypotheses, &mut |_| ControlFlow::Continue(())))
     };
-    workers.run(&indices, || run, keep)?;
-    // None is missing.
-    Ok(done.into_iter().flatten().collect())
+    let mut done = Vec::new();
+    workers.run_in_order(&indices, run, |_, outcome| done.push(outcome));
+    Ok(done)
 }
 
 #[cfg(test)]

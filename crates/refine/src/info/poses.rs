@@ -1,13 +1,13 @@
 //! Poses as a BOP results file.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
 use super::detect::unknown;
 use crate::data::bop::{ResultRow, read_results};
-use crate::data::{AssetError, Times};
+use crate::data::{AssetError, timed_methods};
 
 /// Malformed lines that are named, at most.
 const NAMED: usize = 5;
@@ -41,6 +41,6 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Ass
         "objects": ids(|row| row.obj_id),
         "scores": range,
         "timed": rows.iter().filter(|row| row.time >= 0.0).count(),
-        "methods": Times::methods(&PathBuf::from(times)),
+        "methods": timed_methods(Path::new(&times)),
     }))
 }

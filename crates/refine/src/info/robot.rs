@@ -11,10 +11,8 @@ use serde_json::{Value, json};
 
 use crate::data::AssetError;
 
-/// A joint that is not fixed: name (empty where it has none), motion, moved link, smallest and largest position \[rad or m\], joint that it follows.
-type Joint<'a> = (&'a str, &'static str, &'a str, Option<(f64, f64)>, Option<&'a str>);
-
-/// Name, links, colliding shapes, mass of all links \[kg\], joints but for fixed ones, and how many of each motion there are.
+/// Name, links, colliding shapes, mass of all links \[kg\], joints but for fixed ones, and how many of each motion there are. Of a joint: name, motion, moved
+/// link, smallest and largest position \[rad or m\], joint that it follows.
 pub(super) fn of_urdf(
     path: &Path,
     options: &ReadOptions,
@@ -32,9 +30,13 @@ pub(super) fn of_urdf(
             Drive::Variable { index, .. } => tree.joint_names().get(index),
             Drive::None => None,
         };
-        let mimics = leader.filter(|name| **name != joint.name);
-        let (name, child) = (&joint.name, &tree.links()[joint.child].name);
-        Some(json_of((name, motion, child, joint.limits, mimics.map(String::as_str))))
+        Some(json!({
+            "name": joint.name,
+            "motion": motion,
+            "child": tree.links()[joint.child].name,
+            "limits": joint.limits,
+            "mimics": leader.filter(|name| **name != joint.name),
+        }))
     };
     let joints: Vec<Value> = tree.joints().iter().filter_map(joint).collect();
     for link in tree.links() {
@@ -73,7 +75,13 @@ pub(super) fn of_mjcf(
             JointKind::Ball => "ball",
             JointKind::Free => "free",
         };
-        json_of((&joint.name, motion, &body.name, joint.range, None))
+        json!({
+            "name": joint.name,
+            "motion": motion,
+            "child": body.name,
+            "limits": joint.range,
+            "mimics": null,
+        })
     });
     let joints: Vec<Value> = joints.collect();
     let inertials = model.bodies.iter().filter_map(|body| body.inertial);
@@ -89,11 +97,6 @@ pub(super) fn of_mjcf(
         "motions": motions(&joints),
         "joints": joints,
     }))
-}
-
-fn json_of((name, motion, child, limits, mimics): Joint<'_>) -> Value {
-    let limits = limits.map(|(low, high)| [low, high]);
-    json!({ "name": name, "motion": motion, "child": child, "limits": limits, "mimics": mimics })
 }
 
 /// Number of joints by motion.

@@ -4,6 +4,8 @@ use std::fmt::{Formatter, Result};
 
 use serde_json::{Map, Value};
 
+use crate::evaluate::metrics::Table;
+
 /// Writes a line a field, nested objects indented below their names, and tables of up to `rows` rows.
 pub(super) fn write_fields(
     f: &mut Formatter<'_>,
@@ -21,7 +23,10 @@ pub(super) fn write_fields(
             Value::Array(list) if list.iter().any(Value::is_object) => {
                 let more = if list.len() > rows { " (--all lists all)" } else { "" };
                 writeln!(f, "{:indent$}{name:<width$}  {}{more}", "", list.len())?;
-                write_table(f, list, indent + 2, rows)?;
+                if rows > 0 {
+                    let table = table(list, rows).to_string();
+                    table.lines().try_for_each(|line| writeln!(f, "{:indent$}  {line}", ""))?;
+                }
             }
             value => writeln!(f, "{:indent$}{name:<width$}  {}", "", text(value))?,
         }
@@ -29,26 +34,18 @@ pub(super) fn write_fields(
     Ok(())
 }
 
-/// Writes the first `rows` of a list of objects with the fields of the first one as columns, `id` and `name` before others.
-fn write_table(f: &mut Formatter<'_>, list: &[Value], indent: usize, rows: usize) -> Result {
-    let list = &list[..rows.min(list.len())];
-    let Some(Value::Object(first)) = list.first() else { return Ok(()) };
-    let mut columns: Vec<&String> = first.keys().collect();
+/// The first `rows` of a list of objects, with the fields of the first one as columns, `id` and `name` before others.
+fn table(list: &[Value], rows: usize) -> Table {
+    let mut columns: Vec<&String> =
+        list.first().and_then(Value::as_object).into_iter().flat_map(Map::keys).collect();
     columns.sort_by_key(|name| !matches!(name.as_str(), "id" | "name"));
-    let cell = |row: &Value, name: &str| row.get(name).map(text).unwrap_or_default();
-    let width = |name: &&String| {
-        let widths = list.iter().map(|row| cell(row, name).chars().count());
-        widths.chain([name.len()]).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = columns.iter().map(width).collect();
-    let heads = columns.iter().map(|name| (*name).clone()).collect();
-    let cells = list.iter().map(|row| columns.iter().map(|name| cell(row, name)).collect());
-    for line in std::iter::once::<Vec<String>>(heads).chain(cells) {
-        let padded = line.iter().zip(&widths).map(|(cell, width)| format!("{cell:<width$}"));
-        let line = padded.collect::<Vec<_>>().join("  ");
-        writeln!(f, "{:indent$}{}", "", line.trim_end())?;
+    let mut table = Table::new(columns.iter().copied());
+    for row in list.iter().take(rows) {
+        table.push(
+            columns.iter().map(|name| row.get(*name).map(text).unwrap_or_default()).collect(),
+        );
     }
-    Ok(())
+    table
 }
 
 /// A value on one line: numbers to six digits, rows of a matrix after commas.
@@ -93,10 +90,10 @@ mod tests {
             warnings: vec![],
         };
         let text = described("frame").to_string();
-        let head = "x: frame\n  empty    none\n  hand\n    joints  3\n  inertia  0.000000001 0, 0 2\n  lens     yes\n  mass_kg  0.3\n  rows     30 (--all lists all)\n    name      child  limits\n    joint 0   b      0 0\n";
+        let head = "x: frame\n  empty    none\n  hand\n    joints  3\n  inertia  0.000000001 0, 0 2\n  lens     yes\n  mass_kg  0.3\n  rows     30 (--all lists all)\n    name      child  limits\n    --------  -----  ------\n    joint 0       b     0 0\n";
         assert!(text.starts_with(head) && text.ends_with("  scale    -\n"), "{text}");
-        assert_eq!(text.lines().count(), 9 + 1 + 24);
-        assert_eq!(format!("{:#}", described("robot")).lines().count(), 9 + 1 + 30);
+        assert_eq!(text.lines().count(), 9 + 2 + 24);
+        assert_eq!(format!("{:#}", described("robot")).lines().count(), 9 + 2 + 30);
         assert_eq!(described("robot").to_string().lines().count(), 9);
     }
 }

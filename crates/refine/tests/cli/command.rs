@@ -81,7 +81,7 @@ fn methods_are_picked_by_name_and_changed_by_options() {
     let last = trace("--method icp-best --no-checkpoint --iterations 5");
     assert_eq!(last["t_cam_model_mm"], weak["t_cam_model_mm"]);
     let help = place.succeed("refine --help");
-    for (name, _) in prehend_refine::Method::all() {
+    for (name, _) in prehend_refine::Method::ALL {
         assert!(help.contains(&format!("  {name} ")), "{name}");
     }
 }

@@ -16,20 +16,17 @@ use prehend_refine::data::{Assets, FrameInput, MaskSource, Target, load_frame_fi
 use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_render::RgbImage;
 
-use crate::options::{Job, Masks, Selection};
-use crate::terminal::{cache, exit_code, progress, say, warn};
+use crate::options::{Input, Job, Masks, required_unless_frame};
+use crate::terminal::{cache, progress, say, warn};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
 #[command(override_usage = "prehend check --dataset <DIR> --poses <FILE> [OPTIONS]\n       \
                             prehend check --frame <FILE> [OPTIONS]")]
-#[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
+#[command(mut_args(required_unless_frame))]
 pub(crate) struct Check {
     #[command(flatten)]
-    selection: Option<Selection>,
-    /// Poses on the dataset's images, as a BOP results file
-    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
-    poses: Option<PathBuf>,
+    input: Option<Input>,
     #[command(flatten)]
     masks: Masks,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
@@ -42,10 +39,10 @@ pub(crate) struct Check {
 
 impl Check {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        match (&self.frame, &self.selection, &self.poses) {
-            (Some(file), ..) => self.frame(file),
-            (None, Some(selection), Some(poses)) => self.dataset(selection, poses),
-            _ => bail!("give --dataset and --poses, or --frame"),
+        match (&self.frame, &self.input) {
+            (Some(file), _) => self.frame(file),
+            (None, Some(input)) => self.dataset(input),
+            (None, None) => bail!("give --dataset and --poses, or --frame"),
         }
     }
 
@@ -70,10 +67,10 @@ impl Check {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Checks the poses of the file `poses`.
-    fn dataset(&self, selection: &Selection, poses: &Path) -> anyhow::Result<ExitCode> {
+    /// Checks the poses of a dataset.
+    fn dataset(&self, Input { selection, poses }: &Input) -> anyhow::Result<ExitCode> {
         let dataset = selection.open()?;
-        let (jobs, mut failures) = selection.jobs(poses)?;
+        let (jobs, mut failures) = selection.jobs(poses, None)?;
         let masks = match self.masks.source()? {
             // A pose is not checked by what is made of it.
             MaskSource::Silhouettes => MaskSource::None,
@@ -95,44 +92,39 @@ impl Check {
         let bar = progress(jobs.len(), "drawing");
         for job in bar.wrap_iter(jobs.iter()) {
             let Job { target, row, .. } = job;
-            let checked = assets.load(target, Some(&row.t_cam_model), &[]).map(|input| {
-                without(&dataset, &input, target);
-                drawn(&input, &row.t_cam_model)
-            });
-            match checked {
-                Ok((picture, warnings)) => {
-                    // Of many frames some alone were tried.
-                    let is_meant = |targets: &[Target]| match targets {
-                        [only] => only == target,
-                        all => all
-                            .iter()
-                            .any(|t| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id)),
-                    };
-                    let own = findings.iter().filter(|(_, targets, _)| is_meant(targets));
-                    let (found, mut remarks): (Vec<_>, Vec<_>) =
-                        own.map(|(found, _, message)| (found, message.clone())).unzip();
-                    let untold = |warnings: &[Warning]| -> Vec<String> {
-                        let told = |w: &&Warning| found.iter().any(|found| found.explains(w));
-                        warnings.iter().filter(|w| !told(w)).map(Warning::to_string).collect()
-                    };
-                    let [of_object, of_frame] = warnings.map(|warnings| untold(&warnings));
-                    for text in &of_object {
-                        if introduced.insert((target.obj_id, text.clone())) {
-                            warn(&bar, format!("object {}", target.obj_id), text);
-                        }
-                    }
-                    of_frame.iter().for_each(|text| warn(&bar, target, text));
-                    remarks.extend(of_object.into_iter().chain(of_frame));
-                    report.add_picture(&target.to_string(), &picture, &remarks)?;
-                    done += 1;
+            let input = assets.load(target, Some(&row.t_cam_model), &[]);
+            let Some(input) = failures.keep(target, input) else { continue };
+            without(&dataset, &input, target);
+            let (picture, warnings) = drawn(&input, &row.t_cam_model);
+            // Of many frames some alone were tried.
+            let is_meant = |targets: &[Target]| match targets {
+                [only] => only == target,
+                all => {
+                    all.iter().any(|t| (t.scene_id, t.obj_id) == (target.scene_id, target.obj_id))
                 }
-                Err(error) => failures.push(format!("{target}: {error}")),
+            };
+            let own = findings.iter().filter(|(_, targets, _)| is_meant(targets));
+            let (found, mut remarks): (Vec<_>, Vec<_>) =
+                own.map(|(found, _, message)| (found, message.clone())).unzip();
+            let untold = |warnings: &[Warning]| -> Vec<String> {
+                let told = |w: &&Warning| found.iter().any(|found| found.explains(w));
+                warnings.iter().filter(|w| !told(w)).map(Warning::to_string).collect()
+            };
+            let [of_object, of_frame] = warnings.map(|warnings| untold(&warnings));
+            for text in &of_object {
+                if introduced.insert((target.obj_id, text.clone())) {
+                    warn(&bar, format!("object {}", target.obj_id), text);
+                }
             }
+            of_frame.iter().for_each(|text| warn(&bar, target, text));
+            remarks.extend(of_object.into_iter().chain(of_frame));
+            report.add_picture(&target.to_string(), &picture, &remarks)?;
+            done += 1;
         }
         if done > 0 {
             say(format!("{done} pictures; open {}", report.finish()?.display()))?;
         }
-        Ok(exit_code(done, &failures))
+        Ok(failures.exit_code(done))
     }
 }
 

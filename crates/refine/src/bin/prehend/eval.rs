@@ -11,8 +11,9 @@ use prehend_refine::evaluate::localization::{seconds_per_image, summarize_locali
 use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
+use crate::failures::Failures;
 use crate::options::{Input, Job};
-use crate::terminal::{exit_code, progress, say};
+use crate::terminal::{progress, say};
 
 #[derive(Args)]
 pub(crate) struct Eval {
@@ -37,7 +38,7 @@ impl Eval {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         let Input { selection, poses } = &self.input;
         let dataset = selection.open()?;
-        let (jobs, failures) = selection.jobs(poses)?;
+        let (jobs, failures) = selection.jobs(poses, None)?;
         if self.bop {
             let rows: Vec<ResultRow> = jobs.into_iter().map(|job| job.row).collect();
             self.localization(&dataset, &rows, &failures)
@@ -51,15 +52,12 @@ impl Eval {
         &self,
         dataset: &Dataset,
         jobs: &[Job],
-        mut failures: Vec<String>,
+        mut failures: Failures,
     ) -> anyhow::Result<ExitCode> {
         let mut scorer = Scorer::new(dataset);
         let mut rows = Vec::new();
         for job in progress(jobs.len(), "scoring").wrap_iter(jobs.iter()) {
-            match scorer.score(&job.row) {
-                Ok(row) => rows.push(row),
-                Err(error) => failures.push(format!("{}: {error}", job.target)),
-            }
+            rows.extend(failures.keep(job.target, scorer.score(&job.row)));
         }
         let summary = summarize(&rows);
         if self.json {
@@ -68,7 +66,7 @@ impl Eval {
         } else if !rows.is_empty() {
             say(summary.text(|id| format!("object {id}")))?;
         }
-        Ok(exit_code(rows.len(), &failures))
+        Ok(failures.exit_code(rows.len()))
     }
 
     /// BOP's average recall over the targets. A fault of the dataset ends it, as recall is of all targets; that of a row is
@@ -77,7 +75,7 @@ impl Eval {
         &self,
         dataset: &Dataset,
         rows: &[ResultRow],
-        failures: &[String],
+        failures: &Failures,
     ) -> anyhow::Result<ExitCode> {
         let Input { selection, poses } = &self.input;
         let mut scorer = Scorer::new(dataset);
@@ -101,6 +99,6 @@ impl Eval {
             let table = summary.table(|id| format!("object {id}"));
             say(format!("{table}\ntime per image: {time}"))?;
         }
-        Ok(exit_code(rows.len(), failures))
+        Ok(failures.exit_code(rows.len()))
     }
 }

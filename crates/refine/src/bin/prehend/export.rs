@@ -12,7 +12,7 @@ use prehend_refine::data::bop::{Dataset, DatasetError, check_writable};
 use prehend_refine::export::SceneFilm;
 
 use crate::options::{Input, Job, open_rig};
-use crate::terminal::{cache, exit_code, progress, say};
+use crate::terminal::{cache, progress, say};
 
 /// Images by scene and id, with the poses in each.
 type JobsByImage<'a> = BTreeMap<(u32, u32), Vec<&'a Job>>;
@@ -41,7 +41,7 @@ impl Export {
         check_writable(glb)?;
         let mut film = SceneFilm::new(*rate)?;
         let dataset = selection.open()?;
-        let (jobs, mut failures) = selection.jobs(poses)?;
+        let (jobs, mut failures) = selection.jobs(poses, None)?;
         let mut images = JobsByImage::new();
         for job in &jobs {
             images.entry((job.row.scene_id, job.row.im_id)).or_default().push(job);
@@ -73,16 +73,14 @@ impl Export {
                 }
                 Ok(())
             };
-            if let Err(error) = add() {
-                failures.push(format!("scene {scene_id} image {im_id}: {error:#}"));
-            }
+            failures.keep(format!("scene {scene_id} image {im_id}"), add());
         }
         if done > 0 {
             film.save(glb)?;
             let frame = if world.is_some() { "the world's frame" } else { "the camera's frame" };
             say(format!("{done} poses in {frame}, written to {}", glb.display()))?;
         }
-        Ok(exit_code(done, &failures))
+        Ok(failures.exit_code(done))
     }
 }
 

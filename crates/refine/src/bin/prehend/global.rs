@@ -1,8 +1,10 @@
 //! Options of all commands.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ColorChoice};
+use log::LevelFilter;
 
-use crate::logging::{self, Level, LevelError};
+use crate::logging::{self, LEVELS};
 
 /// What is printed.
 #[derive(Args)]
@@ -16,9 +18,10 @@ pub(crate) struct Global {
         long,
         global = true,
         value_name = "LEVEL",
+        value_parser = PossibleValuesParser::new(LEVELS).try_map(|name| logging::named(&name).ok_or("is no level")),
         conflicts_with_all = ["verbose", "quiet"]
     )]
-    log_level: Option<Level>,
+    log_level: Option<LevelFilter>,
     /// Print more: -v is --log-level info, -vv debug
     #[arg(long, short, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     verbose: u8,
@@ -29,13 +32,13 @@ pub(crate) struct Global {
 
 impl Global {
     /// Lets messages be printed as asked for.
-    pub(crate) fn apply(&self) -> Result<(), LevelError> {
+    pub(crate) fn apply(&self) -> anyhow::Result<()> {
         logging::set_color(self.color);
         logging::set_level(self.log_level.or(match (self.quiet, self.verbose) {
-            (true, _) => Some(Level::Error),
+            (true, _) => Some(LevelFilter::Error),
             (false, 0) => None,
-            (false, 1) => Some(Level::Info),
-            (false, _) => Some(Level::Debug),
+            (false, 1) => Some(LevelFilter::Info),
+            (false, _) => Some(LevelFilter::Debug),
         }))
     }
 }

@@ -8,9 +8,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::{anyhow, bail};
 use clap::Args;
-use prehend_refine::Settings;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
@@ -23,11 +22,12 @@ use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::failures::Failures;
 use crate::options::{
     HYPOTHESES, Masks, Rendering, Selection, beside, limit_threads, row, write_poses,
 };
 use crate::settings::SettingsOptions;
-use crate::terminal::{cache, exit_code, progress, say};
+use crate::terminal::{cache, progress, say};
 
 #[derive(Args)]
 #[command(next_help_heading = "Poses")]
@@ -80,15 +80,6 @@ pub(crate) struct Initial {
     rendering: Rendering,
 }
 
-/// Poses to be written, and failures.
-#[derive(Default)]
-struct PoseRows {
-    rows: Vec<ResultRow>,
-    /// All poses that searches ended with.
-    hypotheses: Vec<ResultRow>,
-    failures: Vec<String>,
-}
-
 /// A pose that a search ended with, as the journal has it.
 #[derive(Serialize, Deserialize)]
 struct FoundPose {
@@ -107,130 +98,124 @@ impl Initial {
         limit_threads(self.threads)?;
         self.masks.require_files_or_detections()?;
         let dataset = self.selection.open()?;
-        let (found, journal) = match self.noise {
-            Some(level) => (self.perturbed(&dataset, level)?, None),
-            None => self.found(&dataset).map(|(found, journal)| (found, Some(journal)))?,
+        let mut failures = Failures::default();
+        let (rows, hypotheses, journal) = match self.noise {
+            Some(level) => (self.perturbed(&dataset, level, &mut failures)?, Vec::new(), None),
+            None => self.found(&dataset, &mut failures)?,
         };
-        let PoseRows { rows, hypotheses, mut failures } = found;
-        if rows.is_empty() && failures.is_empty() {
+        let count = rows.len();
+        if count == 0 && failures.is_empty() {
             journal.map(Journal::discard).transpose()?;
             bail!("nothing is of the scenes, images and objects asked for");
         }
-        let count = rows.len();
         if !hypotheses.is_empty() {
             write_results(&beside, &hypotheses)?;
         } else if count > 0 && beside.exists() {
             // Those of a search before would pass for alternatives of these.
-            fs::remove_file(&beside).with_context(|| beside.display().to_string())?;
+            fs::remove_file(&beside).map_err(|e| anyhow!("{}: {e}", beside.display()))?;
         }
         write_poses(&self.out, rows, &mut failures)?;
         if count > 0 {
             say(format!("{count} poses written to {}", self.out.display()))?;
         }
         journal.map(Journal::discard).transpose()?;
-        Ok(exit_code(count, &failures))
+        Ok(failures.exit_code(count))
     }
 
     /// The true poses with errors of `level`.
-    fn perturbed(&self, dataset: &Dataset, level: NoiseLevel) -> Result<PoseRows, DatasetError> {
+    fn perturbed(
+        &self,
+        dataset: &Dataset,
+        level: NoiseLevel,
+        failures: &mut Failures,
+    ) -> Result<Vec<ResultRow>, DatasetError> {
         let truth = GroundTruth::new(dataset);
-        let mut found = PoseRows::default();
+        let mut rows = Vec::new();
         for scene in dataset.scenes() {
             let scene_id = scene.id();
             let mut images = scene.images()?;
             images.retain(|id| self.selection.admits_image(scene_id, *id));
             for im_id in images {
-                let objects = truth.objects(scene_id, im_id).unwrap_or_else(|error| {
-                    found.failures.push(format!("scene {scene_id} image {im_id}: {error}"));
-                    Vec::new()
-                });
-                for (instance, TrueObject { obj_id, t_cam_model }) in objects.iter().enumerate() {
-                    let target = Target { scene_id, im_id, obj_id: *obj_id, instance };
-                    if self.selection.admits(scene_id, im_id, *obj_id) {
-                        let pose = level.perturb_target(t_cam_model, self.seed, &target);
-                        found.rows.push(row(&target, pose, 1.0));
+                let objects = truth.objects(scene_id, im_id);
+                let objects = failures.keep(format!("scene {scene_id} image {im_id}"), objects);
+                let objects = objects.into_iter().flatten().enumerate();
+                for (instance, TrueObject { obj_id, t_cam_model }) in objects {
+                    let target = Target { scene_id, im_id, obj_id, instance };
+                    if self.selection.admits(scene_id, im_id, obj_id) {
+                        let pose = level.perturb_target(&t_cam_model, self.seed, &target);
+                        rows.push(row(&target, pose, 1.0));
                     }
                 }
             }
         }
-        Ok(found)
+        Ok(rows)
     }
 
-    /// The poses that the search finds, and the journal that holds them until they are written.
-    fn found(&self, dataset: &Dataset) -> anyhow::Result<(PoseRows, Journal)> {
+    /// The best poses of the search and all that it ends with, and the journal that holds them until they are written.
+    fn found(
+        &self,
+        dataset: &Dataset,
+        failures: &mut Failures,
+    ) -> anyhow::Result<(Vec<ResultRow>, Vec<ResultRow>, Option<Journal>)> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets =
             Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
-        let backend = self.rendering.open()?;
-        let settings = self.settings.load()?;
-        let identity = self.identity(dataset, &targets, backend.name(), &settings)?;
-        let settings = settings.search();
-        let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
-            Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
-        let mut searches = BTreeMap::new();
-        let mut all = PoseRows::default();
-        let bar = progress(targets.len(), "searching");
-        for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
-            if searched.contains_key(&index) {
-                continue;
-            }
-            match guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend)) {
-                Ok(found) => {
-                    let found = found.iter().map(|c| FoundPose {
-                        pose: (&c.t_cam_object).into(),
-                        cost: c.cost,
-                        weight: c.weight,
-                    });
-                    let found: Vec<FoundPose> = found.collect();
-                    searched.insert(index, journal.append(index, &found)?);
-                }
-                Err(error) => all.failures.push(format!("{target}: {error}")),
-            }
-        }
-        for (index, found) in searched {
-            let Some(target) = targets.get(index) else { continue };
-            let pose = |c: &FoundPose, score| row(target, (&c.pose).into(), score);
-            // Of a results file's scores the higher is the better.
-            all.rows.extend(found.first().map(|c| pose(c, -c.cost)));
-            all.hypotheses.extend(found.iter().map(|c| pose(c, c.weight)));
-        }
-        Ok((all, journal))
-    }
-
-    fn identity(
-        &self,
-        dataset: &Dataset,
-        targets: &[Target],
-        backend: &str,
-        settings: &Settings,
-    ) -> anyhow::Result<Identity> {
-        Ok(Identity::of(&json!({
+        let (backend, settings) = (self.rendering.open()?, self.settings.load()?);
+        let identity = Identity::of(&json!({
             "command": "initial --search",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "targets": targets.iter().map(Target::to_string).collect::<Vec<_>>(),
             "filters": self.selection.filters(),
             "masks": self.masks.identity()?,
-            "backend": backend,
+            "backend": backend.name(),
             "settings": settings.to_toml()?,
-        })))
+        }));
+        let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
+            Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
+        let (settings, mut searches) = (settings.search(), BTreeMap::new());
+        let bar = progress(targets.len(), "searching");
+        for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
+            if searched.contains_key(&index) {
+                continue;
+            }
+            let found =
+                guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend));
+            if let Some(found) = failures.keep(target, found) {
+                searched.insert(index, journal.append(index, &found)?);
+            }
+        }
+        let (mut best, mut all) = (Vec::new(), Vec::new());
+        for (index, found) in searched {
+            let Some(target) = targets.get(index) else { continue };
+            let pose = |c: &FoundPose, score| row(target, (&c.pose).into(), score);
+            // Of a results file's scores the higher is the better.
+            best.extend(found.first().map(|c| pose(c, -c.cost)));
+            all.extend(found.iter().map(|c| pose(c, c.weight)));
+        }
+        Ok((best, all, Some(journal)))
     }
 }
 
+/// The poses that the search of an object ends with, the best one first.
 fn search_one(
     assets: &mut Assets,
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
     settings: &SearchSettings,
     backend: &Arc<dyn Backend>,
-) -> Result<Vec<PoseCandidate>, AssetError> {
+) -> Result<Vec<FoundPose>, AssetError> {
     let input = assets.load(target, None, &[])?;
-    let search = match searches.entry(target.obj_id) {
-        Entry::Occupied(known) => known.into_mut(),
-        Entry::Vacant(unknown) => {
-            unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?)
-        }
-    };
+    if let Entry::Vacant(unknown) = searches.entry(target.obj_id) {
+        unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?);
+    }
     let frame = PreparedFrame::new(&input.frame, &input.object)?;
-    Ok(search.run(&frame.with_backend(Arc::clone(backend)))?)
+    let frame = frame.with_backend(Arc::clone(backend));
+    let found = searches[&target.obj_id].run(&frame)?.into_iter();
+    let pose = |PoseCandidate { t_cam_object, cost, weight, .. }| FoundPose {
+        pose: (&t_cam_object).into(),
+        cost,
+        weight,
+    };
+    Ok(found.map(pose).collect())
 }

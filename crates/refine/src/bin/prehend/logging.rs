@@ -4,27 +4,19 @@ use std::env;
 use std::io::Write;
 
 use anstream::ColorChoice;
-use clap::ValueEnum;
+use anyhow::bail;
 use clap::builder::styling::{AnsiColor, Style};
 use log::LevelFilter;
 
 /// The variable that sets the level where no option does.
 const VARIABLE: &str = "PREHEND_LOG";
 
-/// What is printed: messages of a level and of those above.
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-pub(crate) enum Level {
-    Error,
-    Warn,
-    Info,
-    Debug,
-}
+/// Names of the levels: of each its messages and those of the levels before it are printed.
+pub(crate) const LEVELS: [&str; 4] = ["error", "warn", "info", "debug"];
 
-/// A level that is none.
-#[derive(Debug, thiserror::Error)]
-#[error("{VARIABLE}: expected error, warn, info or debug, found {found:?}")]
-pub(crate) struct LevelError {
-    found: String,
+/// The level called `name`.
+pub(crate) fn named(name: &str) -> Option<LevelFilter> {
+    name.parse().ok().filter(|_| LEVELS.contains(&name.to_lowercase().as_str()))
 }
 
 /// Prints what has its level as one line: `warning: …`.
@@ -66,18 +58,15 @@ pub(crate) fn start() {
 ///
 /// # Errors
 /// If the variable names no level.
-pub(crate) fn set_level(level: Option<Level>) -> Result<(), LevelError> {
+pub(crate) fn set_level(level: Option<LevelFilter>) -> anyhow::Result<()> {
     let variable = || env::var(VARIABLE).ok().filter(|name| !name.is_empty());
-    let level = match (level, variable()) {
+    log::set_max_level(match (level, variable()) {
         (Some(level), _) => level,
-        (None, None) => Level::Warn,
-        (None, Some(found)) => Level::from_str(&found, true).map_err(|_| LevelError { found })?,
-    };
-    log::set_max_level(match level {
-        Level::Error => LevelFilter::Error,
-        Level::Warn => LevelFilter::Warn,
-        Level::Info => LevelFilter::Info,
-        Level::Debug => LevelFilter::Debug,
+        (None, None) => LevelFilter::Warn,
+        (None, Some(found)) => match named(&found) {
+            Some(level) => level,
+            None => bail!("{VARIABLE}: expected error, warn, info or debug, found {found:?}"),
+        },
     });
     Ok(())
 }

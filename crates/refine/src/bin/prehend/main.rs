@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod eval;
 mod export;
+mod failures;
 mod global;
 mod info;
 mod initial;

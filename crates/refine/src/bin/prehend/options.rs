@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
@@ -19,6 +19,8 @@ use prehend_refine::rig::Rig;
 use prehend_refine::{Hypotheses, Method};
 use prehend_render::{Backend, Device};
 use strum::{Display, VariantNames};
+
+use crate::failures::Failures;
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -48,6 +50,14 @@ pub(crate) struct Input {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
+}
+
+/// Lets [`Input`] be absent where a frame is given in its place.
+pub(crate) fn required_unless_frame(arg: Arg) -> Arg {
+    match arg.get_id().as_str() {
+        "dataset" | "poses" => arg.required(false).required_unless_present("frame"),
+        _ => arg,
+    }
 }
 
 /// Where masks come from.
@@ -161,15 +171,8 @@ impl Unit {
 pub(crate) struct Job {
     pub(crate) target: Target,
     pub(crate) row: ResultRow,
-    /// The other poses that a search ended with, if the row's comes from one.
-    pub(crate) alternatives: Option<Vec<Isometry3<f64>>>,
-}
-
-impl Job {
-    /// Initial poses.
-    pub(crate) fn hypotheses(&self) -> Hypotheses {
-        Hypotheses { best: self.row.t_cam_model, alternatives: self.alternatives.clone() }
-    }
+    /// The row's pose, and others that a search ended with if it comes from one.
+    pub(crate) hypotheses: Hypotheses,
 }
 
 impl Selection {
@@ -224,36 +227,34 @@ impl Selection {
         Ok(targets)
     }
 
-    /// The rows of the results file `poses` that are meant, and what is wrong with the others.
-    pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        self.jobs_with_hypotheses(poses, None)
-    }
-
-    /// As [`jobs`](Self::jobs), with the alternatives of poses that the file `hypotheses` has.
-    pub(crate) fn jobs_with_hypotheses(
+    /// The rows of the results file `poses` that are meant, with the alternatives that the file `hypotheses` has, and what is wrong with other rows.
+    pub(crate) fn jobs(
         &self,
         poses: &Path,
         hypotheses: Option<&Path>,
-    ) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
+    ) -> anyhow::Result<(Vec<Job>, Failures)> {
         let ReadResults { rows, instances, errors, .. } = read_results(poses)?;
         let file = poses.display();
         if rows.is_empty() && errors.is_empty() {
             bail!("{file}: no poses: there is nothing but a header");
         }
-        let mut found = vec![None; rows.len()];
-        if let Some(hypotheses) = hypotheses {
-            found = read_hypotheses(hypotheses, &rows)?;
-        }
+        let found = match hypotheses {
+            Some(hypotheses) => read_hypotheses(hypotheses, &rows)?,
+            None => vec![None; rows.len()],
+        };
         let job = |((row, instance), alternatives): ((ResultRow, usize), _)| {
-            let ResultRow { scene_id, im_id, obj_id, .. } = row;
-            Job { target: Target { scene_id, im_id, obj_id, instance }, row, alternatives }
+            let ResultRow { scene_id, im_id, obj_id, t_cam_model: best, .. } = row;
+            let target = Target { scene_id, im_id, obj_id, instance };
+            Job { target, row, hypotheses: Hypotheses { best, alternatives } }
         };
         let mut jobs: Vec<Job> = rows.into_iter().zip(instances).zip(found).map(job).collect();
         jobs.retain(|Job { row, .. }| self.admits(row.scene_id, row.im_id, row.obj_id));
         if jobs.is_empty() && errors.is_empty() {
             bail!("{file}: no pose is of the scenes, images and objects asked for");
         }
-        Ok((jobs, errors.iter().map(|error| format!("{file}: {error}")).collect()))
+        let mut failures = Failures::default();
+        failures.add_rows(poses, &errors);
+        Ok((jobs, failures))
     }
 }
 
@@ -261,10 +262,10 @@ impl Selection {
 pub(crate) fn write_poses(
     out: &Path,
     mut rows: Vec<ResultRow>,
-    failures: &mut Vec<String>,
+    failures: &mut Failures,
 ) -> Result<(), DatasetError> {
     if rows.is_empty() {
-        failures.push(format!("there is no pose, {} was not written", out.display()));
+        failures.add(format!("there is no pose, {} was not written", out.display()));
         return Ok(());
     }
     share_image_times(&mut rows);
@@ -303,7 +304,7 @@ pub(crate) fn open_rig(file: Option<&Path>) -> Result<Option<Arc<Rig>>, DatasetE
 
 /// `name`, if a method is called so.
 pub(crate) fn named(name: &str) -> Result<String, String> {
-    let names = || Method::all().iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let names = || Method::ALL.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     match Method::named(name) {
         Some(_) => Ok(name.to_owned()),
         None => Err(format!("unknown method: one of {}", names())),

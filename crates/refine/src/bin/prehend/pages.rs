@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
+use anyhow::anyhow;
 use clap::{Args, Command};
 use clap_complete::Shell;
 use prehend_refine::data::bop::create_folder;
@@ -40,7 +40,7 @@ impl Man {
         if let Some(folder) = &self.out {
             create_folder(folder)?;
             clap_mangen::generate_to(command, folder)
-                .with_context(|| folder.display().to_string())?;
+                .map_err(|e| anyhow!("{}: {e}", folder.display()))?;
             return Ok(ExitCode::SUCCESS);
         }
         let mut page = Vec::new();

@@ -27,10 +27,9 @@ pub(crate) fn assignment(text: &str) -> Result<(String, String), String> {
 }
 
 impl SettingsOptions {
-    /// The settings in effect, or none if they are the defaults.
-    pub(crate) fn given(&self) -> anyhow::Result<Option<Settings>> {
-        let is_given = self.settings.is_some() || !self.set.is_empty();
-        is_given.then(|| self.load()).transpose()
+    /// Whether any are given: else the defaults are in effect.
+    pub(crate) fn is_given(&self) -> bool {
+        self.settings.is_some() || !self.set.is_empty()
     }
 
     /// The settings in effect.

@@ -15,8 +15,9 @@ use prehend_refine::evaluate::study::{
     Design, InitialPose, Kind, Record, Runner, StudyFile, Sweep, tables, write_page,
 };
 
+use crate::failures::Failures;
 use crate::options::{Masks, Selection, limit_threads, named, open_rig};
-use crate::terminal::{cache, exit_code, progress, say};
+use crate::terminal::{cache, progress, say};
 
 /// The table has a row a frame and method with pose, scores, stated posterior and run time. Rows that it has already are
 /// kept: after an interruption the same command resumes, and other datasets and studies may go into the same file. Tables of
@@ -72,7 +73,7 @@ impl Study {
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
         let (design, rig) = (self.design(&dataset)?, open_rig(self.rig.as_deref())?);
-        let (mut frames, unreadable) = self.initial_poses()?;
+        let (mut frames, mut failures) = self.initial_poses()?;
         if let Some((index, count)) = self.shard {
             frames = frames.into_iter().skip(index).step_by(count).collect();
         }
@@ -108,8 +109,8 @@ impl Study {
             say(format!("report: open {}", page.display()))?;
         }
         let done = records.iter().filter(|record| record.is_scored()).count();
-        let failures = records.iter().filter_map(Record::failure).chain(unreadable);
-        Ok(exit_code(done, &failures.collect::<Vec<_>>()))
+        records.iter().filter_map(Record::failure).for_each(|failure| failures.add(failure));
+        Ok(failures.exit_code(done))
     }
 
     fn design(&self, dataset: &Dataset) -> anyhow::Result<Design> {
@@ -140,7 +141,7 @@ impl Study {
     }
 
     /// The initial poses of all levels, and what is wrong with rows that cannot be read.
-    fn initial_poses(&self) -> anyhow::Result<(Vec<InitialPose>, Vec<String>)> {
+    fn initial_poses(&self) -> anyhow::Result<(Vec<InitialPose>, Failures)> {
         let file = |level: &&str| self.selection.dataset.join(format!("init_{level}.csv"));
         let files: Vec<(String, PathBuf)> = if self.poses.is_empty() {
             let own = self.kind.levels().iter().map(|level| ((*level).to_owned(), file(level)));
@@ -148,7 +149,7 @@ impl Study {
         } else {
             self.poses.iter().map(|text| level_and_file(text)).collect()
         };
-        let (mut frames, mut unreadable) = (Vec::new(), Vec::new());
+        let (mut frames, mut failures) = (Vec::new(), Failures::default());
         for (k, (level, file)) in files.iter().enumerate() {
             if files[..k].iter().any(|(other, _)| other == level) {
                 bail!("two files of initial poses are of level {level}: give LEVEL=FILE");
@@ -157,15 +158,15 @@ impl Study {
                 self.selection.admits(row.scene_id, row.im_id, row.obj_id)
             })?;
             frames.extend(found);
-            unreadable.extend(errors.iter().map(|error| format!("{}: {error}", file.display())));
+            failures.add_rows(file, &errors);
         }
-        if frames.is_empty() && unreadable.is_empty() {
+        if frames.is_empty() && failures.is_empty() {
             bail!(match files.is_empty() {
                 true => "there are no initial poses to start from: give --poses",
                 false => "no initial pose is of the scenes, images and objects asked for",
             });
         }
-        Ok((frames, unreadable))
+        Ok((frames, failures))
     }
 }
 

@@ -9,7 +9,8 @@ use prehend_refine::data::bop::{Models, write_symmetries};
 use prehend_refine::data::load_mesh;
 use prehend_refine::symmetry::{Symmetries, SymmetrySettings, find_symmetries};
 
-use crate::terminal::{exit_code, progress, say};
+use crate::failures::Failures;
+use crate::terminal::{progress, say};
 
 #[derive(Args)]
 #[command(next_help_heading = "Method")]
@@ -52,18 +53,16 @@ impl Symmetry {
             Ok(symmetries)
         };
         let ids = if self.object.is_empty() { models.object_ids()? } else { self.object };
-        let (mut done, mut failures) = (0, Vec::new());
+        let (mut done, mut failures) = (0, Failures::default());
         let bar = progress(ids.len(), "searching");
         for id in bar.wrap_iter(ids.into_iter()) {
-            match search(id) {
-                Ok(symmetries) => {
-                    bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
-                    done += 1;
-                }
-                Err(error) => failures.push(format!("object {id}: {error}")),
+            let name = format!("object {id}");
+            if let Some(symmetries) = failures.keep(&name, search(id)) {
+                bar.suspend(|| say(format!("{name}: {}", describe(&symmetries))))?;
+                done += 1;
             }
         }
-        Ok(exit_code(done, &failures))
+        Ok(failures.exit_code(done))
     }
 }
 

@@ -16,8 +16,9 @@ use prehend_refine::synth::{
 use prehend_render::Distortion;
 use serde_json::json;
 
+use crate::failures::Failures;
 use crate::options::{Unit, limit_threads};
-use crate::terminal::{exit_code, progress, say};
+use crate::terminal::{progress, say};
 
 #[derive(Args)]
 #[command(next_help_heading = "Frames")]
@@ -25,42 +26,8 @@ pub(crate) struct Synth {
     /// Folder of the dataset: absent, empty, or one that was begun with the same settings and will be gone on with
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Built-in objects, a list such as "006_mustard_bottle,061_foam_brick" [default: all nine]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Objects and hand")]
-    objects: Option<Vec<String>>,
-    /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
-    #[arg(
-        long,
-        value_name = "FILE",
-        conflicts_with = "objects",
-        help_heading = "Objects and hand"
-    )]
-    mesh: Vec<PathBuf>,
-    /// Unit of the meshes
-    #[arg(long, value_name = "UNIT", default_value = "m", help_heading = "Objects and hand")]
-    mesh_unit: Unit,
-    /// Mass of each mesh in the same order, in kilograms [default: 500 kg/m³]
-    #[arg(long, value_name = "KG", requires = "mesh", help_heading = "Objects and hand")]
-    mass: Vec<f64>,
-    /// Hand as URDF [default: built-in Allegro hand with XELA pads]
-    #[arg(long, value_name = "URDF", help_heading = "Objects and hand")]
-    hand: Option<PathBuf>,
-    /// Taxels of that hand (see docs/DATASET.md)
-    #[arg(long, value_name = "CSV", requires = "hand", help_heading = "Objects and hand")]
-    taxels: Option<PathBuf>,
-    /// Links of the hand that must touch the object at least
-    #[arg(long, value_name = "N", default_value = "3", help_heading = "Objects and hand")]
-    links: NonZeroUsize,
-    /// How much of the object must be within 5 mm of the hand, at least and at most, in cm²
-    #[arg(
-        long,
-        value_names = ["MIN", "MAX"],
-        value_delimiter = ',',
-        num_args = 1..=2,
-        default_values_t = [20.0, 60.0],
-        help_heading = "Objects and hand"
-    )]
-    contact_area: Vec<f64>,
+    #[command(flatten)]
+    subjects: Subjects,
     /// Frames of each object
     #[arg(long, value_name = "N", default_value = "40")]
     frames: NonZeroU32,
@@ -73,27 +40,8 @@ pub(crate) struct Synth {
     /// Grasps tried until one holds through its trajectory
     #[arg(long, value_name = "N", default_value = "60")]
     tries: NonZeroU32,
-    /// Make a film of each object instead: one camera that stands still, a hand that moves by up to 1.5 rad/s, frames that follow each other
-    #[arg(long, conflicts_with_all = ["frames_per_grasp", "steps"], help_heading = "Films")]
-    film: bool,
-    /// Frames a second
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 30.0,
-        requires = "film",
-        help_heading = "Films"
-    )]
-    rate: f64,
-    /// How often the object slips in each grasp of the film, by 4 to 15 mm or until it holds again
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "film", help_heading = "Films")]
-    slips: u32,
-    /// Things that nobody knows of and that pass in front of the object, each once
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "film", help_heading = "Films")]
-    occluders: u32,
-    /// Let the hand drop the object, and hold it in another way later on
-    #[arg(long, requires = "film", help_heading = "Films")]
-    drop: bool,
+    #[command(flatten)]
+    film: FilmOptions,
     /// Columns of the images
     #[arg(long, value_name = "PX", default_value = "640")]
     width: NonZeroUsize,
@@ -120,6 +68,63 @@ pub(crate) struct Synth {
     threads: Option<NonZeroUsize>,
 }
 
+/// Objects, and the hand that holds them.
+#[derive(Args)]
+#[command(next_help_heading = "Objects and hand")]
+struct Subjects {
+    /// Built-in objects, a list such as "006_mustard_bottle,061_foam_brick" [default: all nine]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    objects: Option<Vec<String>>,
+    /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
+    #[arg(long, value_name = "FILE", conflicts_with = "objects")]
+    mesh: Vec<PathBuf>,
+    /// Unit of the meshes
+    #[arg(long, value_name = "UNIT", default_value = "m")]
+    mesh_unit: Unit,
+    /// Mass of each mesh in the same order, in kilograms [default: 500 kg/m³]
+    #[arg(long, value_name = "KG", requires = "mesh")]
+    mass: Vec<f64>,
+    /// Hand as URDF [default: built-in Allegro hand with XELA pads]
+    #[arg(long, value_name = "URDF")]
+    hand: Option<PathBuf>,
+    /// Taxels of that hand (see docs/DATASET.md)
+    #[arg(long, value_name = "CSV", requires = "hand")]
+    taxels: Option<PathBuf>,
+    /// Links of the hand that must touch the object at least
+    #[arg(long, value_name = "N", default_value = "3")]
+    links: NonZeroUsize,
+    /// How much of the object must be within 5 mm of the hand, at least and at most, in cm²
+    #[arg(
+        long,
+        value_names = ["MIN", "MAX"],
+        value_delimiter = ',',
+        num_args = 1..=2,
+        default_values_t = [20.0, 60.0]
+    )]
+    contact_area: Vec<f64>,
+}
+
+/// Films instead of single frames.
+#[derive(Args)]
+#[command(next_help_heading = "Films")]
+struct FilmOptions {
+    /// Make a film of each object instead: one camera that stands still, a hand that moves by up to 1.5 rad/s, frames that follow each other
+    #[arg(long, conflicts_with_all = ["frames_per_grasp", "steps"])]
+    film: bool,
+    /// Frames a second
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, requires = "film")]
+    rate: f64,
+    /// How often the object slips in each grasp of the film, by 4 to 15 mm or until it holds again
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "film")]
+    slips: u32,
+    /// Things that nobody knows of and that pass in front of the object, each once
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "film")]
+    occluders: u32,
+    /// Let the hand drop the object, and hold it in another way later on
+    #[arg(long, requires = "film")]
+    drop: bool,
+}
+
 /// Angular speed of the hand of a film, root mean square \[rad/s\]; the largest is 2.5 times that.
 const FILM_TURN_RATE: f64 = 0.6;
 
@@ -133,23 +138,12 @@ impl Synth {
             return Ok(ExitCode::SUCCESS);
         }
         limit_threads(self.threads)?;
-        let subjects = self.subjects()?;
-        let hand = match &self.hand {
-            Some(urdf) => HandFiles::load(urdf, self.taxels.as_deref())?,
-            None => HandFiles::built_in()?,
-        };
-        let film = self.film()?;
-        let (mut steps, tries) = (self.steps.get(), u64::from(self.tries.get()));
-        let mut frames_per_grasp = self.frames_per_grasp;
-        let &[least, most] = self.contact_area.as_slice() else {
-            bail!("--contact-area: expected two numbers, such as 20,60");
-        };
-        let mut grasping = GraspSettings {
-            links: self.links.get(),
-            contact_area: (least, most),
-            slips: self.slips,
-            ..GraspSettings::default()
-        };
+        let (subjects, hand) = (self.subjects.objects()?, self.subjects.hand()?);
+        let film = self.film.settings()?;
+        let mut grasping = self.subjects.grasping()?;
+        grasping.slips = self.film.slips;
+        let (mut steps, mut frames_per_grasp) = (self.steps.get(), self.frames_per_grasp);
+        let (tries, drop) = (u64::from(self.tries.get()), self.film.drop);
         if let Some(film) = &film {
             frames_per_grasp = self.frames;
             steps = self.frames.get() as usize;
@@ -169,16 +163,15 @@ impl Synth {
             film,
             sensor,
             seed: self.seed,
-            grasp: json!({ "steps": steps, "tries": tries, "drop": self.drop, "settings": format!("{grasping:?}") }),
+            grasp: json!({ "steps": steps, "tries": tries, "drop": drop, "settings": format!("{grasping:?}") }),
         };
         let total = settings.frames.get() as usize * subjects.len();
         let bar = progress(total, "frames");
         let prepare = |subject: &'_ SynthObject| -> Result<_, String> {
             let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
             let grasper = grasper.map_err(|e| e.to_string())?;
-            let drops = self.drop;
             Ok(move |seed| {
-                let moments = match drops {
+                let moments = match drop {
                     true => grasper.dropping(seed, tries, steps),
                     false => grasper.sequence(seed, tries, steps),
                 };
@@ -189,20 +182,12 @@ impl Synth {
             generate(&self.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
         bar.finish_and_clear();
         say(format!("{} frames of {total} in {}", summary.frames, self.out.display()))?;
-        let told = |GraspFailure { obj_id, images, reason }: &GraspFailure| {
+        let mut failures = Failures::default();
+        for GraspFailure { obj_id, images, reason } in &summary.failures {
             let images: Vec<String> = images.iter().map(u32::to_string).collect();
-            format!("scene {obj_id} images {}: {reason}", images.join(" "))
-        };
-        let failures: Vec<String> = summary.failures.iter().map(told).collect();
-        Ok(exit_code(summary.frames as usize, &failures))
-    }
-
-    /// The film's settings, if it is to be one.
-    fn film(&self) -> anyhow::Result<Option<FilmSettings>> {
-        if !(self.rate.is_finite() && self.rate > 0.0) {
-            bail!("--rate: {} is no number of images a second", self.rate);
+            failures.add(format!("scene {obj_id} images {}: {reason}", images.join(" ")));
         }
-        Ok(self.film.then_some(FilmSettings { rate: self.rate, occluders: self.occluders }))
+        Ok(failures.exit_code(summary.frames as usize))
     }
 
     /// The last preset named, with all single settings over it.
@@ -223,8 +208,10 @@ impl Synth {
         }
         Ok(settings)
     }
+}
 
-    fn subjects(&self) -> anyhow::Result<Vec<SynthObject>> {
+impl Subjects {
+    fn objects(&self) -> anyhow::Result<Vec<SynthObject>> {
         let (meshes, masses) = (self.mesh.len(), self.mass.len());
         if masses != 0 && masses != meshes {
             bail!("--mass is given {masses} times for {meshes} meshes: give one for each, or none");
@@ -243,6 +230,32 @@ impl Synth {
             Ok(SynthObject { obj_id: object.bop_id(), object: prepared })
         };
         chosen.into_iter().map(subject).collect()
+    }
+
+    fn hand(&self) -> anyhow::Result<HandFiles> {
+        Ok(match &self.hand {
+            Some(urdf) => HandFiles::load(urdf, self.taxels.as_deref())?,
+            None => HandFiles::built_in()?,
+        })
+    }
+
+    /// What grasps must be like.
+    fn grasping(&self) -> anyhow::Result<GraspSettings> {
+        let &[least, most] = self.contact_area.as_slice() else {
+            bail!("--contact-area: expected two numbers, such as 20,60");
+        };
+        let (links, contact_area) = (self.links.get(), (least, most));
+        Ok(GraspSettings { links, contact_area, ..GraspSettings::default() })
+    }
+}
+
+impl FilmOptions {
+    /// The film's settings, if it is to be one.
+    fn settings(&self) -> anyhow::Result<Option<FilmSettings>> {
+        if !(self.rate.is_finite() && self.rate > 0.0) {
+            bail!("--rate: {} is no number of images a second", self.rate);
+        }
+        Ok(self.film.then_some(FilmSettings { rate: self.rate, occluders: self.occluders }))
     }
 }
 

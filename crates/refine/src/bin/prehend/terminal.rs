@@ -1,7 +1,6 @@
-//! Standard output, standard error, progress and exit codes; and where preparations are kept between runs.
+//! Standard output, standard error and progress; and where preparations are kept between runs.
 
 use std::io::{ErrorKind, IsTerminal, Write};
-use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use prehend_geometry::GridCache;
@@ -54,15 +53,4 @@ pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     }
     bar.set_message(what);
     bar
-}
-
-/// The exit code of a run over many frames, of which `done` succeeded: 0 without failures, 2 if some frames failed and 1 if
-/// all did. The failures, one line each, are printed to standard error.
-pub(crate) fn exit_code(done: usize, failures: &[String]) -> ExitCode {
-    if failures.is_empty() {
-        return ExitCode::SUCCESS;
-    }
-    complain(format!("\n{done} done, {} failed:", failures.len()));
-    failures.iter().for_each(|failure| complain(format!("  {failure}")));
-    ExitCode::from(if done > 0 { 2 } else { 1 })
 }

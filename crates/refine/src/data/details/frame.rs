@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use super::column::{TableColumn, Values};
 use crate::scene::Target;
 use crate::strategy::PosteriorSummary;
+use crate::tracker::{Rejection, TrackStatus};
 
 /// What is known of a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,12 +29,12 @@ pub struct FrameDetails {
 }
 
 /// What is known of a frame of a film besides.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackDetails {
-    /// Name of its [`TrackStatus`](crate::tracker::TrackStatus).
-    pub status: &'static str,
+    /// How its pose came about.
+    pub status: TrackStatus,
     /// Why it was not followed, if it was tried.
-    pub rejection: Option<String>,
+    pub rejection: Option<Rejection>,
     /// Cost of the evidence \[nat\]; not a number if the frame was not looked at.
     pub cost: f64,
     /// When the image was taken by the clock of a robot's log \[ns\].
@@ -110,8 +111,8 @@ fn of_tracks(frames: &[FrameDetails]) -> Vec<TableColumn> {
     };
     let cost = rows().map(|track| track.map_or(f64::NAN, |t| t.cost));
     let mut columns = vec![
-        text("status", |track| track.status.to_owned()),
-        text("rejection", |track| track.rejection.clone().unwrap_or_default()),
+        text("status", |track| track.status.name().to_owned()),
+        text("rejection", |track| track.rejection.map_or_else(String::new, |r| r.to_string())),
         TableColumn::new("cost", cost, Values::Numbers),
     ];
     let stamps: Option<Vec<i64>> = rows().map(|track| track.and_then(|t| t.stamp)).collect();

@@ -8,20 +8,20 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::calibration::Calibrator;
 use prehend_refine::data::Assets;
 use prehend_refine::data::CalibrationFrames;
-use prehend_refine::data::bop::{ResultRow, check_writable};
+use prehend_refine::data::bop::{ResultRow, check_writable, create_folder};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::evaluate::report::Report;
 use prehend_refine::scene::Object;
 
 use crate::options::{Input, Job, limit_threads, write_poses};
 use crate::settings::SettingsOptions;
-use crate::terminal::{cache, exit_code, progress, say};
+use crate::terminal::{cache, progress, say};
 
 #[derive(Args)]
 pub(crate) struct Calibrate {
@@ -68,7 +68,7 @@ impl Calibrate {
         if canonical(&models) == canonical(dataset.models().dir()) {
             bail!("--models {}: has the models that are to be corrected", models.display());
         }
-        let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses)?;
+        let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses, None)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_optional_masks();
         let ids: BTreeSet<u32> = jobs.iter().map(|job| job.target.obj_id).collect();
         let objects: BTreeMap<_, _> =
@@ -85,11 +85,12 @@ impl Calibrate {
         let progress = &mut |visits: usize| bar.inc(visits as u64);
         let done = frames.calibrate(nominal.clone(), self.passes, self.window, progress)?;
         bar.finish_and_clear();
-        let target = |index: &usize| frames.poses[*index].0;
-        failures.extend(done.failed.iter().map(|(index, e)| format!("{}: {e}", target(index))));
+        for (&index, error) in &done.failed {
+            failures.add(format!("{}: {error}", frames.poses[index].0));
+        }
         let count = done.poses.len();
         if count == 0 {
-            return Ok(exit_code(count, &failures));
+            return Ok(failures.exit_code(count));
         }
         done.left_out.values().for_each(|frame| log::warn!("{frame}"));
         if done.without_mask > 0 {
@@ -109,7 +110,7 @@ impl Calibrate {
             let page = report::write(report, &frames, (&nominal, size), &done, &mut failures)?;
             say(format!("report: open {}", page.display()))?;
         }
-        Ok(exit_code(count, &failures))
+        Ok(failures.exit_code(count))
     }
 }
 
@@ -129,7 +130,7 @@ fn save_models(
     objects: &BTreeMap<u32, Arc<Object>>,
     folder: &Path,
 ) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    create_folder(folder)?;
     for (id, deviation) in &calibrator.rig().objects {
         let mesh = deviation.applied(&objects[id].mesh).scaled(1e3);
         mesh.save_ply(&folder.join(format!("obj_{id:06}.ply")))?;

@@ -12,6 +12,7 @@ use prehend_refine::data::{Calibrated, CalibrationFrames};
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_render::RgbImage;
 
+use crate::failures::Failures;
 use crate::terminal::progress;
 
 /// Frames that are drawn.
@@ -45,7 +46,7 @@ pub(super) fn write(
     frames: &CalibrationFrames,
     (nominal, size): (&Calibrator, (usize, usize)),
     done: &Calibrated,
-    failures: &mut Vec<String>,
+    failures: &mut Failures,
 ) -> anyhow::Result<PathBuf> {
     let used = |index: &&usize| !done.left_out.contains_key(index);
     let indices: Vec<usize> = done.poses.keys().filter(used).copied().collect();
@@ -54,21 +55,18 @@ pub(super) fn write(
         indices.iter().step_by(step).map(|index| (*index, Isometry3::identity())).collect();
     let [mut before, mut after] = [Residuals::new(size), Residuals::new(size)];
     let bar = progress(indices.len(), "comparing");
+    let report_of = |index: usize| format!("{}: report", frames.poses[index].0);
     let compare = |index: usize| compare(frames, nominal, done, index);
     let workers = Workers::new(indices.len(), rayon::current_num_threads())?;
     workers.run_in_order(&indices, compare, |index, outcome| {
         bar.inc(1);
-        match outcome {
-            Ok(frame) => {
-                before.add(&frame.before);
-                after.add(&frame.after);
-                drawn.entry(index).and_modify(|pose| *pose = frame.alone);
-            }
-            Err(error) => {
-                failures.push(format!("{}: report: {error}", frames.poses[index].0));
-                drawn.remove(&index);
-            }
-        }
+        let Some(frame) = failures.keep(report_of(index), outcome) else {
+            drawn.remove(&index);
+            return;
+        };
+        before.add(&frame.before);
+        after.add(&frame.after);
+        drawn.entry(index).and_modify(|pose| *pose = frame.alone);
     });
     bar.finish_and_clear();
     let (old, new) = (before.sensors(), after.sensors());
@@ -101,11 +99,11 @@ pub(super) fn write(
         report.add_table("Left out", ["frame"], done.left_out.values().map(|f| [f.clone()]));
     }
     for (&index, alone) in &drawn {
-        let target = frames.poses[index].0;
-        let what = format!("{target}: outlines of object and hand (blue) before and after");
-        match draw(frames, nominal, done, index, alone) {
-            Ok(pictures) => report.add_comparison(&what, &pictures)?,
-            Err(error) => failures.push(format!("{target}: report: {error}")),
+        let pictures = draw(frames, nominal, done, index, alone);
+        if let Some(pictures) = failures.keep(report_of(index), pictures) {
+            let target = frames.poses[index].0;
+            let what = format!("{target}: outlines of object and hand (blue) before and after");
+            report.add_comparison(&what, &pictures)?;
         }
     }
     Ok(report.finish()?)

@@ -5,16 +5,16 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use prehend_refine::check::Warning;
+use prehend_refine::Method;
 use prehend_refine::data::bop::write_atomically;
-use prehend_refine::data::{PlainPose, load_frame_file};
-use prehend_refine::strategy::{PosteriorSummary, Strategy};
-use prehend_refine::{Method, Refined};
+use prehend_refine::data::load_frame_file;
+use prehend_refine::strategy::Strategy;
 use prehend_render::Backend;
 use serde_json::json;
 
 use super::Refine;
 use super::options::record;
+use super::refined::RefinedFrame;
 use crate::options::open_rig;
 use crate::terminal::{cache, progress, say};
 
@@ -39,28 +39,24 @@ pub(super) fn refine_frame(
         _ => Vec::new(),
     };
     let bar = progress(configured.iterations(), "refining");
-    let Refined { estimate: refined, input, .. } =
-        estimator.run(&input.frame, &t_cam_object.into(), &mut |p| {
-            bar.set_position(p.iteration as u64);
-            ControlFlow::Continue(())
-        })?;
+    let refined = estimator.run(&input.frame, &t_cam_object.into(), &mut |p| {
+        bar.set_position(p.iteration as u64);
+        ControlFlow::Continue(())
+    })?;
     bar.finish_and_clear();
-    let warnings = input.warnings(&t_cam_object).concat();
-    let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
+    let matrix = refined.estimate.t_cam_object().to_homogeneous();
+    let frame = RefinedFrame::new(refined, &t_cam_object);
+    let warnings = frame.all_warnings();
     warnings.iter().for_each(|warning| log::warn!("{warning}"));
-    let pose = refined.t_cam_object();
-    let PlainPose { translation_m, quaternion_wxyz } = pose.into();
-    let matrix = pose.to_homogeneous();
-    let rows: Vec<Vec<f64>> = matrix.row_iter().map(|r| r.iter().copied().collect()).collect();
     let document = json!({
-        "t_cam_object": rows,
-        "translation_m": translation_m,
-        "quaternion_wxyz": quaternion_wxyz,
+        "t_cam_object": <[[f64; 4]; 4]>::from(matrix.transpose()),
+        "translation_m": frame.pose.translation_m,
+        "quaternion_wxyz": frame.pose.quaternion_wxyz,
         "terms": terms,
-        "iteration": refined.iteration,
+        "iteration": frame.iteration,
         "warnings": warnings,
-        "confidence": refined.posterior.as_ref().map(PosteriorSummary::from),
-        "trace": refined.trace,
+        "confidence": frame.confidence,
+        "trace": frame.trace,
         "settings": record(configured)?,
     });
     let text = format!("{document:#}");

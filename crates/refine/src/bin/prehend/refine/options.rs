@@ -109,7 +109,7 @@ pub(super) fn record(method: &Method) -> anyhow::Result<String> {
 /// What `--help` says of the methods.
 fn method_help() -> String {
     let mut text = "How to refine, with settings that the options below change:\n".to_owned();
-    for (name, summary) in Method::all() {
+    for (name, summary) in Method::ALL {
         text += &format!("\n  {name:<19} {summary}");
     }
     text + "\n\n[default: fused; with --terms, combined]"
@@ -126,9 +126,8 @@ impl MethodOptions {
 
     /// The settings of the method, changed by the other options.
     pub(super) fn configured(&self) -> anyhow::Result<Method> {
-        let (name, given) = (self.method(), self.settings.given()?);
-        let estimator = given.as_ref().map(|given| given.estimator.clone()).unwrap_or_default();
-        let Some(mut method) = Method::with_settings(name, &estimator) else {
+        let (name, settings) = (self.method(), self.settings.load()?);
+        let Some(mut method) = Method::with_settings(name, &settings.estimator) else {
             bail!("--method {name}: there is none");
         };
         if let Some(terms) = &self.terms {
@@ -156,7 +155,7 @@ impl MethodOptions {
             ("--rotation-unknown", self.rotation_unknown),
             ("--fit-scale", self.fit_scale),
             ("--noise", !self.noise.is_empty()),
-            ("--settings, --set", given.is_some()),
+            ("--settings, --set", self.settings.is_given()),
         ];
         if let Some((option, _)) = fused_only.iter().find(|(_, given)| *given) {
             let Method::Fused(fused) = &mut method else {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
 use prehend_geometry::TriMesh;
 use prehend_refine::data::FrameInput;
 use prehend_refine::data::mcap::{ImageTopics, RecordedFrame, Recording, RecordingWriter};
@@ -46,12 +46,12 @@ impl Log {
             options.mesh.as_ref().ok_or_else(|| anyhow!("--mcap needs --mesh, the object"))?;
         let surface = TriMesh::load(mesh)?.scaled(options.mesh_unit.meters());
         let name = mesh.display().to_string();
-        let object = Object::with_mass(&name, surface, options.mass, 0);
-        let object = Arc::new(object.with_context(|| name.clone())?);
+        let object = Arc::new(Object::with_mass(&name, surface, options.mass, 0)?);
         let mut hand = None;
         if let Some(urdf) = &options.hand {
             let prepared = Hand::load(urdf, options.taxels.as_deref(), cache().as_ref());
-            hand = Some(Arc::new(prepared.with_context(|| urdf.display().to_string())?));
+            let prepared = prepared.map_err(|e| anyhow!("{}: {e}", urdf.display()))?;
+            hand = Some(Arc::new(prepared));
         }
         let mut topics = ImageTopics::default();
         for topic in &options.topic {
@@ -78,7 +78,7 @@ pub(super) fn track(
     tracking: &mut Tracking<'_>,
 ) -> anyhow::Result<()> {
     let Log { recording, object, hand } = Log::open(&tracking.options.log, file)?;
-    tracking.failures.extend_from_slice(recording.faults());
+    recording.faults().iter().for_each(|fault| tracking.failures.add(fault));
     let rig = tracking.rig.clone();
     let (mut target, mut first) = (start, None);
     let moment = |RecordedFrame { nanoseconds, frame }: RecordedFrame| {

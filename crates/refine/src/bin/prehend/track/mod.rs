@@ -23,7 +23,7 @@ use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
     Dataset, ReadResults, ResultRow, ResultsWriter, check_writable, read_results,
 };
-use prehend_refine::data::details::write_details;
+use prehend_refine::data::details::{TrackDetails, write_details};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
@@ -35,16 +35,17 @@ use prehend_refine::{Estimator, Settings};
 use prehend_render::Backend;
 use serde_json::json;
 
-use self::done::{Done, details, summary, told};
+use self::done::{Done, told};
 use self::film::{FrameLog, Moment};
 use self::images::{Watch, select_scene, stop_on_ctrl_c};
 use self::log_options::LogOptions;
 use self::report::FilmReport;
+use crate::failures::Failures;
 use crate::options::{
     Masks, Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
 };
 use crate::settings::SettingsOptions;
-use crate::terminal::{cache, exit_code, progress, say, warn};
+use crate::terminal::{cache, progress, say, warn};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -158,7 +159,7 @@ struct Tracking<'a> {
     /// Whether to end before the film does, so that what is recorded is kept.
     stop: Option<Arc<AtomicBool>>,
     frames: Vec<Done>,
-    failures: Vec<String>,
+    failures: Failures,
     /// The poses as they come, if they are written so.
     rows: Option<ResultsWriter>,
     /// Log of what was sensed and found, if that is recorded.
@@ -168,17 +169,15 @@ struct Tracking<'a> {
 
 impl Track {
     pub(crate) fn run(mut self) -> anyhow::Result<ExitCode> {
-        let outputs = [Some(&self.out), self.log.mcap_out.as_ref()];
-        outputs.into_iter().flatten().try_for_each(|out| check_writable(out))?;
+        check_writable(&self.out)?;
         let mcap_out = self.log.mcap_out.as_deref();
-        if let Some(written) = mcap_out.map(canonical)
-            && [&self.details, &self.log.mcap, &self.poses]
-                .into_iter()
-                .flatten()
-                .chain([&self.out])
-                .any(|other| canonical(other) == written)
-        {
-            bail!("--mcap-out {written}: is another of the files, too");
+        if let Some(file) = mcap_out {
+            check_writable(file)?;
+            let others = [&self.details, &self.log.mcap, &self.poses].into_iter().flatten();
+            let written = canonical(file);
+            if others.chain([&self.out]).any(|other| canonical(other) == written) {
+                bail!("--mcap-out {written}: is another of the files, too");
+            }
         }
         self.details.as_deref().map(check_details).transpose()?;
         let mut selection = self.selection.take();
@@ -203,7 +202,7 @@ impl Track {
         let log = mcap_out.map(log::create).transpose()?;
         let rows = watched.map(|_| ResultsWriter::create(&self.out)).transpose()?;
         let report = self.report.as_deref().map(FilmReport::create).transpose()?;
-        let (frames, failures) = (Vec::new(), Vec::new());
+        let (frames, failures) = (Vec::new(), Failures::default());
         let options = &self;
         let mut tracking =
             Tracking { options, settings, backend, rig, stop, frames, failures, rows, log, report };
@@ -217,39 +216,36 @@ impl Track {
             let rows = frames.iter().map(|f| f.row.clone()).collect();
             write_poses(&self.out, rows, &mut failures)?;
         } else if frames.is_empty() {
-            failures.push("no image has come".to_owned());
+            failures.add("no image has come");
         }
-        let table = self.details.as_deref().filter(|_| !frames.is_empty()).map(|file| {
-            let rows: Vec<_> = frames.iter().map(|frame| details(frame, self.time)).collect();
-            write_details(file, &rows)
-        });
-        if let Some(Err(error)) = table {
-            failures.push(format!("--details: {error}"));
+        let mut page = None;
+        if !frames.is_empty() {
+            if let Some(file) = &self.details {
+                let rows: Vec<_> = frames.iter().map(|frame| frame.details(self.time)).collect();
+                failures.keep("--details", write_details(file, &rows));
+            }
+            if let Some(log) = log {
+                failures.keep("--mcap-out", log.finish());
+            }
+            if let Some(report) = report {
+                // Of a dataset that is only coming into being, nobody knows the truth.
+                let finished = selection.as_ref().filter(|_| watched.is_none());
+                let write = |dataset: Option<Dataset>| {
+                    report.finish(&mut frames, dataset.as_ref().map(Scorer::new), &mut failures)
+                };
+                let written = finished.map(Selection::open).transpose().and_then(write);
+                page = failures.keep("--report", written);
+            }
         }
-        let log = log.filter(|_| !frames.is_empty());
-        if let Some(Err(error)) = log.map(FrameLog::finish) {
-            failures.push(format!("--mcap-out: {error:#}"));
-        }
-        let page = report.filter(|_| !frames.is_empty()).map(|report| {
-            // Of a dataset that is only coming into being, nobody knows the truth.
-            let finished = selection.as_ref().filter(|_| watched.is_none());
-            let dataset = finished.map(Selection::open).transpose()?;
-            let scorer = dataset.as_ref().map(Scorer::new);
-            anyhow::Ok(report.finish(&mut frames, scorer.as_ref(), &mut failures)?)
-        });
-        let page = page.transpose().unwrap_or_else(|error| {
-            failures.push(format!("--report: {error:#}"));
-            None
-        });
         if self.json {
-            let frames: Vec<_> = frames.iter().map(summary).collect();
+            let frames: Vec<_> = frames.iter().map(Done::summary).collect();
             let document = json!({ "frames": frames, "failures": failures, "settings": record });
             say(format!("{document:#}"))?;
         } else if !frames.is_empty() {
             say(format!("{}, written to {}", told(&frames), self.out.display()))?;
-            page.map_or(Ok(()), |page| say(format!("report: open {}", page.display())))?;
+            page.iter().try_for_each(|page| say(format!("report: open {}", page.display())))?;
         }
-        Ok(exit_code(frames.len(), &failures))
+        Ok(failures.exit_code(frames.len()))
     }
 
     /// Where to begin to follow the object of a robot's log.
@@ -265,29 +261,31 @@ impl Track {
         Ok((Target { scene_id, im_id, obj_id, ..start }, Some(t_cam_model)))
     }
 
-    /// What to follow, in order, and what is wrong with rows of the poses.
+    /// What to follow, in order; of rows of the poses that are wrong `failures` hears.
     fn starts(
         &self,
         selection: &Selection,
         dataset: &Dataset,
         watched: Option<u32>,
-    ) -> anyhow::Result<(Vec<Start>, Vec<String>)> {
-        let (starts, faults): (Vec<Start>, _) = if let Some(poses) = &self.poses {
-            let (jobs, faults) = selection.jobs(poses)?;
-            (jobs.into_iter().map(|j| (j.target, Some(j.row.t_cam_model))).collect(), faults)
+        failures: &mut Failures,
+    ) -> anyhow::Result<Vec<Start>> {
+        let starts: Vec<Start> = if let Some(poses) = &self.poses {
+            let (jobs, faults) = selection.jobs(poses, None)?;
+            *failures = faults;
+            jobs.into_iter().map(|job| (job.target, Some(job.row.t_cam_model))).collect()
         } else if let Some(scene_id) = watched {
             let known = match selection.object.as_slice() {
                 [] => dataset.models().object_ids()?,
                 named => named.to_vec(),
             };
             let start = |obj_id| (Target { scene_id, im_id: 0, obj_id, instance: 0 }, None);
-            (known.into_iter().map(start).collect(), Vec::new())
+            known.into_iter().map(start).collect()
         } else {
             let targets = selection.targets(dataset, self.targets.as_deref())?;
             if targets.is_empty() {
                 bail!("nothing is of the scenes, images and objects asked for");
             }
-            (targets.into_iter().map(|target| (target, None)).collect(), Vec::new())
+            targets.into_iter().map(|target| (target, None)).collect()
         };
         let mut earliest: BTreeMap<_, Start> = BTreeMap::new();
         for start in starts {
@@ -300,7 +298,7 @@ impl Track {
         if watched.is_some() && earliest.len() != 1 {
             bail!("--watch follows one object, not {}: --object says which", earliest.len());
         }
-        Ok((earliest.into_values().collect(), faults))
+        Ok(earliest.into_values().collect())
     }
 }
 
@@ -310,8 +308,7 @@ impl Tracking<'_> {
         let Track { idle, rate, masks, .. } = self.options;
         let idle = Duration::try_from_secs_f64(*idle).map_err(|e| anyhow!("--idle: {e}"))?;
         let dataset = selection.open()?;
-        let (starts, failures) = self.options.starts(selection, &dataset, watched)?;
-        self.failures = failures;
+        let starts = self.options.starts(selection, &dataset, watched, &mut self.failures)?;
         if self.log.is_some() && starts.len() > 1 {
             let count = starts.len();
             bail!("--mcap-out has one object, not {count}: --scene and --object say which");
@@ -350,9 +347,8 @@ impl Tracking<'_> {
                 });
                 self.follow(&mut film, count, &object, initial)
             };
-            if let Err(error) = followed() {
-                self.failures.push(format!("scene {scene_id} object {obj_id}: {error:#}"));
-            }
+            let outcome = followed();
+            self.failures.keep(format!("scene {scene_id} object {obj_id}"), outcome);
         }
         Ok(())
     }
@@ -380,64 +376,43 @@ impl Tracking<'_> {
             && let Some(Moment { target, time, stamp, input }) = film.next()
         {
             // What was sensed is given back where it is asked for once more.
-            let frame = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
+            let attempt = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
                 let input = input?;
                 if log.is_none() && report.is_none() {
                     return Ok((tracker.push(input.frame, time)?, None));
                 }
-                let tracked = tracker.track(&input.frame, time)?;
-                let moment = (time, stamp);
-                let written = log.as_mut().map(|w| w.add(moment, object, &input.frame, &tracked));
-                if let Some(Err(error)) = written {
-                    // Of a log with a gap nobody would know.
-                    failures.push(format!("--mcap-out: {error:#}; it was given up"));
-                    *log = None;
-                }
-                Ok((tracked, Some(input)))
+                Ok((tracker.track(&input.frame, time)?, Some(input)))
             };
-            match frame() {
-                Ok((tracked, input)) => {
-                    bar.set_message(tracked.status.name());
-                    if let (TrackStatus::Lost, Some(rejection)) =
-                        (tracked.status, tracked.rejection)
-                    {
-                        warn(&bar, target, format!("lost: {rejection}"));
-                    }
-                    let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
-                    let mut row = row(&target, tracked.t_cam_object, score);
-                    if options.time {
-                        row.time = tracked.timing.total().as_secs_f64();
-                    }
-                    if let Some(rows) = rows {
-                        rows.add(&row)?;
-                    }
-                    let posterior = tracked.posterior.as_ref().filter(|_| keeps_posterior);
-                    let posterior = posterior.map(PosteriorSummary::from);
-                    let drawn = report.as_mut().zip(input);
-                    let drawn = drawn
-                        .map(|(report, input)| report.draw(&input, &tracked, posterior.as_ref()));
-                    let drawing = drawn.transpose().unwrap_or_else(|error| {
-                        failures.push(format!("{target}: report: {error}"));
-                        None
-                    });
-                    let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
-                    frames.push(Done {
-                        target,
-                        row,
-                        time,
-                        stamp,
-                        status,
-                        rejection,
-                        iterations,
-                        cost,
-                        timing,
-                        posterior,
-                        drawing: drawing.flatten(),
-                    });
-                }
-                Err(error) => failures.push(format!("{target}: {error:#}")),
-            }
             bar.inc(1);
+            let Some((tracked, input)) = failures.keep(target, attempt()) else { continue };
+            bar.set_message(tracked.status.name());
+            if let (TrackStatus::Lost, Some(rejection)) = (tracked.status, tracked.rejection) {
+                warn(&bar, target, format!("lost: {rejection}"));
+            }
+            if let (Some(writer), Some(input)) = (log.as_mut(), &input)
+                && let Err(error) = writer.add((time, stamp), object, &input.frame, &tracked)
+            {
+                // Of a log with a gap nobody would know.
+                failures.add(format!("--mcap-out: {error}; it was given up"));
+                *log = None;
+            }
+            let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
+            let mut row = row(&target, tracked.t_cam_object, score);
+            if options.time {
+                row.time = tracked.timing.total().as_secs_f64();
+            }
+            if let Some(rows) = rows {
+                rows.add(&row)?;
+            }
+            let posterior = tracked.posterior.as_ref().filter(|_| keeps_posterior);
+            let posterior = posterior.map(PosteriorSummary::from);
+            let drawing = report.as_mut().zip(input).and_then(|(report, input)| {
+                let drawn = report.draw(&input, &tracked, posterior.as_ref());
+                failures.keep(format!("{target}: report"), drawn)?
+            });
+            let Tracked { status, rejection, iterations, cost, timing, .. } = tracked;
+            let track = TrackDetails { status, rejection, cost, stamp };
+            frames.push(Done { target, row, time, track, iterations, timing, posterior, drawing });
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ use prehend_refine::strategy::PosteriorSummary;
 use prehend_refine::tracker::{TrackStatus, Tracked};
 
 use super::done::Done;
+use crate::failures::Failures;
 use crate::report::{self, MILLISECONDS, MOMENT};
 
 /// Frames that are drawn at most of all films, and of one: pages stay small enough to be opened. Of each film half are drawn as time passes, and half
@@ -88,8 +89,8 @@ impl FilmReport {
     pub(super) fn finish(
         self,
         frames: &mut [Done],
-        scorer: Option<&Scorer<'_>>,
-        failures: &mut Vec<String>,
+        scorer: Option<Scorer<'_>>,
+        failures: &mut Failures,
     ) -> Result<PathBuf, DatasetError> {
         let mut report = self.report;
         let drawn = frames.iter().filter(|frame| frame.drawing.is_some()).count();
@@ -97,14 +98,12 @@ impl FilmReport {
         report.add_fact("drawn", format!("{drawn} of {} frames", frames.len()));
         let mut curves: BTreeMap<String, [Vec<[f64; 2]>; 3]> = BTreeMap::new();
         for frame in frames {
-            let Done { target, row, time, status, rejection, timing, posterior, .. } = &*frame;
+            let Done { target, row, time, track, timing, posterior, .. } = &*frame;
             let (moment, seconds) = (time.as_secs_f64(), timing.total().as_secs_f64());
-            let error = scorer.and_then(|scorer| {
-                scorer.pose_error(row).unwrap_or_else(|error| {
-                    failures.push(format!("{target}: report: {error}"));
-                    None
-                })
-            });
+            let error = scorer
+                .as_ref()
+                .map(|scorer| scorer.pose_error(row))
+                .and_then(|error| failures.keep(format!("{target}: report"), error)?);
             let instance = match target.instance {
                 0 => String::new(),
                 more => format!(" instance {more}"),
@@ -119,9 +118,9 @@ impl FilmReport {
             figures.extend([(MOMENT, Some(moment)), (MILLISECONDS, Some(1e3 * seconds))]);
             report.add_frame(FrameReport {
                 name: format!("{target}{instance}"),
-                status: status.name().to_owned(),
+                status: track.status.name().to_owned(),
                 flags: posterior.as_ref().map_or_else(Vec::new, report::flags),
-                remarks: rejection.iter().map(ToString::to_string).collect(),
+                remarks: track.rejection.iter().map(ToString::to_string).collect(),
                 figures,
                 posterior: posterior.clone(),
                 drawing: frame.drawing.take(),
