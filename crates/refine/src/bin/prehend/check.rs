@@ -16,17 +16,20 @@ use prehend_refine::data::{Assets, FrameInput, MaskSource, Target, load_frame_fi
 use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_render::RgbImage;
 
-use crate::options::{Input, Job, Masks, required_unless_frame};
+use crate::options::{Job, Masks, Selection};
 use crate::terminal::{cache, progress, say, warn};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
 #[command(override_usage = "prehend check --dataset <DIR> --poses <FILE> [OPTIONS]\n       \
                             prehend check --frame <FILE> [OPTIONS]")]
-#[command(mut_args(required_unless_frame))]
+#[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
 pub(crate) struct Check {
     #[command(flatten)]
-    input: Option<Input>,
+    selection: Option<Selection>,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
+    poses: Option<PathBuf>,
     #[command(flatten)]
     masks: Masks,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
@@ -39,10 +42,10 @@ pub(crate) struct Check {
 
 impl Check {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        match (&self.frame, &self.input) {
-            (Some(file), _) => self.frame(file),
-            (None, Some(input)) => self.dataset(input),
-            (None, None) => bail!("give --dataset and --poses, or --frame"),
+        match (&self.frame, &self.selection, &self.poses) {
+            (Some(file), ..) => self.frame(file),
+            (None, Some(selection), Some(poses)) => self.dataset(selection, poses),
+            _ => bail!("give --dataset and --poses, or --frame"),
         }
     }
 
@@ -68,7 +71,7 @@ impl Check {
     }
 
     /// Checks the poses of a dataset.
-    fn dataset(&self, Input { selection, poses }: &Input) -> anyhow::Result<ExitCode> {
+    fn dataset(&self, selection: &Selection, poses: &Path) -> anyhow::Result<ExitCode> {
         let dataset = selection.open()?;
         let (jobs, mut failures) = selection.jobs(poses, None)?;
         let masks = match self.masks.source()? {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Arg, Args, ValueEnum};
+use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
@@ -50,14 +50,6 @@ pub(crate) struct Input {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
-}
-
-/// Lets [`Input`] be absent where a frame is given in its place.
-pub(crate) fn required_unless_frame(arg: Arg) -> Arg {
-    match arg.get_id().as_str() {
-        "dataset" | "poses" => arg.required(false).required_unless_present("frame"),
-        _ => arg,
-    }
 }
 
 /// Where masks come from.

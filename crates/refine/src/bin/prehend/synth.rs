@@ -26,8 +26,6 @@ pub(crate) struct Synth {
     /// Folder of the dataset: absent, empty, or one that was begun with the same settings and will be gone on with
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    #[command(flatten)]
-    subjects: Subjects,
     /// Frames of each object
     #[arg(long, value_name = "N", default_value = "40")]
     frames: NonZeroU32,
@@ -40,8 +38,6 @@ pub(crate) struct Synth {
     /// Grasps tried until one holds through its trajectory
     #[arg(long, value_name = "N", default_value = "60")]
     tries: NonZeroU32,
-    #[command(flatten)]
-    film: FilmOptions,
     /// Columns of the images
     #[arg(long, value_name = "PX", default_value = "640")]
     width: NonZeroUsize,
@@ -66,6 +62,11 @@ pub(crate) struct Synth {
     /// Worker threads; the dataset is the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
+    // Last: their headings hold for all options after them.
+    #[command(flatten)]
+    subjects: Subjects,
+    #[command(flatten)]
+    film: FilmOptions,
 }
 
 /// Objects, and the hand that holds them.

@@ -249,13 +249,12 @@ impl Pixel {
         self.share > 0.5
     }
 
-    /// Its label in a frame without depth, a little away from the outline: within it, it is the object's or not `by_color`.
+    /// Its label in a frame without depth: within the object it is that or not `by_color`.
     pub(super) fn label_by(&self, by_color: bool) -> Option<Label> {
-        match self.share {
-            share if share < 1.0 / 3.0 => Some(Label::Other),
-            share if share < 2.0 / 3.0 => None,
-            _ if by_color => Some(Label::Object),
-            _ => Some(Label::Other),
+        match self.share >= 1.0 {
+            true if by_color => Some(Label::Object),
+            true => Some(Label::Other),
+            false => (self.share == 0.0).then_some(Label::Other),
         }
     }
 

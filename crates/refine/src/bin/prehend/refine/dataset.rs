@@ -21,13 +21,14 @@ use super::Refine;
 use super::options::record;
 use super::refined::RefinedFrame;
 use crate::failures::Failures;
-use crate::options::{Input, Job, beside, open_rig, write_poses};
+use crate::options::{Job, Selection, beside, open_rig, write_poses};
 use crate::terminal::{cache, progress, say, warn};
 
 /// A refinement of a dataset's frames.
 pub(super) struct DatasetRun<'a> {
     pub(super) options: &'a Refine,
-    pub(super) input: &'a Input,
+    pub(super) selection: &'a Selection,
+    pub(super) poses: &'a Path,
     /// Alternatives of the poses, where these come from a search.
     pub(super) hypotheses: Option<PathBuf>,
     pub(super) out: &'a Path,
@@ -41,7 +42,7 @@ impl DatasetRun<'_> {
     pub(super) fn run(&self) -> anyhow::Result<ExitCode> {
         let Refine { masks, neighbors, rig, output, method, .. } = self.options;
         let (name, json) = (method.method(), output.json);
-        let Input { selection, poses } = self.input;
+        let Self { selection, poses, .. } = *self;
         let dataset = selection.open()?;
         let hypotheses = self.hypotheses.as_deref();
         let (jobs, mut failures) = selection.jobs(poses, hypotheses)?;
@@ -145,12 +146,12 @@ impl DatasetRun<'_> {
             "command": "refine",
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
-            "poses": file_fingerprint(&self.input.poses)?,
+            "poses": file_fingerprint(self.poses)?,
             "hypotheses": fingerprint(&self.hypotheses)?,
             "masks": masks.identity()?,
             "neighbors": fingerprint(neighbors)?,
             "rig": fingerprint(rig)?,
-            "filters": self.input.selection.filters(),
+            "filters": self.selection.filters(),
             "method": method.method(),
             "settings": record(&self.method)?,
             "seed": method.seed,
@@ -246,6 +247,6 @@ const DRAWN: usize = 200;
 fn least_sure(frames: &[(&Job, &RefinedFrame)]) -> BTreeSet<usize> {
     let probability = |r: &RefinedFrame| r.confidence.as_ref().map_or(0.0, |c| c.probability);
     let mut all: Vec<usize> = (0..frames.len()).collect();
-    all.sort_by(|a, b| probability(&frames[*a].1).total_cmp(&probability(&frames[*b].1)));
+    all.sort_by(|a, b| probability(frames[*a].1).total_cmp(&probability(frames[*b].1)));
     all.into_iter().take(DRAWN).collect()
 }

@@ -16,8 +16,7 @@ use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
 use crate::options::{
-    HYPOTHESES, Input, Masks, Rendering, beside, check_details, limit_threads,
-    required_unless_frame,
+    HYPOTHESES, Masks, Rendering, Selection, beside, check_details, limit_threads,
 };
 
 #[derive(Args)]
@@ -26,10 +25,13 @@ use crate::options::{
     override_usage = "prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
                             prehend refine --frame <FILE> [OPTIONS]"
 )]
-#[command(mut_args(required_unless_frame))]
+#[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
 pub(crate) struct Refine {
     #[command(flatten)]
-    input: Option<Input>,
+    selection: Option<Selection>,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
+    poses: Option<PathBuf>,
     /// Alternative poses, as `prehend initial --search` writes them beside the best ones: the fused method then trusts no
     /// rotation, and starts from all of them and from what looks alike by shape [default: the poses' file with .hypotheses.csv added, if there is one]
     #[arg(long, value_name = "FILE", requires = "poses")]
@@ -56,9 +58,9 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { input, output, method, .. } = &self;
-        let named = |out: &PathBuf| match input {
-            Some(Input { selection, .. }) => selection.results_file(out, method.method()),
+        let Self { selection, poses, output, method, .. } = &self;
+        let named = |out: &PathBuf| match selection {
+            Some(selection) => selection.results_file(out, method.method()),
             None => Ok(out.clone()),
         };
         let out = output.out.as_ref().map(named).transpose()?;
@@ -67,13 +69,13 @@ impl Refine {
         output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
         let backend = self.rendering.open()?;
-        match (&self.frame, input, &out) {
+        match (&self.frame, selection, poses, &out) {
             (Some(file), ..) => refine_frame(file, &self, backend),
-            (None, Some(input), Some(out)) => {
-                let beside = Some(beside(&input.poses, HYPOTHESES)).filter(|file| file.exists());
+            (None, Some(selection), Some(poses), Some(out)) => {
+                let beside = Some(beside(poses, HYPOTHESES)).filter(|file| file.exists());
                 let hypotheses = self.hypotheses.clone().or(beside);
                 let (options, method) = (&self, method.configured()?);
-                DatasetRun { options, input, hypotheses, out, method, backend }.run()
+                DatasetRun { options, selection, poses, hypotheses, out, method, backend }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }
