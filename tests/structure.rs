@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 16_170),
     ("sim", 16_370),
     ("render", 10_900),
-    ("refine", 30_157),
+    ("refine", 29_625),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;
