@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use prehend_refine::evaluate::report::outline_picture;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -10,17 +11,25 @@ use super::frame::Frame;
 use super::hand::Hand;
 use super::images;
 use super::object::Object;
-use crate::arrays::{Array, array, matrix};
+use super::poses::pose;
+use crate::arrays::{Array, Numbers, array, matrix};
+use crate::threads::detached;
 
 #[pymethods]
 impl Frame {
     /// H × W × 3 of uint8.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, u8>> {
-        let image = &self.input.frame.color;
-        let byte = |v: &f32| (255.0 * v.clamp(0.0, 1.0)).round() as u8;
-        let pixels = image.pixels().iter().flatten().map(byte).collect();
-        images::image(py, pixels, &[image.height(), image.width(), 3])
+        images::rgb(py, &self.input.frame.color)
+    }
+
+    /// The color image with the outlines of the object at `pose` (4 × 4, camera ← object [m]), red, and of the hand, blue; brightened where it is dark.
+    /// H × W × 3 of uint8.
+    fn draw<'py>(&self, py: Python<'py>, pose: Numbers<'_>) -> PyResult<Array<'py, u8>> {
+        let pose = self::pose(&pose, "pose")?;
+        let picture =
+            detached(py, || outline_picture(&self.input.frame, &self.input.object, &pose))?;
+        images::rgb(py, &picture)
     }
 
     /// H × W [m], 0 where missing.

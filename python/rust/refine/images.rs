@@ -7,6 +7,7 @@ use numpy::{
 use prehend_render::{DepthImage, Mask, RgbImage};
 use pyo3::prelude::*;
 
+use crate::arrays::Array;
 use crate::error::{Raise, wrong};
 
 /// The pixels of an image in the order of C, as numbers of another type where `dtype` says so; not copied if that is how they are.
@@ -108,4 +109,11 @@ pub(super) fn image<'py, T: Element>(
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArray<T, IxDyn>>> {
     PyArray::from_vec(py, pixels).reshape(IxDyn(shape))
+}
+
+/// The array of a color image: H × W × 3, uint8.
+pub(super) fn rgb<'py>(py: Python<'py>, image: &RgbImage) -> PyResult<Array<'py, u8>> {
+    let byte = |v: &f32| (255.0 * v.clamp(0.0, 1.0)).round() as u8;
+    let pixels = image.pixels().iter().flatten().map(byte).collect();
+    self::image(py, pixels, &[image.height(), image.width(), 3])
 }

@@ -1,6 +1,8 @@
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use prehend_geometry::TriMesh;
+
 use super::modes::{Followed, Modes};
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
@@ -283,4 +285,21 @@ fn color_alone_follows_an_object_without_any_mask() {
     blank.color.pixels_mut().fill([0.5; 3]);
     let lost = tracker.track(&blank, SEQUENCE.frames[12].time).unwrap();
     assert_eq!(lost.status, TrackStatus::Lost);
+}
+
+/// An object of one flat gray in a hand and before things of that gray.
+#[test]
+fn depth_follows_an_object_without_colors() {
+    let mesh = TriMesh { uvs: None, colors: None, texture: None, ..SEQUENCE.object.mesh.clone() };
+    let object = Arc::new(Object::with_mass("gray", mesh, None, 0).unwrap());
+    let mut tracker = Tracker::new(object, TrackerSettings::default()).unwrap();
+    tracker.start_from(&SEQUENCE.initial);
+    for (index, SequenceFrame { frame, time, .. }) in SEQUENCE.frames.iter().enumerate() {
+        let mut gray = frame.clone();
+        gray.color.pixels_mut().fill([0.5; 3]);
+        let tracked = tracker.track(&gray, *time).unwrap();
+        let (pe, oe) = errors(&tracked, index);
+        assert!(pe < 0.6 && oe < 8.0, "{index}: {pe} cm, {oe}°");
+        assert!(index == 0 || tracked.status == TrackStatus::Tracked, "{:?}", tracked.rejection);
+    }
 }
