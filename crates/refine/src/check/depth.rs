@@ -13,21 +13,22 @@ pub(super) fn check(view: &View<'_>, object: &Object, found: &mut Warnings) {
     let enough = depths.len() >= limits::HAND_PIXELS;
     let on_hand = enough.then(|| on_hand(&depths, blank, on_object)).flatten();
     if let Some((ratio, off)) = on_object {
-        if !limits::DEPTH_RATIO.contains(&ratio) {
+        let fits_hand = enough && on_hand.is_none();
+        if !limits::DEPTH_RATIO.contains(&ratio) && !fits_hand {
             // The hand would only say it again.
             let message = format!(
                 "sensor depth is {ratio:.3} times the depth at this pose: check depth_scale and units"
             );
             return found.add(Subject::Depth, message);
         }
-        let (subject, cause) = match enough && on_hand.is_none() {
+        let (subject, cause) = match fits_hand {
             true => (Subject::Pose, "depth fits the hand: is the pose's translation right?"),
             false => (Subject::Depth, "check the pose's translation, depth_scale and cam_K"),
         };
         if off.abs() > object.radius.max(limits::DEPTH_ON_OBJECT) {
             let beside = beside(off);
             let message = format!(
-                "sensor depth under the mask is {beside} the object at this pose ({ratio:.3} times its depth): {cause}"
+                "sensor depth is {beside} the object at this pose ({ratio:.3} times its depth): {cause}"
             );
             found.add(subject, message);
         }

@@ -100,10 +100,10 @@ impl Images<'_> {
             return found;
         }
         let observation = &Frame { mask, ..self.observation.clone() };
-        let drawn = self.drawn.clone();
-        let assumed = Images { observation, object: self.object, drawn, touch: None };
-        let mut found = assumed.compare(&assumed.view(t_cam_object), t_cam_object, false);
-        found.0.retain(|warning| warning.subject != Subject::Mask);
+        let (camera, drawn) = (&observation.camera, self.drawn.clone());
+        let view = View::new(observation, camera, self.object, drawn, t_cam_object);
+        let mut found = Warnings::default();
+        depth::check(&view, self.object, &mut found);
         found
     }
 

@@ -27,7 +27,8 @@ pub fn timed_methods(path: &Path) -> BTreeSet<String> {
     let body = text.strip_prefix(HEADER).unwrap_or_default();
     let reader = csv::ReaderBuilder::new().has_headers(false).from_reader(body.as_bytes());
     let rows = reader.into_deserialize().flatten();
-    rows.map(|(_, _, method, _): (usize, String, String, f64)| method).collect()
+    let is_time = |row: &(usize, String, String, f64)| row.3 >= 0.0 && row.3.is_finite();
+    rows.filter(is_time).map(|(_, _, method, _)| method).collect()
 }
 
 #[cfg(test)]
@@ -45,7 +46,7 @@ mod tests {
         write_times(&path, "depth", [(0, name.clone(), 1.0), (3, name, 0.25)]).unwrap();
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.ends_with("\n3,scene 1 image 0 object 5,depth,0.2500\n"), "{text}");
-        fs::write(&path, text + "4,f,physics,7\n5,f,broken\n").unwrap();
+        fs::write(&path, text + "4,f,physics,7\n5,f,broken\n6,f,icp,NaN\n7,f,fused,-1\n").unwrap();
         assert!(timed_methods(&path).iter().eq(["depth", "physics"]));
         fs::write(&path, "index,frame\n1,f,depth,7\n").unwrap();
         assert!(timed_methods(&path).is_empty());

@@ -81,6 +81,11 @@ impl Weighting {
         self.information * self.kernel.weight(r * r)
     }
 
+    /// True of a residual that counts at least half of what one of zero does.
+    pub(crate) fn is_inlier(&self, r: f64) -> bool {
+        self.kernel.weight(r * r) >= 0.5 * self.kernel.weight(0.0)
+    }
+
     /// What a residual counts that is worth `share` of one.
     pub(crate) fn shared(&self, share: f64) -> Self {
         let (information, degrees) = (share * self.information, share * self.degrees);

@@ -22,6 +22,7 @@ impl RemapCache {
         // Without the lock: a thread that waits for its part of the map may take up another image.
         let remap = Arc::new(Remap::undistort(camera, &lens, camera));
         let mut kept = kept();
+        kept.retain(|known| !is_same(known));
         kept.truncate(KEPT - 1);
         kept.insert(0, (camera, lens, Arc::clone(&remap)));
         remap

@@ -22,7 +22,7 @@ pub struct LongCommand {
     pub blockable: &'static [&'static str],
     /// Tables each row of which is of one frame alone, whatever becomes of the others.
     pub tables: &'static [&'static str],
-    /// What of all that, and beside it, grows while it is at work: journals and times.
+    /// What of all that, and beside it, grows while it is at work: journals and tables.
     pub growing: &'static [&'static str],
 }
 
@@ -32,10 +32,10 @@ pub const COMMANDS: &[LongCommand] = &[
         name: "refine",
         words: "refine --dataset ds --poses ds/init_low.csv --out r.csv --details r.npz --report page",
         inputs: &["ds"],
-        outputs: &["r.csv", "r.npz", "page"],
-        blockable: &["r.csv", "r.npz", "page/index.html"],
+        outputs: &["r.csv", "r.csv.times.csv", "r.npz", "page"],
+        blockable: &["r.csv", "r.csv.times.csv", "r.npz", "page/index.html"],
         tables: &["r.csv"],
-        growing: &["r.csv.journal", "r.csv.times.csv"],
+        growing: &["r.csv.journal"],
     },
     LongCommand {
         name: "initial",
@@ -146,13 +146,12 @@ impl Place {
         Ok(())
     }
 
-    /// What `command` has written; hidden files are not seen, and times are never the same.
+    /// What `command` has written; hidden files are not seen.
     pub(super) fn written(&self, command: &LongCommand) -> Result<Files> {
         let mut files = Files::new();
         for name in command.outputs {
             gather(&self.path(name), Path::new(name), &mut files)?;
         }
-        files.retain(|path, _| !path.ends_with("times.csv"));
         files.values_mut().for_each(without_seconds);
         Ok(files)
     }

@@ -16,7 +16,7 @@ use prehend_refine::data::{Assets, FrameInput, MaskSource, Target, load_frame_fi
 use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_render::RgbImage;
 
-use crate::options::{Job, Masks, Selection};
+use crate::options::{Job, Masks, Selection, advice};
 use crate::terminal::{cache, progress, say, warn};
 
 #[derive(Args)]
@@ -96,6 +96,7 @@ impl Check {
         for job in bar.wrap_iter(jobs.iter()) {
             let Job { target, row, .. } = job;
             let input = assets.load(target, Some(&row.t_cam_model), &[]);
+            let input = input.map_err(|error| format!("{error}{}", advice(&error)));
             let Some(input) = failures.keep(target, input) else { continue };
             without(&dataset, &input, target);
             let (picture, warnings) = drawn(&input, &row.t_cam_model);

@@ -28,6 +28,11 @@ impl Failures {
         self.0.extend(errors.iter().map(|error| format!("{}: {error}", file.display())));
     }
 
+    /// Adds all of `others`.
+    pub(crate) fn extend(&mut self, others: Self) {
+        self.0.extend(others.0);
+    }
+
     /// Adds one that no error tells of.
     pub(crate) fn add(&mut self, failure: impl Into<String>) {
         self.0.push(failure.into());

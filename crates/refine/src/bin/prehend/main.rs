@@ -88,8 +88,8 @@ enum Command {
     /// Draw poses over their images, and say what looks wrong with object, hand and sensors, before refining anything
     ///
     /// Each warning has a figure and a likely cause. Checks: unit and size of the mesh; the pose; the mask against the object's outline, the hand and depth;
-    /// depth on the object and on the hand; the hand's pose and joint limits. Forces are checked for size, sign and place. Without masks, or with boxes, only depth
-    /// and hand are compared.
+    /// depth on the object and on the hand; the hand's pose and joint limits. Forces are checked for size, sign and place. Without masks
+    /// (none, silhouette), or with boxes, only depth and hand are compared.
     Check(check::Check),
     /// Say what a file or a folder is, what it holds and what is wrong with it
     Info(info::Info),

@@ -14,7 +14,7 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::details::check_format;
 use prehend_refine::data::identity::file_fingerprint;
-use prehend_refine::data::{MaskSource, Target, find_targets};
+use prehend_refine::data::{AssetError, MaskSource, Target, find_targets};
 use prehend_refine::rig::Rig;
 use prehend_refine::{Hypotheses, Method};
 use prehend_render::{Backend, Device};
@@ -77,6 +77,14 @@ enum MaskKind {
     Silhouette,
     /// None: pixels are told by the initial pose, depth and colors
     None,
+}
+
+/// Advice where there is no mask.
+pub(crate) fn advice(error: &AssetError) -> &'static str {
+    match error {
+        AssetError::Dataset(DatasetError::NoMask { .. }) => " (--mask-source none does without)",
+        _ => "",
+    }
 }
 
 impl Masks {

@@ -78,12 +78,12 @@ impl Study {
             frames = frames.into_iter().skip(index).step_by(count).collect();
         }
 
+        let assets = Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig);
+        let assets = Mutex::new(assets.with_masks(self.masks.source()?));
         let mut table = StudyFile::open(&self.out, self.restart)?;
         let missing = |frame| Ok((frame, table.missing(design.rows(frame))?));
         let mut open = frames.iter().map(missing).collect::<anyhow::Result<Vec<_>>>()?;
         open.retain(|(_, rows)| !rows.is_empty());
-        let assets = Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig);
-        let assets = Mutex::new(assets.with_masks(self.masks.source()?));
         let bar = progress(frames.len(), "study");
         bar.set_position((frames.len() - open.len()) as u64);
         bar.reset_eta();

@@ -64,9 +64,9 @@ impl Search<'_> {
     /// Adds what explains those trials of one `key`, of their index and target, that are not explained yet, of the corrections that `admits` lets through.
     fn level(&mut self, key: impl Fn(usize, &Target) -> u32, admits: &dyn Fn(&Tried) -> bool) {
         for mut group in groups(self.trials, key) {
-            group.retain(|&k| !self.explained[k]);
+            group.retain(|&k| !self.explained[k] && !self.trials[k].1.tried.is_empty());
             if let Some(finding) = explain(self.trials, &group, admits, self.settings) {
-                group.iter().for_each(|&k| self.explained[k] = true);
+                finding.frames.iter().for_each(|&k| self.explained[k] = true);
                 self.found.push(finding);
             }
         }
@@ -120,11 +120,16 @@ fn explain(
         let differs = t.correction != first.correction;
         differs && !t.correction.is_unnamed() && t.oddness - first.oddness < settings.oddness
     });
+    let mut frames = group.to_vec();
+    if first.correction == Correction::ChannelsSwapped {
+        let is_same = |tried: &Tried| tried.correction == first.correction;
+        frames.retain(|&k| trials[k].1.tried.iter().flatten().any(is_same));
+    }
     Some(Finding {
+        frames,
         correction: first.correction,
         factor: first.value,
         alternative: other.map(|t| (t.correction, t.value)),
-        frames: group.to_vec(),
         agreement: Some(first.agreement),
         sigma: None,
     })

@@ -42,7 +42,7 @@ pub enum Correction {
     ModelScale,
     /// {camera}: {K}: the focal length is too {focal}; multiply fx and fy by {times}
     FocalLength,
-    /// {colors}: red and blue are swapped (BGR was taken for RGB); exchange the first and third channel
+    /// {colors}: red and blue are swapped (BGR was taken for RGB); exchange the first and third channel, unless the model has colors that are not the object's
     ChannelsSwapped,
 }
 

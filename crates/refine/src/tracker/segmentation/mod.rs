@@ -68,6 +68,7 @@ impl Segmenter {
         t_cam_object: &Isometry3<f64>,
     ) -> bool {
         let mut window = mem::take(&mut self.window);
+        sight.regions = None;
         let is_seen = window.look(sight, object, t_cam_object, self.settings.reach, &self.settings);
         let is_seen = is_seen.is_some() && self.segment_window(sight, &window);
         self.window = window;
@@ -84,8 +85,8 @@ impl Segmenter {
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
             expected += pixel.share;
-            // Most pixels.
-            if pixel.is_elsewhere(settings) {
+            // Most pixels. Where no depth is measured, colors beyond the object tell nothing of it.
+            if pixel.is_elsewhere(settings) || pixel.share == 0.0 && !sight.measured {
                 continue;
             }
             let color = self.ratios.of_index(pixel.color);
@@ -159,7 +160,7 @@ impl Segmenter {
     ) -> Option<Isometry3<f64>> {
         let center = expected * object.center;
         let places = self.places(sight, center.z as f32)?;
-        let moved = places.iter().map(|place| {
+        let moved = places.iter().take(self.settings.places).map(|place| {
             let mean = |k: usize| {
                 place.iter().map(|pixel| f64::from(pixel.at[k])).sum::<f64>() / place.len() as f64
             };
@@ -167,7 +168,9 @@ impl Segmenter {
             let pose = Translation3::from(center) * expected;
             (self.shown(sight, object, &pose), pose)
         });
-        moved.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose)
+        // The first of equals is the largest.
+        let better = |best: (f64, _), next: (f64, _)| if next.0 > best.0 { next } else { best };
+        moved.reduce(better).map(|(_, pose)| pose)
     }
 
     /// See [`anywhere`](Self::anywhere): connected parts. Where no depth is measured it is that of the object, `depth` \[m\].
@@ -383,6 +386,8 @@ mod tests {
         observation.depth.pixels_mut().fill(0.0);
         let sight = || Sight::new(observation.clone(), Images::default());
         let mut segmenter = Segmenter::new(&TrackerSettings::default());
+        let unmasked = Sight { tells: false, ..sight() };
+        assert!(segmenter.find(&unmasked, &scene.object, &scene.truth).is_none());
         segmenter.learn(&sight(), &scene.object, &scene.truth);
         let shown = |pose: &Isometry3<f64>| segmenter.shown(&sight(), &scene.object, pose);
         let away = Isometry3::translation(0.15, 0.0, 0.0) * scene.truth;

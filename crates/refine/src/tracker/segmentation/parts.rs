@@ -1,9 +1,10 @@
 //! Connected parts of a mask.
 
+use std::cmp::Reverse;
 use std::mem;
 
-/// Indices of the pixels of each connected part of what is `set`, in rows of so many columns: of the largest, and of others that are not far smaller, for
-/// fingers part what they hold.
+/// Indices of the pixels of each connected part of what is `set`, in rows of so many columns: of the largest first, and of others that are not far smaller,
+/// for fingers part what they hold.
 pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec<Vec<usize>> {
     let mut left = set.to_vec();
     let mut parts: Vec<Vec<usize>> = Vec::new();
@@ -28,6 +29,7 @@ pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec
     }
     let largest = parts.iter().map(Vec::len).max().unwrap_or_default();
     parts.retain(|part| part.len() as f64 >= least_share * largest as f64);
+    parts.sort_by_key(|part| Reverse(part.len()));
     parts
 }
 

@@ -37,6 +37,8 @@ settings! {
         pub stated_sigma: f64 = 5e-3,
         /// Without depth: standard deviation of the sides of a box that is given for a mask \[px\].
         pub box_sigma: f64 = 5.0,
+        /// Without depth: number of places that are compared where an object is looked for.
+        pub places: usize = 4,
         /// Without depth or mask: number of times that colors and pose are found in turns.
         pub rounds: usize = 3,
     }

@@ -110,6 +110,9 @@ impl Window {
                 pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
             }
         }
+        // Of a thin object no square is full: its middle is as sure as can be.
+        let most = self.pixels.iter().map(|pixel| pixel.share).fold(0.0, f32::max);
+        self.pixels.iter_mut().for_each(|pixel| pixel.share /= most);
         let ends = picture(columns, rows);
         self.range = [left * stride..ends[0], top * stride..ends[1]];
         Some(())

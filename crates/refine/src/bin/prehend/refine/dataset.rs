@@ -21,7 +21,7 @@ use super::Refine;
 use super::options::record;
 use super::refined::RefinedFrame;
 use crate::failures::Failures;
-use crate::options::{Job, Selection, beside, open_rig, write_poses};
+use crate::options::{Job, Selection, advice, beside, open_rig, write_poses};
 use crate::terminal::{cache, progress, say, warn};
 
 /// A refinement of a dataset's frames.
@@ -95,7 +95,8 @@ impl DatasetRun<'_> {
         )?;
         bar.finish_and_clear();
         for (&index, error) in &failed {
-            failures.add(format!("{}: {error}{}", jobs[index].target, hint(error)));
+            let advice = error.downcast_ref().map_or("", advice);
+            failures.add(format!("{}: {error}{advice}", jobs[index].target));
         }
         let frames: Vec<(&Job, &RefinedFrame)> =
             refined.iter().map(|(&index, frame)| (&jobs[index], frame)).collect();
@@ -227,16 +228,6 @@ impl DatasetRun<'_> {
             report.add_frame(refined.report(job, errors, self.options.output.time, drawing));
         }
         report.finish()
-    }
-}
-
-/// Advice where there is no mask.
-fn hint(error: &anyhow::Error) -> &'static str {
-    match error.downcast_ref() {
-        Some(AssetError::Dataset(DatasetError::NoMask { .. })) => {
-            " (--mask-source none does without)"
-        }
-        _ => "",
     }
 }
 

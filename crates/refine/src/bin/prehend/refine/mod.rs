@@ -65,7 +65,10 @@ impl Refine {
         };
         let out = output.out.as_ref().map(named).transpose()?;
         // What cannot be written must be known before the work, not after it.
-        out.as_deref().map(check_writable).transpose()?;
+        if let Some(out) = &out {
+            check_writable(out)?;
+            check_writable(&beside(out, "times.csv"))?;
+        }
         output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
         let backend = self.rendering.open()?;

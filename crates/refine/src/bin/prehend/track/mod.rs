@@ -271,7 +271,7 @@ impl Track {
     ) -> anyhow::Result<Vec<Start>> {
         let starts: Vec<Start> = if let Some(poses) = &self.poses {
             let (jobs, faults) = selection.jobs(poses, None)?;
-            *failures = faults;
+            failures.extend(faults);
             jobs.into_iter().map(|job| (job.target, Some(job.row.t_cam_model))).collect()
         } else if let Some(scene_id) = watched {
             let known = match selection.object.as_slice() {
