@@ -82,8 +82,8 @@ struct Point {
 /// Parameters of the object's pose and the camera together.
 const N: usize = 12;
 
-/// Distance from the surface within which a line of sight meets it \[m\], and steps to there at most: those of a line at 4° to the surface.
-const MET: f64 = 1e-4;
+/// Distance from the surface within which a line of sight meets it \[m\], and steps to there at most: those of a line at 5° to the surface.
+const MET: f64 = 1e-5;
 const STEPS: usize = 96;
 
 /// A point seen from the surface.
@@ -178,7 +178,7 @@ impl PointToPlaneFactor {
     }
 
     /// Residual of the point at `place` (camera frame \[m\]), `nearest` to the surface by that distance, from the plane that its line of sight meets first,
-    /// before that point: sphere tracing (Hart, 1996).
+    /// before that point: sphere tracing (Hart, 1996). At an edge that plane is another one at once, and the cost jumps by that one point's.
     fn first_met(
         &self,
         place: &Point3<f64>,
@@ -407,7 +407,7 @@ mod tests {
         let thickness = 5e-3;
         let mesh = cuboid(Vector3::new(0.12, 0.09, thickness));
         let plate = Arc::new(Object::with_mass("plate", mesh, None, 0).unwrap());
-        let truth = Isometry3::new(Vector3::new(0.01, -0.02, 0.5), Vector3::new(0.3, -0.2, 0.1));
+        let truth = Isometry3::new(Vector3::new(0.01, -0.02, 0.5), Vector3::new(0.2, -0.3, 0.1));
         let all = &scene().frame;
         let depth = depth_map(&all.camera, &[(&plate.model, truth)]);
         let set = depth.pixels().iter().map(|z| *z > 0.0).collect();
