@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 16_170),
     ("sim", 16_370),
     ("render", 10_900),
-    ("refine", 29_625),
+    ("refine", 29_652),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

@@ -90,15 +90,14 @@ def test_a_pose_is_drawn_over_the_image(example):
     frame, _, truth = example
     picture = frame.draw(truth)
     assert picture.shape == frame.rgb.shape and picture.dtype == np.uint8
-    red = (picture[..., 0] > 200) & (picture[..., 1] < 120) & (picture[..., 2] < 120)
     moved = truth.copy()
     moved[0, 3] += 0.02
-    other = frame.draw(moved)
-    assert red.sum() > 50 and not (picture == other).all()
-    # The outline is about the mask.
-    rows, columns = np.nonzero(red)
+    # Outlines differ, and nothing else.
+    differs = (picture != frame.draw(moved)).any(axis=2)
+    assert 50 < differs.sum() < 0.1 * differs.size
+    rows, columns = np.nonzero(differs)
     inside = np.nonzero(frame.mask)
-    assert abs(rows.mean() - inside[0].mean()) < 20 and abs(columns.mean() - inside[1].mean()) < 20
+    assert abs(rows.mean() - inside[0].mean()) < 60 and abs(columns.mean() - inside[1].mean()) < 60
 
 
 def test_the_covariance_is_in_the_order_and_frame_that_are_documented(example, refined):
