@@ -40,9 +40,6 @@ pub(super) struct Segmenter {
     window: Window,
 }
 
-/// Share of pixels that is none.
-const LEAST_SHARE: f64 = 1e-3;
-
 impl Segmenter {
     pub(super) fn new(settings: &TrackerSettings) -> Self {
         let TrackerSettings { segmentation, gain, fused, .. } = settings;
@@ -220,7 +217,7 @@ impl Segmenter {
             let Some(usual) = self.usual_shares else { return 1.0 };
             let shares = self.color_shares(&window);
             let relative =
-                shares.iter().zip(usual).map(|(share, usual)| share / usual.max(LEAST_SHARE));
+                shares.iter().zip(usual).map(|(share, usual)| share / usual.max(f64::MIN_POSITIVE));
             return relative.fold(1.0, f64::min);
         }
         let (mut seen, mut expected) = (0.0, 0.0);
