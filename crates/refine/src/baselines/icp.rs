@@ -44,7 +44,7 @@ pub enum IcpMetric {
     /// Distances from depth points to the planes of the closest faces (Chen and Medioni, 1992), under Cauchy's weights, whose scale shrinks geometrically
     /// over the first three quarters of the iterations.
     ///
-    /// Of visibility one thing is known: a depth point is not of a face that looks away from the camera, and such a match counts for nothing. The
+    /// A depth point is not of a face that looks away from the camera: such a match counts for nothing. Else visibility is not asked. The
     /// trace's value is the root mean square distance of the matches \[m\].
     PointToPlane {
         /// Distance whose weight is one half, at the first iteration \[m\].

@@ -209,7 +209,7 @@ impl RigLayout {
 
 impl ObjectLayout {
     /// # Errors
-    /// What is wrong with it.
+    /// Error text of entries that are wrong.
     fn deviation(self) -> Result<SurfaceDeviation, String> {
         let count = self.nodes_m.len();
         if count > MOST_NODES {

@@ -52,7 +52,7 @@ impl Symmetries {
         self.sampled(CONTINUOUS_STEPS)
     }
 
-    /// [`transforms`](Self::transforms) of so many `turns` about each axis, all round.
+    /// [`transforms`](Self::transforms) of `turns` rotations about each axis, all round.
     pub(super) fn sampled(&self, turns: usize) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();
         for symmetry in &self.continuous {

@@ -104,7 +104,7 @@ impl Fixture {
     }
 }
 
-/// What is said of a file that is absent.
+/// Problem of a file that is absent.
 const ABSENT: &str = "no such file or folder";
 
 fn missing(file: &Path, problem: &str) -> DatasetError {

@@ -22,7 +22,7 @@ pub struct LongCommand {
     pub blockable: &'static [&'static str],
     /// Tables each row of which is of one frame alone, whatever becomes of the others.
     pub tables: &'static [&'static str],
-    /// What of all that, and beside it, grows while it is at work: journals and tables.
+    /// Files of its outputs, and beside them, that grow while it is at work: journals and tables.
     pub growing: &'static [&'static str],
 }
 
@@ -146,7 +146,7 @@ impl Place {
         Ok(())
     }
 
-    /// What `command` has written; hidden files are not seen.
+    /// Files that `command` has written, but for hidden ones.
     pub(super) fn written(&self, command: &LongCommand) -> Result<Files> {
         let mut files = Files::new();
         for name in command.outputs {

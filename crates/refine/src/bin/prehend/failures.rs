@@ -1,4 +1,4 @@
-//! What has failed in a run, and its exit code.
+//! Failures of a run, and its exit code.
 
 use std::fmt::Display;
 use std::path::Path;

@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use anyhow::bail;
 use clap::Args;
+use prehend_refine::data::bop::LengthUnit;
 use prehend_refine::info::{DescribeOptions, describe};
 use serde_json::json;
 
-use crate::options::Unit;
+use crate::options::length_unit;
 use crate::robot_options::RobotOptions;
 use crate::terminal::say;
 
@@ -20,8 +21,8 @@ pub(crate) struct Info {
     #[arg(value_name = "PATH")]
     path: PathBuf,
     /// Unit of a mesh
-    #[arg(long, value_name = "UNIT", default_value = "m")]
-    mesh_unit: Unit,
+    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = length_unit())]
+    mesh_unit: LengthUnit,
     /// Print volume, mass, center and inertia of a mesh of this density, too, in kg/m³
     #[arg(long, value_name = "DENSITY")]
     density: Option<f64>,

@@ -9,8 +9,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, Detections, ReadResults, ResultRow, check_writable, read_hypotheses,
-    read_results, share_image_times, write_results,
+    Dataset, DatasetError, Detections, LengthUnit, ReadResults, ResultRow, check_writable,
+    read_hypotheses, read_results, share_image_times, write_results,
 };
 use prehend_refine::data::details::check_format;
 use prehend_refine::data::identity::file_fingerprint;
@@ -151,20 +151,12 @@ impl Rendering {
     }
 }
 
-/// Unit of the lengths of a mesh file.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum Unit {
-    M,
-    Mm,
-}
-
-impl Unit {
-    pub(crate) fn meters(self) -> f64 {
-        match self {
-            Self::M => 1.0,
-            Self::Mm => 1e-3,
-        }
-    }
+/// Parser of the unit of the lengths of a mesh file.
+pub(crate) fn length_unit() -> impl TypedValueParser<Value = LengthUnit> {
+    PossibleValuesParser::new(["m", "mm"]).map(|name| match name.as_str() {
+        "mm" => LengthUnit::Millimeter,
+        _ => LengthUnit::Meter,
+    })
 }
 
 /// A row of the results file and the target that it is of.

@@ -27,7 +27,7 @@ pub(crate) fn assignment(text: &str) -> Result<(String, String), String> {
 }
 
 impl SettingsOptions {
-    /// Whether any are given: else the defaults are in effect.
+    /// True if any are given: else the defaults are in effect.
     pub(crate) fn is_given(&self) -> bool {
         self.settings.is_some() || !self.set.is_empty()
     }

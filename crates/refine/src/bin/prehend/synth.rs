@@ -8,6 +8,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
+use prehend_refine::data::bop::LengthUnit;
 use prehend_refine::scene::Object;
 use prehend_refine::synth::{
     FilmSettings, GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, SynthObject,
@@ -17,7 +18,7 @@ use prehend_render::Distortion;
 use serde_json::json;
 
 use crate::failures::Failures;
-use crate::options::{Unit, limit_threads};
+use crate::options::{length_unit, limit_threads};
 use crate::terminal::{progress, say};
 
 #[derive(Args)]
@@ -80,8 +81,8 @@ struct Subjects {
     #[arg(long, value_name = "FILE", conflicts_with = "objects")]
     mesh: Vec<PathBuf>,
     /// Unit of the meshes
-    #[arg(long, value_name = "UNIT", default_value = "m")]
-    mesh_unit: Unit,
+    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = length_unit())]
+    mesh_unit: LengthUnit,
     /// Mass of each mesh in the same order, in kilograms [default: 500 kg/m³]
     #[arg(long, value_name = "KG", requires = "mesh")]
     mass: Vec<f64>,
@@ -240,7 +241,7 @@ impl Subjects {
         })
     }
 
-    /// What grasps must be like.
+    /// Requirements of grasps.
     fn grasping(&self) -> anyhow::Result<GraspSettings> {
         let &[least, most] = self.contact_area.as_slice() else {
             bail!("--contact-area: expected two numbers, such as 20,60");
@@ -276,7 +277,12 @@ fn built_in(name: &str) -> anyhow::Result<YcbObject> {
     })
 }
 
-fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Result<SynthObject> {
+fn own(
+    obj_id: u32,
+    file: &Path,
+    unit: LengthUnit,
+    mass: Option<f64>,
+) -> anyhow::Result<SynthObject> {
     let mesh = TriMesh::load(file)?.scaled(unit.meters());
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let object =

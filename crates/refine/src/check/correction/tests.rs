@@ -176,7 +176,7 @@ fn masks_and_cameras() {
     }
 }
 
-/// Whatever the light: bright, dark, or tinted.
+/// In any light: bright, dark, or tinted.
 #[test]
 fn channels_that_are_swapped() {
     for gains in [[1.0; 3], [1.6; 3], [0.3; 3], [0.8, 1.0, 1.2], [1.2, 1.0, 0.8]] {

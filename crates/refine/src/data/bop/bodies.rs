@@ -144,10 +144,10 @@ impl BodyEntry {
                 return Err(missing(if self.pose.is_some() { "mesh" } else { "obj_id" }));
             }
         };
-        let stated = || stated_pose(self.rotation, self.translation, "b2c");
         let t_cam_base = match self.pose {
             Some(pose) => Some(pose.0),
-            None => stated().map_err(|name| missing(&name))?,
+            None => stated_pose(self.rotation, self.translation, "b2c")
+                .map_err(|name| missing(&name))?,
         };
         let t_cam_base = t_cam_base.ok_or_else(|| missing("cam_R_b2c"))?;
         let sigmas = sigmas(self.sigma_mm, self.sigma_deg);

@@ -27,7 +27,7 @@ pub struct Dataset {
     models: Arc<Models>,
     /// What all cameras have in common.
     pub(super) camera: Arc<JsonFile>,
-    /// What the images of all scenes have in common.
+    /// Optics that the images of all scenes share.
     pub(super) optics: Arc<SharedOptics>,
 }
 

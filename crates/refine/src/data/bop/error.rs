@@ -13,7 +13,7 @@ pub enum DatasetError {
     Missing {
         /// The path looked for, or that of the file that lacks it.
         file: PathBuf,
-        /// What is missing.
+        /// Name of the part that is missing, and why, where that is known.
         problem: String,
     },
     /// An object without a mask in an image: no file of one, or one in which nothing is set, or no detection.
@@ -21,7 +21,7 @@ pub enum DatasetError {
     NoMask {
         /// The mask, or the file of detections.
         file: PathBuf,
-        /// What is missing.
+        /// Name of the part that is missing, and why, where that is known.
         problem: String,
     },
     /// It is not what it has to be: an image that is absent from a folder of others, broken JSON, a field that is absent, of another type or impossible, a dataset without
@@ -38,7 +38,7 @@ pub enum DatasetError {
     Image(String),
 }
 
-/// What is said of a file that is absent.
+/// Problem of a file that is absent.
 pub(super) const ABSENT: &str = "no such file or folder";
 
 impl DatasetError {

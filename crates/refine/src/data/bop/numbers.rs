@@ -57,7 +57,7 @@ impl<const N: usize> Numbers<N> {
     /// Refuses what [`require_in_range`] refuses, by its index.
     ///
     /// # Errors
-    /// What is wrong with one.
+    /// Error text of the first number out of range.
     pub(crate) fn require_in_range(&self) -> Result<(), String> {
         self.0.iter().enumerate().try_for_each(|(index, value)| {
             let checked = require_in_range(*value);
@@ -69,7 +69,7 @@ impl<const N: usize> Numbers<N> {
 /// Refuses a number that is not finite or beyond [`MAX_NUMBER`].
 ///
 /// # Errors
-/// What is wrong with it.
+/// Error text of a number out of range.
 pub(crate) fn require_in_range(value: f64) -> Result<f64, String> {
     match value.abs() {
         _ if !value.is_finite() => Err("is not finite".into()),

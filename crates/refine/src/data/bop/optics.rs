@@ -41,7 +41,7 @@ pub(crate) struct Optics<'a> {
     pub(crate) shared: &'a SharedOptics,
 }
 
-/// What images have in common: maps from lenses, and warnings that are given once.
+/// Optics that images share: maps from lenses, and warnings that are given once.
 #[derive(Debug, Default)]
 pub(crate) struct SharedOptics {
     remaps: RemapCache,
@@ -50,7 +50,7 @@ pub(crate) struct SharedOptics {
 }
 
 impl LensedCamera {
-    /// Of what a file says.
+    /// Camera and lens as a file states them.
     pub(crate) fn new(Intrinsics(camera): Intrinsics, lens: Option<Lens>) -> Self {
         Self { camera, lens: lens.map(|lens| lens.0) }
     }
@@ -73,7 +73,7 @@ impl LensedCamera {
 }
 
 impl DepthCamera {
-    /// Depth camera of what a file says: intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is said.
+    /// Depth camera as a file states it: intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if it states none of these.
     ///
     /// # Errors
     /// The name of what is missing beside what is there.
@@ -211,7 +211,7 @@ impl Optics<'_> {
     }
 }
 
-/// What is wrong with a depth image that measures nothing.
+/// Problem of a depth image that measures nothing.
 pub(super) const NO_DEPTH: &str = "every depth is zero";
 
 /// Warns of the depth image in `file` unless others were warned of.

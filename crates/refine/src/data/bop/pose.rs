@@ -33,7 +33,7 @@ impl TryFrom<Numbers<9>> for Rotation {
     type Error = String;
 
     /// # Errors
-    /// What is wrong with entries that are not finite, not orthonormal, or a reflection.
+    /// Error text for entries that are not finite, not orthonormal, or a reflection.
     fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
         numbers.require_in_range()?;
         let matrix = Matrix3::from_row_slice(&numbers.0);
@@ -80,7 +80,7 @@ pub(crate) fn pose(rotation: &Rotation, translation: &Numbers<3>) -> Isometry3<f
     Isometry3::from_parts(translation.into(), rotation.nearest)
 }
 
-/// The pose \[m\] of `cam_R_…` and `cam_t_…` \[mm\], whose names end in `between`; `None` where neither is said.
+/// The pose \[m\] of `cam_R_…` and `cam_t_…` \[mm\], whose names end in `between`; `None` without either.
 ///
 /// # Errors
 /// The name of the one that is missing.

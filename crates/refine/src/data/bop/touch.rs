@@ -25,7 +25,7 @@ pub struct Tactile {
     pub(crate) origin: Origin,
 }
 
-/// What a sensor of touch says.
+/// Reading of a tactile sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TactileReading {
     /// Force of the object on the body at each taxel, in the frame of the taxel's link \[N\].

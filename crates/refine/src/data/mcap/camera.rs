@@ -9,7 +9,7 @@ use crate::data::bop::LensedCamera;
 /// The camera that took the images of `topic`.
 ///
 /// # Errors
-/// What is wrong with what is said of it.
+/// Error text of calibration messages that are wrong.
 pub(super) fn camera_of(info: &CameraInfo, topic: &str) -> Result<LensedCamera, String> {
     let rectified = is_rectified(topic);
     let k = match (rectified, info.p) {

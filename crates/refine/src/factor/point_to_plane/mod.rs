@@ -155,7 +155,7 @@ impl PointToPlaneFactor {
             let surface = (state.t_cam_object * closest.point).coords;
             let offset = place.coords - surface;
             let distance = offset.norm().copysign(normal.dot(&offset));
-            let facing = self.facing(state, &closest);
+            let facing = self.facing(state, &closest, &surface);
             let away =
                 if distance.abs() > f64::EPSILON.sqrt() { offset / distance } else { normal };
             let residual = Residual { distance, nearest: distance, facing, surface, away };
@@ -168,13 +168,13 @@ impl PointToPlaneFactor {
         self.points.par_iter().with_min_len(64).map(residual).collect()
     }
 
-    /// Whether a place of the surface looks at the camera, by normals that are smooth over the surface: the cost must not jump as points pass from face to face.
-    fn facing(&self, state: &State, closest: &Closest) -> f64 {
+    /// Visibility from 0 to 1 of the surface at `closest`, which is at `place` (camera frame \[m\]), by normals that are smooth over the surface: the cost must
+    /// not jump as points pass from face to face.
+    fn facing(&self, state: &State, closest: &Closest, place: &Vector3<f64>) -> f64 {
         let corners = &self.object.corner_normals[closest.face as usize];
         let smooth: Vector3<f64> =
             corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
-        let place = (state.t_cam_object * closest.point).coords;
-        facing(&(state.t_cam_object * smooth), &place, self.settings.grazing)
+        facing(&(state.t_cam_object * smooth), place, self.settings.grazing)
     }
 
     /// Residual of the point at `place` (camera frame \[m\]), `nearest` to the surface by that distance, from the plane that its line of sight meets first,
@@ -202,7 +202,7 @@ impl PointToPlaneFactor {
             if closest.distance < MET {
                 let away = state.t_cam_object * self.object.normals[face as usize];
                 let met = (state.t_cam_object * closest.point).coords;
-                let facing = self.facing(state, &closest);
+                let facing = self.facing(state, &closest, &met);
                 let distance = away.dot(&(place.coords - met));
                 let surface = place.coords - away * distance;
                 let residual = Residual { distance, nearest, facing, surface, away };

@@ -29,13 +29,15 @@ impl MaskBorder {
         let around = columns.max(rows) / 2 + 1;
         let (right, bottom) = (left + columns + around, top + rows + around);
         let (left, top) = (left.saturating_sub(around), top.saturating_sub(around));
-        let (columns, rows) = (right.min(width) - left, bottom.min(mask.height()) - top);
-        let line = |y: usize| {
-            let from = (top + y) * width + left;
-            &mask.pixels()[from..from + columns]
-        };
-        let set: Vec<bool> = (0..rows).flat_map(line).copied().collect();
-        Some(Self::within(width, [left..left + columns, top..top + rows], &set))
+        Some(Self::of_window(mask, [left..right.min(width), top..bottom.min(mask.height())]))
+    }
+
+    /// Border of `mask` in a window of its image.
+    pub(crate) fn of_window(mask: &Mask, window: [Range<usize>; 2]) -> Self {
+        let (width, [columns, rows]) = (mask.width(), window.clone());
+        let line = |y: usize| &mask.pixels()[y * width..][columns.clone()];
+        let set: Vec<bool> = rows.flat_map(line).copied().collect();
+        Self::within(width, window, &set)
     }
 
     /// Border of what is `set` of a window of an image that is `width` columns wide.

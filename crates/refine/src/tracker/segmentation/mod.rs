@@ -127,10 +127,7 @@ impl Segmenter {
             let border = MaskBorder::within(camera.width, window.range(), &window.silhouette());
             regions.add_border(&border, sigma as f32, f32::INFINITY);
             if sight.given.count() > 0 {
-                let [columns, rows] = window.range();
-                let line = |y: usize| &sight.given.pixels()[y * camera.width..][columns.clone()];
-                let set: Vec<bool> = rows.flat_map(line).copied().collect();
-                let border = MaskBorder::within(camera.width, window.range(), &set);
+                let border = MaskBorder::of_window(&sight.given, window.range());
                 regions.add_border(&border, self.settings.box_sigma as f32, 0.0);
             }
         }

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::mem;
 
-/// Indices of the pixels of each connected part of what is `set`, in rows of so many columns: of the largest first, and of others that are not far smaller,
+/// Indices of the pixels of each connected part of what is `set`, in rows of `columns`: of the largest first, and of others that are not far smaller,
 /// for fingers part what they hold.
 pub(super) fn large_parts(set: &[bool], columns: usize, least_share: f64) -> Vec<Vec<usize>> {
     let mut left = set.to_vec();

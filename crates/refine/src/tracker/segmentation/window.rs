@@ -118,7 +118,7 @@ impl Window {
         Some(())
     }
 
-    /// Of a whole picture, in which nothing is known of the object but, where no depth is measured, its `depth` \[m\].
+    /// Window of a whole picture, in which nothing is known of the object but, where no depth is measured, its `depth` \[m\].
     pub(super) fn whole(sight: &Sight, depth: f32, settings: &SegmentationSettings) -> Self {
         let (full, stride) = (&sight.frame.camera, settings.stride());
         let (columns, rows) = (full.width.div_ceil(stride), full.height.div_ceil(stride));
@@ -152,7 +152,7 @@ impl Window {
         self.range.clone()
     }
 
-    /// Whether the whole object is at each pixel of the picture within its range.
+    /// Silhouette of the whole object, for each pixel of the picture within its range.
     pub(super) fn silhouette(&self) -> Vec<bool> {
         let (stride, [columns, rows]) = (self.settings.stride(), self.range());
         let width = columns.len() / stride;
@@ -247,7 +247,7 @@ impl Pixel {
         }
     }
 
-    /// Whether the object should be seen here.
+    /// True where the object should be seen.
     pub(super) fn is_expected(&self) -> bool {
         self.share > 0.5
     }

@@ -65,16 +65,14 @@ impl Refine {
         };
         let out = output.out.as_ref().map(named).transpose()?;
         // What cannot be written must be known before the work, not after it.
-        if let Some(out) = &out {
-            check_writable(out)?;
-            check_writable(&beside(out, "times.csv"))?;
-        }
+        out.as_deref().map(check_writable).transpose()?;
         output.details.as_deref().map(check_details).transpose()?;
         limit_threads(method.threads)?;
         let backend = self.rendering.open()?;
         match (&self.frame, selection, poses, &out) {
             (Some(file), ..) => refine_frame(file, &self, backend),
             (None, Some(selection), Some(poses), Some(out)) => {
+                check_writable(&beside(out, "times.csv"))?;
                 let beside = Some(beside(poses, HYPOTHESES)).filter(|file| file.exists());
                 let hypotheses = self.hypotheses.clone().or(beside);
                 let (options, method) = (&self, method.configured()?);

@@ -1,4 +1,4 @@
-//! What is known of a frame that was refined, and what results have of it.
+//! A refined frame, and its part of the results.
 
 use nalgebra::Isometry3;
 use prehend_refine::Refined;
@@ -24,7 +24,7 @@ pub(super) struct RefinedFrame {
     pub(super) object_warnings: Vec<String>,
     /// How sure the pose is, where the method knows.
     pub(super) confidence: Option<PosteriorSummary>,
-    /// What is found without each sensor, if that was asked.
+    /// Estimates without each sensor, if these were asked for.
     #[serde(default)]
     pub(super) diagnosis: Vec<DiagnosisSummary>,
     /// Time that it took \[s\].
@@ -67,7 +67,7 @@ impl RefinedFrame {
         }
     }
 
-    /// What the page has of it, with the errors \[m, rad\] of its pose and of the initial one, where the truth is known.
+    /// Its part of the page, with the errors \[m, rad\] of its pose and of the initial one, where the truth is known.
     pub(super) fn report(
         &self,
         job: &Job,
@@ -98,7 +98,7 @@ impl RefinedFrame {
         FrameReport { name, status, flags, remarks, figures, posterior, drawing }
     }
 
-    /// What the table has of it.
+    /// Its row of the table.
     pub(super) fn details(&self, job: &Job, timed: bool) -> FrameDetails {
         FrameDetails {
             target: job.target,
@@ -112,7 +112,7 @@ impl RefinedFrame {
         }
     }
 
-    /// What JSON has of it.
+    /// Its JSON value.
     pub(super) fn summary(&self, job: &Job) -> serde_json::Value {
         json!({
             "scene_id": job.row.scene_id,

@@ -39,7 +39,7 @@ impl Done {
         }
     }
 
-    /// What JSON has of it.
+    /// Its JSON value.
     pub(super) fn summary(&self) -> serde_json::Value {
         let Self { row, track, timing, .. } = self;
         let pose = PlainPose::from(&row.t_cam_model);

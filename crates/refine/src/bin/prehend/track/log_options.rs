@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use prehend_refine::data::bop::LengthUnit;
 
-use crate::options::Unit;
+use crate::options::length_unit;
 
 /// A robot's log, and what is tracked in it.
 #[derive(Args)]
@@ -17,8 +18,8 @@ pub(crate) struct LogOptions {
     #[arg(long, value_name = "FILE", requires = "mcap")]
     pub(super) mesh: Option<PathBuf>,
     /// Unit of the mesh
-    #[arg(long, value_name = "UNIT", default_value = "m", requires = "mcap")]
-    pub(super) mesh_unit: Unit,
+    #[arg(long, value_name = "UNIT", default_value = "m", requires = "mcap", value_parser = length_unit())]
+    pub(super) mesh_unit: LengthUnit,
     /// Mass of the object [default: 500 kg/m³]
     #[arg(long, value_name = "KG", requires = "mcap")]
     pub(super) mass: Option<f64>,

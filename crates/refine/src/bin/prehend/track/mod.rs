@@ -261,7 +261,7 @@ impl Track {
         Ok((Target { scene_id, im_id, obj_id, ..start }, Some(t_cam_model)))
     }
 
-    /// What to follow, in order; of rows of the poses that are wrong `failures` hears.
+    /// Targets to follow, in order; rows of the poses that are wrong are added to `failures`.
     fn starts(
         &self,
         selection: &Selection,
