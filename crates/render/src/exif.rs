@@ -14,11 +14,36 @@ pub(crate) fn orientation(file: impl BufRead + Seek) -> Orientation {
 
 fn stated(file: impl BufRead + Seek) -> Option<Orientation> {
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
-    match reader.format()? {
+    let exif = match reader.format()? {
         // The decoder knows the chunks before the pixels alone.
-        ImageFormat::Png => Orientation::from_exif_chunk(&exif_chunk(reader.into_inner())?),
-        _ => reader.into_decoder().ok()?.orientation().ok(),
-    }
+        ImageFormat::Png => exif_chunk(reader.into_inner()),
+        _ => reader.into_decoder().ok()?.exif_metadata().ok()?,
+    };
+    Orientation::from_exif(orientation_tag(&exif?)?)
+}
+
+/// Tag 274 of the first directory, whatever the type of its number (EXIF 2.32, 4.6.2): some programs write one of 32 bits.
+fn orientation_tag(exif: &[u8]) -> Option<u8> {
+    let is_little = match exif.get(..4)? {
+        b"II*\0" => true,
+        b"MM\0*" => false,
+        _ => return None,
+    };
+    let number = |at: usize, bytes: usize| {
+        let own = exif.get(at..at.checked_add(bytes)?)?.iter();
+        let push = |all: u32, byte: &u8| all << 8 | u32::from(*byte);
+        Some(if is_little { own.rev().fold(0, push) } else { own.fold(0, push) })
+    };
+    let directory = number(4, 4)? as usize;
+    let entries = (0..number(directory, 2)? as usize).map(|k| directory + 2 + 12 * k);
+    let entry = entries.take_while(|at| *at < exif.len()).find(|&at| number(at, 2) == Some(274))?;
+    let bytes = match number(entry + 2, 2)? {
+        1 => 1,
+        3 => 2,
+        4 => 4,
+        _ => return None,
+    };
+    u8::try_from(number(entry + 8, bytes)?).ok()
 }
 
 /// The chunk `eXIf` of a PNG file, wherever it is.
@@ -64,6 +89,27 @@ mod tests {
         let mut exif = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
         exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
         exif
+    }
+
+    #[test]
+    fn numbers_of_any_type_and_order() {
+        let little = |kind: u8| {
+            let mut exif = exif(6);
+            exif[12] = kind;
+            exif
+        };
+        let big = |kind: u8, value: [u8; 4]| {
+            let head = b"MM\0*\0\0\0\x08\0\x02\x01\0\0\x03\0\0\0\x01\0\x05\0\0\x01\x12\0";
+            [head.as_slice(), &[kind, 0, 0, 0, 1], &value, &[0; 4]].concat()
+        };
+        for exif in [little(1), little(3), little(4), big(3, [0, 6, 0, 0]), big(4, [0, 0, 0, 6])] {
+            assert_eq!(super::orientation_tag(&exif), Some(6), "{exif:?}");
+            for end in 0..exif.len() - 4 {
+                assert!(super::orientation_tag(&exif[..end]).is_none_or(|found| found == 6));
+            }
+        }
+        assert_eq!(super::orientation_tag(&little(2)), None);
+        assert_eq!(super::orientation_tag(b"II*\0\xff\xff\xff\xff"), None);
     }
 
     fn crc(bytes: &[u8]) -> u32 {

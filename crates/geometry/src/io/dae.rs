@@ -10,6 +10,7 @@ use roxmltree::{Document, Node};
 
 use super::MeshError;
 use super::limits::MAX_ELEMENTS;
+use super::polygon::triangles;
 use crate::mesh::TriMesh;
 
 /// Deepest nesting of nodes, those of instances included.
@@ -134,22 +135,28 @@ impl<'a, 'i> Reader<'a, 'i> {
             if corners.iter().any(|corner| *corner as usize >= part.vertices.len()) {
                 return Err(self.fault(list, "refers to a vertex that is not there"));
             }
-            let fan = |c: &[u32]| -> Vec<[u32; 3]> {
-                c.windows(2).skip(1).map(|w| [c[0], w[0], w[1]]).collect()
+            let of_polygon = |c: &[u32]| -> Vec<[u32; 3]> {
+                let positions: Vec<_> = c.iter().map(|&v| part.vertices[v as usize]).collect();
+                triangles(&positions).into_iter().map(|triangle| triangle.map(|k| c[k])).collect()
             };
+            let mut faces = Vec::new();
             match kind {
-                "triangles" => part.faces.extend_from_slice(corners.as_chunks().0),
+                "triangles" => faces.extend_from_slice(corners.as_chunks().0),
                 "polylist" => {
                     let mut rest = corners.as_slice();
                     for &count in &counts {
                         let Some((own, after)) = rest.split_at_checked(count) else { break };
-                        part.faces.extend(fan(own));
+                        faces.extend(of_polygon(own));
                         rest = after;
                     }
                 }
-                "tristrips" => part.faces.extend(strip(&corners)),
-                _ => part.faces.extend(fan(&corners)),
+                "tristrips" => faces.extend(strip(&corners)),
+                "trifans" => {
+                    faces.extend(corners.windows(2).skip(1).map(|w| [corners[0], w[0], w[1]]));
+                }
+                _ => faces.extend(of_polygon(&corners)),
             }
+            part.faces.extend(faces);
         }
         if pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0 {
             part.faces.iter_mut().for_each(|face| face.swap(1, 2));
@@ -205,6 +212,24 @@ mod tests {
         ] {
             let error = parse(FILE.replace(from, to).as_bytes(), path).unwrap_err().to_string();
             assert!(error.starts_with("m.dae: ") && error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn polygons_may_be_concave() {
+        let corners = "0 3 0 -1 0 0 0 1 0 1 0 0";
+        let file = FILE
+            .replace("0 0 0 1 0 0 0 1 0 0 0 1", corners)
+            .replace(
+                "<vcount>3 3</vcount><p>0 0 0 2 0 1 0 0 0 1 0 3</p>",
+                "<vcount>4</vcount><p>0 1 0 2 0 3 0 0</p>",
+            )
+            .replace("<p>0 3 2 1</p>", "");
+        let polygons = file.replace("polylist", "polygons").replace("<vcount>4</vcount>", "");
+        for file in [file, polygons] {
+            let mesh = parse(file.as_bytes(), Path::new("m.dae")).unwrap();
+            assert_eq!(mesh.faces.len(), 2);
+            assert!((mesh.area() - 2e-4).abs() < 1e-15, "{}", mesh.area());
         }
     }
 }

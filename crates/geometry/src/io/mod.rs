@@ -16,8 +16,10 @@ mod obj;
 mod parts;
 mod plain;
 mod ply;
+mod polygon;
 mod save;
 mod stl;
+mod text;
 mod texture;
 
 use std::path::{Path, PathBuf};
@@ -32,7 +34,7 @@ impl TriMesh {
     /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`, or `.dae` without its colors; in the file's unit, a `.dae` in
     /// meters.
     ///
-    /// Polygons become fans of triangles, glTF node transforms are applied, and textures are read from
+    /// Polygons become triangles, glTF node transforms are applied, and textures are read from
     /// the folder of the mesh (never from outside it). Images and libraries that an OBJ file names elsewhere, or in another case, are looked for there by
     /// their file names. A vertex on a texture seam is stored once for each of
     /// its coordinates. An image or a library of materials that cannot be read costs the colors alone, with a warning in the log. Stored normals are brought to unit length; where one is zero, the surface's own stands in.
@@ -74,7 +76,7 @@ pub(crate) fn load_shape(path: &Path) -> Result<TriMesh, MeshError> {
             let bytes = read(path)?;
             let mesh = obj::parse_shape(&bytes, path)?;
             // Points alone are those of a hull.
-            match mesh.faces.is_empty().then(|| obj::points(&bytes).convex_hull()).flatten() {
+            match mesh.faces.is_empty().then(|| mesh.convex_hull()).flatten() {
                 Some(hull) => hull,
                 None => checked(mesh, path)?,
             }

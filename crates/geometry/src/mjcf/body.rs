@@ -79,6 +79,27 @@ pub(super) fn read(
     Ok(reader.tree)
 }
 
+/// Mass that counts as none \[kg\].
+const LEAST_MASS: f64 = 1e-15;
+
+impl Tree {
+    /// Mass of a body, the last but for those that it carries, with those that are fixed to it \[kg\].
+    fn moved_mass(&self, index: usize) -> f64 {
+        let mut is_fixed = vec![true];
+        let mut total = 0.0;
+        for (k, body) in self.bodies.iter().enumerate().skip(index) {
+            if k > index {
+                let parent = body.parent.and_then(|parent| parent.checked_sub(index));
+                let moves = parent.is_some_and(|parent| is_fixed[parent]);
+                is_fixed.push(moves && body.joints.is_empty());
+            }
+            let mass = body.inertial.as_ref().map_or(0.0, |inertial| inertial.mass);
+            total += if is_fixed[k - index] { mass } else { 0.0 };
+        }
+        total
+    }
+}
+
 struct Reader<'a> {
     compilers: &'a Compilers,
     classes: &'a Classes,
@@ -153,6 +174,9 @@ impl Reader<'_> {
             None => written,
         };
         self.tree.bodies[index].inertial = inertial::bounded(inertial, compiler);
+        if !self.tree.bodies[index].joints.is_empty() && self.tree.moved_mass(index) <= LEAST_MASS {
+            return Err(e.misplaced("a body that moves needs a mass (a geom, or an inertial)"));
+        }
         Ok(())
     }
 
@@ -173,6 +197,10 @@ impl Reader<'_> {
         }
         if body.joints.iter().any(|j| j.kind == JointKind::Free) {
             return Err(e.misplaced("a free body has no other joint"));
+        }
+        let joints = body.joints.iter().chain([&joint]);
+        if joints.map(|joint| joint.kind.velocities()).sum::<usize>() > 6 {
+            return Err(e.misplaced("a body has at most six degrees of freedom"));
         }
         self.joint_names.add(e, "joint")?;
         self.tree.bodies[index].joints.push(joint);
@@ -321,5 +349,19 @@ mod tests {
         assert!(turned.unwrap_err().contains("beside an orientation"));
         assert_eq!(inertial("diaginertia=\"1 1 3\""), Ok(1));
         assert_eq!(inertial("diaginertia=\"1 1 2\""), Ok(0));
+    }
+
+    #[test]
+    fn a_body_has_six_degrees_of_freedom() {
+        let slides = |count: usize| {
+            let joints = "<joint type=\"slide\"/>".repeat(count);
+            read(&format!("<body><geom size=\"1\"/><joint type=\"ball\"/>{joints}</body>"))
+        };
+        assert!(slides(3).is_ok());
+        let massless = |more: &str| read(&format!("<body name=\"b\"><joint/>{more}</body>"));
+        assert!(massless("").unwrap_err().contains("body 'b': a body that moves needs a mass"));
+        assert!(massless("<body><joint/><geom size=\"1\"/></body>").is_err());
+        assert!(massless("<body><geom size=\"1\"/></body>").is_ok());
+        assert!(slides(4).unwrap_err().contains("a body has at most six degrees of freedom"));
     }
 }

@@ -112,6 +112,7 @@ fn resolve(file: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result
     let candidates: Vec<String> = match package {
         Some(rest) => {
             let (name, path) = rest.split_once('/').unwrap_or(("", rest));
+            let path = path.trim_start_matches('/');
             if let Some(own) = options.package(name) {
                 let path = Folder::own(&own).file(path)?;
                 let known = path.is_file().then_some(path);
@@ -221,6 +222,7 @@ mod tests {
         let uri = |name: &str| format!("file://{}", at(name).display());
         for file in [
             "package://pkg/meshes/a.obj".to_owned(),
+            "package://pkg//meshes//a.obj".to_owned(),
             "package://pkg/urdf/b%20c.obj".to_owned(),
             uri("pkg/urdf/b c.obj"),
             uri("pkg/urdf/b%20c.obj"),

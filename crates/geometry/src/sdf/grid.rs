@@ -86,6 +86,13 @@ impl SdfGrid {
         (lo - point).sup(&(point - hi)).sup(&Vector3::zeros()).norm()
     }
 
+    /// True unless the spline is above `reach` at `point`: outside of the box, too, it may be less than the distance by a fraction of the spacing. Written
+    /// so that NaN is far away.
+    #[inline]
+    fn may_be_within(&self, point: &Point3<f64>, reach: f64) -> bool {
+        self.lower_bound(point) <= reach + self.spacing()
+    }
+
     /// Value, gradient and Hessian of the spline at `point`, wherever it is.
     #[inline]
     pub fn evaluate(&self, point: &Point3<f64>) -> FieldSample {
@@ -160,8 +167,7 @@ impl SdfGrid {
 impl DistanceField for SdfGrid {
     #[inline]
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        // Written so that NaN is far away.
-        if self.lower_bound(point) <= reach {
+        if self.may_be_within(point, reach) {
             let sample = self.evaluate(point);
             return (sample.distance <= reach).then_some(sample);
         }
@@ -170,7 +176,7 @@ impl DistanceField for SdfGrid {
 
     #[inline]
     fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
-        if self.lower_bound(point) <= reach {
+        if self.may_be_within(point, reach) {
             let distance = self.value(point);
             return (distance <= reach).then_some(distance);
         }

@@ -17,14 +17,15 @@ mod warning;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3};
-use prehend_render::DepthImage;
+use prehend_render::{Camera, DepthImage};
 
 pub use self::correction::{
     Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
 };
 pub(crate) use self::model::{check as check_object, likely_unit};
 pub use self::warning::{Subject, Warning};
-use crate::scene::{Frame, HandMeasurement, Object, Pixel, View};
+use crate::scene::{Frame, HandMeasurement, IntrinsicsMistake, Object, Pixel, View};
+use crate::strategy::FitSettings;
 
 use self::correction::settled_pose;
 use self::warning::Warnings;
@@ -41,6 +42,18 @@ pub(crate) fn check_frame(
     if let Err((image, problem)) = observation.check_sizes() {
         let subject = if image == "mask" { Subject::Mask } else { Subject::Depth };
         found.add(subject, format!("the {image} has {problem}"));
+        return found.0;
+    }
+    let Camera { cx, cy, width, height, .. } = observation.camera;
+    if let Some(mistake) = FitSettings::default().likely_mistake(&observation.camera) {
+        let question = match mistake {
+            IntrinsicsMistake::Swapped => "are they swapped, or of the image before it was turned?",
+            IntrinsicsMistake::OfOtherSize(_) => "are intrinsics those of images of another size?",
+        };
+        let message = format!(
+            "the camera has cx {cx}, cy {cy} in images of {width}x{height} pixels: {question}"
+        );
+        found.add(Subject::Camera, message);
         return found.0;
     }
     let hand = observation.hand.as_ref();

@@ -13,6 +13,8 @@ pub enum Subject {
     Pose,
     /// The object's mask.
     Mask,
+    /// Intrinsics of the camera.
+    Camera,
     /// The depth image.
     Depth,
     /// Pose and joints of the hand.

@@ -21,6 +21,8 @@ pub(super) fn read(
 ) -> Result<Value, AssetError> {
     let mesh = TriMesh::load(path)?.scaled(options.mesh_unit);
     let mut fields = of(&mesh, warnings);
+    // As everywhere else: faces that look inward are turned over.
+    let mesh = mesh.faced_outward();
     match options.density.map(|density| (density, mass_properties(&mesh, density))) {
         Some((density, Ok(mass))) => {
             fields["mass"] = json!({

@@ -53,7 +53,7 @@ pub(super) fn of_urdf(
         "name": tree.name(),
         "links": tree.links().len(),
         "shapes": shapes,
-        "mass_kg": inertials.map(|inertial| inertial.mass).sum::<f64>(),
+        "mass_kg": inertials.fold(0.0, |sum, inertial| sum + inertial.mass),
         "motions": motions(&joints),
         "joints": joints,
     }))
@@ -91,7 +91,7 @@ pub(super) fn of_mjcf(
         "name": model.name,
         "links": model.bodies.len(),
         "shapes": model.world_geoms.len() + geoms,
-        "mass_kg": inertials.map(|inertial| inertial.mass).sum::<f64>(),
+        "mass_kg": inertials.fold(0.0, |sum, inertial| sum + inertial.mass),
         "actuators": model.actuators.len(),
         "keyframes": model.keyframes.len(),
         "motions": motions(&joints),

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
-use prehend_render::Backend;
+use prehend_render::{Backend, Camera};
 
 use self::clock::Clock;
 pub use self::clock::Timing;
@@ -316,7 +316,8 @@ impl Tracker {
         if solved.solution.termination == Termination::Aborted && !solved.tried {
             return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
         }
-        let mut posterior = self.posterior(&solved, nominal)?;
+        let camera = &frame.observation().camera;
+        let mut posterior = self.posterior(camera, &solved, nominal)?;
         let rejection = self.gate(
             &solved,
             &posterior,
@@ -333,7 +334,7 @@ impl Tracker {
         let mut is_turned = false;
         if modes.is_new_view(&rotation, self.settings.new_view) && clock.has(2 * timing.steps) {
             let level = track.allowance(self.settings.gating.growth);
-            let followed = Followed { problem: &problem, prediction, nominal, level };
+            let followed = Followed { camera, problem: &problem, prediction, nominal, level };
             if let Some(other) = self.weigh(&followed, &solved, &posterior, &mut modes)? {
                 (solved, posterior) = other;
                 // The way there is not a motion.
@@ -455,7 +456,12 @@ impl Tracker {
     }
 
     /// The posterior of `solved`. Calibrations far from `nominal` are inconsistent, also where the frames before have led them there.
-    fn posterior(&self, solved: &Solved, nominal: &State) -> Result<Posterior, RefineError> {
+    fn posterior(
+        &self,
+        camera: &Camera,
+        solved: &Solved,
+        nominal: &State,
+    ) -> Result<Posterior, RefineError> {
         let at = &solved.solution.at;
         let calibrations_of = State { t_cam_object: nominal.t_cam_object, ..at.state.clone() };
         let stated = GaussianPrior::independent(nominal.clone(), &self.prior)?;
@@ -471,7 +477,7 @@ impl Tracker {
         posterior.inconsistencies.extend(is_significant.then_some(calibrations));
         let FusedSettings { scales, fit, .. } = &self.settings.fused;
         let of_calibrations = ("calibration", 2.0 * stated.cost(&calibrations_of), degrees as f64);
-        posterior.fit = Some(Fit::of_tracked(at, of_calibrations, scales, fit));
+        posterior.fit = Some(Fit::of_tracked(camera, at, of_calibrations, scales, fit));
         Ok(posterior)
     }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use prehend_render::Camera;
 
 use super::memory::Prediction;
 use super::{Solved, Tracker};
@@ -98,6 +99,7 @@ impl Modes {
 
 /// A frame that is tracked, and what is needed to solve it from elsewhere.
 pub(super) struct Followed<'a> {
+    pub(super) camera: &'a Camera,
     pub(super) problem: &'a Problem,
     pub(super) prediction: &'a Prediction,
     pub(super) nominal: &'a State,
@@ -144,7 +146,7 @@ impl Tracker {
         let least = -self.settings.fused.hypotheses.prune_margin;
         modes.prune(least, 0.5 * self.settings.turn);
         let Some((_, in_object, other)) = best else { return Ok(None) };
-        let posterior = self.posterior(&other, frame.nominal)?;
+        let posterior = self.posterior(frame.camera, &other, frame.nominal)?;
         let index = modes.others.iter().position(|mode| mode.in_object == in_object);
         let (Some(index), None) = (index, self.gate(&other, &posterior, None, frame.level)) else {
             return Ok(None);

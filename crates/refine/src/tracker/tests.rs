@@ -233,11 +233,12 @@ fn a_turned_pose_that_fits_better_is_taken() {
     let frame = tracker.frame(&sight, &object).unwrap();
     let (problem, _) = tracker.prepare(&frame, &prediction).unwrap();
     let level = remembered.allowance(GatingSettings::default().growth);
+    let camera = &frame.observation().camera;
     let followed =
-        Followed { problem: &problem, prediction: &prediction, nominal: &nominal, level };
+        Followed { camera, problem: &problem, prediction: &prediction, nominal: &nominal, level };
     let clock = Clock::start(None);
     let right = tracker.solve(&problem, &prediction.state, &clock);
-    let posterior = tracker.posterior(&right, &nominal).unwrap();
+    let posterior = tracker.posterior(camera, &right, &nominal).unwrap();
     let mut modes = Modes::default();
     for _ in 0..3 {
         let none = tracker.weigh(&followed, &right, &posterior, &mut modes).unwrap();

@@ -16,6 +16,7 @@ use self::body::Body;
 use self::header::Element;
 use super::images::Images;
 use super::limits::MAX_ELEMENTS;
+use super::polygon::{Polygons, triangles};
 use super::{MeshError, texture};
 use crate::mesh::TriMesh;
 
@@ -53,7 +54,7 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErr
     let header = header::parse(bytes, path)?;
     let mut body = Body::new(bytes, &header, path);
     let mut mesh = TriMesh::default();
-    let mut corner_uvs = None;
+    let mut faces = Faces::default();
     // Checked before any is read: what a header claims must not cost more than the file is worth.
     for element in header.elements.iter().filter(|e| !e.properties.is_empty()) {
         MeshError::within(path, &format!("element {}", element.name), element.count, MAX_ELEMENTS)?;
@@ -61,10 +62,11 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErr
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(&mut body, element, &mut mesh)?,
-            "face" => corner_uvs = read_faces(&mut body, element, &mut mesh)?,
+            "face" => faces = Faces::read(&mut body, element)?,
             _ => body.rows(element, |_, _| Ok(()))?,
         }
     }
+    let corner_uvs = faces.add_to(&mut mesh);
     if let (None, Some(corners)) = (&mesh.uvs, corner_uvs) {
         mesh = split_seams(mesh, &corners);
     }
@@ -94,47 +96,65 @@ fn read_vertices(body: &mut Body, element: &Element, mesh: &mut TriMesh) -> Resu
     })
 }
 
-/// Texture coordinates of the corners of each triangle.
-type CornerUvs = Vec<[[f32; 2]; 3]>;
+/// Polygons, which a file may list before its vertices.
+#[derive(Default)]
+struct Faces {
+    polygons: Polygons<u32>,
+    /// Texture coordinates of all corners in turn.
+    uvs: Option<Vec<[f32; 2]>>,
+}
 
-fn read_faces(
-    body: &mut Body,
-    element: &Element,
-    mesh: &mut TriMesh,
-) -> Result<Option<CornerUvs>, MeshError> {
-    let list = |names: &[&str]| {
-        element
-            .properties
-            .iter()
-            .position(|p| p.count.is_some() && names.contains(&p.name.as_str()))
-    };
-    let indices = list(&["vertex_indices", "vertex_index"])
-        .ok_or_else(|| MeshError::malformed(body.path, "element face", "no list vertex_indices"))?;
-    let texcoord = list(&["texcoord"]);
-    let mut corner_uvs = texcoord.map(|_| Vec::new());
-    body.rows(element, |_, row| {
-        let polygon = polygon(&row[indices])?;
-        let fan = 1..polygon.len() - 1;
-        mesh.faces.extend(fan.clone().map(|k| [polygon[0], polygon[k], polygon[k + 1]]));
-        if let (Some(at), Some(corners)) = (texcoord, &mut corner_uvs) {
-            let uv = &row[at];
-            // MeshLab writes an empty list for a face without texture.
-            if !uv.is_empty() && uv.len() != 2 * polygon.len() {
-                return Err(format!(
-                    "texcoord has {} values for {} corners",
-                    uv.len(),
-                    polygon.len()
-                ));
+impl Faces {
+    fn read(body: &mut Body, element: &Element) -> Result<Self, MeshError> {
+        let list = |names: &[&str]| {
+            element
+                .properties
+                .iter()
+                .position(|p| p.count.is_some() && names.contains(&p.name.as_str()))
+        };
+        let indices = list(&["vertex_indices", "vertex_index"]).ok_or_else(|| {
+            MeshError::malformed(body.path, "element face", "no list vertex_indices")
+        })?;
+        let texcoord = list(&["texcoord"]);
+        let mut faces = Self { uvs: texcoord.map(|_| Vec::new()), ..Self::default() };
+        body.rows(element, |_, row| {
+            let polygon = polygon(&row[indices])?;
+            if let (Some(at), Some(uvs)) = (texcoord, &mut faces.uvs) {
+                let (uv, corners) = (&row[at], polygon.len());
+                // MeshLab writes an empty list for a face without texture.
+                match uv.len() {
+                    0 => uvs.extend(vec![[0.0; 2]; corners]),
+                    n if n == 2 * corners => {
+                        uvs.extend(
+                            uv.as_chunks().0.iter().map(|uv: &[f64; 2]| uv.map(|c| c as f32)),
+                        );
+                    }
+                    n => return Err(format!("texcoord has {n} values for {corners} corners")),
+                }
             }
-            let corner = |k: usize| match uv.get(2 * k..2 * k + 2) {
-                Some(&[u, v]) => [u as f32, v as f32],
-                _ => [0.0; 2],
-            };
-            corners.extend(fan.map(|k| [corner(0), corner(k), corner(k + 1)]));
+            faces.polygons.push(polygon);
+            Ok(())
+        })?;
+        Ok(faces)
+    }
+
+    /// Adds the triangles of all polygons to a mesh that has its vertices; their corners' texture coordinates, where there are any.
+    fn add_to(self, mesh: &mut TriMesh) -> Option<Vec<[[f32; 2]; 3]>> {
+        let mut corner_uvs = self.uvs.as_ref().map(|_| Vec::new());
+        let mut first = 0;
+        for polygon in self.polygons.iter() {
+            // An index out of range is reported by the caller's check.
+            let position = |&v: &u32| mesh.vertices.get(v as usize).copied().unwrap_or_default();
+            for triangle in triangles(&polygon.iter().map(position).collect::<Vec<_>>()) {
+                mesh.faces.push(triangle.map(|k| polygon[k]));
+                if let (Some(uvs), Some(corners)) = (&self.uvs, &mut corner_uvs) {
+                    corners.push(triangle.map(|k| uvs[first + k]));
+                }
+            }
+            first += polygon.len();
         }
-        Ok(())
-    })?;
-    Ok(corner_uvs)
+        corner_uvs
+    }
 }
 
 fn polygon(values: &[f64]) -> Result<Vec<u32>, String> {
@@ -347,5 +367,29 @@ mod tests {
         assert_eq!(mesh.uvs.unwrap()[3], [0.5, 0.5]);
         let short = text.replace("6 0 0 1 0 1 1", "4 0 0 1 0");
         assert!(load(short.as_bytes()).unwrap_err().to_string().contains("face 0: texcoord"));
+    }
+
+    #[test]
+    fn polygons_may_be_concave_and_come_first() {
+        let faces = "4 1 2 3 0 8 0 0 0.1 0 0.2 0 0.3 0\n3 0 1 2 0\n";
+        let vertices = "0 3 0\n-1 0 0\n0 1 0\n1 0 0\n";
+        let of_faces = "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n";
+        let of_vertices =
+            "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+        for [header, body] in [
+            [[of_faces, of_vertices].concat(), [faces, vertices].concat()],
+            [[of_vertices, of_faces].concat(), [vertices, faces].concat()],
+        ] {
+            let text = format!("ply\nformat ascii 1.0\n{header}end_header\n{body}");
+            let mesh = load(text.as_bytes()).unwrap();
+            assert!((mesh.area() - 3.0).abs() < 1e-12, "{}", mesh.area());
+            let (uvs, corner) = (mesh.uvs.as_ref().unwrap(), mesh.faces[0].map(|v| v as usize));
+            for v in corner {
+                // Left, middle, right, tip: from 0 on in steps of 0.1.
+                let place = [[-1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 3.0]];
+                let k = place.iter().position(|p| *p == [mesh.vertices[v].x, mesh.vertices[v].y]);
+                assert!((uvs[v][0] - 0.1 * k.unwrap() as f32).abs() < 1e-6);
+            }
+        }
     }
 }

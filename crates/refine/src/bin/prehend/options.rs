@@ -21,6 +21,7 @@ use prehend_render::{Backend, Device};
 use strum::{Display, VariantNames};
 
 use crate::failures::Failures;
+use crate::terminal::complain;
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -257,7 +258,12 @@ pub(crate) fn write_poses(
     failures: &mut Failures,
 ) -> Result<(), DatasetError> {
     if rows.is_empty() {
-        failures.add(format!("there is no pose, {} was not written", out.display()));
+        let text = format!("there is no pose, {} was not written", out.display());
+        // No failure beside the one that it comes from.
+        match failures.is_empty() {
+            true => failures.add(text),
+            false => complain(text),
+        }
         return Ok(());
     }
     share_image_times(&mut rows);

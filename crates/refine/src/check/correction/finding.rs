@@ -35,9 +35,10 @@ pub fn find_corrections(
 ) -> Vec<Finding> {
     let (found, explained) = (Vec::new(), vec![false; trials.len()]);
     let mut search = Search { trials, settings, found, explained };
+    search.intrinsics();
     let of_color = |t: &Tried| t.correction == Correction::ChannelsSwapped;
     search.level(|_, _| 0, &|t| !of_color(t));
-    search.level(|_, target| target.obj_id, &|t| t.correction == Correction::ModelUnit);
+    search.level(|_, target| target.obj_id, &|t| t.correction.is_of_model());
     search.level(|_, target| target.scene_id, &|t| t.correction.is_of_scene());
     // Of one frame alone only what nothing else could be.
     search.level(|k, _| k as u32, &|t| {
@@ -61,6 +62,27 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Adds the corrections of intrinsics, scene by scene.
+    fn intrinsics(&mut self) {
+        for group in groups(self.trials, |_, target| target.scene_id) {
+            let mut frames: BTreeMap<Correction, (f64, Vec<usize>)> = BTreeMap::new();
+            for k in group {
+                let Some((correction, factor)) = self.trials[k].1.intrinsics else { continue };
+                frames.entry(correction).or_insert((factor, Vec::new())).1.push(k);
+                self.explained[k] = true;
+            }
+            let finding = |(correction, (factor, frames))| Finding {
+                correction,
+                factor,
+                frames,
+                alternative: None,
+                agreement: None,
+                sigma: None,
+            };
+            self.found.extend(frames.into_iter().map(finding));
+        }
+    }
+
     /// Adds what explains those trials of one `key`, of their index and target, that are not explained yet, of the corrections that `admits` lets through.
     fn level(&mut self, key: impl Fn(usize, &Target) -> u32, admits: &dyn Fn(&Tried) -> bool) {
         for mut group in groups(self.trials, key) {
@@ -95,7 +117,7 @@ fn explain(
     let candidates = group.iter().map(|&k| trials[k].1.tried.len()).max()?;
     let helps = |(tried, count): &(Tried, usize)| {
         let [given, corrected] = tried.agreement;
-        // Most of the group must need it; few have colors.
+        // Most of the group must need it; few have colors. A rotation that fits one view better may be any.
         let (most, [always, of_one]) = match tried.correction {
             Correction::ChannelsSwapped => (0, settings.color_gain),
             unnamed if unnamed.is_unnamed() => (group.len() / 2, [settings.unnamed_gain, 0.0]),
@@ -115,11 +137,16 @@ fn explain(
         let unnamed = a.correction.is_unnamed().cmp(&b.correction.is_unnamed());
         unnamed.then(a.oddness.total_cmp(&b.oddness))
     });
-    let first = best[0];
+    let mut first = best[0];
+    let is_certain = !first.correction.is_rotation() || group.len() > 2;
     let other = best[1..].iter().find(|t| {
         let differs = t.correction != first.correction;
-        differs && !t.correction.is_unnamed() && t.oddness - first.oddness < settings.oddness
+        let is_usual = t.oddness - first.oddness < settings.oddness;
+        is_certain && differs && !t.correction.is_unnamed() && is_usual
     });
+    if !is_certain {
+        first.correction = Correction::Rotation;
+    }
     let mut frames = group.to_vec();
     if first.correction == Correction::ChannelsSwapped {
         let is_same = |tried: &Tried| tried.correction == first.correction;
@@ -167,6 +194,9 @@ impl Finding {
                 " ({what} of {count} {frames} then agree by {corrected:.0} %, as they are by {given:.0} %)"
             );
         }
+        if self.agreement.is_none() && self.sigma.is_none() {
+            text += &format!(" (from the principal point of {count} {frames})");
+        }
         if let Some(sigma) = self.sigma {
             text += &format!(" (from outlines and depth of {count} {frames}, ± {sigma:.3})");
         }
@@ -181,6 +211,7 @@ impl Finding {
         match warning.subject {
             // What is felt where the object is, not how hard.
             Subject::Model | Subject::Touch => false,
+            Subject::Camera => matches!(kind, PrincipalPointSwapped | CameraOfOtherSize),
             Subject::ModelUnit => matches!(kind, ModelUnit | ModelAndPoseUnit),
             Subject::Hand => is_of_place && (kind == FocalLength || by_agreement),
             Subject::TouchPlace => is_of_place && by_agreement,

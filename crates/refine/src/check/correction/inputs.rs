@@ -91,7 +91,7 @@ impl Inputs {
             FocalLength => self.seen_by(Camera { fx: fx * value, fy: fy * value, ..camera }),
             MaskInverted => Self { mask_inverted: !self.mask_inverted, ..self },
             Translation => Self { is_placed: false, ..self },
-            ChannelsSwapped => self,
+            ChannelsSwapped | Rotation => self,
         }
     }
 }

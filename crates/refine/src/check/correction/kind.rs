@@ -28,6 +28,8 @@ pub enum Correction {
     OpenGlRotation,
     /// {poses}: {R} and {t}: poses are inverted, of a camera with axes of OpenGL in the object's frame; invert them (R ← Rᵀ, t ← −Rᵀt), then negate the second and third row of R and of t
     PoseInvertedOpenGl,
+    /// {poses}: {R}: rotations are wrong while translations fit; check their convention (transposed, order of quaternions, axes of OpenGL), and which way up images are
+    Rotation,
     /// {masks}: masks are inverted; make pixels of the object non-zero and all others zero
     MaskInverted,
     /// {camera}: {K}: cx and cy are swapped; exchange them (cx is entry 2 and cy entry 5, counted from 0)
@@ -49,8 +51,13 @@ pub enum Correction {
 /// Powers of ten that units differ by.
 const UNITS: [f64; 6] = [1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3];
 
-/// Logarithm of a factor between sizes that is none.
-const NEARLY: f64 = 0.1;
+/// Scales of models that are fitted from: a model of another size may fit nowhere near its own.
+const SIZES: [f64; 4] = [0.5, 0.7, 1.4, 2.0];
+
+/// True of a factor between sizes that is none.
+pub(super) fn is_nearly_one(factor: f64) -> bool {
+    factor.ln().abs() <= 0.1
+}
 
 /// Corrections that are tried, each with its factor; `to_fit` makes the principal point that of the image's middle, and depth has to be multiplied by
 /// `depth` to be that of the pose. In each frame they are the same ones.
@@ -60,10 +67,11 @@ pub(super) fn candidates(to_fit: f64, depth: Option<f64>) -> Vec<(Correction, f6
         PoseUnit | ModelUnit | DepthUnit | ModelAndPoseUnit => UNITS.to_vec(),
         // Those between common sizes of images; one that is nearly there is of this size.
         CameraOfOtherSize => {
-            vec![0.5, 2.0, if to_fit.ln().abs() > NEARLY { to_fit } else { f64::NAN }]
+            vec![0.5, 2.0, if is_nearly_one(to_fit) { f64::NAN } else { to_fit }]
         }
         DepthScale => vec![depth.unwrap_or(f64::NAN)],
-        ModelScale | FocalLength => Vec::new(),
+        ModelScale => SIZES.to_vec(),
+        FocalLength | Rotation => Vec::new(),
         _ => vec![1.0],
     };
     let all = |kind| factors(kind).into_iter().map(move |factor| (kind, factor));
@@ -103,10 +111,18 @@ impl Correction {
         )
     }
 
+    /// A mistake that all frames of an object have in common.
+    pub(super) fn is_of_model(self) -> bool {
+        matches!(self, Self::ModelUnit | Self::ModelScale)
+    }
+
     /// A rotation alone: an object that looks much the same from two sides agrees nearly as well without.
     pub(super) fn is_rotation(self) -> bool {
         use Correction::*;
-        matches!(self, RotationTransposed | QuaternionXyzw | QuaternionWxyz | OpenGlRotation)
+        matches!(
+            self,
+            RotationTransposed | QuaternionXyzw | QuaternionWxyz | OpenGlRotation | Rotation
+        )
     }
 
     /// A value that is not known beforehand: what has a name explains as well.

@@ -29,7 +29,7 @@ settings! {
         pub shift: [f64; 2] = [0.1, 0.3],
         /// Standard deviation of their rotation \[rad\]: the coarser ones are off by 16° on average.
         pub turn: f64 = 0.5,
-        /// Agreement from which on nothing but rotations is tried: right inputs agree by nine tenths, of little hidden objects.
+        /// Agreement from which on nothing but rotations and sizes is tried: right inputs agree by nine tenths, of little hidden objects.
         pub good: f64 = 0.8,
         /// Agreement from which on what a fit says of sizes is believed: a wrong focal length takes the hand's part of it away.
         pub sized: f64 = 0.7,

@@ -24,6 +24,11 @@ fn scenes() -> impl Iterator<Item = Scene> {
 
 /// What is found in four scenes that are changed alike, with hand and depth or without.
 fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
+    found_in(4, bare, change)
+}
+
+/// What is found in the first `count` scenes.
+fn found_in(count: usize, bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     let settings = CorrectionSettings::default();
     let trial = |(k, mut scene): (usize, Scene)| {
         change(&mut scene);
@@ -35,7 +40,7 @@ fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
         let trial = CorrectionTrial::new(&observation, &object, &initial, &settings);
         (Target { scene_id: 1, im_id: k as u32, obj_id: 5, instance: 0 }, trial.unwrap())
     };
-    let trials: Vec<_> = scenes().enumerate().map(trial).collect();
+    let trials: Vec<_> = scenes().take(count).enumerate().map(trial).collect();
     find_corrections(&trials, &settings)
 }
 
@@ -226,6 +231,34 @@ fn sizes_of_models_and_focal_lengths() {
             let camera = &mut scene.frame.camera;
             (camera.fx, camera.fy) = (camera.fx / factor, camera.fy / factor);
         });
+    }
+}
+
+/// Models far from their size, with the hand or without.
+#[test]
+fn models_of_another_size() {
+    for factor in [0.5, 0.62, 0.7, 1.4, 1.6, 1.8, 2.0] {
+        named(Correction::ModelScale, factor, sized(1.0 / factor));
+        let found = found(false, &|scene| {
+            sized(1.0 / factor)(scene);
+            scene.frame.hand = None;
+        });
+        let [finding] = &found[..] else { panic!("{factor}: {found:#?}") };
+        assert_eq!(finding.correction, Correction::ModelScale, "{finding:#?}");
+        assert!((finding.factor / factor).ln().abs() < 0.05, "{factor}: {finding:#?}");
+    }
+}
+
+/// One view does not tell which mistake of a rotation it is.
+#[test]
+fn rotations_of_a_single_view() {
+    let about_view = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+    let mistakes: [&dyn Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>; 3] =
+        [&|q| q.inverse(), &|q| flip() * q, &|q| about_view * q];
+    for mistake in mistakes {
+        let found = found_in(1, false, &turned(mistake));
+        let kinds: Vec<_> = found.iter().map(|finding| finding.correction).collect();
+        assert!(kinds.is_empty() || kinds == [Correction::Rotation], "{found:#?}");
     }
 }
 

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use super::alignment::Fitted;
 use super::evidence::FrameImages;
 use super::inputs::Inputs;
-use super::kind::{Correction, candidates};
+use super::kind::{Correction, candidates, is_nearly_one};
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
-use crate::scene::{Frame, Object};
+use crate::scene::{Frame, IntrinsicsMistake, Object};
+use crate::strategy::FitSettings;
 
 /// A frame with each correction tried.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,8 @@ pub struct CorrectionTrial {
     pub(super) tried: Vec<Option<Tried>>,
     /// Information about the model's scale and the focal length.
     pub(super) size: Option<Size>,
+    /// Correction of the intrinsics that the principal point tells, with its factor; then nothing else is tried.
+    pub(super) intrinsics: Option<(Correction, f64)>,
 }
 
 /// One correction of a frame, or of several on average.
@@ -57,14 +60,19 @@ impl CorrectionTrial {
         t_cam_object: &Isometry3<f64>,
         settings: &CorrectionSettings,
     ) -> Result<Self, RefineError> {
-        if !observation.is_segmented() {
-            return Ok(Self::default());
+        let mistake = FitSettings::default().likely_mistake(&observation.camera);
+        let intrinsics = mistake.map(|mistake| match mistake {
+            IntrinsicsMistake::Swapped => (Correction::PrincipalPointSwapped, 1.0),
+            IntrinsicsMistake::OfOtherSize(factor) => (Correction::CameraOfOtherSize, factor),
+        });
+        if intrinsics.is_some() || !observation.is_segmented() {
+            return Ok(Self { intrinsics, ..Self::default() });
         }
         let evidence = FrameImages::new(observation, object, t_cam_object, settings)?;
         let given = evidence.given;
         let agreement = |fitted: &Option<Fitted>| fitted.as_ref().map_or(0.0, |f| f.agreement);
         let [plain, sized] = [false, true].map(|sized| evidence.fit(&given, sized));
-        // A model of another size is no other mistake.
+        // A model that is a little off is no other mistake.
         let as_given = agreement(&plain).max(agreement(&sized));
         let is_sized = |fitted: &Fitted| evidence.has_depth && fitted.agreement >= settings.sized;
         let size = sized.filter(is_sized).and_then(|fitted| Size::of(&fitted, &evidence));
@@ -81,17 +89,24 @@ impl CorrectionTrial {
                 let colors = evidence.color_agreement(&fitted.inputs)?;
                 return tried([colors, 1.0 - colors], fitted.inputs.meters);
             }
-            let needed = as_given < settings.good || correction.is_rotation();
+            let always = correction.is_rotation() || correction == Correction::ModelScale;
+            let needed = as_given < settings.good || always;
             if !(needed && value.is_finite() && value > 0.0) {
                 return None;
             }
             let inputs = given.corrected(correction, value);
-            let fitted = evidence.fit(&inputs, false);
+            let fitted = evidence.fit(&inputs, correction == Correction::ModelScale);
             let meters = fitted.as_ref().map_or(inputs.meters, |f| f.inputs.meters);
-            tried([as_given, agreement(&fitted)], meters)
+            let mut tried = tried([as_given, agreement(&fitted)], meters)?;
+            if correction == Correction::ModelScale {
+                tried.value = meters / given.meters;
+            }
+            // One that is nearly of its size is measured.
+            let is_other = correction != Correction::ModelScale || !is_nearly_one(tried.value);
+            is_other.then_some(tried)
         };
         let tried = candidates(to_fit, evidence.depth_ratio()).par_iter().map(attempt).collect();
-        Ok(Self { tried, size })
+        Ok(Self { tried, size, intrinsics: None })
     }
 }
 

@@ -225,7 +225,11 @@ pub(crate) fn check_size(file: &Path, other: &Path) -> Result<(), DatasetError> 
     if (w, h) == (width, height) {
         return Ok(());
     }
-    let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
+    let mut problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
+    if (w, h) == (height, width) {
+        problem +=
+            ": one of them is turned by 90°; images are read as their EXIF orientation shows them";
+    }
     Err(DatasetError::unusable(file, problem))
 }
 

@@ -2,9 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use prehend_render::Camera;
+
 use crate::defaults::settings;
 use crate::factor::{NoiseEstimate, ScaleSettings, Scales};
 use crate::problem::{Contribution, Linearization};
+use crate::scene::IntrinsicsMistake;
 
 settings! {
     /// Settings of the test of fit.
@@ -15,6 +18,8 @@ settings! {
         pub fault: f64 = 0.005,
         /// Standard deviation of the logarithm of the scale of its residuals then.
         pub fault_scale: f64 = std::f64::consts::LN_10,
+        /// Standard deviation of the principal point from the image's middle, as a part of the width: lenses are off by a few percent.
+        pub principal_point: f64 = 0.05,
     }
 }
 
@@ -42,11 +47,14 @@ pub struct Fit {
     pub probability: f64,
     /// What was compared.
     pub consistency: Vec<Consistency>,
+    /// Probability that the intrinsics are not those of the images.
+    pub camera: f64,
 }
 
 impl Fit {
-    /// Of the solution `point` with these scales; `noise` is that of depth with the nominal deviation of a point.
+    /// Of the solution `point` before `camera` with these scales; `noise` is that of depth with the nominal deviation of a point.
     pub(super) fn new(
+        camera: &Camera,
         point: &Linearization,
         scales: &Scales,
         noise: Option<(NoiseEstimate, f64)>,
@@ -62,11 +70,12 @@ impl Fit {
         let groups = scales.iter();
         logs.extend(groups.map(|(group, log, _)| (group.name(), log - common, prior.own)));
         logs.push(("calibration", common, prior.common));
-        Self::of_logs(&logs, settings)
+        Self::of_logs(camera, &logs, settings)
     }
 
     /// Of a solution whose calibrations deviate from their nominal values by a χ² of so many degrees of freedom.
     pub(crate) fn of_tracked(
+        camera: &Camera,
         point: &Linearization,
         (name, chi_square, degrees): (&'static str, f64, f64),
         prior: &ScaleSettings,
@@ -78,23 +87,26 @@ impl Fit {
             let sigma = prior.own.hypot((0.5 / degrees).sqrt());
             logs.push((name, 0.5 * (chi_square / degrees).ln(), sigma));
         }
-        Self::of_logs(&logs, settings)
+        Self::of_logs(camera, &logs, settings)
     }
 
-    /// Of logarithms of scales, with their names and their standard deviations where nothing is wrong.
-    fn of_logs(logs: &[(&'static str, f64, f64)], settings: &FitSettings) -> Self {
+    /// Of a camera, and of logarithms of scales, with their names and their standard deviations where nothing is wrong.
+    fn of_logs(camera: &Camera, logs: &[(&'static str, f64, f64)], settings: &FitSettings) -> Self {
         let of = |&(name, log_scale, sigma): &(&'static str, f64, f64)| {
             let fault = settings.probability_of_fault(log_scale, sigma);
             Consistency { name, log_scale, sigma, fault }
         };
         let consistency: Vec<_> = logs.iter().map(of).collect();
-        let probability = consistency.iter().map(|of| 1.0 - of.fault).product();
-        Self { probability, consistency }
+        let sound: f64 = consistency.iter().map(|of| 1.0 - of.fault).product();
+        let camera = settings.probability_of_mistake(camera);
+        Self { probability: sound * (1.0 - camera), consistency, camera }
     }
 
     /// Evidence that is more probably of something else than not, and how probably, the most probable first.
     pub fn misfits(&self) -> Vec<(&'static str, f64)> {
-        let mut misfits: Vec<_> = self.consistency.iter().map(|of| (of.name, of.fault)).collect();
+        let of_camera = ("camera", self.camera);
+        let consistency = self.consistency.iter().map(|of| (of.name, of.fault));
+        let mut misfits: Vec<_> = consistency.chain([of_camera]).collect();
         misfits.retain(|(_, fault)| *fault > 0.5);
         misfits.sort_by(|a, b| b.1.total_cmp(&a.1));
         misfits
@@ -113,6 +125,17 @@ fn of_factors(point: &Linearization, prior: &ScaleSettings) -> Vec<(&'static str
 }
 
 impl FitSettings {
+    /// The mistake that intrinsics more probably have than not.
+    pub(crate) fn likely_mistake(&self, camera: &Camera) -> Option<IntrinsicsMistake> {
+        IntrinsicsMistake::likely(camera, self.principal_point, self.fault)
+    }
+
+    /// The probability that intrinsics are wrong.
+    fn probability_of_mistake(&self, camera: &Camera) -> f64 {
+        let all = IntrinsicsMistake::probabilities(camera, self.principal_point, self.fault);
+        all.iter().map(|(_, probability)| probability).sum()
+    }
+
     /// The probability that evidence of this logarithm of a scale, of standard deviation `sigma` where nothing is wrong, is of something else.
     fn probability_of_fault(&self, log_scale: f64, sigma: f64) -> f64 {
         let density =

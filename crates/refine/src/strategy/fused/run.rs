@@ -102,7 +102,8 @@ impl<'a> Run<'a> {
             let noise = depth_noise(self.frame, &found[0].at.state, nominal);
             let noise = noise.map(|noise| (noise, nominal.depth.noise.sigma));
             let (scales, settings) = (&self.scales, &nominal.fit);
-            let fit = Fit::new(&found[0].at, scales, noise, &nominal.scales, settings);
+            let camera = &self.frame.observation().camera;
+            let fit = Fit::new(camera, &found[0].at, scales, noise, &nominal.scales, settings);
             posterior.fit = Some(fit);
         }
         Ok(recorder.estimate(Some(posterior)))

@@ -3,6 +3,7 @@
 mod meshes;
 mod scenes;
 mod trial;
+mod values;
 
 use std::path::Path;
 

@@ -40,6 +40,16 @@ function decodeMesh(mesh) {
   return { positions: new Float32Array(bytesOf(mesh.positions).buffer), colors, faces: new Uint16Array(bytesOf(mesh.faces).buffer) };
 }
 
+/** Diagonal of the bounding box of points. */
+function diagonal(positions) {
+  const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  positions.forEach((v, k) => {
+    low[k % 3] = Math.min(low[k % 3], v);
+    high[k % 3] = Math.max(high[k % 3], v);
+  });
+  return norm(minus(high, low));
+}
+
 /** A sphere of radius one. */
 function ball(rows = 12, segments = 24) {
   const [positions, faces] = [[], []];
@@ -98,7 +108,7 @@ class SceneView {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
     }
-    return { array, positionBuffer, colorBuffer, colors, count: faces ? faces.length : positions.length / 3 };
+    return { array, positionBuffer, colorBuffer, colors, diagonal: diagonal(positions), count: faces ? faces.length : positions.length / 3 };
   }
 
   /** Frees what was uploaded without faces. */
@@ -154,7 +164,7 @@ class SceneView {
     this.turn = 0;
     this.tilt = 0;
     // The object and the fingers around it fill the view.
-    this.distance = Math.max(0.16, 1.2 * norm(this.data.meshes[this.scene.object].size));
+    this.distance = Math.max(0.16, 1.2 * this.mesh(this.scene.object).diagonal);
     this.draw();
   }
 
