@@ -7,10 +7,10 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_100),
-    ("geometry", 16_170),
+    ("geometry", 15_620),
     ("sim", 16_370),
-    ("render", 10_900),
-    ("refine", 29_652),
+    ("render", 10_930),
+    ("refine", 29_790),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

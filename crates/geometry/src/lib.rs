@@ -11,7 +11,6 @@ mod expansion;
 mod field;
 pub mod hand;
 mod hull;
-pub mod icp;
 mod inertial;
 mod io;
 pub mod mass;
@@ -37,7 +36,7 @@ pub mod volume;
 mod weld;
 
 pub use closest::ClosestPoints;
-pub use cloud::{KdTree, PointCloud};
+pub use cloud::KdTree;
 pub use contact_area::contact_area;
 pub use field::{DistanceField, FieldSample};
 pub use inertial::Inertial;

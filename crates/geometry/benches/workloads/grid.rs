@@ -1,4 +1,4 @@
-//! Signed distance at 128³ points about the body: all of them, and a narrow band.
+//! Signed distance at 128³ points about the body.
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::{ClosestPoints, SdfGrid, TriMesh};
@@ -7,9 +7,6 @@ use super::oracle;
 use super::table::Comparison;
 
 const COUNT: usize = 128;
-/// Half the width of the band, in spacings.
-const BAND: f64 = 4.0;
-
 /// A cube of 128³ points, 1.25 times as large as the body.
 pub(crate) struct Lattice {
     pub(crate) points: Vec<Point3<f64>>,
@@ -27,11 +24,6 @@ impl Lattice {
         let place = |i: usize| [i / (COUNT * COUNT), i / COUNT % COUNT, i % COUNT];
         let point = |i| low + Vector3::from(place(i).map(|k| k as f64 * spacing));
         Self { points: (0..COUNT.pow(3)).map(point).collect(), low, spacing }
-    }
-
-    /// The distance up to which the band is asked for \[m\].
-    pub(crate) fn reach(&self) -> f64 {
-        BAND * self.spacing
     }
 
     /// The same points as this crate describes them.
@@ -56,26 +48,5 @@ pub(crate) fn whole<'a>(
     let mut job = Comparison::new("SDF 128³", "m", 1e-7, truth);
     let ours = || SdfGrid::build_on(tree, lattice.ours());
     job.add("ours", ours, |grid| lattice.values(&grid));
-    job
-}
-
-/// The answers are the signed distances where the surface is within four spacings, and four spacings elsewhere.
-pub(crate) fn band<'a>(
-    body: &TriMesh,
-    tree: &'a ClosestPoints,
-    lattice: &'a Lattice,
-) -> Comparison<'a> {
-    let reach = lattice.reach();
-    let near = |p: &_| {
-        let distance = oracle::signed_distance(body, p);
-        if distance.abs() > reach { reach } else { distance }
-    };
-    let truth = oracle::truth(&lattice.points, 2000, near);
-    let mut job = Comparison::new("SDF 128³, band of 4", "m", 1e-7, truth);
-    let ours = move || SdfGrid::build_band_on(tree, lattice.ours(), reach).expect("a band");
-    // Cut values come back from the spline with a rounding error.
-    let cut = reach * (1.0 - 1e-9);
-    let within = move |distance: f64| if distance.abs() < cut { distance } else { reach };
-    job.add("ours", ours, move |grid| lattice.values(&grid).into_iter().map(within).collect());
     job
 }

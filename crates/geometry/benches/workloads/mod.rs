@@ -15,10 +15,9 @@ pub(crate) mod sign;
 pub(crate) mod table;
 
 use nalgebra::Point3;
-use prehend_geometry::icp::CloudTarget;
 use prehend_geometry::{ClosestPoints, KdTree, TriMesh};
 
-use self::cloud::Registration;
+use self::cloud::Clouds;
 use self::grid::Lattice;
 use self::points::QuerySet;
 use self::sign::Tetrahedron;
@@ -44,9 +43,8 @@ pub(crate) struct Scenes {
     /// The body in many poses about the hand.
     pub(crate) posed: Vec<TriMesh>,
     pub(crate) cubes: Vec<overlap::Cubes>,
-    pub(crate) registration: Registration,
+    pub(crate) clouds: Clouds,
     pub(crate) neighbors: KdTree,
-    pub(crate) target: CloudTarget,
 }
 
 impl Scenes {
@@ -55,8 +53,8 @@ impl Scenes {
     pub(crate) fn new() -> Self {
         let body = bodies::body();
         let links = bodies::hand();
-        let registration = Registration::new(&body);
-        let (neighbors, target) = registration.prepared();
+        let clouds = Clouds::new(&body);
+        let neighbors = KdTree::new(&clouds.target).expect("finite points");
         let mut hand = TriMesh::default();
         links.iter().for_each(|link| hand.append(link));
         Self {
@@ -68,9 +66,8 @@ impl Scenes {
             pair: bodies::pair(),
             posed: overlap::poses().iter().map(|pose| body.transformed(pose)).collect(),
             cubes: overlap::cubes(),
-            registration,
+            clouds,
             neighbors,
-            target,
             body,
             links,
             hand,
@@ -85,7 +82,6 @@ pub(crate) struct Comparisons<'a> {
     pub(crate) contact: Comparison<'a>,
     pub(crate) sign: Comparison<'a>,
     pub(crate) grid: Comparison<'a>,
-    pub(crate) band: Comparison<'a>,
     pub(crate) union: Comparison<'a>,
     pub(crate) pair: Comparison<'a>,
     pub(crate) grasp: Comparison<'a>,
@@ -93,7 +89,6 @@ pub(crate) struct Comparisons<'a> {
     pub(crate) cubes: Comparison<'a>,
     pub(crate) cloud: Comparison<'a>,
     pub(crate) nearest: Comparison<'a>,
-    pub(crate) registration: Comparison<'a>,
 }
 
 impl<'a> Comparisons<'a> {
@@ -106,15 +101,13 @@ impl<'a> Comparisons<'a> {
             contact: contact::area(hand, &scenes.samples),
             sign: sign::of_tetrahedron(&scenes.tetrahedron),
             grid: grid::whole(body, tree, &scenes.lattice),
-            band: grid::band(body, tree, &scenes.lattice),
             union: overlap::union(links),
             pair: overlap::pair(&scenes.pair),
             grasp: overlap::grasp(links, body),
             poses: overlap::in_poses(links, &scenes.posed),
             cubes: overlap::of_cubes(&scenes.cubes),
-            cloud: cloud::build(&scenes.registration),
-            nearest: cloud::nearest(&scenes.registration, &scenes.neighbors),
-            registration: cloud::registration(&scenes.registration, &scenes.target),
+            cloud: cloud::build(&scenes.clouds),
+            nearest: cloud::nearest(&scenes.clouds, &scenes.neighbors),
         }
     }
 
@@ -129,7 +122,6 @@ impl<'a> Comparisons<'a> {
             self.contact,
             self.sign,
             self.grid,
-            self.band,
             self.union,
             self.pair,
             self.grasp,
@@ -137,7 +129,6 @@ impl<'a> Comparisons<'a> {
             self.cubes,
             self.cloud,
             self.nearest,
-            self.registration,
         ]);
     }
 }

@@ -1,8 +1,8 @@
 //! Distance grids in files.
 //!
 //! Little-endian: `PREHSDF` and a zero byte; version (u32); samples along each axis (3 × u32); first sample \[m\] (3 ×
-//! f64); spacing \[m\] (f64); smallest and largest corner of the shape's box \[m\] (6 × f64); band \[m\] (f64,
-//! infinite for none); spline coefficients (f64, two more than samples along each axis, the last axis
+//! f64); spacing \[m\] (f64); smallest and largest corner of the shape's box \[m\] (6 × f64);
+//! spline coefficients (f64, two more than samples along each axis, the last axis
 //! fastest); and a hash of all that by 64-bit words after the first 8 bytes (u64).
 
 use std::path::Path;
@@ -15,10 +15,10 @@ use crate::io::read_plain;
 use crate::io::{MeshError, write_atomic};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// No grid takes more: a spare coefficient on both sides of each axis at most doubles it.
-const MAX_BYTES: usize = 128 + 8 * (8 * MAX_SAMPLES);
+const MAX_BYTES: usize = 120 + 8 * (8 * MAX_SAMPLES);
 
 impl SdfGrid {
     /// Writes the grid to a file, atomically.
@@ -42,7 +42,7 @@ impl SdfGrid {
     }
 
     fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(128 + 8 * self.coefficients.len());
+        let mut bytes = Vec::with_capacity(120 + 8 * self.coefficients.len());
         bytes.extend(MAGIC);
         bytes.extend(VERSION.to_le_bytes());
         // At most MAX_SAMPLES, so that they fit.
@@ -50,7 +50,7 @@ impl SdfGrid {
         let origin = self.lattice.origin();
         let header = [self.spacing()];
         let bounds = self.bounds.0.iter().chain(self.bounds.1.iter());
-        let numbers = origin.iter().chain(&header).chain(bounds).chain([&self.band]);
+        let numbers = origin.iter().chain(&header).chain(bounds);
         numbers.chain(&self.coefficients).for_each(|x| bytes.extend(x.to_le_bytes()));
         bytes.extend(hash(&bytes[MAGIC.len()..]).to_le_bytes());
         bytes
@@ -80,10 +80,6 @@ impl SdfGrid {
         if !(0..3).all(|i| bounds.0[i] <= bounds.1[i] && (bounds.1[i] - bounds.0[i]).is_finite()) {
             return Err(("bounds", "not finite or of a negative size".into()));
         }
-        let band = number(&mut left, "band")?;
-        if band.is_nan() || band < spacing {
-            return Err(("band", format!("{band} m is narrower than the spacing")));
-        }
         // The lattice keeps this from overflowing.
         let count: usize = dims.iter().map(|n| n + 2).product();
         if left.len() != 8 * count + 8 {
@@ -104,7 +100,7 @@ impl SdfGrid {
         if !coefficients.iter().all(|c| c.abs() <= longest) {
             return Err(("coefficients", format!("not all are within {longest:e} m")));
         }
-        Ok(Self::from_coefficients(lattice, coefficients, bounds, band))
+        Ok(Self::from_coefficients(lattice, coefficients, bounds))
     }
 }
 
@@ -145,7 +141,7 @@ mod tests {
     fn grid() -> SdfGrid {
         let mesh = ClosestPoints::new(&cuboid(Vector3::new(0.4, 0.5, 0.6))).unwrap();
         let lattice = Lattice::around(mesh.bounds(), 0.1, 0.2).unwrap();
-        SdfGrid::build_band_on(&mesh, lattice, 0.15).unwrap()
+        SdfGrid::build_on(&mesh, lattice)
     }
 
     #[test]
@@ -158,7 +154,7 @@ mod tests {
         assert_eq!(again.to_bytes(), grid.to_bytes());
         let p = Point3::new(0.21, 0.03, 0.14);
         assert_eq!(again.evaluate(&p), grid.evaluate(&p));
-        assert_eq!((again.band(), again.bounds()), (grid.band(), grid.bounds()));
+        assert_eq!(again.bounds(), grid.bounds());
         assert!(matches!(SdfGrid::load(folder.path()), Err(MeshError::Read { .. })));
         // A pipe or a device may never end.
         #[cfg(unix)]
@@ -184,7 +180,6 @@ mod tests {
         assert_eq!(changed(24, &f64::NAN.to_le_bytes()), "lattice");
         assert_eq!(changed(48, &(-1.0_f64).to_le_bytes()), "lattice");
         assert_eq!(changed(56, &9.0_f64.to_le_bytes()), "bounds");
-        assert_eq!(changed(104, &f64::NAN.to_le_bytes()), "band");
         assert_eq!(changed(200, &[1, 2, 3]), "hash");
         // Two signs, and nothing else.
         let mut bytes = whole.clone();
@@ -192,7 +187,7 @@ mod tests {
         assert_eq!(field(&bytes), "hash");
         // With a hash that fits.
         let mut bytes = whole.clone();
-        bytes[112..120].copy_from_slice(&1e200_f64.to_le_bytes());
+        bytes[104..112].copy_from_slice(&1e200_f64.to_le_bytes());
         let (body, end) = bytes.split_last_chunk_mut::<8>().unwrap();
         *end = hash(&body[MAGIC.len()..]).to_le_bytes();
         assert_eq!(field(&bytes), "coefficients");

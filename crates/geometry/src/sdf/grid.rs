@@ -22,8 +22,6 @@ pub struct SdfGrid {
     pub(super) coefficients: Vec<f64>,
     /// Box around the shape itself \[m\].
     pub(super) bounds: (Point3<f64>, Point3<f64>),
-    /// Samples are cut off at this distance \[m\]; infinite for none.
-    pub(super) band: f64,
     /// Largest depth of a coefficient, which no point exceeds \[m\].
     deepest: f64,
 }
@@ -34,19 +32,17 @@ impl SdfGrid {
         lattice: Lattice,
         samples: &[f64],
         bounds: (Point3<f64>, Point3<f64>),
-        band: f64,
     ) -> Self {
-        Self::from_coefficients(lattice, prefilter(samples, lattice.dims()), bounds, band)
+        Self::from_coefficients(lattice, prefilter(samples, lattice.dims()), bounds)
     }
 
     pub(super) fn from_coefficients(
         lattice: Lattice,
         coefficients: Vec<f64>,
         bounds: (Point3<f64>, Point3<f64>),
-        band: f64,
     ) -> Self {
         let deepest = coefficients.iter().fold(0.0, |deepest: f64, c| deepest.max(-c));
-        Self { lattice, coefficients, bounds, band, deepest }
+        Self { lattice, coefficients, bounds, deepest }
     }
 
     /// Where the samples lie.
@@ -62,11 +58,6 @@ impl SdfGrid {
     /// Number of samples along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.lattice.dims()
-    }
-
-    /// The distance at which samples are cut off \[m\]: infinite for a grid that is exact throughout.
-    pub fn band(&self) -> f64 {
-        self.band
     }
 
     /// Smallest and largest corner of the box around the shape, without the margin \[m\].

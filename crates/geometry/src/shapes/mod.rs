@@ -3,7 +3,6 @@
 mod boxes;
 #[cfg(test)]
 pub(crate) mod closed;
-mod extrude;
 mod loft;
 mod mug;
 mod ring;
@@ -11,7 +10,6 @@ mod round;
 mod tube;
 
 pub use boxes::{BoxFace, Panel, RoundedBox, cuboid, rounded_box};
-pub use extrude::{OutlineError, extrude};
 pub use loft::{Section, loft, meridian_lengths, smoothed, subdivided};
 pub use mug::Mug;
 pub use ring::{revolve_ring, torus};

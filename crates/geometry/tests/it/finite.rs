@@ -8,15 +8,14 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Fwd;
 use prehend_geometry::closest::ClosestDerivative;
 use prehend_geometry::cloud::estimate_normals;
-use prehend_geometry::icp::{IcpSettings, MeshTarget, Metric, align};
 use prehend_geometry::mass::mass_properties;
 use prehend_geometry::robot::{ArticulatedRobot, RobotShape};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::sdf::{HeightSpline, Lattice, SdfError};
 use prehend_geometry::shapes::cuboid;
 use prehend_geometry::{
-    ClosestPoints, DistanceField, FieldSample, KdTree, KinematicTree, MassError, RobustKernel,
-    SdfGrid, SolidUnion, TriMesh, contact_area,
+    ClosestPoints, DistanceField, FieldSample, KdTree, KinematicTree, MassError, SdfGrid,
+    SolidUnion, TriMesh, contact_area,
 };
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -87,16 +86,6 @@ fn queries(mesh: &TriMesh) -> Vec<Point3<f64>> {
     all
 }
 
-fn kernels(scale: f64) -> [RobustKernel; 5] {
-    [
-        RobustKernel::Squared,
-        RobustKernel::Huber { scale },
-        RobustKernel::Cauchy { scale },
-        RobustKernel::GemanMcClure { scale },
-        RobustKernel::Tukey { scale },
-    ]
-}
-
 fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         failure_persistence: None,
@@ -158,9 +147,8 @@ proptest! {
         let surface = ClosestPoints::new(&mesh).unwrap();
         let (low, high) = surface.bounds();
         let spacing = ((high - low).amax() / 6.0).max(1e-12);
-        let whole = SdfGrid::build(&surface, spacing, spacing).unwrap();
-        let lattice = Lattice::around((low, high), spacing, 0.0).unwrap();
-        for grid in [whole, SdfGrid::build_band_on(&surface, lattice, spacing).unwrap()] {
+        for margin in [0.0, spacing] {
+            let grid = SdfGrid::build(&surface, spacing, margin).unwrap();
             for query in queries(&mesh).into_iter().chain([Point3::new(1e300, -1e300, 0.0)]) {
                 prop_assert!(is_finite_sample(&grid.evaluate(&query)) && grid.value(&query).is_finite(), "{query}");
                 for reach in [0.0, spacing, f64::INFINITY] {
@@ -172,22 +160,8 @@ proptest! {
     }
 
     #[test]
-    fn alignments_of_degenerate_clouds(mesh in meshes(), cloud in points(0..7), size in scales(), kernel_scale in prop::sample::select(vec![1e-200, 1e-3, 1e200])) {
-        let target = MeshTarget::new(&mesh).unwrap();
+    fn neighbors_in_degenerate_clouds(cloud in points(0..7), size in scales()) {
         let cloud: Vec<_> = cloud.iter().map(|p| p * size).collect();
-        for kernel in kernels(kernel_scale) {
-            for (metric, start) in [
-                (Metric::PointToPlane, Isometry3::identity()),
-                (Metric::PointToPlane, Isometry3::rotation(Vector3::x() * PI)),
-                (Metric::PointToPoint, Isometry3::new(Vector3::repeat(1e100), Vector3::y())),
-            ] {
-                let settings = IcpSettings { metric, kernel, max_distance: f64::INFINITY, least_eigenvalue: 0.0, ..Default::default() };
-                let Ok(found) = align(&cloud, &target, &start, &settings) else { continue };
-                let numbers = found.degeneracy.directions.iter().flatten().chain(&found.degeneracy.eigenvalues);
-                prop_assert!(finite(numbers.chain([&found.cost, &found.rms])), "{kernel:?} {found:?}");
-                prop_assert!(finite(&found.t_target_source.to_homogeneous()), "{kernel:?} {found:?}");
-            }
-        }
         let tree = KdTree::new(&cloud).unwrap();
         for query in cloud.iter().copied().chain([Point3::new(1e300, 0.0, -1e300)]) {
             prop_assert!(tree.k_nearest(&query, 3).iter().all(|near| near.distance_squared.is_finite()), "{query}");

@@ -9,6 +9,5 @@ mod data_robot;
 mod data_sign;
 mod finite;
 mod finite_shapes;
-mod icp;
 mod mjcf_golden;
 mod mutated_files;

@@ -1,7 +1,9 @@
 //! Iterative closest points: the paper's baseline, and a robust one.
 
+use nalgebra::Vector3;
 use prehend_autodiff::Quadratic;
-use prehend_geometry::{RobustKernel, icp};
+use prehend_autodiff::lie::twist_row;
+use prehend_geometry::RobustKernel;
 
 use super::matcher::{Matcher, PointPair};
 use super::rendering_settings;
@@ -96,9 +98,7 @@ impl Icp {
                 let scale = first_scale * (last_scale / first_scale).powf(done);
                 let mut pairs = matcher.to_surface(state);
                 pairs.retain(|pair| pair.normal.dot(&pair.surface.coords) < 0.0);
-                let kernel = RobustKernel::Cauchy { scale };
-                let sums = sums(state, &pairs, icp::Metric::PointToPlane, kernel);
-                (sums.rms(), sums.quadratic)
+                to_planes(state, &pairs, RobustKernel::Cauchy { scale })
             }
         }
     }
@@ -140,27 +140,31 @@ impl Strategy for Icp {
     }
 }
 
-/// The mean squared distance of `pairs` \[m²\].
+/// The mean squared distance of `pairs` \[m²\], with derivatives by a twist about the object's center.
 fn mean_square(state: &State, pairs: &[PointPair]) -> Quadratic<6> {
-    let sums = sums(state, pairs, icp::Metric::PointToPoint, RobustKernel::Squared);
-    // The sums are of half the squares.
+    // Rows count with half their squares.
     let share = 2.0 / pairs.len().max(1) as f64;
-    let Quadratic { value, gradient, hessian } = sums.quadratic;
-    Quadratic { value: value * share, gradient: gradient * share, hessian: hessian * share }
+    let (center, mut sum) = (state.center(), Quadratic::zeros());
+    for PointPair { surface, cloud, .. } in pairs {
+        let (residual, arm) = (surface - cloud, surface.coords - center);
+        for axis in 0..3 {
+            let row = twist_row(&arm, &Vector3::ith(axis, 1.0));
+            sum.add_row(&row, residual[axis], share);
+        }
+    }
+    sum
 }
 
-/// Sums of robust losses of `pairs`, with derivatives by a twist about the object's center.
-fn sums(
-    state: &State,
-    pairs: &[PointPair],
-    metric: icp::Metric,
-    kernel: RobustKernel,
-) -> icp::NormalEquations {
-    let center = state.center().into();
-    let mut sums = icp::NormalEquations::new();
+/// Root mean square distance \[m\] of `pairs` from the planes of their faces, and the sum of their losses with its derivatives by a twist about the
+/// object's center.
+fn to_planes(state: &State, pairs: &[PointPair], kernel: RobustKernel) -> (f64, Quadratic<6>) {
+    let (center, mut sum, mut squares) = (state.center(), Quadratic::zeros(), 0.0);
     for PointPair { surface, normal, cloud } in pairs {
-        let target = icp::Match { point: *cloud, normal: *normal };
-        sums.add(metric, kernel, surface, &target, &center);
+        let residual = normal.dot(&(surface - cloud));
+        let square = residual * residual;
+        let row = twist_row(&(surface.coords - center), normal);
+        sum.add_robust_row(&row, residual, kernel.loss(square), kernel.weight(square));
+        squares += square;
     }
-    sums
+    ((squares / pairs.len().max(1) as f64).sqrt(), sum)
 }

@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn mistakes_are_told_from_real_cameras() {
-        let likely = |camera: &Camera| IntrinsicsMistake::likely(camera, 0.05, 0.005);
+        let likely = |camera: &Camera| IntrinsicsMistake::likely(camera, 0.04, 0.005);
         // Of published datasets, portraits, and crops.
         for (width, height, cx, cy) in [
             (640, 480, 325.26, 242.05),
@@ -68,7 +68,7 @@ mod tests {
         ] {
             let right = camera(width, height, cx, cy);
             assert_eq!(likely(&right), None, "{right:?}");
-            let probabilities = IntrinsicsMistake::probabilities(&right, 0.05, 0.005);
+            let probabilities = IntrinsicsMistake::probabilities(&right, 0.04, 0.005);
             assert!(probabilities.iter().map(|(_, p)| p).sum::<f64>() < 0.01);
             let other = |factor: f64| camera(width, height, factor * cx, factor * cy);
             let is_centered = (cx / width as f64 - 0.5).abs() < 0.1;

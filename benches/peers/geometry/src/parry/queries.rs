@@ -34,9 +34,6 @@ pub(crate) fn add<'a>(to: &mut Comparisons<'a>, scenes: &'a Scenes) {
     let points = &scenes.lattice.points;
     let own = solid(&scenes.body);
     to.grid.add(NAME, move || project(&own, points), |found| distances(points, &found));
-    let (own, reach) = (solid(&scenes.body), scenes.lattice.reach());
-    let within = move || project_within(&own, points, reach);
-    to.band.add(NAME, within, |found| distances_within(points, &found, reach));
 }
 
 /// For distances without a sign.

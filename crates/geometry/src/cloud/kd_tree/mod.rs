@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use self::build::{Leaf, Node};
 use self::probe::Probe;
 pub use self::search::Neighbor;
-use self::search::{Collect, KNearest, Nearest, NearestAndNext, WithinRadius, search};
+use self::search::{Collect, KNearest, Nearest, WithinRadius, search};
 use super::CloudError;
 
 /// A balanced k-d tree over points: exact neighbors of points.
@@ -53,11 +53,6 @@ impl KdTree {
         &self.points
     }
 
-    /// The indices of the points in the order of the leaves: points that follow each other are near each other.
-    pub(crate) fn order(&self) -> impl Iterator<Item = usize> {
-        self.leaves.iter().flat_map(|l| l.indices).filter(|&i| i != u32::MAX).map(|i| i as usize)
-    }
-
     /// The point nearest to `query` within `max_distance` \[m\], which may be infinite; `None` too for a query
     /// that is not finite or farther than 1e18 m, whose square leaves single precision.
     #[inline]
@@ -81,25 +76,6 @@ impl KdTree {
             best.offer((query - point).norm_squared(), hint as u32);
         }
         search(&self.nodes, &self.leaves, &probe, best).found()
-    }
-
-    /// As [`Self::nearest_with_hint`], with the squared distance \[m²\] that no other point is nearer than.
-    #[inline]
-    pub(crate) fn nearest_and_next(
-        &self,
-        query: &Point3<f64>,
-        max_distance: f64,
-        hint: Option<usize>,
-    ) -> Option<(Neighbor, f64)> {
-        let probe = Probe::new(query)?;
-        let mut alone = NearestAndNext::within(max_distance)?;
-        if let Some((hint, point)) = hint.and_then(|i| Some((i, self.points.get(i)?))) {
-            let d2 = (query - point).norm_squared();
-            if d2 <= alone.limit() {
-                alone.offer(d2, hint as u32);
-            }
-        }
-        search(&self.nodes, &self.leaves, &probe, alone).found()
     }
 
     /// The `k` points nearest to `query`, nearest first; fewer where the cloud has fewer.

@@ -115,48 +115,6 @@ impl Collect for Nearest {
     }
 }
 
-/// The nearest point, and how far all others are.
-pub(super) struct NearestAndNext {
-    nearest: Nearest,
-    /// Squared distance that none of the others is nearer than \[m²\].
-    others: f64,
-}
-
-impl NearestAndNext {
-    #[inline]
-    pub(super) fn within(max_distance: f64) -> Option<Self> {
-        let nearest = Nearest::within(max_distance)?;
-        Some(Self { others: nearest.d2, nearest })
-    }
-
-    /// The nearest point, and the squared distance of the next or of the limit \[m²\].
-    #[inline]
-    pub(super) fn found(self) -> Option<(Neighbor, f64)> {
-        Some((self.nearest.found()?, self.others))
-    }
-}
-
-impl Collect for NearestAndNext {
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.others
-    }
-
-    #[inline]
-    fn offer(&mut self, d2: f64, index: u32) {
-        let Nearest { d2: least, index: found } = self.nearest;
-        if index == found {
-            // A hint comes by twice.
-            return;
-        }
-        self.nearest.offer(d2, index);
-        if found == u32::MAX {
-            return;
-        }
-        self.others = self.others.min(if self.nearest.index == index { least } else { d2 });
-    }
-}
-
 /// The k nearest points, in order.
 pub(super) struct KNearest {
     k: usize,

@@ -46,10 +46,6 @@ proptest! {
                 all.iter().copied().take_while(|m| m.distance_squared <= reach * reach).collect();
             prop_assert_eq!(tree.nearest(&q, reach), near.first().copied());
             prop_assert_eq!(tree.nearest_with_hint(&q, reach, i), near.first().copied());
-            let next = all.get(1).map_or(f64::INFINITY, |m| m.distance_squared);
-            let alone = near.first().map(|m| (*m, next.min(reach * reach)));
-            prop_assert_eq!(tree.nearest_and_next(&q, reach, None), alone);
-            prop_assert_eq!(tree.nearest_and_next(&q, reach, Some(i)), alone);
             prop_assert_eq!(tree.within(&q, reach), near);
             prop_assert_eq!(tree.k_nearest(&q, 9), &all[..all.len().min(9)]);
         }

@@ -19,7 +19,7 @@ settings! {
         /// Standard deviation of the logarithm of the scale of its residuals then.
         pub fault_scale: f64 = std::f64::consts::LN_10,
         /// Standard deviation of the principal point from the image's middle, as a part of the width: lenses are off by a few percent.
-        pub principal_point: f64 = 0.05,
+        pub principal_point: f64 = 0.04,
     }
 }
 
