@@ -71,7 +71,7 @@ mod tests {
             let probabilities = IntrinsicsMistake::probabilities(&right, 0.04, 0.005);
             assert!(probabilities.iter().map(|(_, p)| p).sum::<f64>() < 0.01);
             let other = |factor: f64| camera(width, height, factor * cx, factor * cy);
-            let is_centered = (cx / width as f64 - 0.5).abs() < 0.1;
+            let is_centered = (cx / width as f64 - 0.5).abs() < 0.05;
             if is_centered {
                 assert_eq!(likely(&other(2.0)), Some(IntrinsicsMistake::OfOtherSize(0.5)));
                 assert_eq!(likely(&other(0.5)), Some(IntrinsicsMistake::OfOtherSize(2.0)));

@@ -137,7 +137,7 @@ fn the_box_is_no_jump() {
     let grid = SdfGrid::build(&mesh, 0.005, 0.02).unwrap();
     let mut below = 0;
     for k in 0..200 {
-        let z = 0.049 + 1e-5 * f64::from(k);
+        let z = 0.035 + 1e-4 * f64::from(k);
         let at = |x: f64| grid.distance(&Point3::new(x, 0.03, z), 0.0);
         let [inside, outside] = [0.05 - 1e-12, 0.05 + 1e-12].map(at);
         let is_near = |(a, b): (f64, f64)| (a - b).abs() < 1e-9;
