@@ -7,6 +7,7 @@ use super::oracle;
 use super::table::Comparison;
 
 const COUNT: usize = 128;
+
 /// A cube of 128³ points, 1.25 times as large as the body.
 pub(crate) struct Lattice {
     pub(crate) points: Vec<Point3<f64>>,

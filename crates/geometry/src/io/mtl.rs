@@ -71,7 +71,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Library, String> {
         match numbers.as_deref() {
             // A single number stands for all three.
             Some(&[gray]) => material.diffuse = Some([gray; 3]),
-            Some(&[r, g, b]) => material.diffuse = Some([r, g, b]),
+            Some(&[r, g, b, ..]) => material.diffuse = Some([r, g, b]),
             _ => return fault("Kd is not three numbers"),
         }
     }

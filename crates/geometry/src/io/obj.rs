@@ -76,8 +76,8 @@ struct Content {
     faces: Vec<Face>,
     /// Names that stand behind `usemtl`.
     materials: Vec<String>,
-    /// Names that stand behind `mtllib`.
-    libraries: BTreeSet<String>,
+    /// Names that stand behind `mtllib`, in their order.
+    libraries: Vec<String>,
 }
 
 /// Place of a polygon.
@@ -95,17 +95,23 @@ impl Content {
         let fault =
             |line: usize, reason| MeshError::malformed(path, format!("line {line}"), reason);
         let mut all = Self::default();
-        let mut group = 0;
+        let (mut group, mut material, mut places) = (0, None, HashMap::new());
         for (number, line) in text::lines(&text::decoded(bytes)) {
             let line = line.trim();
             let (key, value) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
             match key {
                 "o" | "g" => group += 1,
-                "usemtl" => all.materials.push(value.trim().to_owned()),
-                "mtllib" => drop(all.libraries.insert(value.trim().to_owned())),
+                "usemtl" => {
+                    material = Some(*places.entry(value.trim().to_owned()).or_insert_with(|| {
+                        all.materials.push(value.trim().to_owned());
+                        all.materials.len() - 1
+                    }));
+                }
+                "mtllib" if !all.libraries.iter().any(|name| name == value.trim()) => {
+                    all.libraries.push(value.trim().to_owned());
+                }
                 "f" => {
-                    let material = all.materials.len().checked_sub(1);
-                    let words = value.split_whitespace().take_while(|word| !word.starts_with('#'));
+                    let words = uncommented(value).split_whitespace();
                     let corners: Result<Vec<_>, _> = words.map(|word| all.corner(word)).collect();
                     let corners = corners.map_err(|reason| fault(number, reason))?;
                     // Of two corners it is a line.
@@ -120,7 +126,11 @@ impl Content {
                 _ => {}
             }
         }
+        // Some programs leave out texture coordinates and normals, but not their indices.
         let counts = [all.positions.len(), all.uvs.len(), all.normals.len()];
+        for (k, _) in counts.iter().enumerate().skip(1).filter(|(_, count)| **count == 0) {
+            all.polygons.corners_mut().for_each(|corner| corner[k] = NONE);
+        }
         for (face, corners) in all.faces.iter().zip(all.polygons.iter()) {
             let mut indices = corners.iter().flat_map(|corner| corner.iter().zip(counts));
             let outside = indices.find(|&(&index, count)| index != NONE && index as usize >= count);
@@ -133,8 +143,8 @@ impl Content {
 
     /// Adds a position (`x y z [w]` or `x y z r g b`), texture coordinates or a normal.
     fn add(&mut self, key: &str, value: &str) -> Result<(), String> {
-        // Comments end the numbers, as does whatever is none.
-        let words = value.split(|c: char| c.is_whitespace() || c == '#').filter(|w| !w.is_empty());
+        // Whatever is no number ends them: comments.
+        let words = uncommented(value).split_whitespace();
         let mut numbers = [0.0; 6];
         let parsed = words.map_while(|word| word.parse::<f64>().ok());
         let count = numbers.iter_mut().zip(parsed).map(|(to, number)| *to = number).count();
@@ -236,6 +246,12 @@ impl Content {
             ..TriMesh::new(positions, faces)
         }
     }
+}
+
+/// Numbers without a comment behind them; `1.#QNAN` is none.
+fn uncommented(numbers: &str) -> &str {
+    let own = numbers.split_once('#').map(|(own, _)| own);
+    own.filter(|own| !own.ends_with('.')).unwrap_or(numbers)
 }
 
 fn out_of_range(index: i64) -> String {
@@ -403,6 +419,17 @@ mod tests {
                 load(&format!("{text}{line}\n"), Path::new("m.obj")).unwrap_err().to_string();
             assert_eq!(error, format!("m.obj: line 7: {reason}"));
         }
+    }
+
+    #[test]
+    fn what_is_written_twice_or_not_at_all() {
+        // Indices without what they refer to; a material named before each face; numbers that end in no number.
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl a\nf 1/1/1 2/2/2 3/3/3\nusemtl a\nf 1/1/1 2/2/2 4/4/4\n";
+        let mesh = load(text, Path::new("m.obj")).unwrap();
+        assert_eq!((mesh.vertices.len(), mesh.faces.len()), (4, 2));
+        assert!(mesh.uvs.is_none() && mesh.normals.is_none());
+        let error = load(&format!("{text}v 1 1 1.#QNAN\n"), Path::new("m.obj")).unwrap_err();
+        assert_eq!(error.to_string(), "m.obj: line 9: v has 2 numbers, not 3");
     }
 
     #[test]

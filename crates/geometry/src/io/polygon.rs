@@ -21,6 +21,10 @@ impl<C> Polygons<C> {
         self.ends.push(self.corners.len());
     }
 
+    pub(super) fn corners_mut(&mut self) -> impl Iterator<Item = &mut C> {
+        self.corners.iter_mut()
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = &[C]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts.zip(&self.ends).map(|(start, &end)| &self.corners[start..end])

@@ -2,19 +2,27 @@
 
 use std::borrow::Cow;
 
-/// Lines of `text`, each with its number from 1: with the line ends of any system, and whole where a backslash broke them.
+/// Lines of `text`, each with its number from 1: with the line ends of any system, and whole where a backslash broke one that is no comment.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
-    // Line ends of old Macs have no `\n`.
-    let ends = if text.contains('\n') { '\n' } else { '\r' };
-    let mut physical = text.split(ends).enumerate();
+    // `\r\n` is one end.
+    let ends = text.split_inclusive(['\n', '\r']).scan('\n', |before, line| {
+        let is_rest = *before == '\r' && line == "\n";
+        *before = line.chars().next_back().unwrap_or_default();
+        Some((is_rest, line.trim_end_matches(['\n', '\r'])))
+    });
+    let mut physical = ends.filter_map(|(is_rest, line)| (!is_rest).then_some(line)).enumerate();
     std::iter::from_fn(move || {
         let (index, first) = physical.next()?;
-        let mut line = Cow::Borrowed(first.strip_suffix('\r').unwrap_or(first));
-        while let Some(begun) = line.strip_suffix('\\') {
-            let next = physical.next().map_or("", |(_, next)| next);
-            line = Cow::Owned(format!("{begun} {}", next.strip_suffix('\r').unwrap_or(next)));
+        if !first.ends_with('\\') || first.contains('#') {
+            return Some((index + 1, Cow::Borrowed(first)));
         }
-        Some((index + 1, line))
+        let mut whole = first.to_owned();
+        while whole.ends_with('\\') {
+            whole.pop();
+            whole.push(' ');
+            whole.push_str(physical.next().map_or("", |(_, next)| next));
+        }
+        Some((index + 1, Cow::Owned(whole)))
     })
 }
 
@@ -53,5 +61,10 @@ mod tests {
             }
         }
         assert!(lines("a\\").eq([(1, Cow::Borrowed("a "))]));
+        // Ends of several systems, and paths in comments.
+        let mixed = "# D:\\parts\\\na\rb\r\nc # \\\nd";
+        let right = [(1, "# D:\\parts\\"), (2, "a"), (3, "b"), (4, "c # \\"), (5, "d")];
+        assert!(lines(mixed).eq(right.map(|(at, line)| (at, Cow::Borrowed(line)))));
+        assert_eq!(lines(&"\\\n".repeat(200_000)).count(), 1);
     }
 }

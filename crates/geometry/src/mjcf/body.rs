@@ -41,6 +41,8 @@ pub(super) struct Tree {
     pub(super) bodies: Vec<Body>,
     pub(super) geoms: Vec<Geom>,
     pub(super) sites: Vec<Site>,
+    /// Error of the first body that moves and weighs nothing.
+    pub(super) massless: Option<MjcfError>,
 }
 
 /// Where an element is found.
@@ -175,7 +177,8 @@ impl Reader<'_> {
         };
         self.tree.bodies[index].inertial = inertial::bounded(inertial, compiler);
         if !self.tree.bodies[index].joints.is_empty() && self.tree.moved_mass(index) <= LEAST_MASS {
-            return Err(e.misplaced("a body that moves needs a mass (a geom, or an inertial)"));
+            let error = || e.misplaced("a body that moves needs a mass (a geom, or an inertial)");
+            self.tree.massless.get_or_insert_with(error);
         }
         Ok(())
     }

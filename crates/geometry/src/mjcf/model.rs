@@ -161,7 +161,8 @@ impl Model {
         model.warnings = warning::warnings(root);
         match model.warnings.iter().find(|warning| warning.changes && !partial) {
             Some(warning) => Err(MjcfError::Unsupported(Box::new(warning.clone()))),
-            None => Ok(model),
+            // It may be what was left out that has the mass.
+            None => tree.massless.filter(|_| !partial).map_or(Ok(model), Err),
         }
     }
 

@@ -70,7 +70,7 @@ impl SdfGrid {
         (self.lattice.position([0; 3]), self.lattice.position(self.dims().map(|n| n - 1)))
     }
 
-    /// Distance from `point` to the box around the shape: never above the distance outside \[m\].
+    /// Distance from `point` to the box around the shape: never above the exact distance outside \[m\].
     #[inline]
     pub fn lower_bound(&self, point: &Point3<f64>) -> f64 {
         let (lo, hi) = &self.bounds;
@@ -181,7 +181,7 @@ impl DistanceField for SdfGrid {
 
     fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
         let (low, high) = &self.bounds;
-        Some((nalgebra::center(low, high), 0.5 * (high - low).norm()))
+        Some((nalgebra::center(low, high), 0.5 * (high - low).norm() + self.spacing()))
     }
 }
 

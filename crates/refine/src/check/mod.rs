@@ -54,7 +54,6 @@ pub(crate) fn check_frame(
             "the camera has cx {cx}, cy {cy} in images of {width}x{height} pixels: {question}"
         );
         found.add(Subject::Camera, message);
-        return found.0;
     }
     let hand = observation.hand.as_ref();
     let drawn = hand.and_then(|hand| hand::check(hand, &observation.camera, &mut found));

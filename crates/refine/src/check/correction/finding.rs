@@ -62,24 +62,20 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Adds the corrections of intrinsics, scene by scene.
+    /// Adds the corrections of intrinsics that most frames of a scene need: a single one may be a crop.
     fn intrinsics(&mut self) {
         for group in groups(self.trials, |_, target| target.scene_id) {
-            let mut frames: BTreeMap<Correction, (f64, Vec<usize>)> = BTreeMap::new();
-            for k in group {
-                let Some((correction, factor)) = self.trials[k].1.intrinsics else { continue };
-                frames.entry(correction).or_insert((factor, Vec::new())).1.push(k);
-                self.explained[k] = true;
+            let told: Vec<_> = group.iter().filter_map(|&k| self.trials[k].1.intrinsics).collect();
+            let Some(&(correction, factor)) = told.first() else { continue };
+            let is_same = |k: &&usize| self.trials[**k].1.intrinsics == Some((correction, factor));
+            let frames: Vec<usize> = group.iter().filter(is_same).copied().collect();
+            if 2 * frames.len() <= group.len() {
+                continue;
             }
-            let finding = |(correction, (factor, frames))| Finding {
-                correction,
-                factor,
-                frames,
-                alternative: None,
-                agreement: None,
-                sigma: None,
-            };
-            self.found.extend(frames.into_iter().map(finding));
+            frames.iter().for_each(|&k| self.explained[k] = true);
+            let (alternative, agreement, sigma) = (None, None, None);
+            let finding = Finding { correction, factor, alternative, frames, agreement, sigma };
+            self.found.push(finding);
         }
     }
 

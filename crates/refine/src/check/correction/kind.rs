@@ -32,7 +32,7 @@ pub enum Correction {
     Rotation,
     /// {masks}: masks are inverted; make pixels of the object non-zero and all others zero
     MaskInverted,
-    /// {camera}: {K}: cx and cy are swapped; exchange them (cx is entry 2 and cy entry 5, counted from 0)
+    /// {camera}: {K}: cx and cy are swapped; exchange them (cx is entry 2 and cy entry 5, counted from 0), and fx, fy and poses if images were turned since
     PrincipalPointSwapped,
     /// {camera}: {K}: intrinsics are of images of another size; multiply fx, fy, cx and cy by {times}
     CameraOfOtherSize,

@@ -27,7 +27,7 @@ fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     found_in(4, bare, change)
 }
 
-/// What is found in the first `count` scenes.
+/// Findings in the first `count` scenes.
 fn found_in(count: usize, bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     let settings = CorrectionSettings::default();
     let trial = |(k, mut scene): (usize, Scene)| {
@@ -156,6 +156,8 @@ fn units_of_poses_meshes_and_depth() {
         });
     }
     named(Correction::Translation, 1.0, moved(1.6));
+    let sizes = found(true, &moved(1.6));
+    assert!(sizes.iter().all(|f| f.correction != Correction::ModelScale), "{sizes:#?}");
     named(Correction::DepthScale, 0.25, |scene| {
         scene.frame.depth.pixels_mut().iter_mut().for_each(|z| *z *= 4.0);
     });

@@ -22,7 +22,7 @@ pub struct CorrectionTrial {
     pub(super) tried: Vec<Option<Tried>>,
     /// Information about the model's scale and the focal length.
     pub(super) size: Option<Size>,
-    /// Correction of the intrinsics that the principal point tells, with its factor; then nothing else is tried.
+    /// Correction of the intrinsics that the principal point tells, with its factor.
     pub(super) intrinsics: Option<(Correction, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl CorrectionTrial {
             IntrinsicsMistake::Swapped => (Correction::PrincipalPointSwapped, 1.0),
             IntrinsicsMistake::OfOtherSize(factor) => (Correction::CameraOfOtherSize, factor),
         });
-        if intrinsics.is_some() || !observation.is_segmented() {
+        if !observation.is_segmented() {
             return Ok(Self { intrinsics, ..Self::default() });
         }
         let evidence = FrameImages::new(observation, object, t_cam_object, settings)?;
@@ -91,7 +91,9 @@ impl CorrectionTrial {
             }
             let always = correction.is_rotation() || correction == Correction::ModelScale;
             let needed = as_given < settings.good || always;
-            if !(needed && value.is_finite() && value > 0.0) {
+            // Without depth a model of another size is one elsewhere.
+            let is_told = evidence.has_depth || correction != Correction::ModelScale;
+            if !(needed && is_told && value.is_finite() && value > 0.0) {
                 return None;
             }
             let inputs = given.corrected(correction, value);
@@ -106,7 +108,7 @@ impl CorrectionTrial {
             is_other.then_some(tried)
         };
         let tried = candidates(to_fit, evidence.depth_ratio()).par_iter().map(attempt).collect();
-        Ok(Self { tried, size, intrinsics: None })
+        Ok(Self { tried, size, intrinsics })
     }
 }
 

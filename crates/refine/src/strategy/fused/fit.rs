@@ -14,7 +14,8 @@ settings! {
     #[derive(Copy)]
     pub struct FitSettings {
         // One in two hundred, of any size within a factor of ten.
-        /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere.
+        /// Prior probability that a kind of evidence is of something else: of another object, another frame, a hand that is elsewhere; that intrinsics are wrong;
+        /// and that an image is cropped.
         pub fault: f64 = 0.005,
         /// Standard deviation of the logarithm of the scale of its residuals then.
         pub fault_scale: f64 = std::f64::consts::LN_10,
@@ -52,7 +53,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Of the solution `point` before `camera` with these scales; `noise` is that of depth with the nominal deviation of a point.
+    /// Test of the solution `point` before `camera` with these scales; `noise` is that of depth with the nominal deviation of a point.
     pub(super) fn new(
         camera: &Camera,
         point: &Linearization,
@@ -90,7 +91,7 @@ impl Fit {
         Self::of_logs(camera, &logs, settings)
     }
 
-    /// Of a camera, and of logarithms of scales, with their names and their standard deviations where nothing is wrong.
+    /// Test of a camera and of logarithms of scales, with their names and their standard deviations where nothing is wrong.
     fn of_logs(camera: &Camera, logs: &[(&'static str, f64, f64)], settings: &FitSettings) -> Self {
         let of = |&(name, log_scale, sigma): &(&'static str, f64, f64)| {
             let fault = settings.probability_of_fault(log_scale, sigma);
