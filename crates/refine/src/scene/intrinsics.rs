@@ -22,19 +22,21 @@ impl IntrinsicsMistake {
         let (width, height) = (camera.width as f64, camera.height as f64);
         let sigma = sigma * width;
         let density = |cx: f64, cy: f64| {
-            let off = (cx - width / 2.0).powi(2) + (cy - height / 2.0).powi(2);
-            (-0.5 * off / (sigma * sigma)).exp() / (TAU * sigma * sigma)
+            let square = (cx - width / 2.0).powi(2) + (cy - height / 2.0).powi(2);
+            (-0.5 * square / (sigma * sigma)).exp() / (TAU * sigma * sigma)
         };
         let Camera { cx, cy, .. } = *camera;
         let sound = (1.0 - fault) * ((1.0 - fault) * density(cx, cy) + fault / (width * height));
         let each = fault / Self::ALL.len() as f64;
-        let joint = Self::ALL.map(|mistake| match mistake {
-            Self::Swapped => each * density(cy, cx),
-            Self::OfOtherSize(factor) => each * density(factor * cx, factor * cy) * factor * factor,
+        let joint = Self::ALL.map(|mistake| {
+            let density = match mistake {
+                Self::Swapped => density(cy, cx),
+                Self::OfOtherSize(factor) => density(factor * cx, factor * cy) * factor * factor,
+            };
+            (mistake, each * density)
         });
-        let total = sound + joint.iter().sum::<f64>();
-        let mut joint = joint.into_iter();
-        Self::ALL.map(|mistake| (mistake, joint.next().map_or(0.0, |joint| joint / total)))
+        let total = sound + joint.iter().map(|(_, joint)| joint).sum::<f64>();
+        joint.map(|(mistake, joint)| (mistake, joint / total))
     }
 
     /// The mistake that is more probable than not, if there is one.
