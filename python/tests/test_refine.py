@@ -287,7 +287,7 @@ def test_settings_are_a_dict_or_a_file(example, refined, tmp_path):
         prehend.Tracker(frame.object, settings=tmp_path / "none.toml")
 
 
-def test_a_bad_frame_loses_no_other(example, refined):
+def test_a_bad_frame_loses_no_other(example, refined, tmp_path):
     frame, initial, _ = example
     behind = initial.copy()
     behind[2, 3] = -1.0
@@ -299,11 +299,40 @@ def test_a_bad_frame_loses_no_other(example, refined):
             assert (estimate.covariance == refined.covariance).all()
             assert estimate.probability == refined.probability
             assert estimate.warnings == refined.warnings
+    prehend.refine_batch([frame] * 3, [initial, behind, initial], report=tmp_path / "report")
+    page = (tmp_path / "report/index.html").read_text()
+    assert "frame 0" in page and "frame 2" in page and "frame 1" not in page
     assert prehend.refine_batch([], []) == []
     with pytest.raises(prehend.Error, match="poses: 2 are expected, one a frame, not 1"):
         prehend.refine_batch([frame, frame], [initial])
     with pytest.raises(prehend.Error, match=r"poses\[1\]: not orthonormal"):
         prehend.refine_batch([frame, frame], [initial, np.diag([2.0, 1, 1, 1])])
+
+
+def test_a_frame_is_read_from_its_file(example, tmp_path):
+    images = pytest.importorskip("PIL.Image")
+    frame, initial, truth = example
+    images.fromarray(frame.rgb).save(tmp_path / "rgb.png")
+    images.fromarray(np.round(1e4 * frame.depth).astype(np.uint16)).save(tmp_path / "depth.png")
+    mesh = frame.object.mesh
+    rows = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    rows += [f"f {a} {b} {c}" for a, b, c in 1 + mesh.faces]
+    (tmp_path / "mesh.obj").write_text("\n".join(rows))
+    table = np.eye(4)
+    table[2, 3] = 2.0
+    content = {"K": frame.K.ravel().tolist(), "rgb": "rgb.png", "depth": "depth.png", "depth_unit_m": 1e-4}
+    content |= {"mesh": "mesh.obj", "mesh_unit": "m", "pose": {"unit": "m", "matrix": initial.tolist()}}
+    plane = {"name": "table", "kind": "plane", "pose": {"unit": "m", "matrix": table.tolist()}}
+    (tmp_path / "frame.json").write_text(json.dumps(content | {"bodies": [plane]}))
+    read, pose = prehend.Frame.load(tmp_path / "frame.json")
+    assert np.allclose(pose, initial) and np.allclose(read.depth, frame.depth, atol=1e-4)
+    estimate = read.refine(pose)
+    center = np.array(frame.object.center)
+    moved = [np.linalg.norm((p - truth)[:3, :3] @ center + (p - truth)[:3, 3]) for p in (pose, estimate.pose)]
+    assert moved[1] < min(4e-3, moved[0]), moved
+    (tmp_path / "frame.json").write_text(json.dumps(content | {"mesh": "none.obj"}))
+    with pytest.raises(prehend.Error, match="none.obj"):
+        prehend.Frame.load(tmp_path / "frame.json")
 
 
 def test_estimates_can_be_sent_to_other_processes(refined):

@@ -1,10 +1,11 @@
 //! Frames: all that is known of one moment.
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::PyUntypedArrayMethods;
-use prehend_refine::data::{FrameInput, Target};
+use prehend_refine::data::{FrameInput, Target, load_frame_file, user_cache};
 use prehend_refine::scene::{PreparedFrame, check_gravity};
 use prehend_refine::search::{PoseCandidate, PoseSearch};
 use prehend_refine::{EstimatorInput, RefineError};
@@ -19,7 +20,7 @@ use super::rig::Rig;
 use super::run::{self, Noise};
 use super::settings::settings;
 use super::{estimate, images};
-use crate::arrays::{Array, Numbers, array, in_order, rows, vector};
+use crate::arrays::{Array, Numbers, array, in_order, matrix, rows, vector};
 use crate::error::{Raise, wrong};
 use crate::threads::detached;
 
@@ -117,6 +118,21 @@ impl Frame {
             observation = rig.corrected(&observation).raise()?;
         }
         Ok(Self { input: FrameInput { frame: observation, object, rig }, target: None })
+    }
+
+    /// A frame from a JSON file as `prehend refine --frame` reads it, with its initial pose (4 × 4, camera ← object [m]): also of other bodies, sensors of touch
+    /// and cameras. `rig` corrects frame and object.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, rig=None))]
+    fn load<'py>(
+        py: Python<'py>,
+        path: PathBuf,
+        rig: Option<&Rig>,
+    ) -> PyResult<(Self, Array<'py>)> {
+        let rig = rig.map(|rig| Arc::clone(&rig.rig));
+        let load = || load_frame_file(&path, 0, user_cache().as_ref(), rig);
+        let (input, t_cam_object) = detached(py, load)?.raise()?;
+        Ok((Self { input, target: None }, matrix(py, &t_cam_object)?))
     }
 
     /// Refines a pose of the object (4 × 4, camera ← object [m]), or the hypotheses of a search (n × 4 × 4, the best first): an `Estimate`. Python's other

@@ -2,9 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 use nalgebra::Isometry3;
-use prehend_refine::{Method, RefineJob, refine_all};
+use prehend_refine::data::details::FrameDetails;
+use prehend_refine::data::{AssetError, Target};
+use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
+use prehend_refine::strategy::PosteriorSummary;
+use prehend_refine::{Method, RefineError, RefineJob, Refined, refine_all};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -53,6 +58,41 @@ pub(super) fn method(
     Ok(method)
 }
 
+/// Draws refined frames, each of its initial pose, and writes the page; frames that failed are left out.
+fn write_report(
+    mut report: Report,
+    done: &[Result<Refined<'_>, RefineError>],
+    initial: &[Isometry3<f64>],
+    targets: &[Option<Target>],
+) -> Result<PathBuf, AssetError> {
+    for (number, ((refined, initial), target)) in done.iter().zip(initial).zip(targets).enumerate()
+    {
+        let Ok(Refined { estimate, input, seconds }) = refined else { continue };
+        let of_no_dataset = || Target { scene_id: 0, im_id: number as u32, obj_id: 0, instance: 0 };
+        let name = target.map_or_else(|| format!("frame {number}"), |target| target.to_string());
+        let warnings = input.warnings(initial).concat();
+        let details = FrameDetails {
+            target: target.unwrap_or_else(of_no_dataset),
+            t_cam_model: *estimate.t_cam_object(),
+            initial: Some(*initial),
+            posterior: estimate.posterior.as_ref().map(PosteriorSummary::from),
+            iterations: estimate.trace.iterations.len().saturating_sub(1),
+            seconds: Some(*seconds),
+            warnings: warnings.iter().map(ToString::to_string).collect(),
+            track: None,
+        };
+        let drawing = report.draw(&FrameDrawing {
+            input,
+            initial: Some(initial),
+            t_cam_object: &details.t_cam_model,
+            covariance: details.posterior.as_ref().map(|posterior| &posterior.covariance),
+            trace: None,
+        })?;
+        report.add_frame(FrameReport::refined(name, details, [None; 2], Some(drawing)));
+    }
+    Ok(report.finish()?)
+}
+
 /// The names of all methods, and what each is.
 #[pyfunction]
 pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
@@ -62,9 +102,10 @@ pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
 /// Refines many frames side by side, each from its pose (n × 4 × 4, camera ← object [m]): a list of one `Estimate` a frame, in their order. In place
 /// of a frame that failed is the `Error` that says why, so that none is lost for another; raise it, or look at the others.
 ///
-/// `threads` is how many threads work, all cores if it is not given; poses are the same for any number.
+/// `threads` is how many threads work, all cores if it is not given; poses are the same for any number. `report` is a folder for an `index.html` with
+/// pictures, figures and a 3-D view of each frame, as `prehend refine --report` makes it.
 #[pyfunction]
-#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, settings=None, threads=None))]
+#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, settings=None, threads=None, report=None))]
 #[allow(clippy::too_many_arguments)] // as Python has it
 pub(crate) fn refine_batch<'py>(
     py: Python<'py>,
@@ -75,6 +116,7 @@ pub(crate) fn refine_batch<'py>(
     noise: Option<Noise>,
     settings: Option<Bound<'py, PyAny>>,
     threads: Option<usize>,
+    report: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyList>> {
     let method = self::method(method, iterations, noise.as_ref(), settings.as_ref())?;
     let threads = threads.map(|threads| at_least_one(threads, "threads")).transpose()?;
@@ -89,7 +131,15 @@ pub(crate) fn refine_batch<'py>(
         RefineJob { estimator, frame: &input.frame, hypotheses: (*initial).into() }
     };
     let jobs: Vec<RefineJob<'_>> = frames.iter().zip(&poses).map(job).collect();
+    // Before long work: a folder that cannot be made.
+    let create = |folder| Report::create(folder, "Refined poses").raise();
+    let report = report.as_deref().map(create).transpose()?;
     let done = detached(py, || refine_all(&jobs, threads))?.raise()?;
+    if let Some(report) = report {
+        let targets = frames.iter().map(|frame| Py::get(frame).target);
+        let targets: Vec<Option<Target>> = targets.collect();
+        detached(py, || write_report(report, &done, &poses, &targets))?.raise()?;
+    }
     let results = PyList::empty(py);
     for (outcome, initial) in done.iter().zip(&poses) {
         match outcome {

@@ -320,6 +320,8 @@ class Frame:
         lens: tuple[str, Sequence[float]] | None = None,
         rig: Rig | None = None,
     ) -> Frame: ...
+    @staticmethod
+    def load(path: str | PathLike[str], *, rig: Rig | None = None) -> tuple[Frame, NDArray[np.float64]]: ...
     def refine(
         self,
         pose: ArrayLike,
@@ -411,6 +413,7 @@ def refine_batch(
     noise: Mapping[str, str] | None = None,
     settings: _Settings | None = None,
     threads: int | None = None,
+    report: str | PathLike[str] | None = None,
 ) -> list[Estimate | Error]: ...
 def example_frame(seed: int = 0) -> tuple[Frame, NDArray[np.float64], NDArray[np.float64]]: ...
 def example_sequence(

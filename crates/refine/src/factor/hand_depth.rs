@@ -47,6 +47,9 @@ struct Point {
     depth: f64,
 }
 
+/// Pixels that are looked at together.
+const SIDE_BY_SIDE: usize = 16;
+
 impl HandDepthFactor {
     /// Factor of at most `points` points of the depth of `frame` where the hand is, spread evenly over it. There may be none: the cost is then zero.
     ///
@@ -63,13 +66,6 @@ impl HandDepthFactor {
         let (depth, camera) = (&observation.depth, &observation.camera);
         let mask = observation.mask.pixels();
         let width = depth.width();
-        let on_hand = (depth.pixels().iter().zip(hand.pixels()).enumerate())
-            .filter(|(_, (measured, known))| {
-                **known > 0.0
-                    && **measured > 0.0
-                    && f64::from(**measured - **known).abs() < settings.reach
-            })
-            .map(|(pixel, _)| pixel);
         // Around the mask's outline the object may be what is seen.
         let of_object = |pixel: usize| {
             let near = [0, settings.margin, settings.margin * width];
@@ -78,7 +74,20 @@ impl HandDepthFactor {
                 before.is_some_and(|p| mask[p]) || after.is_some_and(|m| *m)
             })
         };
-        let of_hand: Vec<usize> = on_hand.filter(|p| !of_object(*p)).collect();
+        let is_of_hand = |pixel: &usize| {
+            let (known, measured) = (hand.pixels()[*pixel], depth.pixels()[*pixel]);
+            known > 0.0
+                && measured > 0.0
+                && f64::from(measured - known).abs() < settings.reach
+                && !of_object(*pixel)
+        };
+        let mut of_hand = Vec::new();
+        // Most pixels are not of the hand: looked at side by side.
+        for (start, known) in (0..).step_by(SIDE_BY_SIDE).zip(hand.pixels().chunks(SIDE_BY_SIDE)) {
+            if known.iter().fold(false, |any, known| any | (*known > 0.0)) {
+                of_hand.extend((start..start + known.len()).filter(is_of_hand));
+            }
+        }
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
             Point {

@@ -48,13 +48,13 @@ impl Auxiliary {
     pub(super) fn add_row(
         &mut self,
         own: &[(usize, f64)],
-        by_blocks: &[(usize, f64)],
+        by_blocks: impl Iterator<Item = (usize, f64)> + Clone,
         residual: f64,
         weight: f64,
     ) {
         for &(k, d) in own {
             self.gradient[k] += weight * residual * d;
-            for &(j, e) in by_blocks {
+            for (j, e) in by_blocks.clone() {
                 self.coupling[(k, j)] += weight * d * e;
             }
         }
@@ -115,7 +115,7 @@ mod tests {
         let mut sum = Auxiliary::new(2, 0, 1);
         sum.add_patch(1, &Vector3::new(1.0, 2.0, 3.0), &Matrix3::identity());
         let mut rows = Auxiliary::new(2, 0, 1);
-        rows.add_row(&[(5, 2.0), (0, -1.0)], &[(0, 3.0)], 0.5, 2.0);
+        rows.add_row(&[(5, 2.0), (0, -1.0)], [(0, 3.0)].into_iter(), 0.5, 2.0);
         sum += &rows;
         assert_eq!(sum.gradient.as_slice(), [-1.0, 0.0, 0.0, 1.0, 2.0, 5.0]);
         assert_eq!(sum.coupling.as_slice(), [-6.0, 0.0, 0.0, 0.0, 0.0, 12.0]);

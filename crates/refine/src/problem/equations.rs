@@ -1,5 +1,6 @@
 //! The normal equations that factors add to.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, Vector3};
@@ -20,8 +21,9 @@ pub struct NormalEquations {
     pub(super) image_warp: Option<Arc<ImageWarp>>,
     /// Derivatives by auxiliary parameters, once something depends on them.
     pub(super) by_auxiliary: Option<Auxiliary>,
-    /// Place and derivative of each parameter of the row begun last, and of each auxiliary one.
-    pub(super) entries: Vec<(usize, f64)>,
+    /// Derivatives of the row begun last by all parameters, and in which parts of them they are; place and derivative of each auxiliary one.
+    pub(super) row: Vec<f64>,
+    pub(super) parts: Vec<Range<usize>>,
     pub(super) auxiliary_entries: Vec<(usize, f64)>,
     /// How many independent measurements the residuals amount to.
     degrees: f64,
@@ -68,7 +70,8 @@ impl NormalEquations {
             patches,
             image_warp: None,
             by_auxiliary: None,
-            entries: Vec::new(),
+            row: vec![0.0; n],
+            parts: Vec::new(),
             auxiliary_entries: Vec::new(),
             degrees: 0.0,
         }
@@ -117,6 +120,34 @@ impl NormalEquations {
             hessian.view_mut((n, n), (m, m)).copy_from(&own);
         }
         (gradient, hessian)
+    }
+
+    /// Begins a row without derivatives.
+    pub(super) fn clear_row(&mut self) {
+        self.parts.clear();
+        self.auxiliary_entries.clear();
+    }
+
+    /// Writes derivatives of the row by the parameters from `offset` on; those that are there already are added to.
+    #[inline]
+    pub(super) fn write_row(&mut self, offset: usize, derivatives: &[f64]) {
+        let end = offset + derivatives.len();
+        let own = &mut self.row[offset..end];
+        if self.parts.iter().any(|part| part.contains(&offset)) {
+            own.iter_mut().zip(derivatives).for_each(|(sum, d)| *sum += d);
+            return;
+        }
+        own.copy_from_slice(derivatives);
+        // Blocks side by side are one part.
+        match self.parts.last_mut().filter(|part| part.end == offset) {
+            Some(part) => part.end = end,
+            None => self.parts.push(offset..end),
+        }
+    }
+
+    /// Copies what the Hessian has below the diagonal, which rows add to, above it.
+    pub(super) fn mirror_lower(&mut self) {
+        self.hessian.fill_upper_triangle_with_lower_triangle();
     }
 
     /// Where the parameters of `block` begin, or `None` if it was not requested.

@@ -53,7 +53,9 @@ pub trait Factor: Send + Sync {
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         let mut rows = Rows::linearized(equations);
         self.rows(state, &mut rows);
-        rows.cost()
+        let cost = rows.cost();
+        equations.mirror_lower();
+        cost
     }
 
     /// The [`cost`](Self::cost) at each of several states, one for each and in their order. A factor that has a quicker way than one after the other writes its own.

@@ -41,8 +41,7 @@ impl<'a> Rows<'a> {
             if residual != 0.0 {
                 equations.add_degrees(weighting.degrees);
             }
-            equations.entries.clear();
-            equations.auxiliary_entries.clear();
+            equations.clear_row();
             let mut row = Row { equations };
             jacobian(&mut row);
             row.add(residual, weighting.weight(residual));
@@ -69,8 +68,7 @@ impl Row<'_> {
     pub fn block(&mut self, block: Block, derivatives: &[f64]) {
         assert_eq!(derivatives.len(), block.dimension(), "derivatives by {block:?}");
         if let Some(offset) = self.equations.offset(block) {
-            let derivatives = derivatives.iter().enumerate();
-            self.equations.entries.extend(derivatives.map(|(i, &d)| (offset + i, d)));
+            self.equations.write_row(offset, derivatives);
         }
     }
 
@@ -104,17 +102,25 @@ impl Row<'_> {
     /// Adds ½ `weight` r² of the residual r.
     #[inline]
     fn add(self, residual: f64, weight: f64) {
-        let NormalEquations { gradient, hessian, by_auxiliary, entries, auxiliary_entries, .. } =
-            self.equations;
-        for &(i, d) in &*entries {
-            gradient[i] += weight * residual * d;
-            let column = &mut hessian.column_mut(i);
-            for &(j, e) in &*entries {
-                column[j] += weight * d * e;
+        let NormalEquations {
+            gradient, hessian, by_auxiliary, row, parts, auxiliary_entries, ..
+        } = self.equations;
+        for part in parts.iter() {
+            for i in part.clone() {
+                let scaled = weight * row[i];
+                gradient[i] += weight * residual * row[i];
+                let mut column = hessian.column_mut(i);
+                // What is below the diagonal, whole parts side by side: the rest is its mirror image.
+                for part in parts.iter() {
+                    let below = part.start.max(i).min(part.end)..part.end;
+                    let sums = &mut column.as_mut_slice()[below.clone()];
+                    sums.iter_mut().zip(&row[below]).for_each(|(sum, d)| *sum += scaled * d);
+                }
             }
         }
         if let Some(auxiliary) = by_auxiliary.as_mut().filter(|_| !auxiliary_entries.is_empty()) {
-            auxiliary.add_row(auxiliary_entries, entries, residual, weight);
+            let by_blocks = parts.iter().flat_map(|part| part.clone().map(|i| (i, row[i])));
+            auxiliary.add_row(auxiliary_entries, by_blocks, residual, weight);
         }
     }
 }

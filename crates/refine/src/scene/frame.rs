@@ -208,7 +208,11 @@ impl Frame {
 
     /// True if the picture shows anything under the mask: one color everywhere is what a camera gives that failed.
     pub(crate) fn has_colors(&self) -> bool {
-        let masked = self.color.pixels().iter().zip(self.mask.pixels()).filter(|(_, m)| **m);
+        let width = self.mask.width();
+        let Some([_, top, _, rows]) = self.mask.bounds() else { return false };
+        let within = (top * width)..((top + rows) * width).min(self.color.pixels().len());
+        let masks = &self.mask.pixels()[within.clone()];
+        let masked = self.color.pixels()[within].iter().zip(masks).filter(|(_, m)| **m);
         let mut colors = masked.map(|(color, _)| color);
         let first = colors.next();
         colors.any(|color| Some(color) != first)

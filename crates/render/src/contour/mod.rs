@@ -108,10 +108,8 @@ impl View for ContourView<'_> {
     fn feed<const DERIVATIVES: bool>(&self, block: usize, sink: &mut impl Sink<DERIVATIVES>) {
         let bands = Bands::new(self, block);
         let clear = bands.clear();
-        for window in sink.windows(&bands.visible.region) {
-            sink.begin(&window);
-            Walk::<DERIVATIVES, _>::new(self, &bands, sink).run(&window, &clear);
-            sink.end();
-        }
+        let windows = sink.windows(&bands.visible.region);
+        let mut walk = Walk::<DERIVATIVES, _>::new(self, &bands, sink);
+        windows.into_iter().for_each(|window| walk.run(&window, &clear));
     }
 }

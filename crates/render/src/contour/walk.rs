@@ -22,7 +22,8 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
     }
 
     /// The pixels of `window`; `clear` are all of the block that are in no band.
-    pub(super) fn run(mut self, window: &Region, clear: &[bool]) {
+    pub(super) fn run(&mut self, window: &Region, clear: &[bool]) {
+        self.sink.begin(window);
         let visible = self.bands.visible;
         let (width, whole) = (window.width(), &visible.region);
         // Columns of a row's pixels inside faces, and of the others that may count.
@@ -50,6 +51,7 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
         }
         self.waiting.flush(&self.view.scene, self.sink);
         self.blended.flush(self.sink);
+        self.sink.end();
     }
 
     /// Index of pixel (x, y) in the image.

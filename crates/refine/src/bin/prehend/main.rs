@@ -12,7 +12,6 @@ mod logging;
 mod options;
 mod pages;
 mod refine;
-mod report;
 mod robot_options;
 mod settings;
 mod study;

@@ -212,8 +212,14 @@ impl DatasetImage<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
-        check_size(file, &if self.has_color() { self.rgb_path()? } else { self.depth_path()? })?;
-        observation.mask = self.optics.mask(file)?;
+        let mask = self.optics.mask(file)?;
+        if (mask.width(), mask.height()) != (observation.camera.width, observation.camera.height) {
+            check_size(
+                file,
+                &if self.has_color() { self.rgb_path()? } else { self.depth_path()? },
+            )?;
+        }
+        observation.mask = mask;
         Ok(())
     }
 

@@ -187,7 +187,9 @@ impl Optics<'_> {
     ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
-        if let (Some(color), Some(depth), None) = (color, depth, &self.depth_camera) {
+        if let (Some(color), Some(depth), None) = (color, depth, &self.depth_camera)
+            && Some(image_size(depth)?) != size
+        {
             check_size(depth, color)?;
         }
         let color = color.map(|file| self.color(file)).transpose()?;
@@ -240,6 +242,10 @@ const TOLD: f64 = 1e-3;
 /// cut to it. What is to be said of it where there are many.
 pub(crate) fn drop_saturated(depth: &mut DepthImage, unit: f64) -> Option<String> {
     let largest = (f64::from(u16::MAX) * unit) as f32;
+    // Hardly any image has one: pixels side by side.
+    if !depth.pixels().iter().fold(false, |any, z| any | (*z >= largest)) {
+        return None;
+    }
     let mut count = 0;
     for pixel in depth.pixels_mut().iter_mut().filter(|z| **z >= largest) {
         *pixel = 0.0;

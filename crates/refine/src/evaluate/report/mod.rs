@@ -5,5 +5,8 @@ mod page;
 mod picture;
 
 #[cfg(feature = "cli")]
-pub use page::{Chart, Column, DrawnFrame, Figure, FrameDrawing, FrameReport, Report, Series};
+pub use page::{
+    Chart, Column, DrawnFrame, Figure, FrameDrawing, FrameReport, Report, Series, flags,
+    pose_figures,
+};
 pub use picture::{before_and_after, depth_residual_picture, outline_picture, rig_picture};

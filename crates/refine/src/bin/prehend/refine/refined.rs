@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::options::Job;
-use crate::report;
 
 /// A refined frame as the journal has it.
 #[derive(Serialize, Deserialize)]
@@ -71,31 +70,14 @@ impl RefinedFrame {
     pub(super) fn report(
         &self,
         job: &Job,
-        [error, initial_error]: [Option<[f64; 2]>; 2],
+        errors: [Option<[f64; 2]>; 2],
         timed: bool,
         drawing: Option<DrawnFrame>,
     ) -> FrameReport {
-        let (initial, pose) = (job.row.t_cam_model, Isometry3::from(&self.pose));
-        let confidence = self.confidence.as_ref();
-        let mut figures = report::pose_figures(error, confidence);
-        let moved = (pose.translation.vector - initial.translation.vector).norm();
-        figures.extend([
-            (report::MOVED, Some(1e3 * moved)),
-            (report::TURNED, Some(pose.rotation.angle_to(&initial.rotation).to_degrees())),
-            (report::INITIAL_ERROR, initial_error.map(|[meters, _]| 1e3 * meters)),
-            (report::INITIAL_TURN, initial_error.map(|[_, radians]| radians.to_degrees())),
-            (report::SECONDS, timed.then_some(self.seconds)),
-            (report::ITERATIONS, Some(self.iterations as f64)),
-        ]);
-        let mut remarks = self.all_warnings();
-        let mut flags = confidence.map_or_else(Vec::new, report::flags);
-        if !remarks.is_empty() {
-            flags.push("warning".to_owned());
-        }
-        remarks.extend(self.diagnosis.iter().map(DiagnosisSummary::to_string));
-        let posterior = self.confidence.clone();
-        let (name, status) = (job.target.to_string(), String::new());
-        FrameReport { name, status, flags, remarks, figures, posterior, drawing }
+        let name = job.target.to_string();
+        let mut report = FrameReport::refined(name, self.details(job, timed), errors, drawing);
+        report.remarks.extend(self.diagnosis.iter().map(DiagnosisSummary::to_string));
+        report
     }
 
     /// Its row of the table.

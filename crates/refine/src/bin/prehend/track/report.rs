@@ -8,14 +8,16 @@ use prehend_refine::data::bop::DatasetError;
 use prehend_refine::data::{AssetError, FrameInput};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{
-    Chart, DrawnFrame, FrameDrawing, FrameReport, Report, Series,
+    Chart, Column, DrawnFrame, FrameDrawing, FrameReport, Report, Series, flags, pose_figures,
 };
 use prehend_refine::strategy::PosteriorSummary;
 use prehend_refine::tracker::{TrackStatus, Tracked};
 
 use super::done::Done;
 use crate::failures::Failures;
-use crate::report::{self, MILLISECONDS, MOMENT};
+
+const MILLISECONDS: Column = Column::new("milliseconds", "time", "ms", 1);
+const MOMENT: Column = Column::new("moment", "moment", "s", 2);
 
 /// Frames that are drawn at most of all films, and of one: pages stay small enough to be opened. Of each film half are drawn as time passes, and half
 /// where something has happened.
@@ -114,12 +116,12 @@ impl FilmReport {
             for (curve, value) in curves.entry(film).or_default().iter_mut().zip(values) {
                 curve.push([moment, value]);
             }
-            let mut figures = report::pose_figures(error, posterior.as_ref());
+            let mut figures = pose_figures(error, posterior.as_ref());
             figures.extend([(MOMENT, Some(moment)), (MILLISECONDS, Some(1e3 * seconds))]);
             report.add_frame(FrameReport {
                 name: format!("{target}{instance}"),
                 status: track.status.name().to_owned(),
-                flags: posterior.as_ref().map_or_else(Vec::new, report::flags),
+                flags: posterior.as_ref().map_or_else(Vec::new, flags),
                 remarks: track.rejection.iter().map(ToString::to_string).collect(),
                 figures,
                 posterior: posterior.clone(),

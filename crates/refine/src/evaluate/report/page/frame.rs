@@ -6,8 +6,10 @@ use nalgebra::Isometry3;
 use serde::{Serialize, Serializer};
 
 use super::document::{Chart, Figure, LabeledPicture, Series};
+use super::figures::{self, flags, pose_figures};
 use super::scene::EncodedScene;
 use crate::calibration::{FrameResiduals, SensorResidual};
+use crate::data::details::FrameDetails;
 use crate::error::RefineError;
 use crate::estimator::EstimatorInput;
 use crate::strategy::{PosteriorSummary, Trace};
@@ -30,6 +32,39 @@ pub struct FrameReport {
     pub posterior: Option<PosteriorSummary>,
     /// The frame as it was drawn, if it was.
     pub drawing: Option<DrawnFrame>,
+}
+
+impl FrameReport {
+    /// A refined frame, with the errors \[m, rad\] of its pose and of the initial one, where the truth is known.
+    pub fn refined(
+        name: String,
+        details: FrameDetails,
+        [error, initial_error]: [Option<[f64; 2]>; 2],
+        drawing: Option<DrawnFrame>,
+    ) -> Self {
+        let FrameDetails { t_cam_model: pose, initial, posterior, iterations, seconds, .. } =
+            details;
+        let moved = |initial: &Isometry3<f64>| {
+            1e3 * (pose.translation.vector - initial.translation.vector).norm()
+        };
+        let turned =
+            |initial: &Isometry3<f64>| pose.rotation.angle_to(&initial.rotation).to_degrees();
+        let mut figures = pose_figures(error, posterior.as_ref());
+        figures.extend([
+            (figures::MOVED, initial.as_ref().map(moved)),
+            (figures::TURNED, initial.as_ref().map(turned)),
+            (figures::INITIAL_ERROR, initial_error.map(|[meters, _]| 1e3 * meters)),
+            (figures::INITIAL_TURN, initial_error.map(|[_, radians]| radians.to_degrees())),
+            (figures::SECONDS, seconds),
+            (figures::ITERATIONS, Some(iterations as f64)),
+        ]);
+        let mut flags = posterior.as_ref().map_or_else(Vec::new, flags);
+        if !details.warnings.is_empty() {
+            flags.push("warning".to_owned());
+        }
+        let (status, remarks) = (String::new(), details.warnings);
+        Self { name, status, flags, remarks, figures, posterior, drawing }
+    }
 }
 
 /// Known figures by the keys of their columns.

@@ -1,28 +1,23 @@
-//! What reports of several commands have in common.
+//! Figures and flags of poses, common to all reports.
 
-use prehend_refine::evaluate::report::{Column, Figure};
-use prehend_refine::strategy::PosteriorSummary;
+use super::document::{Column, Figure};
+use crate::strategy::PosteriorSummary;
 
 const ERROR: Column = Column::new("error", "error", "mm", 2);
 const TURN_ERROR: Column = Column::new("turned-error", "orientation error", "°", 2);
 const PROBABILITY: Column = Column::new("probability", "probability", "", 3);
 const SIGMA: Column = Column::new("sigma", "σ", "mm", 2);
 const TURN_SIGMA: Column = Column::new("turned-sigma", "σ of rotation", "°", 2);
-pub(crate) const MOVED: Column = Column::new("moved", "moved", "mm", 1);
-pub(crate) const TURNED: Column = Column::new("turned", "turned", "°", 1);
-pub(crate) const INITIAL_ERROR: Column = Column::new("initial-error", "error before", "mm", 1);
-pub(crate) const INITIAL_TURN: Column =
+pub(super) const MOVED: Column = Column::new("moved", "moved", "mm", 1);
+pub(super) const TURNED: Column = Column::new("turned", "turned", "°", 1);
+pub(super) const INITIAL_ERROR: Column = Column::new("initial-error", "error before", "mm", 1);
+pub(super) const INITIAL_TURN: Column =
     Column::new("initial-turned-error", "orientation error before", "°", 1);
-pub(crate) const SECONDS: Column = Column::new("seconds", "time", "s", 3);
-pub(crate) const ITERATIONS: Column = Column::new("iterations", "iterations", "", 0);
-pub(crate) const MILLISECONDS: Column = Column::new("milliseconds", "time", "ms", 1);
-pub(crate) const MOMENT: Column = Column::new("moment", "moment", "s", 2);
+pub(super) const SECONDS: Column = Column::new("seconds", "time", "s", 3);
+pub(super) const ITERATIONS: Column = Column::new("iterations", "iterations", "", 0);
 
-/// What is known of a pose by its error \[m, rad\], where the truth is known, and by how sure it is.
-pub(crate) fn pose_figures(
-    error: Option<[f64; 2]>,
-    confidence: Option<&PosteriorSummary>,
-) -> Vec<Figure> {
+/// Figures of a pose: its error \[m, rad\], where the truth is known, and how sure it is.
+pub fn pose_figures(error: Option<[f64; 2]>, confidence: Option<&PosteriorSummary>) -> Vec<Figure> {
     let length = |sigmas: [f64; 3]| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt();
     vec![
         (ERROR, error.map(|[meters, _]| 1e3 * meters)),
@@ -33,8 +28,8 @@ pub(crate) fn pose_figures(
     ]
 }
 
-/// What speaks against a pose.
-pub(crate) fn flags(confidence: &PosteriorSummary) -> Vec<String> {
+/// Flags of a pose, each naming something that speaks against it.
+pub fn flags(confidence: &PosteriorSummary) -> Vec<String> {
     let rival = confidence.weights.iter().skip(1).any(|weight| *weight > 0.1);
     let known = [
         (confidence.probability < 0.5, "improbable"),
