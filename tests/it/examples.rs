@@ -27,6 +27,7 @@ examples! {
     inverse_rendering: "../../examples/inverse_rendering.rs",
     law_report: "../../examples/law_report/main.rs",
     learn_friction_from_throws: "../../examples/learn_friction_from_throws.rs",
+    lqr: "../../examples/lqr.rs",
     loss_term: "../../examples/loss_term.rs",
     marbles: "../../examples/marbles.rs",
     mesh_contacts: "../../examples/mesh_contacts.rs",

@@ -2,6 +2,7 @@
 
 mod mask;
 
+use std::array;
 use std::io::{BufReader, Cursor, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -172,8 +173,9 @@ impl RgbImage {
         let pixels = match image {
             // Without a second copy of 12 bytes a pixel.
             DynamicImage::ImageRgb8(image) => {
+                let channel: [f32; 256] = array::from_fn(|byte| byte as f32 / 255.0);
                 let (pixels, _) = image.as_raw().as_chunks();
-                pixels.iter().map(|pixel: &[u8; 3]| pixel.map(|c| f32::from(c) / 255.0)).collect()
+                pixels.iter().map(|p: &[u8; 3]| p.map(|c| channel[usize::from(c)])).collect()
             }
             other => other.into_rgb32f().pixels().map(|p| p.0).collect(),
         };

@@ -37,7 +37,7 @@ impl Region {
         bounds
     }
 
-    /// The same of the pixels of a mask, many side by side: a tenth of the time.
+    /// Smallest rectangle around the set pixels of a mask, which are looked at side by side, in a tenth of the time.
     pub(crate) fn around_mask(width: usize, pixels: &[bool]) -> Option<Self> {
         let mut rows = pixels.chunks(width.max(1));
         let has_any = |row: &[bool]| row.iter().fold(false, |any, set| any | set);

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::error::Raise;
 use crate::threads::detached;
 
-/// A robot hand, prepared once for any number of frames: collision geometry of a URDF file, and taxels of a CSV file with the columns idx, patch,
+/// A robot hand, prepared once for any number of frames: collision geometry of a URDF or MJCF file, and taxels of a CSV file with the columns idx, patch,
 /// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
 ///
 /// What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
@@ -21,9 +21,9 @@ pub(crate) struct Hand {
 #[pymethods]
 impl Hand {
     #[new]
-    #[pyo3(signature = (urdf, taxels=None))]
-    fn new(py: Python<'_>, urdf: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
-        let load = || prehend_refine::Hand::load(&urdf, taxels.as_deref(), user_cache().as_ref());
+    #[pyo3(signature = (path, taxels=None))]
+    fn new(py: Python<'_>, path: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
+        let load = || prehend_refine::Hand::load(&path, taxels.as_deref(), user_cache().as_ref());
         let hand = detached(py, load)?;
         Ok(Self { hand: Arc::new(hand.raise()?) })
     }

@@ -295,7 +295,7 @@ class Object:
 
 class Hand:
     def __new__(
-        cls, urdf: str | PathLike[str], taxels: str | PathLike[str] | None = None
+        cls, path: str | PathLike[str], taxels: str | PathLike[str] | None = None
     ) -> Hand: ...
     @property
     def joints(self) -> list[str]: ...

@@ -1,6 +1,6 @@
 //! Closest points of the body: preparing them, and three sets of queries.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use prehend_geometry::{ClosestPoints, TriMesh};
 
 use super::oracle;
@@ -9,8 +9,6 @@ use super::table::Comparison;
 
 /// \[m\]
 const TOLERANCE: f64 = 1e-7;
-/// How far the query moves between the answer that is remembered and the one that is asked for \[m\].
-const STEP: f64 = 1e-3;
 
 /// Preparing the body; the answers are a few distances that the result must be able to give.
 pub(crate) fn build<'a>(body: &'a TriMesh, set: &'a QuerySet) -> Comparison<'a> {
@@ -41,13 +39,6 @@ pub(crate) fn queries<'a>(
         found.iter().map(|f| f.map_or(f64::NAN, |f| f.distance)).collect()
     };
     job.add("ours", || tree.closest_many(points, f64::INFINITY), distances);
-    let step = Vector3::new(0.6, 0.0, 0.8) * STEP;
-    let before: Vec<u32> = points
-        .iter()
-        .map(|p| tree.closest(&(p + step), f64::INFINITY).map_or(0, |found| found.face))
-        .collect();
-    let warm = move || tree.closest_many_with_hints(points, f64::INFINITY, &before);
-    job.add("ours, from the face 1 mm before", warm, distances);
     job
 }
 

@@ -16,21 +16,6 @@ impl ClosestPoints {
         })
     }
 
-    /// As [`Self::closest_many`], each from a face of its own, such as the answer before the points moved a little;
-    /// points without a hint start from scratch.
-    pub fn closest_many_with_hints(
-        &self,
-        points: &[Point3<f64>],
-        max_distance: f64,
-        hints: &[u32],
-    ) -> Vec<Option<Closest>> {
-        let hint = |i: usize| hints.get(i).copied();
-        // Those from one pack of triangles follow each other, so that they find it in the cache.
-        let pack = |i| hint(i).and_then(|face| self.bvh.pack.get(face as usize)).copied();
-        let packs: Vec<u32> = (0..points.len()).map(|i| pack(i).unwrap_or_default()).collect();
-        in_order(&sorted(&packs), |i, _| self.search(&points[i], max_distance, hint(i)))
-    }
-
     /// Signed distances of many points, in their order, in parallel: the very answers of
     /// [`Self::signed_distance`].
     pub fn signed_distance_many(&self, points: &[Point3<f64>]) -> Vec<(f64, Closest)> {

@@ -83,8 +83,6 @@ fn batches_keep_the_order_whatever_the_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| tree.closest_many(&points, 0.5)), alone);
         assert_eq!(pool.install(|| tree.signed_distance_many(&points)), signed);
-        let hints = vec![77; 2000];
-        assert_eq!(pool.install(|| tree.closest_many_with_hints(&points, 0.5, &hints)), alone);
     }
 }
 

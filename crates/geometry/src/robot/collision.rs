@@ -18,7 +18,7 @@ use crate::read_options::ReadOptions;
 use crate::shapes;
 
 /// Columns of facets around a cylinder, a capsule or a sphere.
-const COLUMNS: usize = 48;
+pub(super) const COLUMNS: usize = 48;
 
 /// One mesh a collision tag of `link`, in the link frame \[m\].
 pub(super) fn parts(

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::mjcf::MjcfError;
+
 /// Why a robot could not be read or posed.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotError {
@@ -19,6 +21,9 @@ pub enum RobotError {
         /// The error of the parser.
         message: String,
     },
+    /// The description is not valid MJCF, or has what is not supported.
+    #[error(transparent)]
+    Mjcf(Box<MjcfError>),
     /// An error in the description that was read from a file.
     #[error("{path}: {source}")]
     InFile {

@@ -47,7 +47,8 @@ impl KinematicTree {
     }
 }
 
-fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry3<S> {
+/// Child frame → parent frame \[m\].
+pub(super) fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry3<S> {
     let fixed = lift(&joint.t_parent_joint);
     let Drive::Variable { index, multiplier, offset } = joint.drive else { return fixed };
     let position = joints[index] * S::constant(multiplier) + S::constant(offset);

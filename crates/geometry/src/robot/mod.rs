@@ -1,4 +1,4 @@
-//! Robots: kinematic trees with collision shapes, read from URDF.
+//! Robots: kinematic trees with collision shapes, read from URDF and MJCF.
 
 mod articulated;
 mod assembly;
@@ -9,6 +9,7 @@ mod error;
 mod kinematics;
 mod lenient;
 mod limits;
+mod mjcf;
 mod origin;
 mod posed;
 mod screw;
@@ -23,6 +24,7 @@ use nalgebra::{Isometry3, Unit, Vector3};
 pub use articulated::{ArticulatedRobot, RobotSample};
 pub use closest::RobotClosest;
 pub use error::RobotError;
+pub use mjcf::outermost_element;
 pub use posed::PosedRobot;
 pub use screw::Screw;
 pub use shape::{LinkShape, RobotShape};
@@ -148,7 +150,7 @@ impl KinematicTree {
         &self.floating
     }
 
-    /// Parts of its description that are against the format and were put right.
+    /// Parts of its description that are against the format and were put right, or that are not kept.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }

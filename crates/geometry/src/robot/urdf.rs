@@ -204,7 +204,7 @@ fn tag_end(text: &str) -> Option<usize> {
     })
 }
 
-fn unique<'a>(
+pub(super) fn unique<'a>(
     kind: &'static str,
     names: impl Iterator<Item = &'a String>,
 ) -> Result<(), RobotError> {

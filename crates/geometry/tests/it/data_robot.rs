@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use prehend_geometry::hand::{Taxel, load_taxels};
+use prehend_geometry::mjcf::Model;
 use prehend_geometry::{
     ClosestPoints, DistanceField, KinematicTree, PosedRobot, RobotShape, TriMesh,
 };
@@ -62,6 +63,40 @@ fn forward_kinematics_match_the_golden_poses() {
     assert_eq!(compared, 40);
     // The file has nine decimals: 1e-9 beside half a unit of the last.
     assert!(worst <= 1e-9 + 0.5e-9);
+}
+
+#[test]
+#[ignore = "reads PREHEND_DATA"]
+fn robots_in_mjcf_have_the_poses_of_their_models() {
+    for file in [
+        "wonik_allegro/left_hand.xml",
+        "shadow_hand/right_hand.xml",
+        "robotiq_2f85/2f85.xml",
+        "kuka_iiwa_14/iiwa14.xml",
+    ] {
+        let path = data("robots").join(file);
+        let model = Model::from_file(&path).unwrap();
+        let robot = KinematicTree::from_file(&path).unwrap();
+        let value = |name: &String| {
+            let found = model.joint_indices().find(|at| model.joint(*at).name == *name);
+            found.map_or(0.0, |at| model.joint(at).reference)
+        };
+        let joints: Vec<f64> = robot.joint_names().iter().map(value).collect();
+        let poses = robot.forward_kinematics(&joints);
+        let expected = model.reference_poses();
+        // The base is a body of the model.
+        let base = expected[model.body_index(&robot.links()[robot.root()].name).unwrap()].inverse();
+        let mut compared = 0;
+        for (body, pose) in model.bodies.iter().zip(&expected) {
+            let Some(link) = robot.link_index(&body.name) else { continue };
+            let error = poses[link].to_homogeneous() - (base * pose).to_homogeneous();
+            assert!(error.amax() < 1e-12, "{file}: {}: {error}", body.name);
+            compared += 1;
+        }
+        let parts: usize = robot.links().iter().map(|link| link.parts.len()).sum();
+        println!("{file}: {compared} links, {parts} parts, {} joints", joints.len());
+        assert!(compared > 5 && parts > 5 && joints.len() > 5);
+    }
 }
 
 /// Link of each taxel and the skin above it, which the golden distances are measured from: taxels of

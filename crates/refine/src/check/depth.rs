@@ -75,7 +75,7 @@ fn on_hand(depths: &[(f64, f64)], blank: usize, on_object: Option<(f64, f64)>) -
     let [on, behind, front, none] = percent.map(|p| format!("{p:.0} %"));
     let message = format!(
         "where the hand should be seen, depth is within {:.1} cm of it in {on} of the pixels, behind it in {behind}, in front \
-         of it in {front} and missing in {none}: are the hand's pose (base to camera), joints and URDF, and cam_K right?",
+         of it in {front} and missing in {none}: are the hand's pose (base to camera), joints and description, and cam_K right?",
         limits::HAND_REACH * 1e2
     );
     let too_few = near < limits::SHARE_ON_HAND * known || near < limits::SHARE_ON_HAND_OF_ALL * all;

@@ -61,7 +61,7 @@ fn joints(tree: &KinematicTree, joints: &[f64]) -> Option<(String, bool)> {
     let other_unit = q.abs() > limits::JOINT_RATIO * low.abs().max(high.abs())
         && alike.all(|j| beyond(j, joints[j] * factor) <= 1.0);
     let cause =
-        if other_unit { question } else { "are its name, sign and zero those of the URDF?" };
+        if other_unit { question } else { "are its name, sign and zero those of its description?" };
     let (name, by) = (&tree.joint_names()[worst], excess(q, limits[worst]));
     let (count, of) = (outside().count(), joints.len());
     let message = format!(

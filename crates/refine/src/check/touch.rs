@@ -108,7 +108,7 @@ pub(super) fn check_places(
     if gap > limits::HAND_FROM_OBJECT {
         let message = format!(
             "{count} taxels feel the object, but it is {gap_cm:.1} cm from the hand where mask and depth have it: are the \
-             hand's pose (base to camera), joints and URDF right?"
+             hand's pose (base to camera), joints and description right?"
         );
         return found.add(Subject::Hand, message);
     }

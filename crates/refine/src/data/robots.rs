@@ -103,7 +103,7 @@ impl Robots {
     ) -> Result<PlacedBody<'b>, AssetError> {
         let tree = kept(&mut self.trees, body.kind.clone(), || -> Result<_, AssetError> {
             Ok(Arc::new(match &body.kind {
-                BodyKind::Hand { urdf } => KinematicTree::from_urdf_file(urdf)?,
+                BodyKind::Hand { urdf } => KinematicTree::from_file(urdf)?,
                 BodyKind::Plane => plane(),
                 BodyKind::Object { obj_id } => match objects.get(obj_id) {
                     Some(object) => solid(&object.mesh),

@@ -154,7 +154,7 @@ impl<'a> Scorer<'a> {
     /// The robot's description alone: contact is measured exactly, so no distance grid is needed.
     fn tree(&mut self, urdf: &Path) -> Result<&KinematicTree, AssetError> {
         if !self.trees.contains_key(urdf) {
-            self.trees.insert(urdf.to_owned(), KinematicTree::from_urdf_file(urdf)?);
+            self.trees.insert(urdf.to_owned(), KinematicTree::from_file(urdf)?);
         }
         Ok(&self.trees[urdf])
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use prehend_geometry::robot::outermost_element;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
@@ -28,7 +29,7 @@ pub(super) fn read(
             ("mesh", mesh::read(path, options, warnings)?)
         }
         "urdf" => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
-        "xml" => match outermost(&read_text(path)?) {
+        "xml" => match outermost_element(&read_text(path)?) {
             Some("robot") => ("robot", robot::of_urdf(path, &options.robot, warnings)?),
             Some("mujoco") => ("robot", robot::of_mjcf(path, &options.robot, warnings)?),
             _ => return Err(unknown(path, "the outermost element is neither robot nor mujoco")),
@@ -57,33 +58,12 @@ pub(super) fn unknown(path: &Path, problem: &str) -> AssetError {
     DatasetError::unusable(path, format!("{problem}; known are {known}")).into()
 }
 
-/// The name of the outermost element of XML.
-fn outermost(xml: &str) -> Option<&str> {
-    let mut rest = xml;
-    loop {
-        rest = &rest[rest.find('<')? + 1..];
-        if let Some(comment) = rest.strip_prefix("!--") {
-            rest = &comment[comment.find("-->")?..];
-        } else if !rest.starts_with(['?', '!']) {
-            return rest.split(|c: char| c.is_whitespace() || c == '>' || c == '/').next();
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
 
     use super::*;
     use crate::info::describe;
-
-    #[test]
-    fn the_outermost_element_is_found_behind_comments() {
-        assert_eq!(outermost("<?xml version=\"1.0\"?><!-- <robot> --><mujoco/>"), Some("mujoco"));
-        assert_eq!(outermost("<!DOCTYPE x>\n<robot\n name='r'>"), Some("robot"));
-        assert_eq!(outermost("<!-- never ends"), None);
-        assert_eq!(outermost(""), None);
-    }
 
     #[test]
     fn collada_is_a_mesh() {

@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Ass
     }
     let mut hand = None;
     if let Some((urdf, joints)) = bodies.iter().find_map(Body::as_hand) {
-        let tree = KinematicTree::from_urdf_file(urdf)?;
+        let tree = KinematicTree::from_file(urdf)?;
         tree.joint_vector(joints)?;
         let joints = tree.joint_names().len();
         hand = Some(

@@ -179,10 +179,9 @@ impl NormalEquations {
         }
         let lower = cholesky(own)?;
         let mut rest = Self {
-            blocks: self.blocks.clone(),
             gradient: self.gradient.clone(),
             hessian: self.hessian.clone(),
-            ..Self::new(&[])
+            ..Self::new(&self.blocks)
         };
         let mut gain = 0.0;
         if let Some(Auxiliary { gradient, coupling, .. }) = &self.by_auxiliary {
@@ -237,7 +236,7 @@ impl NormalEquations {
 
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
-    /// Parts that belong to blocks nobody requested are dropped.
+    /// Parts that belong to blocks nobody requested are dropped. The Hessian must be symmetric: what is below its diagonal may replace what is above.
     ///
     /// # Panics
     /// If there are fewer numbers than the blocks have.

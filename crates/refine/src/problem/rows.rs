@@ -105,16 +105,21 @@ impl Row<'_> {
         let NormalEquations {
             gradient, hessian, by_auxiliary, row, parts, auxiliary_entries, ..
         } = self.equations;
+        let (row, size) = (row.as_slice(), row.len());
         for part in parts.iter() {
             for i in part.clone() {
+                // Joints elsewhere.
+                if row[i] == 0.0 {
+                    continue;
+                }
                 let scaled = weight * row[i];
                 gradient[i] += weight * residual * row[i];
-                let mut column = hessian.column_mut(i);
+                let column = &mut hessian.as_mut_slice()[i * size..(i + 1) * size];
                 // What is below the diagonal, whole parts side by side: the rest is its mirror image.
-                for part in parts.iter() {
-                    let below = part.start.max(i).min(part.end)..part.end;
-                    let sums = &mut column.as_mut_slice()[below.clone()];
-                    sums.iter_mut().zip(&row[below]).for_each(|(sum, d)| *sum += scaled * d);
+                for part in parts.iter().filter(|part| part.end > i) {
+                    let below = part.start.max(i)..part.end;
+                    let sums = column[below.clone()].iter_mut();
+                    sums.zip(&row[below]).for_each(|(sum, d)| *sum += scaled * d);
                 }
             }
         }

@@ -39,16 +39,16 @@ impl Hand {
         Self::cached(tree, taxels, None)
     }
 
-    /// Hand of a URDF file, with the taxels of a table ([`load_taxels`]) and distance grids of a `cache`, where they are given.
+    /// Hand of a URDF or MJCF file, with the taxels of a table ([`load_taxels`]) and distance grids of a `cache`, where they are given.
     ///
     /// # Errors
     /// If a file cannot be read, or the geometry of a link cannot be used.
     pub fn load(
-        urdf: &Path,
+        description: &Path,
         taxels: Option<&Path>,
         cache: Option<&GridCache>,
     ) -> Result<Self, RefineError> {
-        let tree = KinematicTree::from_urdf_file(urdf)?;
+        let tree = KinematicTree::from_file(description)?;
         let taxels = taxels.map(load_taxels).transpose()?.unwrap_or_default();
         Ok(Self::cached(tree, taxels, cache)?)
     }
@@ -173,7 +173,8 @@ impl fmt::Debug for Hand {
 mod tests {
     use super::*;
     use crate::check::check_frame;
-    use crate::scene::{PreparedFrame, default_scene};
+    use crate::estimator::{Estimator, Hypotheses};
+    use crate::scene::{Frame, PreparedFrame, default_scene};
 
     #[test]
     fn a_wrong_number_of_joints_is_an_error() {
@@ -187,6 +188,51 @@ mod tests {
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
         let warnings = check_frame(&observation, &scene.object, &scene.initial);
         assert!(warnings.iter().any(|w| w.message.contains("15 joint positions")), "{warnings:?}");
+    }
+
+    #[test]
+    fn a_hand_in_mjcf_refines_as_the_same_in_urdf() {
+        let dir = tempfile::tempdir().unwrap();
+        let written = |name: &str, text: &str| {
+            let file = dir.path().join(name);
+            std::fs::write(&file, text).unwrap();
+            Arc::new(Hand::load(&file, None, None).unwrap())
+        };
+        let urdf = r#"<robot name="gripper">
+            <link name="palm"><collision><origin xyz="0 0 -0.02"/><geometry><box size="0.14 0.06 0.04"/></geometry></collision></link>
+            <link name="left"><collision><origin xyz="-0.005 0 0.04"/><geometry><box size="0.01 0.03 0.08"/></geometry></collision></link>
+            <link name="right"><collision><origin xyz="0 0 0.04"/><geometry><cylinder radius="0.01" length="0.08"/></geometry></collision></link>
+            <joint name="slide" type="prismatic"><parent link="palm"/><child link="left"/><axis xyz="1 0 0"/></joint>
+            <joint name="turn" type="revolute"><origin xyz="0.05 0 0" rpy="0 0 0.5"/><parent link="palm"/><child link="right"/>
+                <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
+        let mjcf = r#"<mujoco model="gripper"><compiler angle="radian" eulerseq="XYZ"/><worldbody><body name="palm" pos="0.3 0 0">
+            <geom type="box" size="0.07 0.03 0.02" pos="0 0 -0.02"/>
+            <body name="left"><joint name="slide" type="slide" axis="1 0 0"/>
+                <geom type="box" size="0.005 0.015 0.04" pos="-0.005 0 0.04"/></body>
+            <body name="right" pos="0.05 0 0" euler="0 0 0.5"><joint name="turn" axis="0 1 0" range="-1 1"/>
+                <geom type="cylinder" size="0.01 0.04" pos="0 0 0.04"/></body></body></worldbody></mujoco>"#;
+        let scene = default_scene(1).unwrap();
+        let object = Arc::clone(&scene.object);
+        let center = scene.initial * object.center;
+        let t_cam_hand = Isometry3::translation(center.x, center.y, center.z + 0.05);
+        let refined = |hand: Arc<Hand>| {
+            let frame = Frame {
+                hand: Some(hand.measured(t_cam_hand, vec![-0.04, 0.1])),
+                ..scene.frame.clone()
+            };
+            let estimator = Estimator::new(Arc::clone(&object));
+            let initial = Hypotheses::from(scene.initial);
+            *estimator.refine(&frame, &initial).unwrap().t_cam_object()
+        };
+        let [a, b] = [written("a.urdf", urdf), written("b.xml", mjcf)].map(refined);
+        let apart = (a.to_homogeneous() - b.to_homogeneous()).norm();
+        assert!(apart < 1e-9, "{apart}");
+        // The hand counts.
+        let estimator = Estimator::new(Arc::clone(&object));
+        let bare = Frame { hand: None, ..scene.frame.clone() };
+        let alone =
+            *estimator.refine(&bare, &Hypotheses::from(scene.initial)).unwrap().t_cam_object();
+        assert!((a.to_homogeneous() - alone.to_homogeneous()).norm() > 1e-6);
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub(crate) use region::{
     ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index, pixel_distances,
 };
 pub(crate) use remap_cache::RemapCache;
-pub(crate) use sums::{Sums, squares};
+pub(crate) use sums::{BoxSums, squares};
 pub use surface_deviation::{ModelErrorSettings, SurfaceDeviation};
 pub use target::Target;
 pub use touch::{BinaryContact, ContactPatch, ProximityReading, TouchReading};

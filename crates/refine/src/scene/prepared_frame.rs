@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, draw_depth};
 use serde::{Deserialize, Serialize};
 
-use super::{ForegroundSettings, Frame, HandMeasurement, Object, RegionEvidence, Sums};
+use super::{BoxSums, ForegroundSettings, Frame, HandMeasurement, Object, RegionEvidence};
 use crate::error::RefineError;
 
 /// A frame and the object whose pose is sought, checked, with what factors derive from them: each image is made when it is first asked
@@ -297,7 +297,7 @@ impl<'a> PreparedFrame<'a> {
 /// Pixels of an image of `width` columns whose neighbors up to `reach` columns and rows away are all set.
 pub(crate) fn eroded(width: usize, set: &[bool], reach: usize) -> Vec<bool> {
     let values: Vec<f32> = set.iter().map(|set| f32::from(u8::from(*set))).collect();
-    let (columns, mut sums) = (width.max(1), Sums::default());
+    let (columns, mut sums) = (width.max(1), BoxSums::default());
     sums.find(&values, (columns, set.len() / columns), reach);
     let all = (2 * reach + 1).pow(2) as f32;
     sums.all.iter().map(|sum| *sum >= all).collect()

@@ -2,14 +2,14 @@
 
 /// Sums over the square about each pixel.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sums {
+pub(crate) struct BoxSums {
     pub(crate) all: Vec<f32>,
     across: Vec<f32>,
     /// Sum of each column over the rows at hand.
     column: Vec<f32>,
 }
 
-impl Sums {
+impl BoxSums {
     /// Finds those of `values` over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
     pub(crate) fn find(&mut self, values: &[f32], (columns, rows): (usize, usize), reach: usize) {
         let Self { all, across, column } = self;
@@ -62,7 +62,7 @@ mod tests {
         let (columns, rows) = (13, 9);
         let value = |k: usize| f32::from(u8::from((k * 7).is_multiple_of(5)));
         let values: Vec<f32> = (0..columns * rows).map(value).collect();
-        let mut sums = Sums::default();
+        let mut sums = BoxSums::default();
         sums.find(&values, (columns, rows), 2);
         for (k, found) in sums.all.iter().enumerate() {
             let (x, y) = (k % columns, k / columns);

@@ -11,7 +11,7 @@ use crate::error::RefineError;
 use crate::scene::{Frame, HandMeasurement, PreparedFrame, pixel_distances};
 
 /// Everything in the camera frame \[m\].
-pub(super) struct Evidence {
+pub(super) struct SearchEvidence {
     /// Points on the object's visible surface with their normals (zero where unknown), in no particular order.
     pub(super) points: Vec<(Point3<f64>, Vector3<f64>)>,
     /// Taxels that the object touches.
@@ -22,7 +22,7 @@ pub(super) struct Evidence {
     pub(super) map: SightMap,
 }
 
-impl Evidence {
+impl SearchEvidence {
     /// What `frame` shows; the hand's surface is as many points as stage 2 looks at.
     ///
     /// # Errors
@@ -159,7 +159,7 @@ mod tests {
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
         let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
-        let evidence = Evidence::new(&frame, &SearchSettings::default()).unwrap();
+        let evidence = SearchEvidence::new(&frame, &SearchSettings::default()).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
             let facing = scene.object.samples.iter().filter_map(|s| {
@@ -183,7 +183,7 @@ mod tests {
         let mut observation = scene.frame.clone();
         observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
         let frame = PreparedFrame::new(&observation, &scene.object).unwrap();
-        let unfelt = Evidence::new(&frame, &SearchSettings::default()).unwrap();
+        let unfelt = SearchEvidence::new(&frame, &SearchSettings::default()).unwrap();
         let taxels = scene.hand.taxels.len();
         let all = evidence.outside.len() + evidence.touched.len();
         assert_eq!((unfelt.outside.len(), unfelt.touched.len()), (all - taxels, 0));

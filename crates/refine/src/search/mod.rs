@@ -14,7 +14,7 @@ use rayon::prelude::*;
 pub use self::settings::SearchSettings;
 
 use self::distance_lattice::DistanceLattice;
-use self::evidence::Evidence;
+use self::evidence::SearchEvidence;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
 use crate::problem::State;
@@ -80,7 +80,7 @@ impl PoseSearch {
     /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
     pub fn run(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
         let Self { object, lattice, settings } = self;
-        let evidence = &Evidence::new(frame, settings)?;
+        let evidence = &SearchEvidence::new(frame, settings)?;
         let rough = CoarseScorer { object, lattice, evidence, settings };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);

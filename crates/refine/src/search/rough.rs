@@ -7,14 +7,14 @@ use prehend_geometry::RobustKernel;
 
 use super::SearchSettings;
 use super::distance_lattice::DistanceLattice;
-use super::evidence::Evidence;
+use super::evidence::SearchEvidence;
 use crate::scene::Object;
 
 /// An object and what is known of where it is.
 pub(super) struct CoarseScorer<'a> {
     pub(super) object: &'a Object,
     pub(super) lattice: &'a DistanceLattice,
-    pub(super) evidence: &'a Evidence,
+    pub(super) evidence: &'a SearchEvidence,
     pub(super) settings: &'a SearchSettings,
 }
 

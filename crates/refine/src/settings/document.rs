@@ -22,20 +22,20 @@ impl Settings {
         let values = Value::try_from(self).map_err(|error| wrong(&error))?;
         let root = Json::from(schema_for!(Self));
         let mut document =
-            Document { root: &root, text: String::new(), described: BTreeSet::new() };
+            SettingsDocument { root: &root, text: String::new(), described: BTreeSet::new() };
         document.write("", &values, &root).map_err(|error| wrong(&error))?;
         Ok(document.text)
     }
 }
 
-struct Document<'a> {
+struct SettingsDocument<'a> {
     root: &'a Json,
     text: String,
     /// Structures that were described before.
     described: BTreeSet<&'a str>,
 }
 
-impl<'a> Document<'a> {
+impl<'a> SettingsDocument<'a> {
     /// Fields of a structure with their schemas; none of anything else.
     fn fields(&self, schema: &'a Json) -> impl Iterator<Item = (&'a String, &'a Json)> + use<'a> {
         let name = schema["$ref"].as_str().and_then(|name| name.strip_prefix('#'));

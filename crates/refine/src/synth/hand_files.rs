@@ -7,7 +7,7 @@ use std::sync::Arc;
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
 use prehend_geometry::limits::MAX_FILE_BYTES;
 use prehend_geometry::read_plain;
-use prehend_geometry::robot::KinematicTree;
+use prehend_geometry::robot::{KinematicTree, outermost_element};
 
 use crate::data::AssetError;
 use crate::data::bop::{DatasetError, create_folder, read_text, write_atomically};
@@ -45,9 +45,13 @@ impl HandFiles {
     /// # Errors
     /// If a file is missing or broken.
     pub fn load(urdf: &Path, taxels: Option<&Path>) -> Result<Self, AssetError> {
+        let text = read_text(urdf)?;
+        if outermost_element(&text) == Some("mujoco") {
+            let problem = "is MJCF: datasets are made with hands in URDF alone";
+            return Err(DatasetError::unusable(urdf, problem).into());
+        }
         let tree = KinematicTree::from_urdf_file(urdf)?;
         let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
-        let text = read_text(urdf)?;
         let folder = urdf.parent().unwrap_or(Path::new(""));
         let mut meshes: Vec<(PathBuf, Vec<u8>)> = Vec::new();
         for name in named_files(&text) {

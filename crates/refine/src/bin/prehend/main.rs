@@ -32,7 +32,7 @@ use clap::{ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 /// sensors, `prehend refine` finds the pose that agrees with all of them.
 ///
 /// Datasets are in BOP format (https://bop.felk.cvut.cz), extended by scene_bodies.json (gravity, and
-/// the hand's URDF, pose and joints) and scene_tactile.json (taxel forces). Poses are BOP results files
+/// the hand's URDF or MJCF, pose and joints) and scene_tactile.json (taxel forces). Poses are BOP results files
 /// with the columns scene_id,im_id,obj_id,score,R,t,time: R row-major, t in millimeters, object to
 /// camera (x right, y down, z forward).
 ///

@@ -32,7 +32,7 @@ pub struct Body {
 pub enum BodyKind {
     /// A robot hand, or another articulated body.
     Hand {
-        /// Its URDF file.
+        /// Its URDF or MJCF file.
         urdf: PathBuf,
     },
     /// The half-space below z = 0 of its own frame.
@@ -52,7 +52,7 @@ pub enum BodyKind {
 }
 
 impl Body {
-    /// URDF file and joint positions \[rad or m\] of a hand.
+    /// Description and joint positions \[rad or m\] of a hand.
     pub fn as_hand(&self) -> Option<(&Path, &BTreeMap<String, f64>)> {
         match &self.kind {
             BodyKind::Hand { urdf } => Some((urdf, &self.joints)),

@@ -209,7 +209,8 @@ impl Optics<'_> {
         let depth = measured.unwrap_or_else(|| DepthImage::filled(width, height, 0.0));
         let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
         let mask = Mask::filled(width, height, false);
-        Ok(Frame::new(self.camera(width, height)).color(color).depth(depth).mask(mask))
+        let (camera, gravity, hand, views) = (self.camera(width, height), None, None, Vec::new());
+        Ok(Frame { camera, color, depth, mask, gravity, hand, views })
     }
 }
 

@@ -13,7 +13,7 @@ use prehend_render::Mask;
 use rayon::prelude::*;
 
 pub(crate) use self::scatter::NoiseEstimate;
-use self::smooth_field::{Fit, SmoothField};
+use self::smooth_field::{FieldFit, SmoothField};
 use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
 use crate::defaults::settings;
@@ -213,18 +213,18 @@ impl PointToPlaneFactor {
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.
-    fn fit(&self, residuals: &[Option<Residual>]) -> Fit {
+    fn fit(&self, residuals: &[Option<Residual>]) -> FieldFit {
         let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
         let distances: Vec<f64> = residuals.iter().map(distance).collect();
         let weighting = self.weighting();
         let facing = |i: usize| residuals[i].as_ref().map_or(0.0, |r| r.facing);
         let weight = |i: usize, left: f64| facing(i) * weighting.weight(left);
         let fitted = self.field.as_ref().and_then(|field| field.fit(&distances, weight));
-        fitted.unwrap_or_else(|| Fit::without_field(&distances, weight))
+        fitted.unwrap_or_else(|| FieldFit::without_field(&distances, weight))
     }
 
     /// Nats at the fitted field.
-    fn cost_of(&self, residuals: &[Option<Residual>], fit: &Fit) -> f64 {
+    fn cost_of(&self, residuals: &[Option<Residual>], fit: &FieldFit) -> f64 {
         let weighting = self.weighting();
         let cost = |(left, residual): (&f64, &Option<Residual>)| {
             let Some(Residual { nearest, facing, .. }) = residual else { return 0.0 };

@@ -19,7 +19,7 @@ pub(super) struct SmoothField {
 }
 
 /// The field that fits residuals best, or none.
-pub(super) struct Fit {
+pub(super) struct FieldFit {
     /// Residuals without it \[m\].
     pub(super) left: Vec<f64>,
     /// Their weights, with which it was found \[1/m²\].
@@ -30,7 +30,7 @@ pub(super) struct Fit {
     information: Option<Cholesky<f64, Dyn>>,
 }
 
-impl Fit {
+impl FieldFit {
     /// Without a field; `weight` is that of [`SmoothField::fit`].
     pub(super) fn without_field(residuals: &[f64], weight: impl Fn(usize, f64) -> f64) -> Self {
         let weights = residuals.iter().enumerate().map(|(i, r)| weight(i, *r)).collect();
@@ -51,7 +51,11 @@ impl SmoothField {
     /// information is in one \[1/m²\].
     ///
     /// With it at its best, derivatives by anything else are those at a fixed field (Golub and Pereyra, 1973).
-    pub(super) fn fit(&self, residuals: &[f64], weight: impl Fn(usize, f64) -> f64) -> Option<Fit> {
+    pub(super) fn fit(
+        &self,
+        residuals: &[f64],
+        weight: impl Fn(usize, f64) -> f64,
+    ) -> Option<FieldFit> {
         let count = self.features.nrows();
         let round = |left: &[f64]| {
             let weights: Vec<f64> = left.iter().enumerate().map(|(i, r)| weight(i, *r)).collect();
@@ -66,7 +70,7 @@ impl SmoothField {
             let field = self.features.tr_mul(&coefficients);
             let left = residuals.iter().zip(field.iter()).map(|(r, field)| r - field).collect();
             let (cost, information) = (0.5 * coefficients.norm_squared(), Some(information));
-            Some(Fit { left, weights, cost, information })
+            Some(FieldFit { left, weights, cost, information })
         };
         let mut fit = round(residuals)?;
         for _ in 1..self.reweightings {
@@ -79,7 +83,7 @@ impl SmoothField {
     /// residual that are not zero. With the weights of the fit it is never more than there is.
     pub(super) fn lost<I: Iterator<Item = (usize, f64)>>(
         &self,
-        fit: &Fit,
+        fit: &FieldFit,
         size: usize,
         derivatives: impl Fn(usize) -> I,
     ) -> DMatrix<f64> {

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, draw_depth};
 
 use super::SegmentationSettings;
-use crate::scene::{Object, Sums, color_index, squares};
+use crate::scene::{BoxSums, Object, color_index, squares};
 use crate::tracker::sight::Sight;
 
 /// What a pixel surely shows.
@@ -43,9 +43,9 @@ pub(super) struct Window {
     drawn: DepthImage,
     /// Numbers of pixels, and sums of such.
     values: Vec<f32>,
-    shown: Sums,
-    near: Sums,
-    count: Sums,
+    shown: BoxSums,
+    near: BoxSums,
+    count: BoxSums,
     settings: SegmentationSettings,
 }
 

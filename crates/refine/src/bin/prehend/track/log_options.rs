@@ -23,7 +23,7 @@ pub(crate) struct LogOptions {
     /// Mass of the object [default: 500 kg/m³]
     #[arg(long, value_name = "KG", requires = "mcap")]
     pub(super) mass: Option<f64>,
-    /// The hand as URDF: its joints are in the log, and its root link is a frame of the log's transforms
+    /// The hand as URDF or MJCF: its joints are in the log, and its root link is a frame of the log's transforms
     #[arg(long, value_name = "URDF", requires = "mcap")]
     pub(super) hand: Option<PathBuf>,
     /// Taxels of that hand (see docs/DATASET.md): the log has their forces
