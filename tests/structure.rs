@@ -7,8 +7,8 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_100),
-    ("geometry", 15_650),
-    ("sim", 16_370),
+    ("geometry", 15_850),
+    ("sim", 16_630),
     ("render", 10_930),
     ("refine", 29_790),
 ];

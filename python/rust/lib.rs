@@ -7,6 +7,7 @@ mod error;
 mod integrator;
 mod link;
 mod python_law;
+mod read_options;
 mod refine;
 mod render;
 mod robot;

@@ -8,7 +8,7 @@ use prehend_sim::BodyId;
 use prehend_sim::robot::MjcfRobot;
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, in_order};
+use crate::arrays::{Array, Numbers, array, in_order, pose as pose_of};
 use crate::error::{Raise, wrong};
 use crate::world::World;
 
@@ -24,7 +24,7 @@ pub(crate) struct Robot {
     /// The parameter that each actuator is driven by.
     #[pyo3(get)]
     actuators: BTreeMap<String, String>,
-    /// What of the file has no counterpart.
+    /// What of the file has no counterpart, and what was put right.
     #[pyo3(get)]
     warnings: Vec<String>,
     /// Positions that the file has, in MuJoCo's order.
@@ -74,10 +74,14 @@ impl Robot {
                 .map(|joint| (joint.name.clone(), (bodies[joint.child].index(), 0)))
                 .collect(),
             actuators: BTreeMap::new(),
-            warnings: Vec::new(),
+            warnings: tree.warnings().to_vec(),
             reference: Vec::new(),
             mjcf: None,
         }
+    }
+
+    fn of_mujoco(&self, what: &str) -> PyResult<&MjcfRobot> {
+        self.mjcf.as_ref().ok_or_else(|| wrong(format!("a robot of URDF has no {what}")))
     }
 }
 
@@ -96,14 +100,46 @@ impl Robot {
         states: &Bound<'_, PyAny>,
         positions: Option<Numbers<'_>>,
     ) -> PyResult<()> {
-        let robot = self
-            .mjcf
-            .as_ref()
-            .ok_or_else(|| wrong("a robot of URDF has no positions in MuJoCo's order"))?;
+        let robot = self.of_mujoco("positions in MuJoCo's order")?;
         let positions =
             positions.map_or_else(|| self.reference.clone(), |p| in_order(&p).into_owned());
         crate::world::states::change(states, |all| {
             robot.set_positions(&world.world, all, &positions).raise()
+        })
+    }
+
+    /// Names of the sensors of a robot in MJCF whose readings follow from states.
+    #[getter]
+    fn sensors(&self) -> Vec<String> {
+        let robot = self.mjcf.as_ref();
+        robot.into_iter().flat_map(MjcfRobot::sensor_names).map(str::to_owned).collect()
+    }
+
+    /// The reading of a sensor, in MuJoCo's order and units, without noise.
+    fn sensor<'py>(
+        &self,
+        py: Python<'py>,
+        world: &World,
+        states: Numbers<'py>,
+        name: &str,
+    ) -> PyResult<Array<'py>> {
+        let states = crate::world::states::states(&states)?;
+        let reading = self.of_mujoco("sensors")?.sensor(&world.world, &states, name).raise()?;
+        let count = reading.len();
+        array(py, reading, &[count])
+    }
+
+    /// Puts a mocap body of a robot in MJCF at `pose` (4 × 4 or a translation), between steps: it has no velocity.
+    fn set_mocap(
+        &self,
+        world: &mut World,
+        states: &Bound<'_, PyAny>,
+        name: &str,
+        pose: Numbers<'_>,
+    ) -> PyResult<()> {
+        let (robot, pose) = (self.of_mujoco("mocap bodies")?, pose_of(Some(&pose), "pose")?);
+        crate::world::states::change(states, |all| {
+            robot.set_mocap(&mut world.world, all, name, &pose).raise()
         })
     }
 

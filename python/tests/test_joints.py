@@ -126,6 +126,64 @@ def test_mjcf_and_urdf_become_robots(tmp_path):
         world.add_mjcf(tmp_path / "missing.xml")
 
 
+def test_robots_are_read_as_told(tmp_path):
+    world = prehend.World()
+    mjcf = tmp_path / "arm.xml"
+    mjcf.write_text(
+        """<mujoco><worldbody><body name="arm"><joint name="hinge"/><geom size="0.1"/></body></worldbody>
+        <actuator><dcmotor name="drive" joint="hinge"/></actuator></mujoco>"""
+    )
+    with pytest.raises(prehend.Error, match="drive"):
+        world.add_mjcf(mjcf)
+    robot = world.add_mjcf(mjcf, partial=True)
+    assert not robot.actuators and "drive" in robot.warnings[0]
+    with pytest.raises(prehend.Error, match="partly"):
+        world.add_mjcf(mjcf, partly=True)
+
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "a.stl").write_text(
+        "solid a\n"
+        + "".join(
+            "facet normal 0 0 0\nouter loop\n"
+            + "".join(f"vertex {p}\n" for p in face)
+            + "endloop\nendfacet\n"
+            for corners in [("0 0 0", "1 0 0", "0 1 0", "0 0 1")]
+            for face in [[corners[i] for i in f] for f in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))]
+        )
+        + "endsolid a\n"
+    )
+    urdf = tmp_path / "robot" / "arm.urdf"
+    urdf.parent.mkdir()
+    mesh = '<geometry><mesh filename="package://arm_description/a.stl"/></geometry>'
+    urdf.write_text(f"""<robot name="arm"><link name="base"><collision>{mesh}</collision></link></robot>""")
+    with pytest.raises(prehend.Error, match="a.stl"):
+        world.add_urdf(urdf, shapes=False)
+    packages = {"arm_description": tmp_path / "meshes"}
+    assert "base" in world.add_urdf(urdf, shapes=False, packages=packages).bodies
+    assert prehend.Hand(urdf, packages=packages).joints == []
+
+
+def test_sensors_and_mocap_bodies(tmp_path):
+    path = tmp_path / "hand.xml"
+    path.write_text(
+        """<mujoco><worldbody><body name="hand" mocap="true"><site name="tip" pos="0.1 0 0"/></body>
+        <body name="arm"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></worldbody>
+        <sensor><jointpos name="angle" joint="hinge"/><framepos name="tip" objtype="site" objname="tip"/></sensor></mujoco>"""
+    )
+    world = prehend.World()
+    robot = world.add_mjcf(path)
+    states = world.neutral_states()
+    robot.set_positions(world, states, [0.3])
+    robot.set_mocap(world, states, "hand", [1, 2, 3])
+    assert robot.sensors == ["angle", "tip"]
+    np.testing.assert_allclose(robot.sensor(world, states, "angle"), [0.3])
+    np.testing.assert_allclose(robot.sensor(world, states, "tip"), [1.1, 2, 3])
+    with pytest.raises(prehend.Error, match="gyro"):
+        robot.sensor(world, states, "gyro")
+    with pytest.raises(prehend.Error, match="arm"):
+        robot.set_mocap(world, states, "arm", [0, 0, 0])
+
+
 @needs_data
 def test_a_gripper_of_the_data_closes():
     path = next(Path(DATA, "robots").rglob("2f85.xml"))

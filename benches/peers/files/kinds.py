@@ -136,6 +136,23 @@ MODELS = {
       <actuator><position joint="ball" gear="0 1 .5" kp="2"/><motor jointinparent="ball" gear="1 0 2"/><motor joint="free" gear="1 2 3 4 5 6"/><motor jointinparent="free" gear="0 0 1 1 0 0"/></actuator></mujoco>""",
     "spring and damper by time": """<mujoco><worldbody><body><joint name="a" axis="0 1 0" springdamper=".1 .5" springref="20"/><geom type="box" size=".1 .2 .3"/><site name="a" pos=".1 0 .2"/><body pos=".5 0 0">
       <joint type="ball" springdamper=".2 .7"/><geom type="box" size=".1 .2 .1"/></body></body><site name="w" pos="1 0 1"/></worldbody><tendon><spatial armature="2"><site site="a"/><site site="w"/></spatial></tendon></mujoco>""",
+    "polynomials of a ball": """<mujoco><worldbody><body euler="10 20 30"><joint type="ball" stiffness="5 -4 9" damping=".1 .2 .3"/><geom type="box" size=".1 .2 .3" pos="0 .1 0"/></body>
+      <body pos="1 0 0"><freejoint/><geom type="box" size=".1 .2 .3"/></body></worldbody></mujoco>""",
+    "sensors": """<mujoco><worldbody><site name="w" pos="0 0 2" euler="20 30 40"/><geom name="g" type="box" size=".1 .1 .1" pos="1 1 0" euler="0 0 30"/>
+      <body name="a" pos="0 0 1" euler="5 10 15"><joint name="a" axis="0 1 0" ref="10" pos="0 0 .05"/><geom name="a" type="capsule" size=".03" fromto="0 0 0 .4 .1 0"/><site name="a" pos=".2 0 .1" euler="40 10 -30"/>
+      <body name="b" pos=".4 0 0"><joint name="b" type="ball" pos="0 .02 0"/><geom name="b" type="box" size=".1 .05 .02" pos=".1 0 0" euler="0 20 0"/><site name="b" pos=".1 .1 0" euler="0 -20 50"/></body>
+      <body name="c" pos="0 .3 0"><joint name="c" type="slide" axis="1 0 1"/><geom size=".05"/></body></body>
+      <body name="free" pos="1 0 1"><freejoint name="free"/><geom type="box" size=".1 .2 .05"/><site name="free" pos=".1 0 0" euler="0 60 0"/></body></worldbody>
+      <tendon><fixed name="sum"><joint joint="a" coef="2"/><joint joint="c" coef="-1"/></fixed><spatial name="cable"><site site="w"/><site site="b"/></spatial></tendon>
+      <actuator><motor name="motor" joint="a" gear="-3"/><motor name="pull" tendon="cable" gear="2"/><motor name="place" site="b" refsite="w" gear="1 2 3 .1 .2 .3"/></actuator>
+      <sensor><jointpos name="jointpos" joint="a"/><jointvel name="jointvel" joint="c"/><jointpos name="cut" joint="a" cutoff=".05"/><ballquat name="ballquat" joint="b"/><ballangvel name="ballangvel" joint="b"/>
+      <tendonpos name="tendonpos" tendon="cable"/><tendonvel name="tendonvel" tendon="cable"/><tendonpos name="sum" tendon="sum"/><actuatorpos name="actuatorpos" actuator="motor"/><actuatorvel name="actuatorvel" actuator="pull"/>
+      <actuatorpos name="place" actuator="place"/><framepos name="framepos" objtype="site" objname="b"/><framepos name="com" objtype="body" objname="a"/><framepos name="relative" objtype="geom" objname="b" reftype="site" refname="free"/>
+      <framequat name="framequat" objtype="xbody" objname="b" reftype="geom" refname="g"/><framexaxis name="framexaxis" objtype="site" objname="b"/><framezaxis name="framezaxis" objtype="geom" objname="b" reftype="site" refname="a"/>
+      <framelinvel name="framelinvel" objtype="site" objname="b"/><framelinvel name="rellinvel" objtype="site" objname="b" reftype="xbody" refname="free"/><frameangvel name="frameangvel" objtype="xbody" objname="b"/>
+      <frameangvel name="relangvel" objtype="site" objname="b" reftype="site" refname="free"/><framelinvel name="comvel" objtype="body" objname="c"/><velocimeter name="velocimeter" site="b"/><gyro name="gyro" site="b"/>
+      <accelerometer name="accelerometer" site="b"/><accelerometer name="of the world" site="w"/><accelerometer name="falling" site="free"/><subtreecom name="subtreecom" body="a"/><subtreelinvel name="subtreelinvel" body="a"/>
+      <subtreeangmom name="subtreeangmom" body="a"/><subtreecom name="all" body="world"/></sensor></mujoco>""",
     "mocap": """<mujoco><option gravity="1 2 3"><flag gravity="disable"/></option><worldbody><body name="hand" mocap="true" pos="1 2 3"><geom size=".1"/><site name="hand"/></body><body name="thing"><freejoint/><geom type="box" size=".1 .2 .3"/>
       <site name="thing"/></body></worldbody><tendon><spatial stiffness="4"><site site="hand"/><site site="thing"/></spatial></tendon></mujoco>""",
 }
@@ -228,6 +245,7 @@ def main():
             mujoco.mj_forward(model, data)
             state["qacc"] = data.qacc.tolist()
             state["xpos"] = data.xpos[1:].flatten().tolist()
+            state["sensors"] = {model.sensor(i).name: data.sensor(i).data.tolist() for i in range(model.nsensor)}
             if name in ROBOTS:
                 model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
                 for _ in range(1000):

@@ -8,7 +8,7 @@ mod cuboid;
 pub(crate) mod error;
 mod from_parry;
 mod ground;
-mod height_field;
+pub(crate) mod height_field;
 mod kind;
 mod lattice;
 pub(crate) mod lifted;

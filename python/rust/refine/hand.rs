@@ -3,16 +3,20 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use prehend_geometry::hand::load_taxels;
+use prehend_geometry::robot::KinematicTree;
 use prehend_refine::data::user_cache;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::error::Raise;
+use crate::read_options::read_options;
 use crate::threads::detached;
 
 /// A robot hand, prepared once for any number of frames: collision geometry of a URDF or MJCF file, and taxels of a CSV file with the columns idx, patch,
 /// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
 ///
-/// What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
+/// Options of reading are those of `World.add_urdf`. What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Hand {
     pub(super) hand: Arc<prehend_refine::Hand>,
@@ -21,10 +25,17 @@ pub(crate) struct Hand {
 #[pymethods]
 impl Hand {
     #[new]
-    #[pyo3(signature = (path, taxels=None))]
-    fn new(py: Python<'_>, path: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
-        let load = || prehend_refine::Hand::load(&path, taxels.as_deref(), user_cache().as_ref());
-        let hand = detached(py, load)?;
+    #[pyo3(signature = (path, taxels=None, **options))]
+    fn new(
+        py: Python<'_>,
+        path: PathBuf,
+        taxels: Option<PathBuf>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let tree = KinematicTree::from_file_with(&path, &read_options(options)?).raise()?;
+        let taxels = taxels.as_deref().map(load_taxels).transpose().raise()?.unwrap_or_default();
+        let cached = || prehend_refine::Hand::cached(tree, taxels, user_cache().as_ref());
+        let hand = detached(py, cached)?;
         Ok(Self { hand: Arc::new(hand.raise()?) })
     }
 

@@ -17,6 +17,7 @@ use super::{BodyKey, World};
 use crate::arrays::{Numbers, pose};
 use crate::error::{Raise, wrong};
 use crate::link::Link;
+use crate::read_options::read_options;
 use crate::robot::Robot;
 use crate::threads::detached;
 
@@ -86,8 +87,9 @@ impl World {
     }
 
     /// Adds a robot in MJCF with its joints, actuators, tendons and loops. With `shapes`, its bodies get their collision shapes. `pose` is where the
-    /// model's world is (4 × 4 or a translation).
-    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true))]
+    /// model's world is (4 × 4 or a translation). Options of reading are `partial` (leave out what is not supported, with a warning), `root` (folder that
+    /// named files may lie in) and `allow_outside` (read them wherever they lie).
+    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true, **options))]
     fn add_mjcf(
         &mut self,
         py: Python<'_>,
@@ -95,19 +97,22 @@ impl World {
         pose: Option<Numbers<'_>>,
         floating: bool,
         shapes: bool,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Robot> {
-        let t_world_model = self::pose(pose.as_ref(), "pose")?;
+        let (t_world_model, read) = (self::pose(pose.as_ref(), "pose")?, read_options(options)?);
+        let (base, partial) = (base(floating), read.partial);
         let options =
-            MjcfOptions { t_world_model, base: base(floating), shapes, ..MjcfOptions::default() };
+            MjcfOptions { t_world_model, base, shapes, partial, ..MjcfOptions::default() };
         let before = self.world.parameter_names();
-        let model = Model::from_file(&path).raise()?;
+        let model = Model::from_file_with(&path, &read).raise()?;
         let robot = detached(py, || self.world.add_mjcf(&model, &options))?.raise()?;
         Ok(Robot::of_mjcf(&model, robot, &self.world, &before))
     }
 
     /// Adds a robot in URDF with its joints, their limits, damping and friction; it has no motors. With `shapes`, its links get their collision
-    /// meshes as distance fields, which the samples of other bodies touch. `pose` is where its base is (4 × 4 or a translation).
-    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true))]
+    /// meshes as distance fields, which the samples of other bodies touch. `pose` is where its base is (4 × 4 or a translation). Options of reading
+    /// are those of `add_mjcf`, `packages` (folders of ROS packages by name) and `inertia_from_geometry` (replace inertias that no body can have).
+    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true, **options))]
     fn add_urdf(
         &mut self,
         py: Python<'_>,
@@ -115,8 +120,9 @@ impl World {
         pose: Option<Numbers<'_>>,
         floating: bool,
         shapes: bool,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Robot> {
-        let robot = KinematicTree::from_urdf_file(&path).raise()?;
+        let robot = KinematicTree::from_urdf_file_with(&path, &read_options(options)?).raise()?;
         let [spacing, margin] = LINK_GRID;
         let cache = user_cache();
         let shape = || {

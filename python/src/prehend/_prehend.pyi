@@ -110,6 +110,10 @@ class Robot:
     def set_positions(
         self, world: World, states: _Array, positions: ArrayLike | None = None
     ) -> None: ...
+    @property
+    def sensors(self) -> list[str]: ...
+    def sensor(self, world: World, states: _Array, name: str) -> _Array: ...
+    def set_mocap(self, world: World, states: _Array, name: str, pose: ArrayLike) -> None: ...
 
 class Rollout:
     @property
@@ -214,6 +218,9 @@ class World:
         pose: ArrayLike | None = None,
         floating: bool = False,
         shapes: bool = True,
+        partial: bool = False,
+        root: str | PathLike[str] | None = None,
+        allow_outside: bool = False,
     ) -> Robot: ...
     def add_urdf(
         self,
@@ -222,6 +229,11 @@ class World:
         pose: ArrayLike | None = None,
         floating: bool = False,
         shapes: bool = True,
+        partial: bool = False,
+        root: str | PathLike[str] | None = None,
+        allow_outside: bool = False,
+        packages: Mapping[str, str | PathLike[str]] | None = None,
+        inertia_from_geometry: bool = False,
     ) -> Robot: ...
     def joint_row(self, link: _Body) -> int: ...
     def neutral_states(self) -> _Array: ...
@@ -295,7 +307,15 @@ class Object:
 
 class Hand:
     def __new__(
-        cls, path: str | PathLike[str], taxels: str | PathLike[str] | None = None
+        cls,
+        path: str | PathLike[str],
+        taxels: str | PathLike[str] | None = None,
+        *,
+        partial: bool = False,
+        root: str | PathLike[str] | None = None,
+        allow_outside: bool = False,
+        packages: Mapping[str, str | PathLike[str]] | None = None,
+        inertia_from_geometry: bool = False,
     ) -> Hand: ...
     @property
     def joints(self) -> list[str]: ...

@@ -33,6 +33,8 @@ pub struct Body {
     pub sites: Vec<Site>,
     /// The share of its weight that is carried for it \[1\].
     pub gravity_compensation: f64,
+    /// True if whoever simulates puts it where it is, as a hand that is tracked: it has no joints and no mass counts.
+    pub is_mocap: bool,
 }
 
 /// The world and all bodies.
@@ -81,24 +83,21 @@ pub(super) fn read(
     Ok(reader.tree)
 }
 
-/// Mass that counts as none \[kg\].
-const LEAST_MASS: f64 = 1e-15;
-
 impl Tree {
-    /// Mass of a body, the last but for those that it carries, with those that are fixed to it \[kg\].
-    fn moved_mass(&self, index: usize) -> f64 {
+    /// True if a body, the last but for those that it carries, or one that is fixed to it has a mass and an inertia about each axis.
+    fn has_inertia(&self, index: usize) -> bool {
         let mut is_fixed = vec![true];
-        let mut total = 0.0;
         for (k, body) in self.bodies.iter().enumerate().skip(index) {
             if k > index {
                 let parent = body.parent.and_then(|parent| parent.checked_sub(index));
                 let moves = parent.is_some_and(|parent| is_fixed[parent]);
                 is_fixed.push(moves && body.joints.is_empty());
             }
-            let mass = body.inertial.as_ref().map_or(0.0, |inertial| inertial.mass);
-            total += if is_fixed[k - index] { mass } else { 0.0 };
+            if is_fixed[k - index] && body.inertial.as_ref().is_some_and(inertial::resists) {
+                return true;
+            }
         }
-        total
+        false
     }
 }
 
@@ -160,6 +159,7 @@ impl Reader<'_> {
             geoms: Vec::new(),
             sites: Vec::new(),
             gravity_compensation: e.number("gravcomp")?.unwrap_or(0.0),
+            is_mocap: e.switch("mocap")?.unwrap_or(false),
         });
         // Whose inertia is written need not have shapes that could weigh.
         let infers = match compiler.inertia_from {
@@ -176,9 +176,13 @@ impl Reader<'_> {
             None => written,
         };
         self.tree.bodies[index].inertial = inertial::bounded(inertial, compiler);
-        if !self.tree.bodies[index].joints.is_empty() && self.tree.moved_mass(index) <= LEAST_MASS {
-            let error = || e.misplaced("a body that moves needs a mass (a geom, or an inertial)");
-            self.tree.massless.get_or_insert_with(error);
+        let body = &self.tree.bodies[index];
+        if body.is_mocap && !(body.joints.is_empty() && body.parent.is_none()) {
+            return Err(e.misplaced("a mocap body has no joints and is in the world"));
+        }
+        if !body.joints.is_empty() && !self.tree.has_inertia(index) {
+            let needs = "a body that moves needs a mass and an inertia (a geom, or an inertial)";
+            self.tree.massless.get_or_insert_with(|| e.misplaced(needs));
         }
         Ok(())
     }
@@ -332,7 +336,7 @@ mod tests {
             ("<geom type=\"mesh\" mesh=\"m\"/>", "mesh names 'm'"),
             ("<geom type=\"capsule\" size=\"1\" fromto=\"0 0 0 0 0 0\"/>", "fromto has no length"),
             ("<geom size=\"1\" fromto=\"0 0 0 0 0 1\"/>", "fromto is for capsules"),
-            ("<geom type=\"box\" size=\"1\" pos=\"0 0 0\" fromto=\"0 0 0 0 0 1\"/>", "beside pos"),
+            ("<geom type=\"box\" size=\"1\" pos=\"0 0 1\" fromto=\"0 0 0 0 0 1\"/>", "beside pos"),
             ("<body><joint axis=\"0 0 0\"/></body>", "axis must not be zero"),
             ("<body><joint damping=\"-1\"/></body>", "damping must not be negative"),
             ("<body><inertial mass=\"1\"/></body>", "inertial: pos is missing"),
@@ -341,6 +345,9 @@ mod tests {
             let error = read(worldbody).unwrap_err();
             assert!(error.contains(part), "{error}");
         }
+        // A place at the origin is none.
+        let ends = "<geom type=\"box\" size=\"1\" pos=\"0 0 0\" fromto=\"0 0 0 0 0 1\"/>";
+        assert!(read(ends).is_ok());
         let inertial = |more: &str| {
             let e = read(&format!("<body><inertial pos=\"0 0 0\" mass=\"1\" {more}/></body>"));
             e.map(|model| model.warnings.len())
@@ -365,6 +372,13 @@ mod tests {
         assert!(massless("").unwrap_err().contains("body 'b': a body that moves needs a mass"));
         assert!(massless("<body><joint/><geom size=\"1\"/></body>").is_err());
         assert!(massless("<body><geom size=\"1\"/></body>").is_ok());
+        // A mass without an inertia is none, whatever the joint.
+        let point = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0 1 1\"/>";
+        assert!(massless(point).is_err());
+        assert!(massless(&format!("{point}<body><geom size=\"1\"/></body>")).is_ok());
+        assert!(massless(&point.replace("0 1 1", "1 1 1")).is_ok());
+        let mocap = |more: &str| read(&format!("<body mocap=\"true\">{more}</body>"));
+        assert!(mocap("").unwrap().bodies[0].is_mocap && mocap("<freejoint/>").is_err());
         assert!(slides(4).unwrap_err().contains("a body has at most six degrees of freedom"));
     }
 }

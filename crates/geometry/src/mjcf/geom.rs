@@ -233,7 +233,7 @@ impl Spec {
             let position = self.position.unwrap_or_default();
             return Ok((Isometry3::from_parts(position.into(), self.rotation), self.size));
         };
-        if self.position.is_some() {
+        if self.position.is_some_and(|position| position != Vector3::zeros()) {
             return Err(e.invalid("fromto", "is given beside pos: one place too many"));
         }
         if !self.kind.has_ends() {

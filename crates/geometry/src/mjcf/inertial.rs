@@ -48,6 +48,14 @@ pub(super) fn written(body: &Element, compiler: &Compiler) -> Result<Option<Iner
     Ok((mass > 0.0 || c > 0.0).then_some(Inertial { mass, com, inertia }))
 }
 
+/// Mass \[kg\] and principal moment \[kg m²\] that count as none.
+const LEAST: f64 = 1e-15;
+
+/// True if it has a mass and an inertia about each axis.
+pub(super) fn resists(inertial: &Inertial) -> bool {
+    inertial.mass >= LEAST && principal(&inertial.inertia)[0] >= LEAST
+}
+
 /// The principal moments, the least first.
 fn principal(inertia: &Matrix3<f64>) -> [f64; 3] {
     let mut moments: [f64; 3] = inertia.symmetric_eigenvalues().into();

@@ -1,7 +1,7 @@
 //! Robots and scenes in MJCF, the XML format of MuJoCo, read into plain data.
 //!
 //! [`Model::from_file`] reads bodies, joints, shapes, actuators, tendons that are sums of joints, equality constraints and
-//! keyframes, with default classes applied, included files put in place, ranges resolved and inertias inferred as MuJoCo 4
+//! keyframes, and the sensors that a state determines, with default classes applied, included files put in place, ranges resolved and inertias inferred as MuJoCo 4
 //! does. All is in SI units and radians. What is not read is named in [`Model::warnings`], once for each kind of
 //! element or attribute; attributes that concern looks alone are passed over.
 //!
@@ -51,6 +51,7 @@ mod msh;
 mod names;
 mod orientation;
 mod reference;
+mod sensor;
 mod shape;
 mod site;
 mod solver;
@@ -69,6 +70,7 @@ pub use height_field::HeightField;
 pub use joint::{Joint, JointKind};
 pub use keyframe::Keyframe;
 pub use model::{JointIndex, Model};
+pub use sensor::{FramePart, Quantity, Sensor};
 pub use shape::Shape;
 pub use site::Site;
 pub use solver::SolverParameters;

@@ -20,6 +20,7 @@ use super::joint::{Joint, JointKind};
 use super::keyframe::{self, Keyframe};
 use super::mesh::Meshes;
 use super::names::Names;
+use super::sensor::{self, Sensor};
 use super::site::Site;
 use super::tendon::{self, Tendon};
 use super::warning::{self, Warning};
@@ -61,6 +62,8 @@ pub struct Model {
     pub exclusions: Vec<[Option<usize>; 2]>,
     /// States that it comes with.
     pub keyframes: Vec<Keyframe>,
+    /// Sensors whose readings follow from a state.
+    pub sensors: Vec<Sensor>,
     /// What has not been read.
     pub warnings: Vec<Warning>,
 }
@@ -138,6 +141,7 @@ impl Model {
             equalities: Vec::new(),
             exclusions: Vec::new(),
             keyframes: Vec::new(),
+            sensors: Vec::new(),
             warnings: Vec::new(),
         };
         for e in root.sections("option") {
@@ -158,6 +162,7 @@ impl Model {
         model.actuators = actuators;
         flags.apply(&mut model);
         model.keyframes = keyframe::read(root, &model, &written)?;
+        model.sensors = sensor::read(root, &model, &names)?;
         model.warnings = warning::warnings(root);
         match model.warnings.iter().find(|warning| warning.changes && !partial) {
             Some(warning) => Err(MjcfError::Unsupported(Box::new(warning.clone()))),

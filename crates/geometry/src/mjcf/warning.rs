@@ -160,7 +160,7 @@ mod tests {
     fn what_is_not_read_is_named_once() {
         let xml = "<mujoco><option cone=\"elliptic\" viscosity=\"1\"/>\n<worldbody><light/><light/><geom size=\"1\" rgba=\"1 0 0 1\" gap=\"0\"/>\n\
             <body><geom size=\"1\" gap=\"1\"/><composite/></body></worldbody>\n\
-            <actuator><plugin name=\"m\" joint=\"t\"/></actuator><sensor><gyro/></sensor></mujoco>";
+            <actuator><plugin name=\"m\" joint=\"t\"/></actuator><sensor><clock/></sensor></mujoco>";
         let error = Model::from_str(xml, None).unwrap_err().to_string();
         assert_eq!(
             error,

@@ -1,5 +1,6 @@
 //! URDF as its users' tools take it: what is plain though against the format is put right, with a warning, before it is read.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use roxmltree::Node;
@@ -32,13 +33,21 @@ pub(super) fn put_right(xml: &str, partial: bool) -> Result<(String, Vec<String>
             root.tag_name().name()
         )));
     }
-    let mut writer = Writer { out: String::new(), warnings: Vec::new(), owner: String::new() };
+    let of_joint = |node: &Node<'_, '_>| node.has_tag_name("joint");
+    let joints = root.children().filter(of_joint).filter_map(|node| node.attribute("name"));
+    let mut writer = Writer {
+        out: String::new(),
+        warnings: Vec::new(),
+        owner: String::new(),
+        joints: joints.map(str::to_owned).collect(),
+        partial,
+    };
     writer.open("robot", &[("name", root.attribute("name").unwrap_or_default())]);
     for node in root.children().filter(Node::is_element) {
         let name = node.attribute("name").unwrap_or_default();
         writer.owner = format!("{} '{name}'", node.tag_name().name());
         match node.tag_name().name() {
-            "link" => writer.link(node, partial)?,
+            "link" => writer.link(node)?,
             "joint" => writer.joint(node),
             _ => {}
         }
@@ -52,6 +61,9 @@ struct Writer {
     warnings: Vec<String>,
     /// The link or joint that is written.
     owner: String,
+    /// Names of all joints.
+    joints: BTreeSet<String>,
+    partial: bool,
 }
 
 impl Writer {
@@ -110,7 +122,7 @@ impl Writer {
         self.whole("origin", &given);
     }
 
-    fn link(&mut self, node: Node<'_, '_>, partial: bool) -> Result<(), RobotError> {
+    fn link(&mut self, node: Node<'_, '_>) -> Result<(), RobotError> {
         self.open("link", &[("name", node.attribute("name").unwrap_or_default())]);
         if let Some(inertial) = self.first(node, "inertial") {
             self.inertial(inertial);
@@ -121,7 +133,7 @@ impl Writer {
             if !["box", "cylinder", "capsule", "sphere", "mesh"].contains(&tag) {
                 let link = node.attribute("name").unwrap_or_default().to_owned();
                 let reason = format!("collision shapes of the kind '{tag}' are not supported");
-                if !partial {
+                if !self.partial {
                     return Err(RobotError::Shape { link, reason });
                 }
                 self.warn(format!("{reason}: left out"));
@@ -200,9 +212,13 @@ impl Writer {
             ("dynamics", &["damping", "friction"][..]),
             ("mimic", &["joint", "multiplier", "offset"]),
         ] {
-            if let Some(child) = self.first(node, tag) {
-                self.copied(child, fields);
+            let Some(child) = self.first(node, tag) else { continue };
+            let leader = child.attribute("joint").unwrap_or_default();
+            if self.partial && tag == "mimic" && !self.joints.contains(leader) {
+                self.warn(format!("there is no joint '{leader}' that it could mimic: left out"));
+                continue;
             }
+            self.copied(child, fields);
         }
         self.out.push_str("</joint>");
     }
@@ -231,6 +247,7 @@ impl Writer {
 #[cfg(test)]
 mod tests {
     use super::super::KinematicTree;
+    use crate::read_options::ReadOptions;
 
     #[test]
     fn what_is_plain_is_read_with_a_warning() {
@@ -252,6 +269,21 @@ mod tests {
                 "joint 'j': its limits are from 1 to 0, upside down: none is taken",
             ]
         );
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_left_out_where_that_is_wanted() {
+        let xml = r#"<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/>
+            <mimic joint="gone"/></joint></robot>"#;
+        let error = KinematicTree::from_urdf_str(xml, None).unwrap_err().to_string();
+        assert!(error.contains("joint 'gone', named by the mimic tag of joint 'j'"), "{error}");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), xml).unwrap();
+        let options = ReadOptions { partial: true, ..ReadOptions::default() };
+        let robot = KinematicTree::from_urdf_file_with(file.path(), &options).unwrap();
+        assert_eq!(robot.joint_names(), ["j"]);
+        let warning = "joint 'j': there is no joint 'gone' that it could mimic: left out";
+        assert_eq!(robot.warnings(), [warning]);
     }
 
     #[test]

@@ -102,12 +102,13 @@ impl<S: Scalar> Link<S> {
         if !self.numbers().all(|x| x.value().is_finite()) {
             return Err(wrong("place, mass, center of mass, inertia or armature is not finite"));
         }
+        Ok(())
+    }
+
+    /// True if a principal moment is negative by more than what few decimals round below zero.
+    fn is_impossible(&self) -> bool {
         let moments = self.inertia.map(S::value).symmetric_eigenvalues();
-        // Descriptions of robots have few decimals, and what they round below zero is small beside what the joints move.
-        match moments.min() >= -1e-3 * moments.amax() {
-            true => Ok(()),
-            false => Err(wrong("a principal moment of its inertia is negative")),
-        }
+        moments.min() < -1e-3 * moments.amax() - 1e-12 * self.mass.value()
     }
 
     /// The least inertia \[kg or kg m²\] that its joint moves if nothing hangs on the link, without armature; of a joint type of one's own nothing is known.
@@ -239,7 +240,7 @@ impl<S: Scalar> Articulation<S> {
     /// Articulation of `links`, each after its parent, that fall with `gravity` \[m/s²\].
     ///
     /// # Errors
-    /// If a parent does not come before its link, a number is not finite, a mass or a principal moment negative, or a joint moves no mass.
+    /// If a parent does not come before its link, a number is not finite, a mass negative, or a joint moves no mass or less inertia than none.
     pub fn new(links: Vec<Link<S>>, gravity: Vector3<S>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
         let mut carriers = Vec::new();
@@ -268,7 +269,22 @@ impl<S: Scalar> Articulation<S> {
         }
         first.push(next);
         check_moved(&links)?;
-        Ok(Self { links, first, link_of, carriers, last, gravity })
+        let new = Self { links, first, link_of, carriers, last, gravity };
+        new.check_inertias()?;
+        Ok(new)
+    }
+
+    /// Checks that all that the joints move has an inertia: where a link has one that no body can have, others that are fixed to it, hang on it or
+    /// carry it may make good for it.
+    fn check_inertias(&self) -> Result<(), ArticulationError> {
+        let Some(link) = self.links.iter().find(|link| link.is_impossible()) else {
+            return Ok(());
+        };
+        let q: Vec<S> = self.neutral().into_iter().map(S::constant).collect();
+        let mass = self.kinematics(&q, &vec![S::zero(); self.nv()]).mass_matrix();
+        let problem = "a principal moment of its inertia is negative";
+        let error = || ArticulationError::Mass { link: link.name.clone(), problem };
+        mass.map(|x| x.value()).cholesky().map(|_| ()).ok_or_else(error)
     }
 
     /// The links, each after its parent.
@@ -278,7 +294,8 @@ impl<S: Scalar> Articulation<S> {
 
     /// Checks that the numbers of all links are such.
     pub(crate) fn check_numbers(&self) -> Result<(), ArticulationError> {
-        self.links.iter().try_for_each(Link::check_numbers)
+        self.links.iter().try_for_each(Link::check_numbers)?;
+        self.check_inertias()
     }
 
     /// The links, to be changed: to differentiate by a mass, a length or an armature, put a variable in its place. Their joints and parents are

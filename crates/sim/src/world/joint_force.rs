@@ -312,8 +312,8 @@ impl<S: Scalar> World<S> {
         };
         if let Some(path) = &force.path {
             let at = self.placed(articulation, states, places);
-            let [_, velocities] = own.coordinates(states.get(joints)?);
-            let length = path.length(at, false);
+            let [q, velocities] = own.coordinates(states.get(joints)?);
+            let length = path.length(at, &q, false);
             along.position = length.value;
             for (dof, slope) in length.slopes.into_iter().enumerate() {
                 along.velocity += slope * velocities[dof];

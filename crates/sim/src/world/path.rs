@@ -59,6 +59,10 @@ pub(crate) enum PathPart {
     Angle { link: usize },
     /// A rod from a crank to a slider along the z axis of a frame: how far the slider is.
     Crank { pin: Anchor, slider: Frame, rod: f64, factor: f64 },
+    /// The coordinate of a joint of one axis, whose degree of freedom this is.
+    Axis { coordinate: usize, dof: usize, factor: f64 },
+    /// A polynomial, its lowest power first, of the length of another way less `reference`.
+    Polynomial { path: Box<Path>, reference: f64, coefficients: [f64; 5] },
 }
 
 /// A way: its parts one after the other.
@@ -70,13 +74,18 @@ pub(crate) struct Length<S> {
     pub(crate) value: S,
     /// By each degree of freedom of the articulation.
     pub(crate) slopes: Vec<S>,
-    /// Its acceleration while those of all joints are zero; no number of ways around obstacles.
+    /// Its acceleration while those of all joints are zero; no number of ways around obstacles and of polynomials.
     pub(crate) drift: S,
 }
 
 impl Path {
-    /// The length with the links where they are; the drift only where it is wanted.
-    pub(crate) fn length<S: Scalar>(&self, at: &Kinematics<'_, S>, with_drift: bool) -> Length<S> {
+    /// The length with the links where they are by coordinates `q`; the drift only where it is wanted.
+    pub(crate) fn length<S: Scalar>(
+        &self,
+        at: &Kinematics<'_, S>,
+        q: &[S],
+        with_drift: bool,
+    ) -> Length<S> {
         let mut sum = Sum { at, value: S::zero(), slopes: vec![S::zero(); at.axes.len()] };
         let mut drift = S::zero();
         for part in &self.0 {
@@ -109,6 +118,26 @@ impl Path {
                 PathPart::Angle { link } => sum.add_angle(*link),
                 PathPart::Crank { pin, slider, rod, factor } => {
                     sum.add_crank(pin, slider, *rod, *factor);
+                }
+                PathPart::Axis { coordinate, dof, factor } => {
+                    sum.value += q[*coordinate].times(*factor);
+                    sum.slopes[*dof] += S::constant(*factor);
+                }
+                PathPart::Polynomial { path, reference, coefficients } => {
+                    let inner = path.length(at, q, false);
+                    let x = inner.value - S::constant(*reference);
+                    let (mut value, mut slope) = (S::zero(), S::zero());
+                    for coefficient in coefficients.iter().rev() {
+                        slope = slope * x + value;
+                        value = value * x + S::constant(*coefficient);
+                    }
+                    sum.value += value;
+                    for (own, inner) in sum.slopes.iter_mut().zip(inner.slopes) {
+                        *own += inner * slope;
+                    }
+                    if with_drift {
+                        drift = S::constant(f64::NAN);
+                    }
                 }
             }
         }

@@ -84,7 +84,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The states, with links where their joints put them.
-    fn sensed(&self, states: &[State<S>]) -> Result<Vec<State<S>>, SimulationError> {
+    pub(crate) fn sensed(&self, states: &[State<S>]) -> Result<Vec<State<S>>, SimulationError> {
         let mut states = self.with_deflections(states);
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));

@@ -130,6 +130,7 @@ impl<S: Scalar> World<S> {
         own: &ArticulatedBody<S>,
         at: &Kinematics<'_, S>,
         joints: &[State<S>],
+        q: &[S],
     ) -> Vec<(f64, DVector<S>, S)> {
         let rotors = self.transmissions.rotors.iter();
         let own_rotors = rotors.filter(|rotor| own.bodies().contains(&rotor.link));
@@ -146,7 +147,7 @@ impl<S: Scalar> World<S> {
                 }
             }
             if let Some(path) = &rotor.path {
-                let length = path.length(at, true);
+                let length = path.length(at, q, true);
                 slopes += DVector::from_vec(length.slopes);
                 drift = length.drift;
             }
@@ -162,7 +163,7 @@ impl<S: Scalar> World<S> {
         let [q, v] = own.coordinates(joints);
         let at = own.tree.kinematics(&q, &v);
         let mut mass = at.mass_matrix();
-        for (inertia, slopes, _) in self.rotors(own, &at, joints) {
+        for (inertia, slopes, _) in self.rotors(own, &at, joints, &q) {
             mass += &slopes * slopes.transpose() * S::constant(inertia);
         }
         mass
@@ -183,7 +184,7 @@ impl<S: Scalar> World<S> {
             return accelerations(&own.tree, &acting);
         }
         let at = own.tree.kinematics(coordinates, velocities);
-        let rotors = self.rotors(own, &at, joints);
+        let rotors = self.rotors(own, &at, joints, coordinates);
         let mut efforts = DVector::from_column_slice(efforts);
         for (inertia, slopes, drift) in &rotors {
             efforts -= slopes * drift.times(*inertia);

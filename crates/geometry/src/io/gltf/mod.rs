@@ -74,8 +74,18 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     join(reader.parts, path)
 }
 
-/// Extensions that are read, beside those of materials, of which nothing but the base color is.
-const EXTENSIONS: [&str; 2] = ["KHR_mesh_quantization", "KHR_texture_transform"];
+/// Extensions that are read, or cost nothing but colors, beside those of materials, of which nothing but the base color is.
+const EXTENSIONS: [&str; 6] = [
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_texture_basisu",
+    "EXT_texture_webp",
+    "MSFT_texture_dds",
+    "KHR_lights_punctual",
+];
+
+/// Extensions that hold positions, which may stand beside plain ones.
+const COMPRESSION: [&str; 2] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression"];
 
 /// The document, validated.
 fn document(bytes: &[u8], path: &Path) -> Result<Gltf, MeshError> {
@@ -83,17 +93,25 @@ fn document(bytes: &[u8], path: &Path) -> Result<Gltf, MeshError> {
     let Gltf { document, blob } =
         Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
     let mut json = document.into_json();
+    let unsupported = |name: &str| {
+        let feature = format!("extension {name}");
+        MeshError::Unsupported { path: path.into(), feature }
+    };
     for required in std::mem::take(&mut json.extensions_required) {
         if !required.starts_with("KHR_materials_") && !EXTENSIONS.contains(&&*required) {
-            let feature = format!("extension {required}");
-            return Err(MeshError::Unsupported { path: path.into(), feature });
+            return Err(unsupported(&required));
         }
     }
     // The crate's validation takes for granted that accessors of positions are there.
     let primitives = json.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let mut positions = primitives.filter_map(|p| p.attributes.get(&Valid(Semantic::Positions)));
-    if positions.any(|accessor| accessor.value() >= json.accessors.len()) {
-        return Err(malformed("an accessor of positions is not there".into()));
+    let used = json.extensions_used.iter().find(|own| COMPRESSION.contains(&own.as_str()));
+    for index in primitives.filter_map(|p| p.attributes.get(&Valid(Semantic::Positions))) {
+        let Some(accessor) = json.accessors.get(index.value()) else {
+            return Err(malformed("an accessor of positions is not there".into()));
+        };
+        if let (Some(used), None, None) = (used, &accessor.buffer_view, &accessor.sparse) {
+            return Err(unsupported(used));
+        }
     }
     let document = Document::from_json(json).map_err(|e| malformed(e.to_string()))?;
     Ok(Gltf { document, blob })
@@ -232,7 +250,14 @@ impl Reader<'_> {
         let mut part = Part { mesh, texture: None, color: [r, g, b] };
         let info = pbr.base_color_texture();
         if let Some(info) = &info {
-            part.texture = self.image(&info.texture().source());
+            part.texture = match info.texture().source() {
+                Some(source) => self.image(&source),
+                None => {
+                    let path = self.path.display();
+                    log::warn!("{path}: a texture is in a format that is not read: no colors");
+                    None
+                }
+            };
         }
         let transform = info.as_ref().and_then(|info| info.texture_transform());
         let uv_set = transform.as_ref().and_then(|transform| transform.tex_coord());
@@ -409,6 +434,15 @@ mod tests {
             let error = TriMesh::from_bytes(&glb(&json, &bin), path).unwrap_err().to_string();
             assert_eq!(error, format!("m.glb: extension {name} not supported"));
         }
+        // Compressed positions without plain ones; images in other formats cost the colors.
+        let bare = json
+            .replace(r#"{"bufferView": 0, "componentType": 5126"#, r#"{"componentType": 5126"#)
+            .replacen('{', r#"{"extensionsUsed": ["KHR_draco_mesh_compression"],"#, 1);
+        let error = TriMesh::from_bytes(&glb(&bare, &bin), path).unwrap_err().to_string();
+        assert_eq!(error, "m.glb: extension KHR_draco_mesh_compression not supported");
+        let other = required("\"EXT_texture_webp\"").replace(r#"[{"source": 0}]"#, "[{}]");
+        let mesh = TriMesh::from_bytes(&glb(&other, &bin), path).unwrap();
+        assert!(mesh.texture.is_none() && mesh.faces.len() == 2);
         // A quarter turn, by the inverse of which the image turns on the surface, and half of the image.
         let moved = r#""baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform":
             {"offset": [0.25, 1], "rotation": 1.5707963267948966, "scale": [0.5, 1]}}}"#;

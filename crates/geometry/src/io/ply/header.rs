@@ -103,7 +103,7 @@ pub(super) struct Header {
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
     let bad = |reason: String| MeshError::malformed(path, "header", reason);
-    let (mut encoding, mut elements, mut texture) = (None, Vec::<Element>::new(), None);
+    let (mut encoding, mut elements, mut textures) = (None, Vec::<Element>::new(), Vec::new());
     let mut at = 0;
     let mut first = true;
     loop {
@@ -137,12 +137,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
             ["comment", "TextureFile", ..] => {
                 let name =
                     line.split_once("TextureFile").map_or("", |(_, name)| name.trim()).to_owned();
-                if texture.replace(name).is_some() {
-                    return Err(MeshError::Unsupported {
-                        path: path.into(),
-                        feature: "several TextureFile".into(),
-                    });
-                }
+                textures.push(name);
             }
             ["element", name, count] => {
                 if elements.len() == MAX_KINDS {
@@ -178,5 +173,13 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
         }
     }
     let encoding = encoding.ok_or_else(|| bad("no format line".into()))?;
+    // Which face has which of several is not read.
+    let texture = match textures.len() {
+        0 | 1 => textures.pop(),
+        several => {
+            log::warn!("{}: {several} textures: none is used", path.display());
+            None
+        }
+    };
     Ok(Header { encoding, elements, texture, length: at })
 }

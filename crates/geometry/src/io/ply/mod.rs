@@ -346,6 +346,15 @@ mod tests {
     }
 
     #[test]
+    fn of_several_textures_none_is_used() {
+        let text = "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 3\n\
+            property float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+            end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let mesh = TriMesh::from_bytes(text.as_bytes(), Path::new("m.ply")).unwrap();
+        assert!(mesh.texture.is_none() && mesh.faces == [[0, 1, 2]]);
+    }
+
+    #[test]
     fn faces_may_come_first_and_headers_may_have_junk() {
         let text = "ply\r\nformat ascii 1.0\r\nwritten by nobody\r\nelement face 2\r\nproperty list uint8 uint vertex_indices\r\n\
             element vertex 5\r\nproperty double z\r\nproperty short y\r\nproperty uchar x\r\nend_header\r\n\

@@ -50,7 +50,6 @@ impl Forces<'_> {
             let (axes, path) = match along {
                 Along::Joints(axes) => (axes, None),
                 Along::Path(path) => (Vec::new(), Some(path)),
-                Along::Contacts => continue,
             };
             let (link, inertia) = (self.link, tendon.armature);
             self.world.transmissions.rotors.push(Rotor { link, axes, path, inertia });
@@ -63,9 +62,18 @@ impl Forces<'_> {
             self.add_tendon(tendon)?;
         }
         for equality in model.equalities.iter().filter(|equality| equality.active) {
-            if let EqualityKind::Tendon { tendons, polynomial } = &equality.kind {
-                self.couple(*tendons, polynomial, &equality.solver)?;
-            }
+            let joint = |own| Along::Joints(vec![(self.lengths.axis(own).0, 1.0)]);
+            let tendon = |own: usize| self.lengths.of_tendon(&model.tendons[own], 1.0);
+            let (first, second, polynomial) = match &equality.kind {
+                EqualityKind::Joint { joints: (first, second), polynomial } => {
+                    (joint(*first), second.map(joint), polynomial)
+                }
+                EqualityKind::Tendon { tendons: (first, second), polynomial } => {
+                    (tendon(*first), second.map(tendon), polynomial)
+                }
+                _ => continue,
+            };
+            self.couple(first, second, polynomial, &equality.solver)?;
         }
         for (index, actuator) in model.actuators.iter().enumerate() {
             self.add_actuator(actuator, self.activations[index])?;
@@ -84,7 +92,6 @@ impl Forces<'_> {
             Along::Path(path) => {
                 Some(self.world.add_path_force(self.link, Arc::clone(path), law)?)
             }
-            Along::Contacts => None,
         })
     }
 
@@ -102,10 +109,24 @@ impl Forces<'_> {
                 (axes.iter().filter_map(position).sum(), slopes)
             }
             Along::Path(path) => {
-                let length = path.length(&tree.kinematics(q, &vec![0.0; n]), false);
+                let length = path.length(&tree.kinematics(q, &vec![0.0; n]), q, false);
                 (length.value, DMatrix::from_vec(n, 1, length.slopes))
             }
-            Along::Contacts => (0.0, DMatrix::zeros(n, 1)),
+        }
+    }
+
+    /// The parts of a way of this length.
+    fn parts(&self, along: Along) -> Vec<PathPart> {
+        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let part = |(JointAxis { link, index }, factor)| {
+            let (_, own) = self.world.link_of(link).ok()?;
+            let [coordinates, dofs] = tree.range(own);
+            let (coordinate, dof) = (coordinates.start + index, dofs.start + index);
+            Some(PathPart::Axis { coordinate, dof, factor })
+        };
+        match along {
+            Along::Joints(axes) => axes.into_iter().filter_map(part).collect(),
+            Along::Path(path) => path.0.clone(),
         }
     }
 
@@ -190,19 +211,20 @@ impl Forces<'_> {
             true => self.model.bodies[index.body].t_parent_body,
             false => Isometry3::identity(),
         };
+        let bends = joint.higher_stiffness != [0.0; 2];
+        if bends && !is_free {
+            let along = Along::Path(Arc::new(Path(vec![PathPart::Angle { link }])));
+            let law = polynomial(stiffness, joint.higher_stiffness, (0.0, 0.0));
+            self.add(&along, Arc::new(law))?;
+        }
         for k in 0..joint.kind.velocities() {
-            if damping <= 0.0 && stiffness <= 0.0 {
-                break;
-            }
             let mut gear = [0.0; 6];
             gear[k] = 1.0;
             let (in_parent, reference) = (false, Some(reference));
             let part = PathPart::Turn { link, gear, is_free, in_parent, reference };
             let along = Along::Path(Arc::new(Path(vec![part])));
-            for law in losses(damping, 0.0) {
-                self.add(&along, law)?;
-            }
-            if stiffness > 0.0 {
+            self.add_losses(&along, (damping, joint.higher_damping), joint.friction_loss)?;
+            if stiffness > 0.0 && !bends {
                 self.add(&along, Arc::new(JointSpring { stiffness, rest: 0.0 }))?;
             }
         }
@@ -261,21 +283,30 @@ impl Forces<'_> {
         Ok(())
     }
 
-    /// Holds the length of a tendon where that of another has it.
+    /// Holds a length where a polynomial of another has it, both less what they are with all joints at their references.
     fn couple(
         &mut self,
-        (first, second): (usize, Option<usize>),
-        &[constant, slope, ..]: &[f64; 5],
+        first: Along,
+        second: Option<Along>,
+        &[constant, slope, ref rest @ ..]: &[f64; 5],
         solver: &SolverParameters,
     ) -> Result<(), MjcfError> {
-        let tendons = &self.model.tendons;
-        let own = self.lengths.of_tendon(&tendons[first], 1.0);
-        let both = second.map(|second| self.lengths.of_tendon(&tendons[second], -slope));
-        let both = match both {
-            Some(other) => own.plus(other),
-            None => Some(own),
+        let along = match (first, second) {
+            (first, None) => first,
+            (Along::Joints(mut axes), Some(Along::Joints(others))) if *rest == [0.0; 3] => {
+                axes.extend(others.into_iter().map(|(axis, factor)| (axis, -slope * factor)));
+                Along::Joints(axes)
+            }
+            (first, Some(second)) => {
+                let (reference, _) = self.length(&second, &self.references[0]);
+                let [b, c, d] = rest.map(|x| -x);
+                let coefficients = [0.0, -slope, b, c, d];
+                let path = Box::new(Path(self.parts(second)));
+                let mut parts = self.parts(first);
+                parts.push(PathPart::Polynomial { path, reference, coefficients });
+                Along::Path(Arc::new(Path(parts)))
+            }
         };
-        let Some(along) = both else { return Ok(()) };
         let (reference, slopes) = self.length(&along, &self.references[0]);
         let [stiffness, damping] = stiffness(solver, self.inertia_of(&slopes), self.softness);
         self.add(&along, Arc::new(JointSpring { stiffness, rest: reference + constant }))?;

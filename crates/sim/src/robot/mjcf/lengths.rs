@@ -10,25 +10,10 @@ use crate::world::joint_force::JointAxis;
 use crate::world::path::{Anchor, Frame, Obstacle, Path, PathPart};
 
 /// A length.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(super) enum Along {
     Joints(Vec<(JointAxis, f64)>),
     Path(Arc<Path>),
-    /// Nothing: the contacts of a body.
-    Contacts,
-}
-
-impl Along {
-    /// The sum of two lengths; `None` of a sum of joints and a path.
-    pub(super) fn plus(self, other: Self) -> Option<Self> {
-        match (self, other) {
-            (Self::Joints(a), Self::Joints(b)) => Some(Self::Joints([a, b].concat())),
-            (Self::Path(a), Self::Path(b)) => {
-                Some(Self::Path(Arc::new(Path([a.0.as_slice(), &b.0].concat()))))
-            }
-            _ => None,
-        }
-    }
 }
 
 /// What lengths are found by.
@@ -42,7 +27,7 @@ pub(super) struct Lengths<'a> {
 }
 
 impl Lengths<'_> {
-    fn axis(&self, joint: JointIndex) -> (JointAxis, usize) {
+    pub(super) fn axis(&self, joint: JointIndex) -> (JointAxis, usize) {
         let found = self.axes.binary_search_by(|(own, ..)| own.cmp(&joint));
         let (_, axis, link) = self.axes[found.unwrap_or_default()];
         (axis, link)
@@ -132,7 +117,8 @@ impl Lengths<'_> {
                 let (slider, rod, factor) = (self.frame(slider), *rod, gear[0]);
                 path(PathPart::Crank { pin, slider, rod, factor })
             }
-            Transmission::Adhesion(_) => Along::Contacts,
+            // Where nothing touches, there is nothing to hold.
+            Transmission::Adhesion(_) => Along::Path(Arc::new(Path(Vec::new()))),
         }
     }
 }

@@ -12,6 +12,8 @@ pub(super) struct Chain {
     pub(super) links: Vec<Link>,
     /// The link that each body is.
     pub(super) bodies: Vec<usize>,
+    /// The links that mocap bodies are.
+    pub(super) mocaps: Vec<usize>,
     /// In the order of the model.
     pub(super) joints: Vec<ChainJoint>,
 }
@@ -74,7 +76,9 @@ impl Chain {
         let link =
             match parent.filter(|_| !body.joints.is_empty() && place == Isometry3::identity()) {
                 Some(link) => link,
-                None if parent.is_none() => self.push(&body.name, None, place, base.clone()),
+                None if parent.is_none() && !body.is_mocap => {
+                    self.push(&body.name, None, place, base.clone())
+                }
                 None => self.push(&body.name, parent, place, Joint::Fixed),
             };
         let own = &mut self.links[link];
@@ -83,6 +87,7 @@ impl Chain {
             (own.mass, own.com, own.inertia) = (inertial.mass, inertial.com, inertial.inertia);
         }
         self.bodies.push(link);
+        self.mocaps.extend(body.is_mocap.then_some(link));
     }
 
     fn push(

@@ -10,7 +10,6 @@ use crate::handle::BodyId;
 use crate::world::World;
 use crate::world::body::Body;
 use crate::world::bushing::{Bushing, BushingStiffness};
-use crate::world::joint_force::JointAxis;
 
 /// Mobility that counts, as part of that of the most mobile direction.
 const LEAST_MOBILITY: f64 = 1e-2;
@@ -63,25 +62,7 @@ impl World {
                     self.add_bushing(Bushing { bodies, frames, stiffness })?;
                 }
                 // Among the forces.
-                EqualityKind::Tendon { .. } => {}
-                EqualityKind::Joint { joints: (first, second), polynomial } => {
-                    let [constant, slope, rest @ ..] = *polynomial;
-                    if rest != [0.0; 3] {
-                        continue;
-                    }
-                    let place = |joint| model.joint_indices().position(|own| own == joint);
-                    let axis = |joint| Some(JointAxis::from(robot.moved[place(joint)?].1));
-                    let mut axes: Vec<(JointAxis, f64)> = Vec::new();
-                    axes.extend(axis(*first).map(|axis| (axis, 1.0)));
-                    let mut target = model.joint(*first).reference + constant;
-                    if let Some(second) = second {
-                        axes.extend(axis(*second).map(|axis| (axis, -slope)));
-                        target -= slope * model.joint(*second).reference;
-                    }
-                    let inertia = self.inertia_along(at.0, &axes);
-                    let held = stiffness(&equality.solver, inertia, options.softness);
-                    self.add_coupling(&axes, target, held)?;
-                }
+                EqualityKind::Joint { .. } | EqualityKind::Tendon { .. } => {}
             }
         }
         Ok(())

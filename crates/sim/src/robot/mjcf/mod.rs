@@ -6,12 +6,11 @@ mod lengths;
 mod links;
 mod loops;
 mod motion;
+mod sensors;
 mod shapes;
 
 use nalgebra::Isometry3;
-use prehend_geometry::mjcf::{
-    Dynamics, EqualityKind, JointKind, Model, Shape as MjcfShape, Transmission,
-};
+use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Transmission};
 use thiserror::Error;
 
 use crate::articulated::Joint;
@@ -20,6 +19,7 @@ use crate::handle::BodyId;
 use crate::handle::JointForceId;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
+use crate::state::State;
 use crate::world::World;
 use crate::world::joint_force::JointAxis;
 
@@ -64,6 +64,8 @@ pub struct MjcfRobot {
     /// The link of each actuator with a state, whose velocity is that state, in the order of MuJoCo's `act`.
     pub activations: Vec<BodyId>,
     names: Vec<String>,
+    mocaps: Vec<BodyId>,
+    sensors: sensors::Sensors,
     /// Of each joint, in the order of positions in MuJoCo, the link that it moves.
     moved: Vec<(JointKind, BodyId)>,
 }
@@ -77,6 +79,26 @@ impl MjcfRobot {
     /// The joint of that name.
     pub fn joint(&self, name: &str) -> Option<JointAxis> {
         Some(self.joints.iter().find(|(own, _)| own == name)?.1)
+    }
+
+    /// Puts a mocap body at `t_world_body`, as MuJoCo's `mocap_pos` and `mocap_quat` do: between steps, for it has no velocity.
+    ///
+    /// # Errors
+    /// If the model has no such mocap body, or the states are not those of the world.
+    pub fn set_mocap(
+        &self,
+        world: &mut World,
+        states: &mut [State],
+        name: &str,
+        t_world_body: &Isometry3<f64>,
+    ) -> Result<(), MjcfError> {
+        let none = || MjcfError::NoMocap { name: name.to_owned() };
+        let body = self.body(name).filter(|body| self.mocaps.contains(body)).ok_or_else(none)?;
+        world.joint_place(states, body)?;
+        let (articulation, link) = world.link_of(body)?;
+        world.articulations[articulation].tree.links_mut()[link].t_parent_joint = *t_world_body;
+        world.forward_kinematics(states);
+        Ok(())
     }
 
     /// The actuator of that name.
@@ -111,6 +133,18 @@ pub enum MjcfError {
         given: usize,
         /// How many it has.
         expected: usize,
+    },
+    /// A body that is no mocap body of the model.
+    #[error("'{name}' is no mocap body")]
+    NoMocap {
+        /// Its name.
+        name: String,
+    },
+    /// A sensor that the model has not, or whose reading more than a state determines.
+    #[error("there is no sensor '{name}' whose reading the state determines")]
+    NoSensor {
+        /// Its name.
+        name: String,
     },
     /// Something that changes how the model moves, and that a world has no counterpart of.
     #[error("{what}: there is no counterpart (with `partial`, it is left out)")]
@@ -168,9 +202,11 @@ impl World {
             bodies: chain.bodies.iter().map(|link| links[*link]).collect(),
             joints: named(&chain.joints, |link| links[link]),
             actuators: Vec::new(),
-            warnings: Vec::new(),
+            warnings,
             activations: links[first..].to_vec(),
             names: model.bodies.iter().map(|body| body.name.clone()).collect(),
+            sensors: sensors::Sensors::default(),
+            mocaps: chain.mocaps.iter().map(|link| links[*link]).collect(),
             moved: chain.joints.iter().map(|joint| (joint.kind, links[joint.link])).collect(),
         };
         if options.shapes {
@@ -191,6 +227,7 @@ impl World {
             axes: &axes,
             t_world_model: options.t_world_model,
         };
+        let sensors = sensors::Sensors::new(&lengths);
         let references = self.reference_coordinates(model, &robot)?;
         let mobility = self.mobility(&references[0]);
         let mut forces = forces::Forces {
@@ -208,7 +245,7 @@ impl World {
         forces.add_all()?;
         let actuators = forces.actuators;
         self.add_loops(model, &robot, options, (&mobility, &references[0]))?;
-        Ok(MjcfRobot { actuators, warnings, ..robot })
+        Ok(MjcfRobot { actuators, sensors, ..robot })
     }
 }
 
@@ -216,15 +253,10 @@ impl World {
 fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (String, bool)> {
     let joints = model.joint_indices().map(|index| model.joint(index));
     let joints = joints.flat_map(|joint| {
-        let turns = matches!(joint.kind, JointKind::Ball | JointKind::Free);
+        let bends = joint.kind == JointKind::Free && joint.higher_stiffness != [0.0; 2];
         let left = [
             (joint.limit_margin != 0.0, "the margin of its limits", false),
-            (
-                turns && (joint.higher_stiffness, joint.higher_damping) != ([0.0; 2], [0.0; 2]),
-                "the polynomials of a ball or free joint",
-                true,
-            ),
-            (turns && joint.friction_loss > 0.0, "the dry friction of a ball or free joint", true),
+            (bends, "the polynomial of a free joint's spring", true),
         ];
         let name = joint.name.clone();
         let left = left.into_iter().filter(|(is, ..)| *is);
@@ -235,35 +267,20 @@ fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (Strin
     });
     let bounded = bounded.map(|own| (format!("actuator '{}': bounds of a muscle", own.name), true));
     let actuators = model.actuators.iter().filter_map(|own| match own.transmission {
-        Transmission::Adhesion(_) => {
+        Transmission::Adhesion(_) if options.shapes => {
             Some((format!("actuator '{}': its hold on what touches a body", own.name), true))
         }
         _ => None,
     });
-    let geoms = model.world_geoms.iter().chain(model.bodies.iter().flat_map(|body| &body.geoms));
-    let terrain = geoms.filter(|geom| options.shapes && geom.collides()).filter_map(|geom| {
-        let is_terrain = matches!(geom.shape, MjcfShape::HeightField(_));
-        is_terrain.then(|| (format!("geom '{}': contacts of a height field", geom.name), true))
+    let of_bodies = model.bodies.iter().flat_map(|body| &body.geoms).map(|geom| (geom, true));
+    let geoms = model.world_geoms.iter().map(|geom| (geom, false)).chain(of_bodies);
+    let terrain =
+        geoms.filter(|(geom, _)| options.shapes && geom.collides() && shapes::is_terrain(geom));
+    let terrain = terrain.map(|(geom, of_body)| {
+        let left = if of_body { "contacts of a body's height field" } else { "its field's border" };
+        (format!("geom '{}': {left}", geom.name), of_body)
     });
-    let equalities = model.equalities.iter().filter(|equality| equality.active);
-    let equalities = equalities.filter_map(|equality| {
-        let is_cable = |tendon: usize| !model.tendons[tendon].parts.is_empty();
-        let what = match equality.kind {
-            EqualityKind::Joint { polynomial, .. } | EqualityKind::Tendon { polynomial, .. }
-                if polynomial[2..] != [0.0; 3] =>
-            {
-                "a polynomial beyond the first power"
-            }
-            EqualityKind::Tendon { tendons: (first, Some(second)), .. }
-                if is_cable(first) != is_cable(second) =>
-            {
-                "a cable and a sum of joints"
-            }
-            _ => return None,
-        };
-        Some((format!("equality '{}': {what}", equality.name), true))
-    });
-    joints.chain(actuators).chain(bounded).chain(terrain).chain(equalities)
+    joints.chain(actuators).chain(bounded).chain(terrain)
 }
 
 fn named(joints: &[links::ChainJoint], body: impl Fn(usize) -> BodyId) -> Vec<(String, JointAxis)> {

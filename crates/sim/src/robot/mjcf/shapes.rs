@@ -1,15 +1,20 @@
 //! Shapes of a model's geoms.
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::shape::{
     Ball, Capsule, Compound, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, SharedShape,
 };
-use prehend_geometry::mjcf::{Geom, Model, Shape as MjcfShape};
+use prehend_geometry::mjcf::{Geom, HeightField as Terrain, Model, Shape as MjcfShape};
+use prehend_geometry::sdf::HeightSpline;
 
 use super::{MjcfError, MjcfOptions, MjcfRobot};
+use crate::fields::{HalfSpace as Below, Placed};
 use crate::shape::Shape;
 use crate::shape::error::ShapeError;
+use crate::shape::height_field::HeightField;
 use crate::shape::options::ShapeOptions;
 use crate::world::World;
 use crate::world::body::Body;
@@ -44,19 +49,26 @@ impl World {
                 own.field = Some(shape.field().clone());
             }
         }
-        for geom in model.world_geoms.iter().filter(|geom| touches(geom)) {
+        for geom in model.world_geoms.iter().filter(|geom| geom.collides()) {
             let wrong = |error| MjcfError::Shape { body: geom.name.clone(), error };
             let shape = match geom.shape {
                 MjcfShape::Plane { .. } => {
                     let turned = options.t_world_model.rotation * geom.t_body_geom.rotation;
                     let normal = turned * nalgebra::Vector3::z();
                     let place = options.t_world_model * geom.t_body_geom.translation.vector;
-                    let field = crate::fields::HalfSpace {
+                    let field = Below {
                         normal: nalgebra::Unit::new_normalize(normal),
                         height: normal.dot(&place),
                     };
                     let body = Body::fixed(&geom.name);
-                    self.add(body.with_field(std::sync::Arc::new(field)));
+                    self.add(body.with_field(Arc::new(field)));
+                    continue;
+                }
+                MjcfShape::HeightField(ref terrain) => {
+                    let field = ground(terrain).ok_or(ShapeError::Heights).map_err(wrong)?;
+                    let pose = options.t_world_model * geom.t_body_geom * field.pose;
+                    let body = Body::fixed(&geom.name);
+                    self.add(body.with_field(Arc::new(Placed { pose, ..field })));
                     continue;
                 }
                 _ => {
@@ -94,14 +106,33 @@ fn same(a: &[Geom], b: &[Geom]) -> bool {
     touching(a) == touching(b) && pairs().all(is_same)
 }
 
-/// True if a geom collides and has a shape here: terrain has none.
+/// Terrain in the frame of its geom: it goes on beyond its border, and has no end below.
+fn ground(terrain: &Terrain) -> Option<Placed<HeightField>> {
+    let ([columns, rows], [x, y]) = (terrain.counts, terrain.half_extents);
+    // The field is above x and z: z is against y.
+    let column = |i| (0..rows).rev().map(move |row| terrain.heights[row * columns + i]);
+    let heights: Vec<f64> = (0..columns).flat_map(column).collect();
+    let spacing = [2.0 * x / (columns - 1) as f64, 2.0 * y / (rows - 1) as f64];
+    let spline = HeightSpline::new(&heights, [columns, rows], [-x, -y], spacing)?;
+    Some(Placed { field: HeightField::new(spline), pose: upright() })
+}
+
+/// The frame of shapes about the y axis, in one of shapes about z.
+fn upright() -> Isometry3<f64> {
+    Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::FRAC_PI_2)
+}
+
+/// True if a geom of a body collides and has a shape there: terrain has none.
 fn touches(geom: &Geom) -> bool {
-    geom.collides() && !matches!(geom.shape, MjcfShape::HeightField(_))
+    geom.collides() && !is_terrain(geom)
+}
+
+pub(super) fn is_terrain(geom: &Geom) -> bool {
+    matches!(geom.shape, MjcfShape::HeightField(_))
 }
 
 /// The shape of parry, whose round ones are about y, and where it is in the geom's frame.
 fn part(shape: &MjcfShape) -> Result<(SharedShape, Isometry3<f64>), ShapeError> {
-    let upright = Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::FRAC_PI_2);
     let vector = |v: &nalgebra::Vector3<f64>| Vector::new(v.x, v.y, v.z);
     let hull =
         |points: &[Vector]| ConvexPolyhedron::from_convex_hull(points).ok_or(ShapeError::NotConvex);
@@ -112,10 +143,10 @@ fn part(shape: &MjcfShape) -> Result<(SharedShape, Isometry3<f64>), ShapeError> 
         }
         MjcfShape::Sphere { radius } => (SharedShape::new(Ball::new(*radius)), own),
         MjcfShape::Capsule { radius, half_length } => {
-            (SharedShape::new(Capsule::new_y(*half_length, *radius)), upright)
+            (SharedShape::new(Capsule::new_y(*half_length, *radius)), upright())
         }
         MjcfShape::Cylinder { radius, half_length } => {
-            (SharedShape::new(Cylinder::new(*half_length, *radius)), upright)
+            (SharedShape::new(Cylinder::new(*half_length, *radius)), upright())
         }
         MjcfShape::Ellipsoid { radii } => (SharedShape::new(hull(&ellipsoid(radii))?), own),
         MjcfShape::Box { half_extents } => {

@@ -1,6 +1,6 @@
 //! A small model of each kind that is read. Masses, poses and accelerations are MuJoCo 4.0's, those of URDF Pinocchio 4.1's, written by `benches/peers/files/kinds.py`.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::robot::{MjcfError, MjcfOptions, MjcfRobot, UrdfOptions};
@@ -82,6 +82,15 @@ fn each_kind_is_as_mujoco_has_it() {
                 &numbers(&state["xpos"]),
                 1e-9,
             );
+            for (sensor, expected) in state["sensors"].as_object().unwrap() {
+                let mut found = robot.sensor(&world, &states, sensor).unwrap();
+                let expected = numbers(expected);
+                // Two quaternions are one rotation.
+                if sensor.contains("quat") && found[0] * expected[0] < 0.0 {
+                    found.iter_mut().for_each(|x| *x = -*x);
+                }
+                near(&format!("{what}: sensor {sensor}"), &found, &expected, 1e-6);
+            }
             let found = robot.accelerations(&world, &states);
             near(&format!("{what}: accelerations"), &found, &numbers(&state["qacc"]), 1e-6);
             if state["end"].is_object() {
@@ -117,18 +126,96 @@ fn tendons_follow_each_other() {
     };
     for tendons in [&cables, sums] {
         let (world, robot) = scene(tendons, "0.1 0.5").unwrap();
-        let end = world.simulate(&world.neutral_states(), 0.2).unwrap();
-        let place = |joint: &str| {
-            let [position, _] = world.joint_motion(&end, robot.joint(joint).unwrap()).unwrap();
-            position
-        };
-        let (a, b) = (place("a"), place("b"));
+        let [a, b] = ends(&world, &robot);
         assert!(b < -0.1 && (-a - (0.1 - 0.5 * b)).abs() < 2e-3, "{a} {b}");
     }
+    // By higher powers, and a cable by a sum of joints.
     let mixed = cable("a", "u", "a") + "<fixed name='b'><joint joint='b' coef='-1'/></fixed>";
-    for refused in [scene(&cables, "0 1 2"), scene(&mixed, "0 1")] {
-        assert!(matches!(refused, Err(MjcfError::NoCounterpart { .. })));
+    for tendons in [&cables, sums, &mixed] {
+        let (world, robot) = scene(tendons, "0.1 0.5 2 -1").unwrap();
+        let [a, b] = ends(&world, &robot);
+        assert!(
+            b < -0.1 && (-a - (0.1 - 0.5 * b + 2.0 * b * b + b * b * b)).abs() < 4e-3,
+            "{a} {b}"
+        );
     }
+}
+
+#[test]
+fn joints_follow_polynomials_of_others() {
+    // From their references, as MuJoCo has it.
+    let xml = "<mujoco><compiler angle='radian'/><worldbody><body name='a'><joint name='a' axis='0 1 0' ref='.2' damping='.1'/><geom size='.1' pos='.2 0 0'/></body>
+        <body name='b'><joint name='b' axis='0 1 0' ref='-.1'/><geom size='.1' pos='.4 0 0'/></body></worldbody>
+        <equality><joint joint1='a' joint2='b' polycoef='.05 .5 -.3 .2 .1'/></equality></mujoco>";
+    let model = Model::from_str(xml, None).unwrap();
+    let mut world = World::new(model.gravity);
+    let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
+    let robot = world.add_mjcf(&model, &options).unwrap();
+    let [a, b] = ends(&world, &robot);
+    let x = b + 0.1;
+    let follows = 0.05 + x * (0.5 + x * (-0.3 + x * (0.2 + x * 0.1)));
+    assert!(x > 0.3 && (a - 0.2 - follows).abs() < 4e-3, "{a} {b}");
+}
+
+/// Positions of the joints a and b after a while.
+fn ends(world: &World, robot: &MjcfRobot) -> [f64; 2] {
+    let end = world.simulate(&world.neutral_states(), 0.2).unwrap();
+    ["a", "b"].map(|joint| world.joint_motion(&end, robot.joint(joint).unwrap()).unwrap()[0])
+}
+
+#[test]
+fn terrain_is_where_mujoco_has_it() {
+    let xml = "<mujoco><asset><hfield name='h' nrow='3' ncol='4' size='.6 .4 .3 .1' elevation='0 1 2 3 2 3 4 5 4 5 6 7'/></asset>
+        <worldbody><geom name='ground' type='hfield' hfield='h' pos='.1 -.2 .05' euler='5 -10 30'/></worldbody></mujoco>";
+    let mut world = World::new(Vector3::zeros());
+    let model = Model::from_str(xml, None).unwrap();
+    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
+    assert_eq!(robot.warnings, ["geom 'ground': its field's border"]);
+    let ground = world.bodies.iter().find(|body| body.name == "ground").unwrap();
+    let field = ground.field.as_ref().unwrap();
+    // Where rays from above meet it.
+    for place in [
+        [0.1, -0.2, 0.2065795233110186],
+        [0.3, 0.0, 0.27377191831993386],
+        [-0.2, -0.3, 0.09562425931210461],
+        [0.2, -0.45, 0.257967393837234],
+        [-0.1, 0.05, 0.11651211877755263],
+    ] {
+        let at = |up: f64| field.sample(&(Point3::from(place) + Vector3::z() * up), 1.0).unwrap();
+        assert!(at(0.0).distance.abs() < 1e-9, "{}", at(0.0).distance);
+        assert!(at(0.05).distance > 0.03 && at(-0.05).distance < -0.03);
+    }
+    let moved = xml.replace(
+        "<geom name",
+        "<body><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/><geom name",
+    );
+    let model =
+        Model::from_str(&moved.replace("</worldbody>", "</body></worldbody>"), None).unwrap();
+    let refused = World::new(Vector3::zeros()).add_mjcf(&model, &MjcfOptions::default());
+    assert!(matches!(refused, Err(MjcfError::NoCounterpart { .. })));
+}
+
+#[test]
+fn mocap_bodies_lead() {
+    let xml = "<mujoco><worldbody><body name='hand' mocap='true' pos='0 0 1'><geom size='.1' contype='0' conaffinity='0'/></body>
+        <body name='thing' pos='0 0 1'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody>
+        <equality><weld body1='hand' body2='thing'/></equality></mujoco>";
+    let model = Model::from_str(xml, None).unwrap();
+    let mut world = World::new(Vector3::zeros());
+    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
+    let mut states = world.neutral_states();
+    robot.set_positions(&world, &mut states, &model.reference_positions()).unwrap();
+    let pose = Isometry3::new(Vector3::new(0.05, -0.02, 1.1), Vector3::new(0.1, 0.0, 0.2));
+    robot.set_mocap(&mut world, &mut states, "hand", &pose).unwrap();
+    let apart = |states: &[State], name: &str| {
+        let found = states[robot.body(name).unwrap()].pose;
+        (found.to_homogeneous() - pose.to_homogeneous()).amax()
+    };
+    assert!(apart(&states, "hand") < 1e-12);
+    let end = world.simulate(&states, 0.3).unwrap();
+    assert!(apart(&end, "thing") < 5e-3, "{}", apart(&end, "thing"));
+    let wrong = robot.set_mocap(&mut world, &mut states, "thing", &pose);
+    assert_eq!(wrong, Err(MjcfError::NoMocap { name: "thing".to_owned() }));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::robot::KinematicTree;
+use prehend_sim::articulated::Joint;
 use prehend_sim::robot::UrdfOptions;
 use prehend_sim::{BodyId, State, World};
 
@@ -107,4 +108,25 @@ fn limits_losses_and_mimicry_act() {
     let expected = 0.3 * (-0.05 / inertia * 0.1).exp();
     assert!((speed / expected - 1.0).abs() < 0.05, "{speed} {expected}");
     assert!((slide - 0.1 * speed).abs() < 2e-3 && place.abs() < 0.02, "{place} {slide}");
+}
+
+#[test]
+fn inertias_that_no_body_has_matter_where_joints_feel_them() {
+    let impossible = r#"<inertia ixx="-1e-3" ixy="0" ixz="0" iyy="2e-3" iyz="0" izz="2e-3"/>"#;
+    let given = r#"<inertia ixx="1e-4" ixy="0" ixz="0" iyy="2e-4" iyz="0" izz="2e-4"/>"#;
+    let added = |axis: &str, joint: Joint| {
+        let xml = ARM.replace(given, impossible).replace(r#"<axis xyz="0 1 0"/>"#, axis);
+        let tree = KinematicTree::from_urdf_str(&xml, None).unwrap();
+        assert_eq!(tree.warnings(), ["link 'finger': no body has its inertia"]);
+        let options = UrdfOptions { base: joint, ..UrdfOptions::default() };
+        World::new(Vector3::zeros()).add_articulated_robot(&tree, None, &options).map(|_| ())
+    };
+    assert!(added(r#"<axis xyz="0 1 0"/>"#, Joint::Fixed).is_ok());
+    // The base's makes good for it.
+    assert!(added(r#"<axis xyz="0 1 0"/>"#, Joint::Floating).is_ok());
+    let error = added(r#"<axis xyz="1 0 0"/>"#, Joint::Fixed).unwrap_err().to_string();
+    assert!(
+        error.contains("link finger: a principal moment of its inertia is negative"),
+        "{error}"
+    );
 }
