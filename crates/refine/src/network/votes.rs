@@ -95,6 +95,7 @@ impl Shape<'_> {
             found.push(self.mean(&votes[seed].pose.rotation, poses, kept));
             members.iter().for_each(|b| is_left[*b] = false);
         }
+        found.sort_by(|a: &ProposedPose, b| b.score.total_cmp(&a.score));
         found
     }
 
