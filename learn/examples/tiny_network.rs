@@ -15,16 +15,19 @@ use prehend_refine::Object;
 use prehend_refine::network::PoseNetwork;
 use prehend_refine::synth::HandFiles;
 
+/// Steps of the training.
+const STEPS: u32 = 800;
+
 fn main() -> anyhow::Result<()> {
     let object = Arc::new(Object::new("mug", Mug::default().mesh(), None, 0)?);
     let hand = HandFiles::built_in()?;
-    let settings = ViewSettings { grasps: 4, views_per_grasp: 25, seed: 1 };
+    let settings = ViewSettings { grasps: 2, views_per_grasp: 40, seed: 1 };
     let views = make_views(&object, &hand.robot, &settings, &|_| ())?;
     println!("{} frames", views.len());
     let settings = TrainSettings {
         widths: Widths { point: vec![32, 64, 128], global: vec![128], vote: vec![128, 64] },
         size: SampleSize { points: 96, voters: 16 },
-        steps: 400,
+        steps: STEPS,
         ..TrainSettings::default()
     };
     let mut training = Training::new(&object, settings, Device::ndarray())?;
@@ -33,7 +36,7 @@ fn main() -> anyhow::Result<()> {
     };
     let before = validate(&network(&training)?, &object, &views);
     let mut distance = 0.0;
-    for _ in 0..400 {
+    for _ in 0..STEPS {
         distance = training.step(&views, &object).distance;
     }
     let after = validate(&network(&training)?, &object, &views);

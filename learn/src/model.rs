@@ -102,7 +102,7 @@ impl Pass {
             whole = relu(dense(&format!("global.{n}"), whole));
         }
         let [_, inner] = local.dims();
-        let voting = local.reshape([sets, each, inner]).slice([0..sets, 0..voters]);
+        let voting = local.reshape([sets, each, inner]).slice([0..sets, 0..voters, 0..inner]);
         let voting = voting.reshape([sets * voters, inner]);
         // A layer of both together, of which the part of all points is computed once a set.
         let first = matrix("vote.0.weight");

@@ -29,7 +29,7 @@ fn views(object: &Object, count: u64) -> Vec<View> {
         let rotation = UnitQuaternion::from_scaled_axis(normal() * 2.0);
         let translation = Vector3::new(0.0, 0.0, 0.5) + normal() * 0.03;
         let truth = Isometry3::from_parts(translation.into(), rotation);
-        let point = |(p, n): (Point3<f64>, Vector3<f64>), is_contact| SensedPoint {
+        let point = |(p, n): (Point3<f64>, Vector3<f64>), is_contact: bool| SensedPoint {
             position: truth * p,
             normal: truth * n,
             color: (!is_contact).then_some([0.3, 0.5, 0.7]),
@@ -37,7 +37,8 @@ fn views(object: &Object, count: u64) -> Vec<View> {
             is_contact,
         };
         let all = samples.iter().map(|s| (s.point, s.normal));
-        let faces = |(p, n): &(Point3<f64>, Vector3<f64>)| (truth * n).dot(&(truth * p).coords) < 0.0;
+        let faces =
+            |(p, n): &(Point3<f64>, Vector3<f64>)| (truth * n).dot(&(truth * p).coords) < 0.0;
         let seen = all.clone().filter(faces).map(|s| point(s, false)).collect();
         let felt = all.step_by(40).map(|s| point(s, true)).collect();
         View { points: SensedPoints { seen, felt }, truth }
@@ -92,7 +93,7 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
 fn training_brings_votes_nearer_to_the_truth() {
     let object = Arc::new(block());
     let views = views(&object, 60);
-    let settings = TrainSettings { steps: 300, ..settings() };
+    let settings = TrainSettings { steps: 1000, batch: 16, ..settings() };
     let mut training = Training::new(&object, settings, Device::ndarray()).unwrap();
     // A block has three half turns.
     assert_eq!(training.symmetries(), 4);
@@ -101,7 +102,7 @@ fn training_brings_votes_nearer_to_the_truth() {
         validate(&network, &object, &views)
     };
     let before = errors(&training);
-    (0..300).for_each(|_| drop(training.step(&views, &object)));
+    (0..1000).for_each(|_| drop(training.step(&views, &object)));
     let after = errors(&training);
     assert!(after.orientation < 0.6 * before.orientation, "{before:?} {after:?}");
     assert!(after.position < 0.7 * before.position, "{before:?} {after:?}");
