@@ -30,7 +30,7 @@ fn main() -> anyhow::Result<()> {
         steps: STEPS,
         ..TrainSettings::default()
     };
-    let mut training = Training::new(&object, settings, Device::ndarray())?;
+    let mut training = Training::new(&object, settings, Device::flex())?;
     let network = |training: &Training| {
         PoseNetwork::from_tensors(Path::new("tiny"), training.network(&object))
     };

@@ -92,7 +92,7 @@ fn main() -> anyhow::Result<()> {
     let settings =
         TrainSettings { steps: arguments.steps, seed: arguments.seed, ..TrainSettings::default() };
     let device = match arguments.device {
-        Kind::Cpu => Device::ndarray(),
+        Kind::Cpu => Device::flex(),
         #[cfg(feature = "wgpu")]
         Kind::Gpu => Device::wgpu(Default::default()),
     };

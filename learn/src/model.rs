@@ -141,5 +141,5 @@ impl Pass {
 }
 
 fn numbers(data: TensorData) -> Vec<f32> {
-    data.convert::<f32>().into_vec().unwrap_or_default()
+    data.convert::<f32>().try_into_vec().unwrap_or_default()
 }

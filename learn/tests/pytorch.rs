@@ -33,7 +33,7 @@ impl Golden {
     }
 
     fn pass(&self) -> Pass {
-        let device = Device::ndarray().autodiff();
+        let device = Device::flex().autodiff();
         Pass::forward(&device, &self.weights, self.values("points").to_vec(), SETS, VOTERS)
     }
 }

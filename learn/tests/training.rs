@@ -64,7 +64,7 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
     save_views(&file, &views(&object, 20), "block").unwrap();
     let views = load_views(&file, "block").unwrap();
     assert!(load_views(&file, "other").unwrap_err().to_string().contains("made with block"));
-    let begin = || Training::new(&object, settings(), Device::ndarray()).unwrap();
+    let begin = || Training::new(&object, settings(), Device::flex()).unwrap();
     let [mut whole, mut first, mut again] = [begin(), begin(), begin()];
     for _ in 0..20 {
         whole.step(&views, &object);
@@ -84,7 +84,7 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
     }
     assert_eq!(second.network(&object), whole.network(&object));
     let other = TrainSettings { seed: 1, ..settings() };
-    let mut other = Training::new(&object, other, Device::ndarray()).unwrap();
+    let mut other = Training::new(&object, other, Device::flex()).unwrap();
     let refused = other.resume(&checkpoint).unwrap_err().to_string();
     assert!(refused.contains("give the same settings"), "{refused}");
 }
@@ -94,7 +94,7 @@ fn training_brings_votes_nearer_to_the_truth() {
     let object = Arc::new(block());
     let views = views(&object, 60);
     let settings = TrainSettings { steps: 1000, batch: 16, ..settings() };
-    let mut training = Training::new(&object, settings, Device::ndarray()).unwrap();
+    let mut training = Training::new(&object, settings, Device::flex()).unwrap();
     // A block has three half turns.
     assert_eq!(training.symmetries(), 4);
     let errors = |training: &Training| {

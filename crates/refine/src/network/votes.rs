@@ -19,7 +19,7 @@ const VOTES: usize = 96;
 const SPREAD: f64 = 0.15;
 
 /// Difference of two poses.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Difference {
     /// Angle, turns of the object apart \[rad\].
     pub(super) angle: f64,
@@ -72,27 +72,28 @@ impl Shape<'_> {
             return Vec::new();
         }
         let count = votes.len();
-        let mut between = vec![Difference::default(); count * count];
+        let mut between = vec![0.0; count * count];
         for a in 0..count {
-            for b in 0..count {
-                between[a * count + b] = self.difference(&votes[a].pose, &votes[b].pose);
+            for b in 0..a {
+                let size = self.difference(&votes[a].pose, &votes[b].pose).size();
+                (between[a * count + b], between[b * count + a]) = (size, size);
             }
         }
         let mut is_left = vec![true; count];
         let mut found = Vec::new();
         while found.len() < limit {
             let density = |a: usize| -> f64 {
-                let near =
-                    |b: usize| (-0.5 * (between[a * count + b].size() / SPREAD).powi(2)).exp();
+                let near = |b: usize| (-0.5 * (between[a * count + b] / SPREAD).powi(2)).exp();
                 (0..count).filter(|b| is_left[*b]).map(|b| votes[b].weight * near(b)).sum()
             };
             let densest = (0..count).filter(|a| is_left[*a]).map(|a| (a, density(a)));
             let Some((seed, _)) = densest.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            let near = |b: &usize| is_left[*b] && between[seed * count + b].size() <= 2.0 * SPREAD;
+            let near = |b: &usize| is_left[*b] && between[seed * count + b] <= 2.0 * SPREAD;
             let members: Vec<usize> = (0..count).filter(near).collect();
-            let poses =
-                members.iter().map(|&b| (&votes[b], self.turns[between[seed * count + b].turn]));
-            found.push(self.mean(&votes[seed].pose.rotation, poses, kept));
+            let first = votes[seed].pose;
+            let turn = |vote: &Vote| self.turns[self.difference(&first, &vote.pose).turn];
+            let poses = members.iter().map(|&b| (&votes[b], turn(&votes[b])));
+            found.push(self.mean(&first.rotation, poses, kept));
             members.iter().for_each(|b| is_left[*b] = false);
         }
         found.sort_by(|a: &ProposedPose, b| b.score.total_cmp(&a.score));
