@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 15_850),
     ("sim", 16_630),
     ("render", 10_930),
-    ("refine", 29_790),
+    ("refine", 30_490),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

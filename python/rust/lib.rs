@@ -27,8 +27,8 @@ mod _prehend {
     use super::link::Link;
     #[pymodule_export]
     use super::refine::{
-        _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, Rig, Tracker, example_frame,
-        example_sequence, methods, refine_batch,
+        _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, PoseNetwork, Rig, Tracker,
+        example_frame, example_sequence, methods, refine_batch,
     };
     #[pymodule_export]
     use super::render::light::{ambient_light, headlight};

@@ -26,6 +26,7 @@
 //! | [`baselines`] | methods that the estimator is compared with: the paper's heuristic, ICPs |
 //! | [`check`] | what looks wrong with inputs, and mistakes by name |
 //! | [`search`] | poses to start from, by sensors alone |
+//! | [`network`] | poses to start from, by a trained network |
 //! | [`tracker`] | an object followed through frames |
 //! | [`data`] | BOP datasets and other files |
 //! | [`export`] | poses for other programs: films |
@@ -47,6 +48,7 @@ pub mod export;
 pub mod factor;
 pub mod info;
 mod method;
+pub mod network;
 pub mod problem;
 pub mod rig;
 pub mod scene;

@@ -4,16 +4,18 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
 use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target, load_frame_file, user_cache};
 use prehend_refine::scene::{PreparedFrame, check_gravity};
-use prehend_refine::search::{PoseCandidate, PoseSearch};
+use prehend_refine::search::PoseSearch;
 use prehend_refine::{EstimatorInput, RefineError};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
 use super::hand::Hand;
 use super::measured::{Joints, measured};
+use super::network::PoseNetwork;
 use super::object::prepared;
 use super::poses::{hypotheses, pose};
 use super::rig::Rig;
@@ -161,22 +163,29 @@ impl Frame {
     }
 
     /// Searches the object in the masked depth, without any initial pose: up to four poses (n × 4 × 4, camera ← object [m]), the best first, and their
-    /// weights (n), which sum to 1. `refine` takes them all; `settings` are as it has them. Python's other threads run on meanwhile.
-    #[pyo3(signature = (*, settings=None))]
+    /// weights (n), which sum to 1. `refine` takes them all; `settings` are as it has them. With a `network` of the object, a `PoseNetwork`, up to five poses
+    /// that it proposes, with their shares of the votes. Python's other threads run on meanwhile.
+    #[pyo3(signature = (*, settings=None, network=None))]
     fn search<'py>(
         &self,
         py: Python<'py>,
         settings: Option<Bound<'py, PyAny>>,
+        network: Option<&PoseNetwork>,
     ) -> PyResult<(Array<'py>, Array<'py>)> {
         let settings = self::settings(settings.as_ref())?.search();
-        let search = || -> Result<Vec<PoseCandidate>, RefineError> {
-            let object = Arc::clone(&self.input.object);
-            PoseSearch::new(object, settings)?
-                .run(&PreparedFrame::new(&self.input.frame, &self.input.object)?)
+        let network = network.map(|network| Arc::clone(&network.network));
+        let search = || -> Result<Vec<(Isometry3<f64>, f64)>, RefineError> {
+            let frame = PreparedFrame::new(&self.input.frame, &self.input.object)?;
+            if let Some(network) = network {
+                let found = network.propose(&frame)?.into_iter();
+                return Ok(found.map(|p| (p.t_cam_object, p.score)).collect());
+            }
+            let found = PoseSearch::new(Arc::clone(&self.input.object), settings)?.run(&frame)?;
+            Ok(found.into_iter().map(|c| (c.t_cam_object, c.weight)).collect())
         };
         let found = detached(py, search)?.raise()?;
-        let poses = found.iter().flat_map(|c| rows(&c.t_cam_object)).collect();
-        let weights = found.iter().map(|c| c.weight).collect();
+        let poses = found.iter().flat_map(|(pose, _)| rows(pose)).collect();
+        let weights = found.iter().map(|(_, weight)| *weight).collect();
         Ok((array(py, poses, &[found.len(), 4, 4])?, array(py, weights, &[found.len()])?))
     }
 

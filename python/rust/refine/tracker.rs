@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use super::estimate;
 use super::frame::Frame;
+use super::network::PoseNetwork;
 use super::object::prepared;
 use super::poses::pose;
 use super::rig::Rig;
@@ -20,7 +21,7 @@ use crate::threads::detached;
 ///
 /// `pose` (4 × 4, camera ← object [m]) is where to begin; without it the first frame is searched. `budget` [s] is what following may take in a frame.
 /// `recovery` is what is done about an object that is lost: "off", "near" (look about where it should be) or "anywhere", the default. Of a `rig`, frames
-/// and the object are corrected already. `settings` are a dict or the path of a TOML file, as `Frame.refine` has them.
+/// and the object are corrected already. A `network` of the object, a `PoseNetwork`, is asked where the object is before any search. `settings` are a dict or the path of a TOML file, as `Frame.refine` has them.
 #[pyclass(module = "prehend")]
 pub(crate) struct Tracker {
     tracker: prehend_refine::tracker::Tracker,
@@ -35,13 +36,14 @@ fn seconds(seconds: f64, what: &str) -> PyResult<Duration> {
 impl Tracker {
     #[new]
     #[allow(clippy::too_many_arguments)] // as Python has it
-    #[pyo3(signature = (object, *, pose=None, rig=None, budget=None, recovery=None, settings=None))]
+    #[pyo3(signature = (object, *, pose=None, rig=None, budget=None, recovery=None, network=None, settings=None))]
     fn new(
         object: Bound<'_, PyAny>,
         pose: Option<Numbers<'_>>,
         rig: Option<&Rig>,
         budget: Option<f64>,
         recovery: Option<&str>,
+        network: Option<&PoseNetwork>,
         settings: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let recovery = recovery.map(|name| name.parse::<Recovery>().raise()).transpose()?;
@@ -50,7 +52,13 @@ impl Tracker {
         settings.budget = budget.or(settings.budget);
         settings.recovery = recovery.unwrap_or(settings.recovery);
         let object = prepared(&object)?;
+        if let Some(network) = network {
+            network.network.check_object(&object).raise()?;
+        }
         let mut tracker = prehend_refine::tracker::Tracker::new(object, settings).raise()?;
+        if let Some(network) = network {
+            tracker = tracker.with_network(Arc::clone(&network.network));
+        }
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(&rig.rig));
         }

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._prehend import Frame, Hand, Mesh, Object, Rig
+from ._prehend import Frame, Hand, Mesh, Object, PoseNetwork, Rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +174,12 @@ def search(
     depth_scale: float | None = None,
     lens: tuple[str, Sequence[float]] | None = None,
     rig: Rig | None = None,
+    network: PoseNetwork | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Searches an object without any pose to begin with: the same as `Frame(rgb, depth, K, mesh, …).search()`, with arguments as of `refine`.
+    """Searches an object without any pose to begin with: the same as `Frame(rgb, depth, K, mesh, …).search(network=network)`, with arguments as of `refine`.
+
+    Args:
+        network: Network of the object, which proposes poses in place of the search.
 
     Returns:
         Up to four poses, n × 4 × 4, camera ← object [m], the best first, and their weights, n, which sum to 1. `refine` takes them all.
@@ -198,5 +202,5 @@ def search(
         lens=lens,
         rig=rig,
     )
-    found: tuple[NDArray[np.float64], NDArray[np.float64]] = frame.search()
+    found: tuple[NDArray[np.float64], NDArray[np.float64]] = frame.search(network=network)
     return found

@@ -17,9 +17,10 @@ pub use self::input::EstimatorInput;
 use crate::baselines::GradientKind;
 use crate::error::RefineError;
 use crate::method::Method;
+use crate::network::PoseNetwork;
 use crate::problem::{Factor, State};
 use crate::rig::Rig;
-use crate::scene::{Frame, Object};
+use crate::scene::{Frame, Object, PreparedFrame};
 use crate::search::PoseSearch;
 use crate::settings::Settings;
 use crate::strategy::{Diagnosis, Estimate, Fused, Observer, Strategy};
@@ -33,6 +34,7 @@ pub struct Estimator {
     method: Method,
     factors: Vec<Arc<dyn Factor>>,
     rig: Option<Arc<Rig>>,
+    network: Option<Arc<PoseNetwork>>,
     backend: Option<Arc<dyn Backend>>,
 }
 
@@ -51,7 +53,7 @@ impl Estimator {
     pub fn new(object: impl Into<Arc<Object>>) -> Self {
         let (settings, method) = (Settings::default(), Method::default());
         let (object, factors) = (object.into(), Vec::new());
-        Self { object, settings, method, factors, rig: None, backend: None }
+        Self { object, settings, method, factors, rig: None, network: None, backend: None }
     }
 
     /// With these settings.
@@ -78,16 +80,27 @@ impl Estimator {
         Self { rig, ..self }
     }
 
+    /// With a network of the object: it finds poses in place of the search, and before it in trackers.
+    pub fn network(self, network: Option<Arc<PoseNetwork>>) -> Self {
+        Self { network, ..self }
+    }
+
     /// Rendering by `backend` in place of the processor.
     pub fn backend(self, backend: Arc<dyn Backend>) -> Self {
         Self { backend: Some(backend), ..self }
     }
 
-    /// Poses by sensors alone, the most likely one first.
+    /// Poses by sensors alone, the most likely one first: those of the network, or else of a search.
     ///
     /// # Errors
-    /// Those of [`PoseSearch::run`].
+    /// Those of [`PoseNetwork::propose`] or [`PoseSearch::run`].
     pub fn search(&self, frame: &Frame) -> Result<Hypotheses, RefineError> {
+        if let Some(network) = &self.network {
+            let proposed = network.propose(&PreparedFrame::new(frame, &self.object)?)?;
+            let mut poses = proposed.into_iter().map(|p| p.t_cam_object);
+            let best = poses.next().ok_or(RefineError::NothingFits)?;
+            return Ok(Hypotheses { best, alternatives: Some(poses.collect()) });
+        }
         let search = PoseSearch::new(Arc::clone(&self.object), self.settings.search())?;
         let input = EstimatorInput::new(frame, &self.object);
         let mut found = search.run(&input.prepared(self.backend.as_ref())?)?.into_iter();
@@ -155,6 +168,9 @@ impl Estimator {
         let mut tracker = Tracker::new(Arc::clone(&self.object), self.settings.tracker())?;
         if let Some(rig) = &self.rig {
             tracker = tracker.with_rig(Arc::clone(rig));
+        }
+        if let Some(network) = &self.network {
+            tracker = tracker.with_network(Arc::clone(network));
         }
         tracker.factors.clone_from(&self.factors);
         Ok(match &self.backend {

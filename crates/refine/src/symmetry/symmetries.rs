@@ -53,7 +53,7 @@ impl Symmetries {
     }
 
     /// [`transforms`](Self::transforms) of `turns` rotations about each axis, all round.
-    pub(super) fn sampled(&self, turns: usize) -> Vec<Isometry3<f64>> {
+    pub fn sampled(&self, turns: usize) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();
         for symmetry in &self.continuous {
             let turn = |k| symmetry.turn(TAU * k as f64 / turns as f64);

@@ -7,6 +7,7 @@ mod annotation;
 mod dataset;
 mod error;
 mod files;
+mod frame;
 mod generate;
 mod grasp;
 mod hand_files;
@@ -17,6 +18,7 @@ mod settings;
 
 pub use dataset::write_dataset;
 pub use error::SynthError;
+pub use frame::simulate_frame;
 pub use generate::{DatasetSummary, GraspFailure, generate};
 pub use grasp::{Grasp, GraspError, GraspSettings, GraspSnapshot, Grasper};
 pub use hand_files::HandFiles;

@@ -16,6 +16,7 @@ use super::tracked::{TrackStatus, Tracked};
 use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
+use crate::network::{PoseNetwork, ProposedPose};
 use crate::problem::{Solution, State};
 use crate::scene::{Frame, PreparedFrame, RegionEvidence};
 use crate::search::PoseSearch;
@@ -38,7 +39,11 @@ impl Tracker {
         let frame = &self.frame(sight, &object)?;
         let (initial, alternatives) = match self.initial {
             Some(pose) => (pose, None),
-            None => self.search(frame).map(|(best, others)| (best, Some(others)))?,
+            None => {
+                let proposed = self.network.as_deref().and_then(|n| propose(n, frame).ok());
+                let found = proposed.map_or_else(|| self.search(frame), Ok);
+                found.map(|(best, others)| (best, Some(others)))?
+            }
         };
         let nominal = State::new(frame, &initial)?;
         let stated = self.settings.fused.prior.of_hand(frame.observation().hand.as_ref());
@@ -169,7 +174,7 @@ impl Tracker {
         Ok((best, found.collect()))
     }
 
-    /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
+    /// A pose that is believed, looked for where it should be and then everywhere, by a network before a search, or the other way round if it was `long_lost`. One from anywhere must
     /// fit as if nothing had changed. Half of the pixels that should show it must do so, or a quarter if it is where it was expected. It was looked at where it
     /// should be, and `seen` there or not.
     pub(super) fn recover(
@@ -180,17 +185,18 @@ impl Tracker {
         seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let mut ways = [
-            (Recovery::Near, track.allowance(self.settings.gating.growth)),
-            (Recovery::Anywhere, track.level),
-        ];
-        if long_lost {
-            ways.reverse();
-        }
+        let network = self.network.clone();
+        let near = (Recovery::Near, track.allowance(self.settings.gating.growth), None);
+        let anywhere = |network| (Recovery::Anywhere, track.level, network);
+        let by_network = network.as_deref().map(|network| anywhere(Some(network)));
+        let mut ways: Vec<_> = by_network.into_iter().chain([anywhere(None)]).collect();
+        ways.insert(if long_lost { ways.len() } else { 0 }, near);
         let recovery = self.settings.recovery;
-        for (reach, level) in ways.into_iter().filter(|(reach, _)| *reach <= recovery) {
+        for (reach, level, network) in ways.into_iter().filter(|(reach, ..)| *reach <= recovery) {
             let found = match reach {
-                Recovery::Anywhere => self.search_anywhere(sight, &predicted.t_cam_object)?,
+                Recovery::Anywhere => {
+                    self.search_anywhere(sight, &predicted.t_cam_object, network)?
+                }
                 _ => Some((predicted.t_cam_object, None)),
             };
             let Some((t_cam_object, alternatives)) = found else { continue };
@@ -223,14 +229,18 @@ impl Tracker {
         Ok(None)
     }
 
-    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; where no depth is measured, the `expected` one moved to
+    /// The best pose that a network or a search finds wherever something like the object is seen, and the others \[m\]; where no depth is measured, the `expected` one moved to
     /// where its colors are seen. None if nothing fits.
     fn search_anywhere(
         &mut self,
         sight: &mut Sight,
         expected: &Isometry3<f64>,
+        network: Option<&PoseNetwork>,
     ) -> Result<Option<Candidates>, RefineError> {
         if !sight.measured {
+            if network.is_some() {
+                return Ok(None);
+            }
             let found = self.segmenter.find(sight, &self.object, expected);
             return Ok(found.map(|pose| (pose, None)));
         }
@@ -241,7 +251,7 @@ impl Tracker {
         (sight.frame.mask, sight.focus) = (mask, None);
         let object = Arc::clone(&self.object);
         let frame = self.frame(sight, &object)?;
-        match self.search(&frame) {
+        match network.map_or_else(|| self.search(&frame), |network| propose(network, &frame)) {
             Ok((best, others)) => Ok(Some((best, Some(others)))),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
             Err(error) => Err(error),
@@ -262,4 +272,15 @@ impl Tracker {
     pub(super) fn shown(&self, sight: &Sight, t_cam_object: &Isometry3<f64>) -> f64 {
         self.segmenter.shown(sight, &self.object, t_cam_object)
     }
+}
+
+/// The best pose that `network` proposes, and the others \[m\].
+fn propose(
+    network: &PoseNetwork,
+    frame: &PreparedFrame<'_>,
+) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
+    let pose = |proposed: ProposedPose| proposed.t_cam_object;
+    let mut found = network.propose(frame)?.into_iter().map(pose);
+    let best = found.next().ok_or(RefineError::NothingFits)?;
+    Ok((best, found.collect()))
 }

@@ -35,6 +35,7 @@ use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::{RefineError, guard};
 use crate::factor::{GaussianPrior, PriorSettings};
+use crate::network::PoseNetwork;
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
 use crate::scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
@@ -92,6 +93,8 @@ pub struct Tracker {
     last_time: Option<Duration>,
     /// Made when it is first needed.
     search: Option<PoseSearch>,
+    /// Asked before any search.
+    network: Option<Arc<PoseNetwork>>,
     segmenter: Segmenter,
     /// Of the frame before.
     images: Images,
@@ -129,6 +132,7 @@ impl Tracker {
             track: None,
             last_time: None,
             search: None,
+            network: None,
             segmenter: Segmenter::new(&settings),
             settings,
             images: Images::default(),
@@ -143,6 +147,11 @@ impl Tracker {
     /// Of frames that are corrected by `rig` already, as the object is: calibrations are as accurate as the rig is known.
     pub fn with_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig: Some(rig), ..self }
+    }
+
+    /// With a network of the object: it is asked where the object is before any search.
+    pub fn with_network(self, network: Arc<PoseNetwork>) -> Self {
+        Self { network: Some(network), ..self }
     }
 
     /// With a factor of one's own, in every frame.

@@ -13,11 +13,12 @@ use clap::Args;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
-use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint};
+use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Target};
+use prehend_refine::network::{PoseNetwork, ProposedPose};
 use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_refine::synth::NoiseLevel;
-use prehend_refine::{PreparedFrame, guard};
+use prehend_refine::{PreparedFrame, RefineError, guard};
 use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -33,7 +34,8 @@ use crate::terminal::{cache, progress, say};
 #[command(next_help_heading = "Poses")]
 #[command(
     override_usage = "prehend initial --dataset <DIR> --noise <LEVEL> --out <FILE> [OPTIONS]\n       \
-                            prehend initial --dataset <DIR> --search --out <FILE> [OPTIONS]"
+                            prehend initial --dataset <DIR> --search --out <FILE> [OPTIONS]\n       \
+                            prehend initial --dataset <DIR> --network <FILE> --out <FILE> [OPTIONS]"
 )]
 pub(crate) struct Initial {
     #[command(flatten)]
@@ -46,8 +48,8 @@ pub(crate) struct Initial {
     #[arg(
         long,
         value_name = "LEVEL",
-        required_unless_present = "search",
-        conflicts_with_all = ["search", "device", "Masks", "SettingsOptions"]
+        required_unless_present = "finder",
+        conflicts_with_all = ["finder", "device", "Masks", "SettingsOptions"]
     )]
     noise: Option<NoiseLevel>,
     /// Seed of the errors
@@ -57,11 +59,16 @@ pub(crate) struct Initial {
     ///
     /// All poses that the search of an object ends with, the best one first and with their shares as scores, are written to FILE.hypotheses.csv beside
     /// the best ones, where `prehend refine` finds them.
-    #[arg(long)]
+    #[arg(long, group = "finder")]
     search: bool,
+    /// Find the objects by networks that prehend-learn or others have trained, from the same inputs; written as --search has it
+    ///
+    /// The network of one object, or, with its number before it, of the object of that number; may be repeated: --network 5=can.safetensors.
+    #[arg(long, value_name = "[OBJECT=]FILE", value_parser = numbered, group = "finder")]
+    network: Vec<(Option<u32>, PathBuf)>,
     /// What to search for, as BOP's test_targets_bop19.json has it
     /// [default: that file of the dataset, or the only object in every image]
-    #[arg(long, value_name = "FILE", requires = "search")]
+    #[arg(long, value_name = "FILE", requires = "finder")]
     targets: Option<PathBuf>,
     #[command(flatten)]
     masks: Masks,
@@ -69,7 +76,7 @@ pub(crate) struct Initial {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
     /// Discard what an interrupted search with other settings left, instead of refusing
-    #[arg(long, requires = "search")]
+    #[arg(long, requires = "finder")]
     restart: bool,
     /// Worker threads of the search; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
@@ -84,15 +91,25 @@ pub(crate) struct Initial {
 #[derive(Serialize, Deserialize)]
 struct FoundPose {
     pose: PlainPose,
-    cost: f64,
+    /// Score as the best pose: of a search the negative cost, of which the higher is the better.
+    score: f64,
+    /// Share among the poses of its object.
     weight: f64,
+}
+
+/// What finds objects.
+enum Finder {
+    /// Searches, made when they are needed, by object.
+    Search(BTreeMap<u32, PoseSearch>, SearchSettings),
+    /// Networks by object, or of any.
+    Networks(BTreeMap<Option<u32>, PoseNetwork>),
 }
 
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
         let beside = beside(&self.out, HYPOTHESES);
-        if self.search {
+        if self.noise.is_none() {
             check_writable(&beside)?;
         }
         limit_threads(self.threads)?;
@@ -161,8 +178,17 @@ impl Initial {
         let mut assets =
             Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
         let (backend, settings) = (self.rendering.open()?, self.settings.load()?);
+        let (mut networks, mut loaded) = (Vec::new(), BTreeMap::new());
+        for (obj_id, file) in &self.network {
+            let known = loaded.insert(*obj_id, PoseNetwork::load(file)?);
+            networks.push((obj_id, file_fingerprint(file)?));
+            if known.is_some() {
+                bail!("--network {}: a second one of the same object", file.display());
+            }
+        }
         let identity = Identity::of(&json!({
-            "command": "initial --search",
+            "command": if self.search { "initial --search" } else { "initial --network" },
+            "networks": networks,
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "targets": targets.iter().map(Target::to_string).collect::<Vec<_>>(),
@@ -173,14 +199,16 @@ impl Initial {
         }));
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
-        let (settings, mut searches) = (settings.search(), BTreeMap::new());
+        let mut finder = match self.search {
+            true => Finder::Search(BTreeMap::new(), settings.search()),
+            false => Finder::Networks(loaded),
+        };
         let bar = progress(targets.len(), "searching");
         for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
             if searched.contains_key(&index) {
                 continue;
             }
-            let found =
-                guard(|| search_one(&mut assets, &mut searches, target, &settings, &backend));
+            let found = guard(|| finder.find(&mut assets, target, &backend));
             if let Some(found) = failures.keep(target, found) {
                 searched.insert(index, journal.append(index, &found)?);
             }
@@ -189,33 +217,63 @@ impl Initial {
         for (index, found) in searched {
             let Some(target) = targets.get(index) else { continue };
             let pose = |c: &FoundPose, score| row(target, (&c.pose).into(), score);
-            // Of a results file's scores the higher is the better.
-            best.extend(found.first().map(|c| pose(c, -c.cost)));
+            best.extend(found.first().map(|c| pose(c, c.score)));
             all.extend(found.iter().map(|c| pose(c, c.weight)));
         }
         Ok((best, all, Some(journal)))
     }
 }
 
-/// The poses that the search of an object ends with, the best one first.
-fn search_one(
-    assets: &mut Assets,
-    searches: &mut BTreeMap<u32, PoseSearch>,
-    target: &Target,
-    settings: &SearchSettings,
-    backend: &Arc<dyn Backend>,
-) -> Result<Vec<FoundPose>, AssetError> {
-    let input = assets.load(target, None, &[])?;
-    if let Entry::Vacant(unknown) = searches.entry(target.obj_id) {
-        unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?);
+impl Finder {
+    /// The poses of an object that are found, the best one first.
+    fn find(
+        &mut self,
+        assets: &mut Assets,
+        target: &Target,
+        backend: &Arc<dyn Backend>,
+    ) -> Result<Vec<FoundPose>, AssetError> {
+        let input = assets.load(target, None, &[])?;
+        let frame = PreparedFrame::new(&input.frame, &input.object)?;
+        match self {
+            Self::Search(searches, settings) => {
+                if let Entry::Vacant(unknown) = searches.entry(target.obj_id) {
+                    unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?);
+                }
+                let frame = frame.with_backend(Arc::clone(backend));
+                let found = searches[&target.obj_id].run(&frame)?.into_iter();
+                let pose = |PoseCandidate { t_cam_object, cost, weight, .. }| FoundPose {
+                    pose: (&t_cam_object).into(),
+                    score: -cost,
+                    weight,
+                };
+                Ok(found.map(pose).collect())
+            }
+            Self::Networks(networks) => {
+                let named = networks.get(&Some(target.obj_id)).or_else(|| networks.get(&None));
+                let network = named.ok_or_else(|| RefineError::Object {
+                    object: input.object.name.clone(),
+                    reason: "no --network is of it".into(),
+                })?;
+                let pose = |p: ProposedPose| FoundPose {
+                    pose: (&p.t_cam_object).into(),
+                    score: p.score,
+                    weight: p.score,
+                };
+                Ok(network.propose(&frame)?.into_iter().map(pose).collect())
+            }
+        }
     }
-    let frame = PreparedFrame::new(&input.frame, &input.object)?;
-    let frame = frame.with_backend(Arc::clone(backend));
-    let found = searches[&target.obj_id].run(&frame)?.into_iter();
-    let pose = |PoseCandidate { t_cam_object, cost, weight, .. }| FoundPose {
-        pose: (&t_cam_object).into(),
-        cost,
-        weight,
-    };
-    Ok(found.map(pose).collect())
+}
+
+/// A file, with the number of an object before it or not.
+fn numbered(text: &str) -> Result<(Option<u32>, PathBuf), String> {
+    match text.split_once('=') {
+        Some((number, file))
+            if !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()) =>
+        {
+            let number = number.parse().map_err(|error| format!("{number}: {error}"))?;
+            Ok((Some(number), file.into()))
+        }
+        _ => Ok((None, text.into())),
+    }
 }

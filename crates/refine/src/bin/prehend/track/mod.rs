@@ -27,6 +27,7 @@ use prehend_refine::data::details::{TrackDetails, write_details};
 use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Target};
 use prehend_refine::evaluate::Scorer;
+use prehend_refine::network::PoseNetwork;
 use prehend_refine::rig::Rig;
 use prehend_refine::scene::Object;
 use prehend_refine::strategy::{Posterior, PosteriorSummary};
@@ -72,6 +73,9 @@ pub(crate) struct Track {
     /// Begin by searching for the objects in the first image
     #[arg(long)]
     search: bool,
+    /// Look for an object that is lost, or with --search for the first time, by this network of it before any search
+    #[arg(long, value_name = "FILE")]
+    network: Option<PathBuf>,
     /// What to search for, as BOP's test_targets_bop19.json has it
     /// [default: that file of the dataset, or the only object in every image]
     #[arg(long, value_name = "FILE", requires = "search")]
@@ -156,6 +160,7 @@ struct Tracking<'a> {
     settings: Settings,
     backend: Arc<dyn Backend>,
     rig: Option<Arc<Rig>>,
+    network: Option<Arc<PoseNetwork>>,
     /// Whether to end before the film does, so that what is recorded is kept.
     stop: Option<Arc<AtomicBool>>,
     frames: Vec<Done>,
@@ -196,6 +201,7 @@ impl Track {
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let rig = open_rig(self.rig.as_deref())?;
+        let network = self.network.as_deref().map(PoseNetwork::load).transpose()?.map(Arc::new);
         // A scene that is watched ends by itself.
         let stop = (mcap_out.is_some() && watched.is_none()).then(stop_on_ctrl_c);
         let stop = stop.transpose()?;
@@ -204,8 +210,19 @@ impl Track {
         let report = self.report.as_deref().map(FilmReport::create).transpose()?;
         let (frames, failures) = (Vec::new(), Failures::default());
         let options = &self;
-        let mut tracking =
-            Tracking { options, settings, backend, rig, stop, frames, failures, rows, log, report };
+        let mut tracking = Tracking {
+            options,
+            settings,
+            backend,
+            rig,
+            network,
+            stop,
+            frames,
+            failures,
+            rows,
+            log,
+            report,
+        };
         match (&self.log.mcap, &selection) {
             (Some(file), _) => log::track(file, self.start_in_log()?, &mut tracking)?,
             (None, Some(selection)) => tracking.track_scenes(selection, watched)?,
@@ -365,6 +382,8 @@ impl Tracking<'_> {
         let bar = progress(count, "tracking");
         let estimator = Estimator::new(Arc::clone(object)).settings(self.settings.clone());
         let estimator = estimator.backend(Arc::clone(&self.backend)).rig(self.rig.clone());
+        self.network.iter().try_for_each(|network| network.check_object(object))?;
+        let estimator = estimator.network(self.network.clone());
         let mut tracker = estimator.tracker()?;
         initial.iter().for_each(|pose| tracker.start_from(pose));
         let stopped = || stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
