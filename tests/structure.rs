@@ -6,11 +6,11 @@ use std::{fs, io};
 
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
-    ("autodiff", 4_100),
-    ("geometry", 15_850),
-    ("sim", 16_630),
-    ("render", 10_930),
-    ("refine", 30_490),
+    ("autodiff", 4_070),
+    ("geometry", 15_780),
+    ("sim", 16_390),
+    ("render", 10_610),
+    ("refine", 30_560),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

@@ -1,5 +1,6 @@
 //! Times the dynamics of an arm and of a floating base with thirty joints, one thread: `cargo bench -p prehend-sim --bench articulated`.
-//! `benches/peers/sim/articulated_pinocchio.cpp` times Pinocchio on the same trees.
+//! `benches/peers/sim/articulated_pinocchio.cpp` times Pinocchio on the same trees, and
+//! `articulated_transition.py` MuJoCo's step and its differences.
 
 use std::hint::black_box;
 use std::sync::Arc;

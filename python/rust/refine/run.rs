@@ -1,15 +1,18 @@
 //! Methods by name, and many frames at once.
 
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use nalgebra::Isometry3;
+use prehend_refine::data::Target;
+use prehend_refine::data::bop::DatasetError;
 use prehend_refine::data::details::FrameDetails;
-use prehend_refine::data::{AssetError, Target};
-use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report};
+use prehend_refine::evaluate::report::{FrameDrawing, FrameReport, Report, least_sure};
 use prehend_refine::strategy::PosteriorSummary;
 use prehend_refine::{Method, RefineError, RefineJob, Refined, refine_all};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -58,39 +61,61 @@ pub(super) fn method(
     Ok(method)
 }
 
-/// Draws refined frames, each of its initial pose, and writes the page; frames that failed are left out.
+/// Draws refined frames, each of its initial pose, and writes the page; frames that failed are left out, and what cannot be drawn is said of the frame.
 fn write_report(
     mut report: Report,
+    (name, method): (&str, &Method),
     done: &[Result<Refined<'_>, RefineError>],
     initial: &[Isometry3<f64>],
     targets: &[Option<Target>],
-) -> Result<PathBuf, AssetError> {
+) -> Result<(), DatasetError> {
+    report.add_fact("method", name);
+    report.add_fact("version", env!("CARGO_PKG_VERSION"));
+    let is_fused = matches!(method, Method::Fused(_));
+    let posterior =
+        |refined: &Refined<'_>| refined.estimate.posterior.as_ref().map(PosteriorSummary::from);
+    let probability = |outcome: &Result<Refined<'_>, RefineError>| {
+        let known = outcome.as_ref().ok().and_then(posterior);
+        known.map_or(0.0, |posterior| posterior.probability)
+    };
+    let drawn = least_sure(done.iter().map(probability));
     for (number, ((refined, initial), target)) in done.iter().zip(initial).zip(targets).enumerate()
     {
-        let Ok(Refined { estimate, input, seconds }) = refined else { continue };
-        let of_no_dataset = || Target { scene_id: 0, im_id: number as u32, obj_id: 0, instance: 0 };
+        let Ok(refined) = refined else { continue };
+        let Refined { estimate, input, seconds } = refined;
+        let of_no_dataset = Target { scene_id: 0, im_id: number as u32, obj_id: 0, instance: 0 };
         let name = target.map_or_else(|| format!("frame {number}"), |target| target.to_string());
         let warnings = input.warnings(initial).concat();
-        let details = FrameDetails {
-            target: target.unwrap_or_else(of_no_dataset),
+        let mut details = FrameDetails {
+            target: target.unwrap_or(of_no_dataset),
             t_cam_model: *estimate.t_cam_object(),
             initial: Some(*initial),
-            posterior: estimate.posterior.as_ref().map(PosteriorSummary::from),
+            posterior: posterior(refined),
             iterations: estimate.trace.iterations.len().saturating_sub(1),
             seconds: Some(*seconds),
             warnings: warnings.iter().map(ToString::to_string).collect(),
             track: None,
         };
-        let drawing = report.draw(&FrameDrawing {
-            input,
-            initial: Some(initial),
-            t_cam_object: &details.t_cam_model,
-            covariance: details.posterior.as_ref().map(|posterior| &posterior.covariance),
-            trace: None,
-        })?;
-        report.add_frame(FrameReport::refined(name, details, [None; 2], Some(drawing)));
+        let drawing = drawn.contains(&number).then(|| {
+            report.draw(&FrameDrawing {
+                input,
+                initial: Some(initial),
+                t_cam_object: &details.t_cam_model,
+                covariance: details.posterior.as_ref().map(|posterior| &posterior.covariance),
+                // Stages of the fused method minimize other losses each.
+                trace: Some(&estimate.trace).filter(|_| !is_fused),
+            })
+        });
+        let drawing = match drawing.transpose() {
+            Ok(drawing) => drawing,
+            Err(error) => {
+                details.warnings.push(format!("not drawn: {error}"));
+                None
+            }
+        };
+        report.add_frame(FrameReport::refined(name, details, [None; 2], drawing));
     }
-    Ok(report.finish()?)
+    report.finish().map(drop)
 }
 
 /// The names of all methods, and what each is.
@@ -103,7 +128,7 @@ pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
 /// of a frame that failed is the `Error` that says why, so that none is lost for another; raise it, or look at the others.
 ///
 /// `threads` is how many threads work, all cores if it is not given; poses are the same for any number. `report` is a folder for an `index.html` with
-/// pictures, figures and a 3-D view of each frame, as `prehend refine --report` makes it.
+/// figures of each frame that did not fail, and pictures and a 3-D view of the 200 least sure; a page that cannot be written is a warning.
 #[pyfunction]
 #[pyo3(signature = (frames, poses, *, method="fused", iterations=None, noise=None, settings=None, threads=None, report=None))]
 #[allow(clippy::too_many_arguments)] // as Python has it
@@ -118,7 +143,8 @@ pub(crate) fn refine_batch<'py>(
     threads: Option<usize>,
     report: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let method = self::method(method, iterations, noise.as_ref(), settings.as_ref())?;
+    let name = method;
+    let method = self::method(name, iterations, noise.as_ref(), settings.as_ref())?;
     let threads = threads.map(|threads| at_least_one(threads, "threads")).transpose()?;
     let poses = self::poses(&poses, "poses")?;
     let (count, given) = (frames.len(), poses.len());
@@ -138,7 +164,13 @@ pub(crate) fn refine_batch<'py>(
     if let Some(report) = report {
         let targets = frames.iter().map(|frame| Py::get(frame).target);
         let targets: Vec<Option<Target>> = targets.collect();
-        detached(py, || write_report(report, &done, &poses, &targets))?.raise()?;
+        let written =
+            detached(py, || write_report(report, (name, &method), &done, &poses, &targets))?;
+        // Poses are not lost for it.
+        if let Err(error) = written {
+            let text = CString::new(error.to_string()).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        }
     }
     let results = PyList::empty(py);
     for (outcome, initial) in done.iter().zip(&poses) {

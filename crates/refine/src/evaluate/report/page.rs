@@ -16,7 +16,7 @@ use serde_json::json;
 
 pub use self::document::{Chart, Column, Figure, Series};
 use self::document::{Document, LabeledPicture};
-pub use self::figures::{flags, pose_figures};
+pub use self::figures::{flags, least_sure, pose_figures};
 pub use self::frame::{DrawnFrame, FrameDrawing, FrameReport};
 use self::frame::{loss_chart, residuals};
 use self::scene::{encoded_hand, encoded_scene, object_mesh};

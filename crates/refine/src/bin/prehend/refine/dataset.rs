@@ -11,7 +11,7 @@ use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{AssetError, Assets, Identity, Journal, Sensor, write_times};
 use prehend_refine::evaluate::Scorer;
-use prehend_refine::evaluate::report::{FrameDrawing, Report};
+use prehend_refine::evaluate::report::{FrameDrawing, Report, least_sure};
 use prehend_refine::strategy::DiagnosisSummary;
 use prehend_refine::{Method, Workers, guard};
 use prehend_render::Backend;
@@ -198,9 +198,12 @@ impl DatasetRun<'_> {
         report.add_fact("method", self.options.method.method());
         report.add_fact("version", env!("CARGO_PKG_VERSION"));
         let is_fused = matches!(self.method, Method::Fused(_));
-        let drawn = least_sure(frames);
+        let probability = |(_, refined): &(&Job, &RefinedFrame)| {
+            refined.confidence.as_ref().map_or(0.0, |confidence| confidence.probability)
+        };
+        let drawn = least_sure(frames.iter().map(probability));
         if drawn.len() < frames.len() {
-            report.add_fact("drawn", format!("the {DRAWN} least sure frames"));
+            report.add_fact("drawn", format!("the {} least sure frames", drawn.len()));
         }
         let bar = progress(frames.len(), "reporting");
         for (index, (job, refined)) in bar.wrap_iter(frames.iter().enumerate()) {
@@ -229,15 +232,4 @@ impl DatasetRun<'_> {
         }
         report.finish()
     }
-}
-
-/// Frames that are drawn at most: pages stay small enough to be opened.
-const DRAWN: usize = 200;
-
-/// Frames that are drawn: all, or those whose poses are the least probable.
-fn least_sure(frames: &[(&Job, &RefinedFrame)]) -> BTreeSet<usize> {
-    let probability = |r: &RefinedFrame| r.confidence.as_ref().map_or(0.0, |c| c.probability);
-    let mut all: Vec<usize> = (0..frames.len()).collect();
-    all.sort_by(|a, b| probability(frames[*a].1).total_cmp(&probability(frames[*b].1)));
-    all.into_iter().take(DRAWN).collect()
 }

@@ -1,5 +1,7 @@
 //! Figures and flags of poses, common to all reports.
 
+use std::collections::BTreeSet;
+
 use super::document::{Column, Figure};
 use crate::strategy::PosteriorSummary;
 
@@ -39,4 +41,14 @@ pub fn flags(confidence: &PosteriorSummary) -> Vec<String> {
         (!confidence.unobservable_mm.is_empty(), "unobservable direction"),
     ];
     known.iter().filter(|(is, _)| *is).map(|(_, flag)| (*flag).to_owned()).collect()
+}
+
+/// Frames that are drawn at most: pages stay small enough to be opened.
+const DRAWN: usize = 200;
+
+/// Numbers of the frames to draw: all, or those whose poses are the least probable.
+pub fn least_sure(probabilities: impl Iterator<Item = f64>) -> BTreeSet<usize> {
+    let mut all: Vec<(usize, f64)> = probabilities.enumerate().collect();
+    all.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+    all.into_iter().take(DRAWN).map(|(number, _)| number).collect()
 }
