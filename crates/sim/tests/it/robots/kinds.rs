@@ -182,7 +182,8 @@ fn terrain_is_where_mujoco_has_it() {
         [-0.1, 0.05, 0.11651211877755263],
     ] {
         let at = |up: f64| field.sample(&(Point3::from(place) + Vector3::z() * up), 1.0).unwrap();
-        assert!(at(0.0).distance.abs() < 1e-9, "{}", at(0.0).distance);
+        // Its heights are in single precision.
+        assert!(at(0.0).distance.abs() < 1e-7, "{}", at(0.0).distance);
         assert!(at(0.05).distance > 0.03 && at(-0.05).distance < -0.03);
     }
     let moved = xml.replace(
