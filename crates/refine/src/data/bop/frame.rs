@@ -212,14 +212,12 @@ impl DatasetImage<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
-        let mask = self.optics.mask(file)?;
-        if (mask.width(), mask.height()) != (observation.camera.width, observation.camera.height) {
-            check_size(
-                file,
-                &if self.has_color() { self.rgb_path()? } else { self.depth_path()? },
-            )?;
+        let camera = &observation.camera;
+        if image_size(file)? != (camera.width, camera.height) {
+            let image = if self.has_color() { self.rgb_path()? } else { self.depth_path()? };
+            check_size(file, &image)?;
         }
-        observation.mask = mask;
+        observation.mask = self.optics.mask(file)?;
         Ok(())
     }
 
