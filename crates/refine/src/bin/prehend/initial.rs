@@ -100,7 +100,7 @@ struct FoundPose {
 /// What finds objects.
 enum Finder {
     /// Searches, made when they are needed, by object.
-    Search(BTreeMap<u32, PoseSearch>, SearchSettings),
+    Search(BTreeMap<u32, PoseSearch>, Box<SearchSettings>),
     /// Networks by object, or of any.
     Networks(BTreeMap<Option<u32>, PoseNetwork>),
 }
@@ -200,7 +200,7 @@ impl Initial {
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
         let mut finder = match self.search {
-            true => Finder::Search(BTreeMap::new(), settings.search()),
+            true => Finder::Search(BTreeMap::new(), Box::new(settings.search())),
             false => Finder::Networks(loaded),
         };
         let bar = progress(targets.len(), "searching");
@@ -237,7 +237,8 @@ impl Finder {
         match self {
             Self::Search(searches, settings) => {
                 if let Entry::Vacant(unknown) = searches.entry(target.obj_id) {
-                    unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings.clone())?);
+                    let settings = SearchSettings::clone(settings);
+                    unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings)?);
                 }
                 let frame = frame.with_backend(Arc::clone(backend));
                 let found = searches[&target.obj_id].run(&frame)?.into_iter();
