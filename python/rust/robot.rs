@@ -24,7 +24,7 @@ pub(crate) struct Robot {
     /// The parameter that each actuator is driven by.
     #[pyo3(get)]
     actuators: BTreeMap<String, String>,
-    /// What of the file has no counterpart, and what was put right.
+    /// Parts of the file that have no counterpart, and those that were put right.
     #[pyo3(get)]
     warnings: Vec<String>,
     /// Positions that the file has, in MuJoCo's order.

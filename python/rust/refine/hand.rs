@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use prehend_geometry::hand::load_taxels;
-use prehend_geometry::robot::KinematicTree;
 use prehend_refine::data::user_cache;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -32,10 +30,10 @@ impl Hand {
         taxels: Option<PathBuf>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let tree = KinematicTree::from_file_with(&path, &read_options(options)?).raise()?;
-        let taxels = taxels.as_deref().map(load_taxels).transpose().raise()?.unwrap_or_default();
-        let cached = || prehend_refine::Hand::cached(tree, taxels, user_cache().as_ref());
-        let hand = detached(py, cached)?;
+        let (options, cache) = (read_options(options)?, user_cache());
+        let (taxels, cache) = (taxels.as_deref(), cache.as_ref());
+        let load = || prehend_refine::Hand::load_with(&path, taxels, cache, &options);
+        let hand = detached(py, load)?;
         Ok(Self { hand: Arc::new(hand.raise()?) })
     }
 

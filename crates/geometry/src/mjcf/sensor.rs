@@ -14,7 +14,7 @@ use super::{JointIndex, Model};
 pub struct Sensor {
     /// Its name, empty where it has none.
     pub name: String,
-    /// What it measures.
+    /// Measured quantity.
     pub quantity: Quantity,
     /// Largest size of each number that it shows; of rotations and axes there is none.
     pub cutoff: f64,

@@ -153,7 +153,8 @@ impl CameraImages<'_> {
         };
         let optics = Optics { color: self.camera, depth_camera, depth_unit, shared };
         if let (Some(mask), Some(other)) = (&mask, color.as_ref().or(depth.as_ref())) {
-            check_size(mask, other).map_err(named)?;
+            let size = prehend_render::image_size(other).map_err(|e| named(e.into()))?;
+            check_size(mask, other, size).map_err(named)?;
         }
         let observation = optics.observation(color.as_deref(), depth.as_deref());
         let mut observation = observation.map_err(named)?;

@@ -20,7 +20,7 @@ use crate::method::Method;
 use crate::network::PoseNetwork;
 use crate::problem::{Factor, State};
 use crate::rig::Rig;
-use crate::scene::{Frame, Object, PreparedFrame};
+use crate::scene::{Frame, Object};
 use crate::search::PoseSearch;
 use crate::settings::Settings;
 use crate::strategy::{Diagnosis, Estimate, Fused, Observer, Strategy};
@@ -95,17 +95,17 @@ impl Estimator {
     /// # Errors
     /// Those of [`PoseNetwork::propose`] or [`PoseSearch::run`].
     pub fn search(&self, frame: &Frame) -> Result<Hypotheses, RefineError> {
-        if let Some(network) = &self.network {
-            let proposed = network.propose(&PreparedFrame::new(frame, &self.object)?)?;
-            let mut poses = proposed.into_iter().map(|p| p.t_cam_object);
-            let best = poses.next().ok_or(RefineError::NothingFits)?;
-            return Ok(Hypotheses { best, alternatives: Some(poses.collect()) });
-        }
-        let search = PoseSearch::new(Arc::clone(&self.object), self.settings.search())?;
         let input = EstimatorInput::new(frame, &self.object);
-        let mut found = search.run(&input.prepared(self.backend.as_ref())?)?.into_iter();
-        let best = found.next().ok_or(RefineError::NothingFits)?.t_cam_object;
-        Ok(Hypotheses { best, alternatives: Some(found.map(|c| c.t_cam_object).collect()) })
+        let frame = input.prepared(self.backend.as_ref())?;
+        let found: Vec<Isometry3<f64>> = match &self.network {
+            Some(network) => network.propose(&frame)?.iter().map(|p| p.t_cam_object).collect(),
+            None => {
+                let search = PoseSearch::new(Arc::clone(&self.object), self.settings.search())?;
+                search.run(&frame)?.iter().map(|c| c.t_cam_object).collect()
+            }
+        };
+        let (best, others) = found.split_first().ok_or(RefineError::NothingFits)?;
+        Ok(Hypotheses { best: *best, alternatives: Some(others.to_vec()) })
     }
 
     /// Refines `hypotheses` in `frame`.

@@ -160,8 +160,9 @@ impl PoseNetwork {
     /// # Errors
     /// [`RefineError::Object`].
     pub fn check_object(&self, object: &Object) -> Result<(), RefineError> {
-        let off = (object.center - self.center).norm().max((object.radius - self.radius).abs());
-        if off <= SIZE_TOLERANCE * self.radius {
+        let difference =
+            (object.center - self.center).norm().max((object.radius - self.radius).abs());
+        if difference <= SIZE_TOLERANCE * self.radius {
             return Ok(());
         }
         let (own, other) = (1e3 * object.radius, 1e3 * self.radius);
@@ -181,7 +182,7 @@ impl PoseNetwork {
         if found.is_empty() { Err(RefineError::NothingFits) } else { Ok(found) }
     }
 
-    /// The same of points that have been taken from a frame; none if no vote counts.
+    /// Hypotheses by points that were taken from a frame; none if no vote counts.
     pub fn propose_from(&self, points: &SensedPoints) -> Vec<ProposedPose> {
         let seen = spread(&points.seen, SEEN);
         let felt = spread(&points.felt, FELT);
@@ -191,12 +192,9 @@ impl PoseNetwork {
         chosen.extend(spread(&seen, VOTERS - share.min(VOTERS)));
         let voters = chosen.len();
         chosen.extend(felt.iter().chain(&seen));
-        let views: Vec<ViewFrame> = (0..ROLLS)
-            .map(|k| {
-                let roll = std::f64::consts::TAU * k as f64 / ROLLS as f64;
-                ViewFrame::new(&points.seen, self.radius, roll)
-            })
-            .collect();
+        let roll = |k: usize| std::f64::consts::TAU * k as f64 / ROLLS as f64;
+        let view = |k: usize| ViewFrame::new(&points.seen, self.radius, roll(k));
+        let views: Vec<ViewFrame> = (0..ROLLS).map(view).collect();
         let of_view = |view: &ViewFrame| chosen.iter().map(|p| view.features(p)).collect();
         let sets: Vec<Vec<[f32; CHANNELS]>> = views.iter().map(of_view).collect();
         let slices: Vec<&[[f32; CHANNELS]]> = sets.iter().map(Vec::as_slice).collect();

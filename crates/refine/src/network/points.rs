@@ -35,7 +35,7 @@ pub struct SensedPoint {
     pub is_contact: bool,
 }
 
-/// What of a frame the network reads, in the camera frame.
+/// Points of a frame that the network reads, in the camera frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensedPoints {
     /// Points that were seen, at least one.

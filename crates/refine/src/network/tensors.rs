@@ -28,7 +28,7 @@ pub enum NetworkError {
     File {
         /// File.
         file: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         reason: std::io::Error,
     },
     /// The file is not in the format safetensors.
@@ -36,7 +36,7 @@ pub enum NetworkError {
     Format {
         /// File.
         file: PathBuf,
-        /// What is wrong.
+        /// Fault.
         problem: String,
     },
     /// A tensor is missing or not what it should be.
@@ -46,7 +46,7 @@ pub enum NetworkError {
         file: PathBuf,
         /// Name of the tensor.
         name: String,
-        /// What is wrong.
+        /// Fault.
         problem: String,
     },
 }

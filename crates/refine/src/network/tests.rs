@@ -44,12 +44,12 @@ fn a_network_is_read_as_it_was_written_and_gives_the_same_votes() {
     let together = network.votes(&[&points, &points[..1]], 2);
     let alone = network.votes(&[&points], 2);
     assert_eq!((together[0].len(), together[1].len()), (2, 1));
-    let off = |a: &[f32; VOTE], b: &[f32; VOTE]| {
+    let apart = |a: &[f32; VOTE], b: &[f32; VOTE]| {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     };
-    assert!(off(&together[0][1], &alone[0][1]) < 1e-5);
+    assert!(apart(&together[0][1], &alone[0][1]) < 1e-5);
     // Another point that is in no way greater changes the whole: the maximum.
-    assert!(off(&together[1][0], &together[0][0]) > 1e-4);
+    assert!(apart(&together[1][0], &together[0][0]) > 1e-4);
     let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
     let found = network.propose(&frame).unwrap();
     assert!((1..=5).contains(&found.len()));

@@ -51,13 +51,10 @@ impl Shape<'_> {
         // The angle of between · turn is that of their scalar product, the conjugate's.
         let cosine =
             |turn: &UnitQuaternion<f64>| between.coords.dot(&turn.conjugate().coords).abs();
-        let (mut best, mut most) = (0, -1.0_f64);
-        for (k, turn) in self.turns.iter().enumerate() {
-            let cosine = cosine(turn);
-            if cosine > most {
-                (best, most) = (k, cosine);
-            }
-        }
+        // The first of equals.
+        let better =
+            |best: (usize, f64), next: (usize, f64)| if next.1 > best.1 { next } else { best };
+        let (best, most) = self.turns.iter().map(cosine).enumerate().fold((0, -1.0), better);
         let distance = (a * self.center - b * self.center).norm() / self.radius;
         Difference { angle: 2.0 * most.min(1.0).acos(), distance, turn: best }
     }

@@ -5,11 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_geometry::GridCache;
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::{
     ArticulatedRobot, KinematicTree, PosedRobot, RobotError, RobotShape,
 };
+use prehend_geometry::{GridCache, ReadOptions};
 use prehend_render::RenderModel;
 
 use super::HandMeasurement;
@@ -48,7 +48,20 @@ impl Hand {
         taxels: Option<&Path>,
         cache: Option<&GridCache>,
     ) -> Result<Self, RefineError> {
-        let tree = KinematicTree::from_file(description)?;
+        Self::load_with(description, taxels, cache, &ReadOptions::default())
+    }
+
+    /// [`load`](Self::load) with options of reading the description.
+    ///
+    /// # Errors
+    /// See there.
+    pub fn load_with(
+        description: &Path,
+        taxels: Option<&Path>,
+        cache: Option<&GridCache>,
+        options: &ReadOptions,
+    ) -> Result<Self, RefineError> {
+        let tree = KinematicTree::from_file_with(description, options)?;
         let taxels = taxels.map(load_taxels).transpose()?.unwrap_or_default();
         Ok(Self::cached(tree, taxels, cache)?)
     }

@@ -97,7 +97,7 @@ struct FoundPose {
     weight: f64,
 }
 
-/// What finds objects.
+/// Finder of objects without initial poses.
 enum Finder {
     /// Searches, made when they are needed, by object.
     Search(BTreeMap<u32, PoseSearch>, Box<SearchSettings>),

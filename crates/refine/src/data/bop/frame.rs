@@ -212,11 +212,9 @@ impl DatasetImage<'_> {
 
     /// The same of the mask in `file`.
     fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
-        let camera = &observation.camera;
-        if image_size(file)? != (camera.width, camera.height) {
-            let image = if self.has_color() { self.rgb_path()? } else { self.depth_path()? };
-            check_size(file, &image)?;
-        }
+        let image = if self.has_color() { self.rgb_path()? } else { self.depth_path()? };
+        let Camera { width, height, .. } = observation.camera;
+        check_size(file, &image, (width, height))?;
         observation.mask = self.optics.mask(file)?;
         Ok(())
     }

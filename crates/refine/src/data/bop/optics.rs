@@ -187,10 +187,10 @@ impl Optics<'_> {
     ) -> Result<Frame, DatasetError> {
         // Before anything is decoded.
         let size = color.map(image_size).transpose()?;
-        if let (Some(color), Some(depth), None) = (color, depth, &self.depth_camera)
-            && Some(image_size(depth)?) != size
+        if let (Some(color), Some(size), Some(depth), None) =
+            (color, size, depth, &self.depth_camera)
         {
-            check_size(depth, color)?;
+            check_size(depth, color, size)?;
         }
         let color = color.map(|file| self.color(file)).transpose()?;
         let mut measured = None;
@@ -222,9 +222,13 @@ fn warn_once(told: &OnceLock<()>, file: &Path, text: &str) {
     told.get_or_init(|| log::warn!("{}: {text} (other images are not named)", file.display()));
 }
 
-/// Refuses an image in `file` of another size than that in `other`.
-pub(crate) fn check_size(file: &Path, other: &Path) -> Result<(), DatasetError> {
-    let ((w, h), (width, height)) = (image_size(file)?, image_size(other)?);
+/// Refuses an image in `file` of another size than that in `other`, which has this width and height.
+pub(crate) fn check_size(
+    file: &Path,
+    other: &Path,
+    (width, height): (usize, usize),
+) -> Result<(), DatasetError> {
+    let (w, h) = image_size(file)?;
     if (w, h) == (width, height) {
         return Ok(());
     }
