@@ -1,8 +1,8 @@
 //! Errors of a network's hypotheses on views whose truth is known.
 
 use nalgebra::Isometry3;
-use prehend_refine::Object;
-use prehend_refine::network::{PoseNetwork, ProposedPose};
+use prehend_refine::network::PoseNetwork;
+use prehend_refine::{Object, PoseCandidate};
 use rayon::prelude::*;
 
 use crate::views::View;
@@ -24,7 +24,7 @@ const FOUND: f64 = 15.0;
 /// Errors of the hypotheses of `network` for `views` of `object`.
 pub fn validate(network: &PoseNetwork, object: &Object, views: &[View]) -> Errors {
     let of_view = |view: &View| {
-        let proposed = network.propose_from(&view.points);
+        let proposed = network.find_in(&view.points);
         errors(network, object, &proposed, &view.truth)
     };
     let all: Vec<[f64; 3]> = views.par_iter().map(of_view).collect();
@@ -41,10 +41,10 @@ pub fn validate(network: &PoseNetwork, object: &Object, views: &[View]) -> Error
 pub fn errors(
     network: &PoseNetwork,
     object: &Object,
-    proposed: &[ProposedPose],
+    proposed: &[PoseCandidate],
     truth: &Isometry3<f64>,
 ) -> [f64; 3] {
-    let angle = |p: &ProposedPose| network.angle(&p.t_cam_object, truth).to_degrees();
+    let angle = |p: &PoseCandidate| network.angle(&p.t_cam_object, truth).to_degrees();
     let Some(best) = proposed.first() else { return [f64::INFINITY; 3] };
     let distance = (best.t_cam_object * object.center - truth * object.center).norm();
     let least = proposed.iter().map(angle).fold(f64::INFINITY, f64::min);

@@ -49,6 +49,7 @@ pub mod factor;
 pub mod info;
 mod method;
 pub mod network;
+mod pose_finder;
 pub mod problem;
 pub mod rig;
 pub mod scene;
@@ -64,8 +65,9 @@ mod workers;
 pub(crate) const MM_PER_M: f64 = 1e3;
 
 pub use error::{Panicked, RefineError, guard};
-pub use estimator::{Estimator, EstimatorInput, Hypotheses, RefineJob, Refined, refine_all};
+pub use estimator::{Estimator, EstimatorInput, RefineJob, Refined, refine_all};
 pub use method::Method;
+pub use pose_finder::{Hypotheses, PoseCandidate, PoseFinder};
 pub use problem::{Factor, State};
 pub use scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
 pub use settings::{Settings, SettingsError};

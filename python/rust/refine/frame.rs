@@ -4,12 +4,10 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
 use numpy::PyUntypedArrayMethods;
 use prehend_refine::data::{FrameInput, Target, load_frame_file, user_cache};
 use prehend_refine::scene::{PreparedFrame, check_gravity};
-use prehend_refine::search::PoseSearch;
-use prehend_refine::{EstimatorInput, RefineError};
+use prehend_refine::{Estimator, EstimatorInput, PoseFinder, RefineError};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
@@ -172,20 +170,13 @@ impl Frame {
         settings: Option<Bound<'py, PyAny>>,
         network: Option<&PoseNetwork>,
     ) -> PyResult<(Array<'py>, Array<'py>)> {
-        let settings = self::settings(settings.as_ref())?.search();
-        let network = network.map(|network| Arc::clone(&network.network));
-        let search = || -> Result<Vec<(Isometry3<f64>, f64)>, RefineError> {
-            let frame = PreparedFrame::new(&self.input.frame, &self.input.object)?;
-            if let Some(network) = network {
-                let found = network.propose(&frame)?.into_iter();
-                return Ok(found.map(|p| (p.t_cam_object, p.score)).collect());
-            }
-            let found = PoseSearch::new(Arc::clone(&self.input.object), settings)?.run(&frame)?;
-            Ok(found.into_iter().map(|c| (c.t_cam_object, c.weight)).collect())
-        };
-        let found = detached(py, search)?.raise()?;
-        let poses = found.iter().flat_map(|(pose, _)| rows(pose)).collect();
-        let weights = found.iter().map(|(_, weight)| *weight).collect();
+        let settings = self::settings(settings.as_ref())?;
+        let network = network.map(|network| Arc::clone(&network.network) as Arc<dyn PoseFinder>);
+        let estimator = Estimator::new(Arc::clone(&self.input.object));
+        let estimator = estimator.settings(settings).finder(network);
+        let found = detached(py, || estimator.find(&self.input.frame))?.raise()?;
+        let poses = found.iter().flat_map(|found| rows(&found.t_cam_object)).collect();
+        let weights = found.iter().map(|found| found.weight).collect();
         Ok((array(py, poses, &[found.len(), 4, 4])?, array(py, weights, &[found.len()])?))
     }
 

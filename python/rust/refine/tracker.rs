@@ -57,7 +57,7 @@ impl Tracker {
         }
         let mut tracker = prehend_refine::tracker::Tracker::new(object, settings).raise()?;
         if let Some(network) = network {
-            tracker = tracker.with_network(Arc::clone(&network.network));
+            tracker = tracker.with_finder(network.network.clone());
         }
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(&rig.rig));

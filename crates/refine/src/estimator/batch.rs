@@ -3,8 +3,9 @@
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
-use super::{Estimator, Hypotheses, Refined};
+use super::{Estimator, Refined};
 use crate::error::{RefineError, guard};
+use crate::pose_finder::Hypotheses;
 use crate::scene::Frame;
 use crate::workers::Workers;
 

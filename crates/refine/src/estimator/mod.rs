@@ -1,23 +1,21 @@
 //! The estimator of an object's pose: search, refinement and tracking by one set of settings.
 
 mod batch;
-mod hypotheses;
 mod input;
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use nalgebra::Isometry3;
 use prehend_render::Backend;
 
 pub use self::batch::{RefineJob, refine_all};
-pub use self::hypotheses::Hypotheses;
 pub use self::input::EstimatorInput;
 use crate::baselines::GradientKind;
 use crate::error::RefineError;
 use crate::method::Method;
-use crate::network::PoseNetwork;
+use crate::pose_finder::{Hypotheses, PoseCandidate, PoseFinder};
 use crate::problem::{Factor, State};
 use crate::rig::Rig;
 use crate::scene::{Frame, Object};
@@ -34,7 +32,9 @@ pub struct Estimator {
     method: Method,
     factors: Vec<Arc<dyn Factor>>,
     rig: Option<Arc<Rig>>,
-    network: Option<Arc<PoseNetwork>>,
+    finder: Option<Arc<dyn PoseFinder>>,
+    /// Made when it is first needed.
+    search: OnceLock<Arc<PoseSearch>>,
     backend: Option<Arc<dyn Backend>>,
 }
 
@@ -53,7 +53,8 @@ impl Estimator {
     pub fn new(object: impl Into<Arc<Object>>) -> Self {
         let (settings, method) = (Settings::default(), Method::default());
         let (object, factors) = (object.into(), Vec::new());
-        Self { object, settings, method, factors, rig: None, network: None, backend: None }
+        let (rig, finder, search, backend) = (None, None, OnceLock::new(), None);
+        Self { object, settings, method, factors, rig, finder, search, backend }
     }
 
     /// With these settings.
@@ -61,7 +62,7 @@ impl Estimator {
         if let Method::Fused(fused) = &mut self.method {
             fused.settings.clone_from(&settings.estimator);
         }
-        Self { settings, ..self }
+        Self { settings, search: OnceLock::new(), ..self }
     }
 
     /// With another method than the fused estimator, or with its ablations.
@@ -80,9 +81,9 @@ impl Estimator {
         Self { rig, ..self }
     }
 
-    /// With a network of the object: it finds poses in place of the search, and before it in trackers.
-    pub fn network(self, network: Option<Arc<PoseNetwork>>) -> Self {
-        Self { network, ..self }
+    /// With a finder of the object, such as a [network](crate::network::PoseNetwork): it finds poses in place of the search, and before it in trackers.
+    pub fn finder(self, finder: Option<Arc<dyn PoseFinder>>) -> Self {
+        Self { finder, ..self }
     }
 
     /// Rendering by `backend` in place of the processor.
@@ -90,22 +91,24 @@ impl Estimator {
         Self { backend: Some(backend), ..self }
     }
 
-    /// Poses by sensors alone, the most likely one first: those of the network, or else of a search.
+    /// Poses by sensors alone, the most likely one first: those of the finder, or else of a search. [`Hypotheses::found`] has them to be refined.
     ///
     /// # Errors
-    /// Those of [`PoseNetwork::propose`] or [`PoseSearch::run`].
-    pub fn search(&self, frame: &Frame) -> Result<Hypotheses, RefineError> {
+    /// Those of [`PoseFinder::find`]; [`RefineError::Setting`] for a setting of the search out of range.
+    pub fn find(&self, frame: &Frame) -> Result<Vec<PoseCandidate>, RefineError> {
         let input = EstimatorInput::new(frame, &self.object);
         let frame = input.prepared(self.backend.as_ref())?;
-        let found: Vec<Isometry3<f64>> = match &self.network {
-            Some(network) => network.propose(&frame)?.iter().map(|p| p.t_cam_object).collect(),
+        if let Some(finder) = &self.finder {
+            return finder.find(&frame);
+        }
+        let search = match self.search.get() {
+            Some(search) => search,
             None => {
                 let search = PoseSearch::new(Arc::clone(&self.object), self.settings.search())?;
-                search.run(&frame)?.iter().map(|c| c.t_cam_object).collect()
+                self.search.get_or_init(|| Arc::new(search))
             }
         };
-        let (best, others) = found.split_first().ok_or(RefineError::NothingFits)?;
-        Ok(Hypotheses { best: *best, alternatives: Some(others.to_vec()) })
+        search.find(&frame)
     }
 
     /// Refines `hypotheses` in `frame`.
@@ -169,8 +172,8 @@ impl Estimator {
         if let Some(rig) = &self.rig {
             tracker = tracker.with_rig(Arc::clone(rig));
         }
-        if let Some(network) = &self.network {
-            tracker = tracker.with_network(Arc::clone(network));
+        if let Some(finder) = &self.finder {
+            tracker = tracker.with_finder(Arc::clone(finder));
         }
         tracker.factors.clone_from(&self.factors);
         Ok(match &self.backend {

@@ -32,6 +32,7 @@ pub use self::tensors::{NetworkError, Tensor, Tensors, read_tensors, write_tenso
 use self::dense::{Dense, rectified, relu};
 use self::votes::{Shape, Vote};
 use crate::error::RefineError;
+use crate::pose_finder::{PoseCandidate, PoseFinder};
 use crate::scene::{Object, PreparedFrame};
 
 /// Numbers of a vote.
@@ -47,15 +48,6 @@ const ROLLS: usize = 4;
 const HYPOTHESES: usize = 5;
 /// Relative difference of sizes from which on an object is not that of the network.
 const SIZE_TOLERANCE: f64 = 0.05;
-
-/// A pose that a network proposes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProposedPose {
-    /// Object coordinates → camera coordinates \[m\].
-    pub t_cam_object: Isometry3<f64>,
-    /// Share of the votes, weighted by their confidence.
-    pub score: f64,
-}
 
 /// A trained network of one object.
 #[derive(Clone, Debug)]
@@ -172,18 +164,8 @@ impl PoseNetwork {
         Err(RefineError::Object { object: object.name.clone(), reason })
     }
 
-    /// Hypotheses, the most likely one first, at most five, by depth, and by color and touch where they are known.
-    ///
-    /// # Errors
-    /// [`RefineError::Object`] if the frame is of an object of another size; if no pixel of the mask has a depth, or forces do not fit the taxels.
-    pub fn propose(&self, frame: &PreparedFrame<'_>) -> Result<Vec<ProposedPose>, RefineError> {
-        self.check_object(frame.object())?;
-        let found = self.propose_from(&SensedPoints::new(frame, self.radius)?);
-        if found.is_empty() { Err(RefineError::NothingFits) } else { Ok(found) }
-    }
-
     /// Hypotheses by points that were taken from a frame; none if no vote counts.
-    pub fn propose_from(&self, points: &SensedPoints) -> Vec<ProposedPose> {
+    pub fn find_in(&self, points: &SensedPoints) -> Vec<PoseCandidate> {
         let seen = spread(&points.seen, SEEN);
         let felt = spread(&points.felt, FELT);
         // Points that vote come first.
@@ -226,6 +208,18 @@ impl PoseNetwork {
         let rotation = Rotation3::from_matrix_unchecked(columns);
         let pose = view.pose(&self.center, &position, &UnitQuaternion::from(rotation));
         Some(Vote { pose, weight: 1.0 / (1.0 + f64::from(-logit).exp()) })
+    }
+}
+
+impl PoseFinder for PoseNetwork {
+    /// At most five poses, by depth, and by color and touch where they are known; weights are shares of the votes.
+    ///
+    /// # Errors
+    /// [`RefineError::Object`] if the frame is of an object of another size; if no pixel of the mask has a depth, or forces do not fit the taxels.
+    fn find(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
+        self.check_object(frame.object())?;
+        let found = self.find_in(&SensedPoints::new(frame, self.radius)?);
+        if found.is_empty() { Err(RefineError::NothingFits) } else { Ok(found) }
     }
 }
 

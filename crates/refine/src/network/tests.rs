@@ -51,14 +51,14 @@ fn a_network_is_read_as_it_was_written_and_gives_the_same_votes() {
     // Another point that is in no way greater changes the whole: the maximum.
     assert!(apart(&together[1][0], &together[0][0]) > 1e-4);
     let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
-    let found = network.propose(&frame).unwrap();
+    let found = network.find(&frame).unwrap();
     assert!((1..=5).contains(&found.len()));
     assert!(found.iter().map(|p| p.score).sum::<f64>() <= 1.0 + 1e-9);
     let bare = scene.frame.clone();
     let bare = crate::Frame { hand: None, ..bare };
     let bare = bare.color(prehend_render::RgbImage::filled(640, 480, [0.0; 3]));
     let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
-    assert!(!network.propose(&frame).unwrap().is_empty());
+    assert!(!network.find(&frame).unwrap().is_empty());
 }
 
 #[test]
@@ -103,6 +103,6 @@ fn another_object_is_refused() {
     all.get_mut("object.radius").unwrap().values[0] *= 1.2;
     let network = PoseNetwork::from_tensors(Path::new("n"), all).unwrap();
     let frame = PreparedFrame::new(&scene.frame, &scene.object).unwrap();
-    let refused = network.propose(&frame).unwrap_err().to_string();
+    let refused = network.find(&frame).unwrap_err().to_string();
     assert!(refused.contains("the network is of another one"), "{refused}");
 }

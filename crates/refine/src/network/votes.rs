@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
-use super::ProposedPose;
+use crate::pose_finder::PoseCandidate;
 
 /// A pose that one point is for.
 #[derive(Clone, Debug)]
@@ -60,7 +60,7 @@ impl Shape<'_> {
     }
 
     /// At most `limit` hypotheses, the one with most votes first; scores are shares of the confidence of all votes.
-    pub(super) fn gathered(&self, mut votes: Vec<Vote>, limit: usize) -> Vec<ProposedPose> {
+    pub(super) fn gathered(&self, mut votes: Vec<Vote>, limit: usize) -> Vec<PoseCandidate> {
         let total: f64 = votes.iter().map(|v| v.weight).sum();
         votes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let kept: f64 = votes.iter().take(VOTES).map(|v| v.weight).sum();
@@ -93,7 +93,7 @@ impl Shape<'_> {
             found.push(self.mean(&first.rotation, poses, kept));
             members.iter().for_each(|b| is_left[*b] = false);
         }
-        found.sort_by(|a: &ProposedPose, b| b.score.total_cmp(&a.score));
+        found.sort_by(|a: &PoseCandidate, b| b.score.total_cmp(&a.score));
         found
     }
 
@@ -103,7 +103,7 @@ impl Shape<'_> {
         like: &UnitQuaternion<f64>,
         votes: impl Iterator<Item = (&'v Vote, UnitQuaternion<f64>)>,
         total: f64,
-    ) -> ProposedPose {
+    ) -> PoseCandidate {
         let (mut rotation, mut place, mut weight) =
             (Quaternion::new(0.0, 0.0, 0.0, 0.0), Vector3::zeros(), 0.0);
         for (vote, turn) in votes {
@@ -116,7 +116,8 @@ impl Shape<'_> {
         let rotation = UnitQuaternion::from_quaternion(rotation);
         let translation = place / weight - rotation * self.center.coords;
         let t_cam_object = Isometry3::from_parts(translation.into(), rotation);
-        ProposedPose { t_cam_object, score: weight / total }
+        let weight = weight / total;
+        PoseCandidate { t_cam_object, score: weight, weight }
     }
 }
 

@@ -186,7 +186,8 @@ impl fmt::Debug for Hand {
 mod tests {
     use super::*;
     use crate::check::check_frame;
-    use crate::estimator::{Estimator, Hypotheses};
+    use crate::estimator::Estimator;
+    use crate::pose_finder::Hypotheses;
     use crate::scene::{Frame, PreparedFrame, default_scene};
 
     #[test]

@@ -17,20 +17,10 @@ use self::distance_lattice::DistanceLattice;
 use self::evidence::SearchEvidence;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
+use crate::pose_finder::{PoseCandidate, PoseFinder};
 use crate::problem::State;
 use crate::scene::{Object, PreparedFrame};
 use crate::strategy::problem_of;
-
-/// A pose that a search ends with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseCandidate {
-    /// Object coordinates → camera coordinates \[m\].
-    pub t_cam_object: Isometry3<f64>,
-    /// Cost of the estimator's factors with nominal calibrations \[nat\].
-    pub cost: f64,
-    /// Its share among the poses that the search ended with, in proportion to exp(−cost); they sum to one.
-    pub weight: f64,
-}
 
 /// Visuo-tactile global search: finds an object without any initial pose, training or randomness.
 ///
@@ -72,23 +62,6 @@ impl PoseSearch {
         // Beyond the margin all distances count alike.
         let lattice = DistanceLattice::new(&object, settings.cells, 2.0 * settings.scale);
         Ok(Self { object, lattice, settings })
-    }
-
-    /// Searches in `frame`, which must be of this object; the best pose comes first, and others that differ from it follow.
-    ///
-    /// # Errors
-    /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
-    pub fn run(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
-        let Self { object, lattice, settings } = self;
-        let evidence = &SearchEvidence::new(frame, settings)?;
-        let rough = CoarseScorer { object, lattice, evidence, settings };
-        let placed = self.place(&rough);
-        let turned = self.turn(&rough, &placed);
-        let found = self.descend(frame, &turned)?;
-        if found.is_empty() {
-            return Err(RefineError::NothingFits);
-        }
-        Ok(weighted(&found))
     }
 
     /// Stage 1.
@@ -175,13 +148,32 @@ impl PoseSearch {
 }
 
 /// `poses`, best first, with their shares.
+impl PoseFinder for PoseSearch {
+    /// Poses that differ from each other; their weights sum to one, in proportion to exp(score).
+    ///
+    /// # Errors
+    /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
+    fn find(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
+        let Self { object, lattice, settings } = self;
+        let evidence = &SearchEvidence::new(frame, settings)?;
+        let rough = CoarseScorer { object, lattice, evidence, settings };
+        let placed = self.place(&rough);
+        let turned = self.turn(&rough, &placed);
+        let found = self.descend(frame, &turned)?;
+        if found.is_empty() {
+            return Err(RefineError::NothingFits);
+        }
+        Ok(weighted(&found))
+    }
+}
+
 fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
     let least = poses.first().map_or(0.0, |(_, cost)| *cost);
     let share = |cost: f64| (least - cost).exp();
     let total: f64 = poses.iter().map(|(_, cost)| share(*cost)).sum();
     let candidate = |&(t_cam_object, cost): &Scored| {
         let weight = share(cost) / total;
-        PoseCandidate { t_cam_object, cost, weight }
+        PoseCandidate { t_cam_object, score: -cost, weight }
     };
     poses.iter().map(candidate).collect()
 }

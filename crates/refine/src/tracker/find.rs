@@ -16,14 +16,11 @@ use super::tracked::{TrackStatus, Tracked};
 use super::{Solved, Tracker};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
-use crate::network::{PoseNetwork, ProposedPose};
+use crate::pose_finder::{Hypotheses, PoseFinder};
 use crate::problem::{Solution, State};
 use crate::scene::{Frame, PreparedFrame, RegionEvidence};
 use crate::search::PoseSearch;
 use crate::strategy::{Fused, Posterior, Strategy};
-
-/// Initial pose, and its alternatives, if it comes from a search.
-type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
 
 impl Tracker {
     /// The first frame.
@@ -37,12 +34,12 @@ impl Tracker {
         let object = Arc::clone(&self.object);
         let sight = &*sight;
         let frame = &self.frame(sight, &object)?;
-        let (initial, alternatives) = match self.initial {
-            Some(pose) => (pose, None),
+        let Hypotheses { best: initial, alternatives } = match self.initial {
+            Some(pose) => pose.into(),
             None => {
-                let proposed = self.network.as_deref().and_then(|n| propose(n, frame).ok());
-                let found = proposed.map_or_else(|| self.search(frame), Ok);
-                found.map(|(best, others)| (best, Some(others)))?
+                let finder = self.finder.clone();
+                let found = finder.and_then(|finder| self.find(frame, Some(&*finder)).ok());
+                found.map_or_else(|| self.find(frame, None), Ok)?
             }
         };
         let nominal = State::new(frame, &initial)?;
@@ -157,24 +154,24 @@ impl Tracker {
         Ok((Solved { solution, tried: true }, posterior))
     }
 
-    /// The best pose that a search finds, and the others \[m\].
-    fn search(
+    /// Poses that `finder` finds, or else a search.
+    fn find(
         &mut self,
         frame: &PreparedFrame<'_>,
-    ) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
-        let search = match &mut self.search {
-            Some(search) => search,
-            none => {
+        finder: Option<&dyn PoseFinder>,
+    ) -> Result<Hypotheses, RefineError> {
+        let finder: &dyn PoseFinder = match (finder, &mut self.search) {
+            (Some(finder), _) => finder,
+            (None, Some(search)) => search,
+            (None, none) => {
                 let (object, settings) = (Arc::clone(&self.object), self.settings.search.clone());
                 none.insert(PoseSearch::new(object, settings)?)
             }
         };
-        let mut found = search.run(frame)?.into_iter().map(|found| found.t_cam_object);
-        let best = found.next().ok_or(RefineError::NothingFits)?;
-        Ok((best, found.collect()))
+        Hypotheses::found(&finder.find(frame)?)
     }
 
-    /// A pose that is believed, looked for where it should be and then everywhere, by a network before a search, or the other way round if it was `long_lost`. One from anywhere must
+    /// A pose that is believed, looked for where it should be and then everywhere, by the finder before a search, or the other way round if it was `long_lost`. One from anywhere must
     /// fit as if nothing had changed. Half of the pixels that should show it must do so, or a quarter if it is where it was expected. It was looked at where it
     /// should be, and `seen` there or not.
     pub(super) fn recover(
@@ -185,21 +182,19 @@ impl Tracker {
         seen: bool,
         long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let network = self.network.clone();
+        let finder = self.finder.clone();
         let near = (Recovery::Near, track.allowance(self.settings.gating.growth), None);
-        let anywhere = |network| (Recovery::Anywhere, track.level, network);
-        let by_network = network.as_deref().map(|network| anywhere(Some(network)));
-        let mut ways: Vec<_> = by_network.into_iter().chain([anywhere(None)]).collect();
+        let anywhere = |finder| (Recovery::Anywhere, track.level, finder);
+        let by_finder = finder.as_deref().map(|finder| anywhere(Some(finder)));
+        let mut ways: Vec<_> = by_finder.into_iter().chain([anywhere(None)]).collect();
         ways.insert(if long_lost { ways.len() } else { 0 }, near);
         let recovery = self.settings.recovery;
-        for (reach, level, network) in ways.into_iter().filter(|(reach, ..)| *reach <= recovery) {
+        for (reach, level, finder) in ways.into_iter().filter(|(reach, ..)| *reach <= recovery) {
             let found = match reach {
-                Recovery::Anywhere => {
-                    self.search_anywhere(sight, &predicted.t_cam_object, network)?
-                }
-                _ => Some((predicted.t_cam_object, None)),
+                Recovery::Anywhere => self.find_anywhere(sight, &predicted.t_cam_object, finder)?,
+                _ => Some(predicted.t_cam_object.into()),
             };
-            let Some((t_cam_object, alternatives)) = found else { continue };
+            let Some(Hypotheses { best: t_cam_object, alternatives }) = found else { continue };
             let start = State { t_cam_object, ..predicted.clone() };
             if start.center().z <= 0.0 {
                 continue;
@@ -229,20 +224,20 @@ impl Tracker {
         Ok(None)
     }
 
-    /// The best pose that a network or a search finds wherever something like the object is seen, and the others \[m\]; where no depth is measured, the `expected` one moved to
-    /// where its colors are seen. None if nothing fits.
-    fn search_anywhere(
+    /// Poses that `finder` or else a search finds wherever something like the object is seen; where no depth is measured, the `expected` one moved to where its colors are
+    /// seen. None if nothing fits.
+    fn find_anywhere(
         &mut self,
         sight: &mut Sight,
         expected: &Isometry3<f64>,
-        network: Option<&PoseNetwork>,
-    ) -> Result<Option<Candidates>, RefineError> {
+        finder: Option<&dyn PoseFinder>,
+    ) -> Result<Option<Hypotheses>, RefineError> {
         if !sight.measured {
-            if network.is_some() {
+            if finder.is_some() {
                 return Ok(None);
             }
             let found = self.segmenter.find(sight, &self.object, expected);
-            return Ok(found.map(|pose| (pose, None)));
+            return Ok(found.map(Hypotheses::from));
         }
         let Some(mask) = self.segmenter.anywhere(sight) else {
             debug!("nothing like the object is seen anywhere");
@@ -251,8 +246,8 @@ impl Tracker {
         (sight.frame.mask, sight.focus) = (mask, None);
         let object = Arc::clone(&self.object);
         let frame = self.frame(sight, &object)?;
-        match network.map_or_else(|| self.search(&frame), |network| propose(network, &frame)) {
-            Ok((best, others)) => Ok(Some((best, Some(others)))),
+        match self.find(&frame, finder) {
+            Ok(found) => Ok(Some(found)),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
             Err(error) => Err(error),
         }
@@ -272,15 +267,4 @@ impl Tracker {
     pub(super) fn shown(&self, sight: &Sight, t_cam_object: &Isometry3<f64>) -> f64 {
         self.segmenter.shown(sight, &self.object, t_cam_object)
     }
-}
-
-/// The best pose that `network` proposes, and the others \[m\].
-fn propose(
-    network: &PoseNetwork,
-    frame: &PreparedFrame<'_>,
-) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
-    let pose = |proposed: ProposedPose| proposed.t_cam_object;
-    let mut found = network.propose(frame)?.into_iter().map(pose);
-    let best = found.next().ok_or(RefineError::NothingFits)?;
-    Ok((best, found.collect()))
 }

@@ -35,7 +35,7 @@ use self::sight::{Images, Sight};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::{RefineError, guard};
 use crate::factor::{GaussianPrior, PriorSettings};
-use crate::network::PoseNetwork;
+use crate::pose_finder::PoseFinder;
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
 use crate::scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
@@ -94,7 +94,7 @@ pub struct Tracker {
     /// Made when it is first needed.
     search: Option<PoseSearch>,
     /// Asked before any search.
-    network: Option<Arc<PoseNetwork>>,
+    finder: Option<Arc<dyn PoseFinder>>,
     segmenter: Segmenter,
     /// Of the frame before.
     images: Images,
@@ -132,7 +132,7 @@ impl Tracker {
             track: None,
             last_time: None,
             search: None,
-            network: None,
+            finder: None,
             segmenter: Segmenter::new(&settings),
             settings,
             images: Images::default(),
@@ -149,9 +149,9 @@ impl Tracker {
         Self { rig: Some(rig), ..self }
     }
 
-    /// With a network of the object: it is asked where the object is before any search.
-    pub fn with_network(self, network: Arc<PoseNetwork>) -> Self {
-        Self { network: Some(network), ..self }
+    /// With a finder of the object, such as a network: it is asked where the object is before any search.
+    pub fn with_finder(self, finder: Arc<dyn PoseFinder>) -> Self {
+        Self { finder: Some(finder), ..self }
     }
 
     /// With a factor of one's own, in every frame.

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use prehend_refine::PreparedFrame;
 use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, GroundTruth};
 use prehend_refine::data::find_targets;
 use prehend_refine::evaluate::metrics::{oe_symmetric_deg, pe_cm};
 use prehend_refine::search::{PoseSearch, SearchSettings};
+use prehend_refine::{PoseFinder, PreparedFrame};
 
 use crate::data;
 
@@ -28,7 +28,7 @@ fn half_of_the_inhand_objects_are_found_without_a_hand() {
         let start = Instant::now();
         let seen = PreparedFrame::new(&observation, &object).unwrap();
         let search = PoseSearch::new(Arc::clone(&object), SearchSettings::default()).unwrap();
-        let pose = search.run(&seen).unwrap()[0].t_cam_object;
+        let pose = search.find(&seen).unwrap()[0].t_cam_object;
         let seconds = start.elapsed().as_secs_f64();
         let symmetries = truth.models().info(target.obj_id).unwrap().symmetries;
         let true_pose = truth.pose(target.scene_id, target.im_id, target.obj_id, &pose).unwrap();

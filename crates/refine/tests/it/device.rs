@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use prehend_refine::baselines::Heuristic;
 use prehend_refine::scene::{PreparedFrame, default_scene};
 use prehend_refine::search::{PoseSearch, SearchSettings};
-use prehend_refine::{Method, refine};
+use prehend_refine::{Method, PoseFinder, refine};
 use prehend_render::{
     Backend, BackendError, Hypothesis, Linearized, Loss, PoseImage, PoseProblem, Session, Tile,
 };
@@ -114,7 +114,7 @@ fn hypotheses_go_to_the_device_together() {
             frame = frame.with_backend(backend);
         }
         let settings = SearchSettings::default();
-        PoseSearch::new(Arc::clone(&scene.object), settings).unwrap().run(&frame).unwrap()
+        PoseSearch::new(Arc::clone(&scene.object), settings).unwrap().find(&frame).unwrap()
     };
     assert_eq!(found(Some(Arc::new(device.clone()))), found(None));
     let most = device.most.load(Ordering::Relaxed);

@@ -18,11 +18,14 @@ use prehend_refine::factor::{
 };
 use prehend_refine::problem::{Block, NoiseModel, NormalEquations};
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::search::{PoseSearch, SearchSettings};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::symmetry::{ContinuousSymmetry, Symmetries};
 use prehend_refine::tracker::{Recovery, Tracker, TrackerSettings};
-use prehend_refine::{Estimate, Factor, Frame, Method, PreparedFrame, RefineError, State, refine};
+use prehend_refine::{
+    Estimate, Factor, Frame, Method, PoseCandidate, PoseFinder, PreparedFrame, RefineError, State,
+    refine,
+};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use proptest::prelude::*;
 
@@ -264,8 +267,8 @@ fn searches_of_one_hypothesis() {
         let observation = observation(*fault);
         assert_finite(fault.0, || {
             let frame = PreparedFrame::new(&observation, &SCENE.object)?;
-            let found = search.run(&frame)?;
-            let of = |f: &PoseCandidate| [of_pose(&f.t_cam_object), vec![f.cost, f.weight]];
+            let found = search.find(&frame)?;
+            let of = |f: &PoseCandidate| [of_pose(&f.t_cam_object), vec![f.score, f.weight]];
             Ok(found.iter().flat_map(of).flatten().collect())
         });
     }

@@ -4,14 +4,14 @@ use std::sync::{Arc, LazyLock};
 
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::scene::{Scene, default_scene};
-use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
-use prehend_refine::{Frame, PreparedFrame, RefineError};
+use prehend_refine::search::{PoseSearch, SearchSettings};
+use prehend_refine::{Frame, PoseCandidate, PoseFinder, PreparedFrame, RefineError};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
 fn search(settings: SearchSettings) -> Result<Vec<PoseCandidate>, RefineError> {
     let frame = PreparedFrame::new(&SCENE.frame, &SCENE.object)?;
-    PoseSearch::new(Arc::clone(&SCENE.object), settings)?.run(&frame)
+    PoseSearch::new(Arc::clone(&SCENE.object), settings)?.find(&frame)
 }
 
 #[test]
@@ -20,7 +20,7 @@ fn the_bottle_is_found_from_sensors_alone() {
     let best = &found[0].t_cam_object;
     let (pe, oe) = (pe_cm(best, &SCENE.truth), oe_deg(best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
-    assert!(found.windows(2).all(|f| f[0].cost <= f[1].cost && f[0].weight >= f[1].weight));
+    assert!(found.windows(2).all(|f| f[0].score >= f[1].score && f[0].weight >= f[1].weight));
     assert!((found.iter().map(|f| f.weight).sum::<f64>() - 1.0).abs() < 1e-9);
 }
 
@@ -30,7 +30,7 @@ fn vision_alone_finds_it_too() {
     observation.hand = None;
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
     let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
-    let best = search.run(&frame).unwrap()[0].t_cam_object;
+    let best = search.find(&frame).unwrap()[0].t_cam_object;
     let (pe, oe) = (pe_cm(&best, &SCENE.truth), oe_deg(&best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
 }
@@ -60,7 +60,7 @@ fn bad_input_is_an_error() {
         let mut observation = SCENE.frame.clone();
         change(&mut observation);
         let frame = PreparedFrame::new(&observation, &SCENE.object).unwrap();
-        search.run(&frame).unwrap_err()
+        search.find(&frame).unwrap_err()
     };
     let dark = refused(&|o| o.depth.pixels_mut().fill(0.0));
     assert!(matches!(dark, RefineError::NoDepth));

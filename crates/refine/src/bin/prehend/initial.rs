@@ -1,7 +1,6 @@
 //! `prehend initial`.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -15,11 +14,9 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Target};
-use prehend_refine::network::{PoseNetwork, ProposedPose};
-use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::network::PoseNetwork;
 use prehend_refine::synth::NoiseLevel;
-use prehend_refine::{PreparedFrame, RefineError, guard};
-use prehend_render::Backend;
+use prehend_refine::{Estimator, PoseCandidate, PoseFinder, RefineError, guard};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -97,14 +94,6 @@ struct FoundPose {
     weight: f64,
 }
 
-/// Finder of objects without initial poses.
-enum Finder {
-    /// Searches, made when they are needed, by object.
-    Search(BTreeMap<u32, PoseSearch>, Box<SearchSettings>),
-    /// Networks by object, or of any.
-    Networks(BTreeMap<Option<u32>, PoseNetwork>),
-}
-
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
@@ -178,9 +167,10 @@ impl Initial {
         let mut assets =
             Assets::new(dataset, 0).with_cache(cache()).with_masks(self.masks.source()?);
         let (backend, settings) = (self.rendering.open()?, self.settings.load()?);
-        let (mut networks, mut loaded) = (Vec::new(), BTreeMap::new());
+        let (mut networks, mut finders) = (Vec::new(), BTreeMap::new());
         for (obj_id, file) in &self.network {
-            let known = loaded.insert(*obj_id, PoseNetwork::load(file)?);
+            let network: Arc<dyn PoseFinder> = Arc::new(PoseNetwork::load(file)?);
+            let known = finders.insert(*obj_id, network);
             networks.push((obj_id, file_fingerprint(file)?));
             if known.is_some() {
                 bail!("--network {}: a second one of the same object", file.display());
@@ -199,16 +189,30 @@ impl Initial {
         }));
         let (mut journal, mut searched): (_, BTreeMap<usize, Vec<FoundPose>>) =
             Journal::open(&beside(&self.out, "journal"), &identity, self.restart)?;
-        let mut finder = match self.search {
-            true => Finder::Search(BTreeMap::new(), Box::new(settings.search())),
-            false => Finder::Networks(loaded),
+        let mut estimators = BTreeMap::new();
+        let mut find = |target: &Target| -> Result<Vec<FoundPose>, AssetError> {
+            let input = assets.load(target, None, &[])?;
+            let finder = finders.get(&Some(target.obj_id)).or_else(|| finders.get(&None)).cloned();
+            if finder.is_none() && !self.search {
+                let (object, reason) = (input.object.name.clone(), "no --network is of it".into());
+                return Err(RefineError::Object { object, reason }.into());
+            }
+            let estimator = estimators.entry(target.obj_id).or_insert_with(|| {
+                let estimator = Estimator::new(input.object).settings(settings.clone());
+                estimator.backend(Arc::clone(&backend)).finder(finder)
+            });
+            let pose = |found: PoseCandidate| {
+                let PoseCandidate { t_cam_object, score, weight } = found;
+                FoundPose { pose: (&t_cam_object).into(), score, weight }
+            };
+            Ok(estimator.find(&input.frame)?.into_iter().map(pose).collect())
         };
         let bar = progress(targets.len(), "searching");
         for (index, target) in bar.wrap_iter(targets.iter().enumerate()) {
             if searched.contains_key(&index) {
                 continue;
             }
-            let found = guard(|| finder.find(&mut assets, target, &backend));
+            let found = guard(|| find(target));
             if let Some(found) = failures.keep(target, found) {
                 searched.insert(index, journal.append(index, &found)?);
             }
@@ -221,48 +225,6 @@ impl Initial {
             all.extend(found.iter().map(|c| pose(c, c.weight)));
         }
         Ok((best, all, Some(journal)))
-    }
-}
-
-impl Finder {
-    /// The poses of an object that are found, the best one first.
-    fn find(
-        &mut self,
-        assets: &mut Assets,
-        target: &Target,
-        backend: &Arc<dyn Backend>,
-    ) -> Result<Vec<FoundPose>, AssetError> {
-        let input = assets.load(target, None, &[])?;
-        let frame = PreparedFrame::new(&input.frame, &input.object)?;
-        match self {
-            Self::Search(searches, settings) => {
-                if let Entry::Vacant(unknown) = searches.entry(target.obj_id) {
-                    let settings = SearchSettings::clone(settings);
-                    unknown.insert(PoseSearch::new(Arc::clone(&input.object), settings)?);
-                }
-                let frame = frame.with_backend(Arc::clone(backend));
-                let found = searches[&target.obj_id].run(&frame)?.into_iter();
-                let pose = |PoseCandidate { t_cam_object, cost, weight, .. }| FoundPose {
-                    pose: (&t_cam_object).into(),
-                    score: -cost,
-                    weight,
-                };
-                Ok(found.map(pose).collect())
-            }
-            Self::Networks(networks) => {
-                let named = networks.get(&Some(target.obj_id)).or_else(|| networks.get(&None));
-                let network = named.ok_or_else(|| RefineError::Object {
-                    object: input.object.name.clone(),
-                    reason: "no --network is of it".into(),
-                })?;
-                let pose = |p: ProposedPose| FoundPose {
-                    pose: (&p.t_cam_object).into(),
-                    score: p.score,
-                    weight: p.score,
-                };
-                Ok(network.propose(&frame)?.into_iter().map(pose).collect())
-            }
-        }
     }
 }
 

@@ -32,7 +32,7 @@ use prehend_refine::rig::Rig;
 use prehend_refine::scene::Object;
 use prehend_refine::strategy::{Posterior, PosteriorSummary};
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, TrackerSettings};
-use prehend_refine::{Estimator, Settings};
+use prehend_refine::{Estimator, PoseFinder, Settings};
 use prehend_render::Backend;
 use serde_json::json;
 
@@ -383,8 +383,8 @@ impl Tracking<'_> {
         let estimator = Estimator::new(Arc::clone(object)).settings(self.settings.clone());
         let estimator = estimator.backend(Arc::clone(&self.backend)).rig(self.rig.clone());
         self.network.iter().try_for_each(|network| network.check_object(object))?;
-        let estimator = estimator.network(self.network.clone());
-        let mut tracker = estimator.tracker()?;
+        let network = self.network.clone().map(|network| network as Arc<dyn PoseFinder>);
+        let mut tracker = estimator.finder(network).tracker()?;
         initial.iter().for_each(|pose| tracker.start_from(pose));
         let stopped = || stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         let keeps_posterior = options.details.is_some() || report.is_some();
