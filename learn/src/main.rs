@@ -41,14 +41,17 @@ struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Grasps that frames are of; every tenth one is for validation
-    #[arg(long, value_name = "N", default_value_t = 60)]
+    #[arg(long, value_name = "N", default_value_t = 100)]
     grasps: u32,
     /// Frames of each grasp
-    #[arg(long, value_name = "N", default_value_t = 40)]
+    #[arg(long, value_name = "N", default_value_t = 36)]
     views_per_grasp: u32,
     /// Steps of the training, of 32 frames each
-    #[arg(long, value_name = "N", default_value_t = 4000)]
+    #[arg(long, value_name = "N", default_value_t = 9000)]
     steps: u32,
+    /// How much colors may differ where rotations count as equal, root mean square, of 0 to 1; 1: equal by shape is enough
+    #[arg(long, value_name = "TOLERANCE", default_value_t = 0.05)]
+    color_tolerance: f64,
     /// Decides everything that is random
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -81,16 +84,16 @@ fn main() -> anyhow::Result<()> {
     if arguments.grasps < 10 || arguments.views_per_grasp == 0 {
         bail!("--grasps, --views-per-grasp: at least 10 and 1 are needed");
     }
+    if !(0.0..=1.0).contains(&arguments.color_tolerance) {
+        bail!("--color-tolerance: must be from 0 to 1");
+    }
     let views = views(&arguments, &object, &views_file)?;
     // Whole grasps are held back.
-    let (mut kept, mut held) = (Vec::new(), Vec::new());
-    for (k, view) in views.into_iter().enumerate() {
-        let grasp = k / arguments.views_per_grasp as usize;
-        if grasp % 10 == 9 { held.push(view) } else { kept.push(view) }
-    }
+    let (held, kept): (Vec<View>, Vec<View>) =
+        views.into_iter().partition(|view| view.grasp % 10 == 9);
     let held: Vec<View> = held.into_iter().step_by(2).collect();
-    let settings =
-        TrainSettings { steps: arguments.steps, seed: arguments.seed, ..TrainSettings::default() };
+    let &Arguments { steps, seed, color_tolerance, .. } = &arguments;
+    let settings = TrainSettings { steps, seed, color_tolerance, ..TrainSettings::default() };
     let device = match arguments.device {
         Kind::Cpu => Device::flex(),
         #[cfg(feature = "wgpu")]
@@ -101,7 +104,8 @@ fn main() -> anyhow::Result<()> {
         training.resume(&checkpoint)?;
     }
     let bar = bar(u64::from(arguments.steps), "steps")?;
-    bar.println(format!("{} motions change nothing of the object's shape", training.symmetries()));
+    let say = |line: String| bar.suspend(|| println!("{line}"));
+    say(format!("{} rotations count as equal", training.symmetries()));
     bar.set_position(u64::from(training.steps_done()));
     let (start, mut distance, mut count) = (Instant::now(), 0.0, 0.0);
     while training.steps_done() < arguments.steps {
@@ -113,7 +117,7 @@ fn main() -> anyhow::Result<()> {
             let network = PoseNetwork::from_tensors(&arguments.out, training.network(&object))?;
             let errors = validate(&network, &object, &held);
             let trained = 100.0 * f64::from(distance / count) * object.radius;
-            bar.println(format!(
+            say(format!(
                 "step {done}, {:.0} s: mean distance {trained:.2} cm; validation: median {:.2} cm, {:.1}°, within 15° {:.0} %",
                 start.elapsed().as_secs_f64(),
                 errors.position,

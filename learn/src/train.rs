@@ -33,12 +33,15 @@ pub struct TrainSettings {
     pub rate: f32,
     /// Seed of weights, batches and changes of views.
     pub seed: u64,
+    /// Largest difference of mean colors, root mean square, from 0 to 1, of rotations that count as equal; 1 for those that are equal by shape alone.
+    pub color_tolerance: f64,
 }
 
 impl Default for TrainSettings {
     fn default() -> Self {
         let size = SampleSize { points: 160, voters: 24 };
-        Self { widths: Widths::default(), size, batch: 32, steps: 4000, rate: 2e-3, seed: 0 }
+        let (widths, color_tolerance) = (Widths::default(), 0.05);
+        Self { widths, size, batch: 32, steps: 9000, rate: 2e-3, seed: 0, color_tolerance }
     }
 }
 
@@ -59,12 +62,14 @@ pub struct Training {
 }
 
 impl Training {
-    /// Training from the beginning on `device`, for `object` and its symmetries of shape.
+    /// Training from the beginning on `device`, for `object` and its symmetries.
     ///
     /// # Errors
     /// If the mesh cannot be searched for symmetries.
     pub fn new(object: &Object, settings: TrainSettings, device: Device) -> anyhow::Result<Self> {
-        let symmetries = find_symmetries(&object.mesh, &SymmetrySettings::default())?;
+        let color_tolerance = Some(settings.color_tolerance).filter(|tolerance| *tolerance < 1.0);
+        let symmetry = SymmetrySettings { color_tolerance, ..SymmetrySettings::default() };
+        let symmetries = find_symmetries(&object.mesh, &symmetry)?;
         let motions = symmetries.sampled(TURNS);
         let turn = |m: &nalgebra::Isometry3<f64>| m.rotation.to_rotation_matrix().into_inner();
         let turns: Vec<Matrix3<f32>> = motions.iter().map(|m| turn(m).cast()).collect();

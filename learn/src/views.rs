@@ -23,6 +23,8 @@ pub struct View {
     pub points: SensedPoints,
     /// True pose, object → camera \[m\].
     pub truth: Isometry3<f64>,
+    /// Number of the grasp.
+    pub grasp: u32,
 }
 
 /// Numbers of grasps and of views.
@@ -71,7 +73,7 @@ pub fn make_views(
             let moment = &moments[k as usize % moments.len()];
             let view = view(object, hand, moment, mixed(seed, u64::from(k) + 1));
             progress(1);
-            view
+            view.map(|(points, truth)| View { points, truth, grasp })
         };
         (0..settings.views_per_grasp).into_par_iter().filter_map(view).collect()
     };
@@ -83,8 +85,13 @@ pub fn make_views(
     Ok(views.into_iter().flatten().collect())
 }
 
-/// A view of `moment`; none if too little of the object is seen.
-fn view(object: &Arc<Object>, hand: &Arc<Hand>, moment: &GraspSnapshot, seed: u64) -> Option<View> {
+/// Points of a view of `moment` and the true pose; none if too little of the object is seen.
+fn view(
+    object: &Arc<Object>,
+    hand: &Arc<Hand>,
+    moment: &GraspSnapshot,
+    seed: u64,
+) -> Option<(SensedPoints, Isometry3<f64>)> {
     let mut random = SplitMix64::new(seed);
     let settings = sensors(object.radius, FAULTS * random.uniform(), seed)?;
     let (frame, truth) = simulate_frame(&settings, object, hand, moment, seed).ok()?;
@@ -93,7 +100,7 @@ fn view(object: &Arc<Object>, hand: &Arc<Hand>, moment: &GraspSnapshot, seed: u6
     }
     let prepared = PreparedFrame::new(&frame, object).ok()?;
     let points = SensedPoints::new(&prepared, object.radius).ok()?;
-    Some(View { points, truth })
+    Some((points, truth))
 }
 
 /// Pixels of the object that a view must show.
@@ -162,8 +169,8 @@ pub fn mixed(seed: u64, number: u64) -> u64 {
 
 /// Numbers of a stored point: position, normal, color, force, and what of it is known.
 const STORED: usize = 15;
-/// Numbers of a stored view: how many points were seen and felt, and the pose.
-const HEAD: usize = 9;
+/// Numbers of a stored view: how many points were seen and felt, the pose, and the grasp.
+const HEAD: usize = 10;
 
 /// Writes `views` to a file, whole or not at all.
 ///
@@ -171,10 +178,11 @@ const HEAD: usize = 9;
 /// If it cannot be written.
 pub fn save_views(file: &Path, views: &[View], of: &str) -> anyhow::Result<()> {
     let (mut heads, mut points) = (Vec::new(), Vec::new());
-    for View { points: SensedPoints { seen, felt }, truth } in views {
+    for View { points: SensedPoints { seen, felt }, truth, grasp } in views {
         heads.extend([seen.len() as f32, felt.len() as f32]);
         heads.extend(truth.rotation.coords.iter().map(|v| *v as f32));
         heads.extend(truth.translation.vector.iter().map(|v| *v as f32));
+        heads.push(*grasp as f32);
         for p in seen.iter().chain(felt) {
             points.extend(p.position.iter().chain(&p.normal).map(|v| *v as f32));
             points.extend(p.color.unwrap_or_default());
@@ -225,7 +233,7 @@ pub fn load_views(file: &Path, of: &str) -> anyhow::Result<Vec<View>> {
         }
     });
     let view = |head: &[f32; HEAD]| {
-        let [seen, felt, i, j, k, w, x, y, z] = *head;
+        let [seen, felt, i, j, k, w, x, y, z, grasp] = *head;
         let [i, j, k, w] = [i, j, k, w].map(f64::from);
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
         let translation = Vector3::new(x, y, z).cast::<f64>();
@@ -234,6 +242,7 @@ pub fn load_views(file: &Path, of: &str) -> anyhow::Result<Vec<View>> {
         View {
             points: SensedPoints { seen, felt },
             truth: Isometry3::from_parts(translation.into(), rotation),
+            grasp: grasp as u32,
         }
     };
     Ok(values("heads")?.as_chunks().0.iter().map(view).collect())

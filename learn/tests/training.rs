@@ -41,7 +41,7 @@ fn views(object: &Object, count: u64) -> Vec<View> {
             |(p, n): &(Point3<f64>, Vector3<f64>)| (truth * n).dot(&(truth * p).coords) < 0.0;
         let seen = all.clone().filter(faces).map(|s| point(s, false)).collect();
         let felt = all.step_by(40).map(|s| point(s, true)).collect();
-        View { points: SensedPoints { seen, felt }, truth }
+        View { points: SensedPoints { seen, felt }, truth, grasp: seed as u32 }
     };
     (0..count).map(view).collect()
 }
