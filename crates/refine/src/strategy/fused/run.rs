@@ -181,7 +181,8 @@ impl<'a> Run<'a> {
         let solver = &self.stages()[index].solver;
         let states = &self.taken_up(index, states, problem);
         if index > 0 {
-            return self.compared(problem, problem.solve_all(states, solver));
+            let states = self.shortlisted(index, states, problem);
+            return self.compared(problem, problem.solve_all(&states, solver));
         }
         // Not so in the first stage, which sees no colors.
         let first = if self.is_rotation_unknown { states.len() } else { 1 };
@@ -277,6 +278,23 @@ impl<'a> Run<'a> {
             return states.to_vec();
         }
         lowest(states, &problem.cost_all(states), limit)
+    }
+
+    /// Those of `states` that stage `index`, which solves `problem`, solves to the end: of more than usual the best after a few steps.
+    fn shortlisted(&self, index: usize, states: &[State], problem: &Problem) -> Vec<State> {
+        let Stage { hypotheses, solver, .. } = &self.stages()[index];
+        let usual = (*hypotheses).max(1);
+        if states.len() <= usual {
+            return states.to_vec();
+        }
+        let steps: usize = std::env::var("STEPS").map_or(2, |s| s.parse().unwrap_or(2));
+        let usual: usize = std::env::var("USUAL").map_or(usual, |s| s.parse().unwrap_or(usual));
+        if steps == 0 {
+            return states.to_vec();
+        }
+        let few = Solver { iterations: steps, ..*solver };
+        let found = self.distinct(problem.solve_all(states, &few));
+        found.into_iter().take(usual).map(|found| found.at.state).collect()
     }
 
     /// Where the stage after `index` starts, which found these solutions from `initial`.
