@@ -19,6 +19,7 @@
 
 mod dense;
 mod points;
+mod settings;
 mod tensors;
 mod votes;
 
@@ -27,6 +28,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 pub use self::points::{CHANNELS, SensedPoint, SensedPoints, ViewFrame};
+pub use self::settings::NetworkSettings;
 pub use self::tensors::{NetworkError, Tensor, Tensors, read_tensors, write_tensors};
 
 use self::dense::{Dense, rectified, relu};
@@ -37,17 +39,6 @@ use crate::scene::{Object, PreparedFrame};
 
 /// Numbers of a vote.
 pub const VOTE: usize = 10;
-
-/// Points that are looked at, seen and felt ones, and those that vote of both.
-const SEEN: usize = 256;
-const FELT: usize = 64;
-const VOTERS: usize = 48;
-/// Turns about the line of sight in which a frame is looked at: votes that differ tell what is ambiguous.
-const ROLLS: usize = 4;
-/// Hypotheses at most.
-const HYPOTHESES: usize = 5;
-/// Relative difference of sizes from which on an object is not that of the network.
-const SIZE_TOLERANCE: f64 = 0.05;
 
 /// A trained network of one object.
 #[derive(Clone, Debug)]
@@ -60,6 +51,7 @@ pub struct PoseNetwork {
     center: Point3<f64>,
     radius: f64,
     turns: Vec<UnitQuaternion<f64>>,
+    settings: NetworkSettings,
 }
 
 impl PoseNetwork {
@@ -109,7 +101,17 @@ impl PoseNetwork {
         }
         let vote_rest = vote.split_off(1);
         let vote_first = vote[0].split(local);
-        Ok(Self { point, global, vote_first, vote_rest, center, radius, turns })
+        let settings = NetworkSettings::default();
+        Ok(Self { point, global, vote_first, vote_rest, center, radius, turns, settings })
+    }
+
+    /// With these settings.
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`] for one out of range.
+    pub fn with_settings(self, settings: NetworkSettings) -> Result<Self, RefineError> {
+        settings.check()?;
+        Ok(Self { settings, ..self })
     }
 
     /// Votes of `points` with such [features](ViewFrame::features): [`VOTE`] numbers for each of the first `voters` of every set.
@@ -154,7 +156,7 @@ impl PoseNetwork {
     pub fn check_object(&self, object: &Object) -> Result<(), RefineError> {
         let difference =
             (object.center - self.center).norm().max((object.radius - self.radius).abs());
-        if difference <= SIZE_TOLERANCE * self.radius {
+        if difference <= self.settings.size_tolerance * self.radius {
             return Ok(());
         }
         let (own, other) = (1e3 * object.radius, 1e3 * self.radius);
@@ -166,17 +168,17 @@ impl PoseNetwork {
 
     /// Hypotheses by points that were taken from a frame; none if no vote counts.
     pub fn find_in(&self, points: &SensedPoints) -> Vec<PoseCandidate> {
-        let seen = spread(&points.seen, SEEN);
-        let felt = spread(&points.felt, FELT);
+        let &NetworkSettings { seen, felt, voters, rolls, .. } = &self.settings;
+        let (seen, felt) = (spread(&points.seen, seen), spread(&points.felt, felt));
         // Points that vote come first.
-        let share = (VOTERS * felt.len()).div_ceil((felt.len() + seen.len()).max(1));
+        let share = (voters * felt.len()).div_ceil((felt.len() + seen.len()).max(1));
         let mut chosen = spread(&felt, share);
-        chosen.extend(spread(&seen, VOTERS - share.min(VOTERS)));
+        chosen.extend(spread(&seen, voters - share.min(voters)));
         let voters = chosen.len();
         chosen.extend(felt.iter().chain(&seen));
-        let roll = |k: usize| std::f64::consts::TAU * k as f64 / ROLLS as f64;
+        let roll = |k: usize| std::f64::consts::TAU * k as f64 / rolls as f64;
         let view = |k: usize| ViewFrame::new(&points.seen, self.radius, roll(k));
-        let views: Vec<ViewFrame> = (0..ROLLS).map(view).collect();
+        let views: Vec<ViewFrame> = (0..rolls).map(view).collect();
         let of_view = |view: &ViewFrame| chosen.iter().map(|p| view.features(p)).collect();
         let sets: Vec<Vec<[f32; CHANNELS]>> = views.iter().map(of_view).collect();
         let slices: Vec<&[[f32; CHANNELS]]> = sets.iter().map(Vec::as_slice).collect();
@@ -184,7 +186,7 @@ impl PoseNetwork {
         for ((view, set), outputs) in views.iter().zip(&sets).zip(self.votes(&slices, voters)) {
             votes.extend(set.iter().zip(&outputs).filter_map(|(p, vote)| self.vote(view, p, vote)));
         }
-        self.shape().gathered(votes, HYPOTHESES)
+        self.shape().gathered(votes, &self.settings)
     }
 
     /// Angle between two rotations of the object, turns that change nothing apart \[rad\].
@@ -212,7 +214,7 @@ impl PoseNetwork {
 }
 
 impl PoseFinder for PoseNetwork {
-    /// At most five poses, by depth, and by color and touch where they are known; weights are shares of the votes.
+    /// Poses by depth, and by color and touch where they are known; weights are shares of the votes.
     ///
     /// # Errors
     /// [`RefineError::Object`] if the frame is of an object of another size; if no pixel of the mask has a depth, or forces do not fit the taxels.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
+use super::settings::NetworkSettings;
 use crate::pose_finder::PoseCandidate;
 
 /// A pose that one point is for.
@@ -12,11 +13,6 @@ pub(super) struct Vote {
     /// Confidence, 0 to 1.
     pub(super) weight: f64,
 }
-
-/// Votes of the highest confidence that are gathered.
-const VOTES: usize = 96;
-/// Standard deviation of votes for the same pose \[rad; radii of the object\].
-const SPREAD: f64 = 0.15;
 
 /// Difference of two poses.
 #[derive(Clone, Copy, Debug)]
@@ -59,12 +55,17 @@ impl Shape<'_> {
         Difference { angle: 2.0 * most.min(1.0).acos(), distance, turn: best }
     }
 
-    /// At most `limit` hypotheses, the one with most votes first; scores are shares of the confidence of all votes.
-    pub(super) fn gathered(&self, mut votes: Vec<Vote>, limit: usize) -> Vec<PoseCandidate> {
+    /// Hypotheses, the one with most votes first; scores are shares of the confidence of all votes.
+    pub(super) fn gathered(
+        &self,
+        mut votes: Vec<Vote>,
+        settings: &NetworkSettings,
+    ) -> Vec<PoseCandidate> {
+        let &NetworkSettings { votes: most, spread, hypotheses, .. } = settings;
         let total: f64 = votes.iter().map(|v| v.weight).sum();
         votes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let kept: f64 = votes.iter().take(VOTES).map(|v| v.weight).sum();
-        votes.truncate(VOTES);
+        let kept: f64 = votes.iter().take(most).map(|v| v.weight).sum();
+        votes.truncate(most);
         if kept.is_nan() || kept <= 0.0 || total.is_nan() {
             return Vec::new();
         }
@@ -78,14 +79,14 @@ impl Shape<'_> {
         }
         let mut is_left = vec![true; count];
         let mut found = Vec::new();
-        while found.len() < limit {
+        while found.len() < hypotheses {
             let density = |a: usize| -> f64 {
-                let near = |b: usize| (-0.5 * (between[a * count + b] / SPREAD).powi(2)).exp();
+                let near = |b: usize| (-0.5 * (between[a * count + b] / spread).powi(2)).exp();
                 (0..count).filter(|b| is_left[*b]).map(|b| votes[b].weight * near(b)).sum()
             };
             let densest = (0..count).filter(|a| is_left[*a]).map(|a| (a, density(a)));
             let Some((seed, _)) = densest.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            let near = |b: &usize| is_left[*b] && between[seed * count + b] <= 2.0 * SPREAD;
+            let near = |b: &usize| is_left[*b] && between[seed * count + b] <= 2.0 * spread;
             let members: Vec<usize> = (0..count).filter(near).collect();
             let first = votes[seed].pose;
             let turn = |vote: &Vote| self.turns[self.difference(&first, &vote.pose).turn];
@@ -140,7 +141,7 @@ mod tests {
             let pose = if k < 20 { truth * small * turn } else { other };
             Vote { pose, weight: 0.5 }
         };
-        let found = shape.gathered((0..30).map(vote).collect(), 5);
+        let found = shape.gathered((0..30).map(vote).collect(), &NetworkSettings::default());
         assert_eq!(found.len(), 2);
         assert!(
             (found[0].score - 2.0 / 3.0).abs() < 1e-9 && (found[1].score - 1.0 / 3.0).abs() < 1e-9

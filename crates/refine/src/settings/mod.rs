@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use crate::calibration::CalibratorSettings;
+use crate::network::NetworkSettings;
 use crate::search::SearchSettings;
 use crate::strategy::{Fused, FusedSettings};
 use crate::tracker::TrackerSettings;
@@ -38,6 +39,8 @@ pub struct Settings {
     pub estimator: FusedSettings,
     /// The search for poses from sensors alone.
     pub search: SearchSettings,
+    /// Networks that propose poses.
+    pub network: NetworkSettings,
     /// The tracker.
     pub tracker: TrackerSettings,
     /// The calibration of a rig from its frames.

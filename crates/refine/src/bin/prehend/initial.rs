@@ -169,7 +169,8 @@ impl Initial {
         let (backend, settings) = (self.rendering.open()?, self.settings.load()?);
         let (mut networks, mut finders) = (Vec::new(), BTreeMap::new());
         for (obj_id, file) in &self.network {
-            let network: Arc<dyn PoseFinder> = Arc::new(PoseNetwork::load(file)?);
+            let network: Arc<dyn PoseFinder> =
+                Arc::new(PoseNetwork::load(file)?.with_settings(settings.network)?);
             let known = finders.insert(*obj_id, network);
             networks.push((obj_id, file_fingerprint(file)?));
             if known.is_some() {

@@ -287,10 +287,7 @@ impl<'a> Run<'a> {
         if states.len() <= usual {
             return states.to_vec();
         }
-        let steps: usize = std::env::var("STEPS").map_or(2, |s| s.parse().unwrap_or(2));
-        let usual: usize = std::env::var("USUAL").map_or(usual, |s| s.parse().unwrap_or(usual));
-        if steps == 0 { return states.to_vec(); }
-        let few = Solver { iterations: steps, ..*solver };
+        let few = Solver { iterations: self.hypotheses().shortlist_steps, ..*solver };
         let found = self.distinct(problem.solve_all(states, &few));
         found.into_iter().take(usual).map(|found| found.at.state).collect()
     }

@@ -169,7 +169,9 @@ settings! {
         pub another: f64 = 0.2,
         /// Number of steps of geometry alone that a pose of another convention of rotations is given before it is compared.
         pub alternative_steps: usize = 4,
-        /// Ratio of such a pose's cost to that of the best one from which it is given up.
+        /// Number of steps that the hypotheses of a search are given before those are chosen that a stage solves to the end.
+        pub shortlist_steps: usize = 2,
+        /// Ratio of the cost of a pose of another convention to that of the best one from which it is given up.
         pub hopeless: f64 = 4.0,
     }
 }

@@ -201,7 +201,8 @@ impl Track {
         limit_threads(self.threads)?;
         let backend = self.rendering.open()?;
         let rig = open_rig(self.rig.as_deref())?;
-        let network = self.network.as_deref().map(PoseNetwork::load).transpose()?.map(Arc::new);
+        let network = self.network.as_deref().map(PoseNetwork::load).transpose()?;
+        let network = network.map(|network| network.with_settings(settings.network)).transpose()?;
         // A scene that is watched ends by itself.
         let stop = (mcap_out.is_some() && watched.is_none()).then(stop_on_ctrl_c);
         let stop = stop.transpose()?;
@@ -215,7 +216,7 @@ impl Track {
             settings,
             backend,
             rig,
-            network,
+            network: network.map(Arc::new),
             stop,
             frames,
             failures,
