@@ -280,16 +280,16 @@ impl<'a> Run<'a> {
         lowest(states, &problem.cost_all(states), limit)
     }
 
-    /// Those of `states` that stage `index`, which solves `problem`, solves to the end: of more than usual the best after a few steps.
+    /// Those of `states` that stage `index`, which solves `problem`, solves to the end: while they are more than usual, half of them are given up after a few steps.
     fn shortlisted(&self, index: usize, states: &[State], problem: &Problem) -> Vec<State> {
         let Stage { hypotheses, solver, .. } = &self.stages()[index];
-        let usual = (*hypotheses).max(1);
-        if states.len() <= usual {
-            return states.to_vec();
-        }
         let few = Solver { iterations: self.hypotheses().shortlist_steps, ..*solver };
-        let found = self.distinct(problem.solve_all(states, &few));
-        found.into_iter().take(usual).map(|found| found.at.state).collect()
+        let (mut states, usual) = (states.to_vec(), (*hypotheses).max(1));
+        while states.len() > usual {
+            let found = self.distinct(problem.solve_all(&states, &few)).into_iter();
+            states = found.take(usual.max(states.len() / 2)).map(|found| found.at.state).collect();
+        }
+        states
     }
 
     /// Where the stage after `index` starts, which found these solutions from `initial`.

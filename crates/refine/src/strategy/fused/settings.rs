@@ -169,8 +169,8 @@ settings! {
         pub another: f64 = 0.2,
         /// Number of steps of geometry alone that a pose of another convention of rotations is given before it is compared.
         pub alternative_steps: usize = 4,
-        /// Number of steps that the hypotheses of a search are given before those are chosen that a stage solves to the end.
-        pub shortlist_steps: usize = 2,
+        /// Number of steps that the hypotheses of a search are given before half of them are given up, while they are more than a stage solves to the end.
+        pub shortlist_steps: usize = 1,
         /// Ratio of the cost of a pose of another convention to that of the best one from which it is given up.
         pub hopeless: f64 = 4.0,
     }
