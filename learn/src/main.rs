@@ -13,6 +13,8 @@ use prehend_learn::train::{TrainSettings, Training};
 use prehend_learn::validate::validate;
 use prehend_learn::views::{View, ViewSettings, load_views, make_views, save_views};
 use prehend_refine::Object;
+use prehend_refine::data::bop::check_writable;
+use prehend_refine::data::identity::file_fingerprint;
 use prehend_refine::network::{PoseNetwork, write_tensors};
 use prehend_refine::synth::HandFiles;
 
@@ -60,7 +62,18 @@ struct Arguments {
     device: Kind,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+impl Arguments {
+    /// What a training is of: the content of its files, and how they are read.
+    fn inputs(&self) -> anyhow::Result<String> {
+        let Self { object, hand, taxels, unit, mass, grasps, views_per_grasp, .. } = self;
+        let files = [Some(object), hand.as_ref(), taxels.as_ref()].into_iter().flatten();
+        let files: Result<Vec<String>, _> = files.map(|file| file_fingerprint(file)).collect();
+        let (files, frames) = (files?.join(" "), grasps * views_per_grasp);
+        Ok(format!("files {files}, unit {unit:?}, mass {mass:?}, {frames} frames"))
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Unit {
     M,
     Mm,
@@ -73,6 +86,8 @@ enum Kind {
     Gpu,
 }
 
+/// Frames at most: a file of them is limited.
+const MOST_FRAMES: u32 = 20_000;
 /// Steps between validations, and between checkpoints.
 const ROUND: u32 = 200;
 
@@ -81,18 +96,31 @@ fn main() -> anyhow::Result<()> {
     let object = Arc::new(object(&arguments)?);
     let (views_file, checkpoint) =
         (beside(&arguments.out, "views"), beside(&arguments.out, "checkpoint"));
-    if arguments.grasps < 10 || arguments.views_per_grasp == 0 {
+    let Arguments { grasps, views_per_grasp, .. } = arguments;
+    if grasps < 10 || views_per_grasp == 0 {
         bail!("--grasps, --views-per-grasp: at least 10 and 1 are needed");
     }
+    if grasps.checked_mul(views_per_grasp).is_none_or(|frames| frames > MOST_FRAMES) {
+        bail!("--grasps, --views-per-grasp: at most {MOST_FRAMES} frames");
+    }
+    if arguments.steps == 0 {
+        bail!("--steps: at least one is needed");
+    }
+    check_writable(&arguments.out)?;
     if !(0.0..=1.0).contains(&arguments.color_tolerance) {
         bail!("--color-tolerance: must be from 0 to 1");
     }
-    let views = views(&arguments, &object, &views_file)?;
+    let inputs = arguments.inputs()?;
+    let views = views(&arguments, &object, &views_file, &inputs)?;
     // Whole grasps are held back.
     let (held, kept): (Vec<View>, Vec<View>) =
         views.into_iter().partition(|view| view.grasp % 10 == 9);
-    let held: Vec<View> = held.into_iter().step_by(2).collect();
-    let &Arguments { steps, seed, color_tolerance, .. } = &arguments;
+    // Prime to the number of moments of a grasp.
+    let held: Vec<View> = held.into_iter().step_by(3).collect();
+    if kept.is_empty() || held.is_empty() {
+        bail!("{}: too few grasps hold: more --grasps are needed", object.name);
+    }
+    let Arguments { steps, seed, color_tolerance, .. } = arguments;
     let settings = TrainSettings { steps, seed, color_tolerance, ..TrainSettings::default() };
     let device = match arguments.device {
         Kind::Cpu => Device::flex(),
@@ -101,7 +129,7 @@ fn main() -> anyhow::Result<()> {
     };
     let mut training = Training::new(&object, settings, device)?;
     if checkpoint.exists() {
-        training.resume(&checkpoint)?;
+        training.resume(&checkpoint, &inputs)?;
     }
     let bar = bar(u64::from(arguments.steps), "steps")?;
     let say = |line: String| bar.suspend(|| println!("{line}"));
@@ -110,6 +138,12 @@ fn main() -> anyhow::Result<()> {
     let (start, mut distance, mut count) = (Instant::now(), 0.0, 0.0);
     while training.steps_done() < arguments.steps {
         let loss = training.step(&kept, &object);
+        if !loss.value.is_finite() {
+            bail!(
+                "the training diverged in step {}: another --seed may help",
+                training.steps_done()
+            );
+        }
         (distance, count) = (distance + loss.distance, count + 1.0);
         bar.inc(1);
         let done = training.steps_done();
@@ -125,7 +159,7 @@ fn main() -> anyhow::Result<()> {
                 100.0 * errors.found,
             ));
             (distance, count) = (0.0, 0.0);
-            training.save(&checkpoint)?;
+            training.save(&checkpoint, &inputs)?;
         }
     }
     bar.finish_and_clear();
@@ -138,10 +172,15 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Views as an interrupted call left them, or new ones.
-fn views(arguments: &Arguments, object: &Arc<Object>, file: &Path) -> anyhow::Result<Vec<View>> {
+fn views(
+    arguments: &Arguments,
+    object: &Arc<Object>,
+    file: &Path,
+    inputs: &str,
+) -> anyhow::Result<Vec<View>> {
     let &Arguments { grasps, views_per_grasp, seed, .. } = arguments;
     let settings = ViewSettings { grasps, views_per_grasp, seed };
-    let identity = format!("{settings:?} of {}", arguments.object.display());
+    let identity = format!("{settings:?}, {inputs}");
     if file.exists() {
         return load_views(file, &identity);
     }

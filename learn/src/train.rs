@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use burn::tensor::Device;
-use nalgebra::Matrix3;
+use nalgebra::{Isometry3, Matrix3};
 use prehend_geometry::SplitMix64;
 use prehend_refine::Object;
 use prehend_refine::network::{Tensor as Array, Tensors, read_tensors, write_tensors};
@@ -16,7 +16,7 @@ use crate::adam::Moments;
 use crate::loss::{Loss, ObjectPoints, TrueView, confidence_weighted_loss};
 use crate::model::{Pass, Widths};
 use crate::sample::{Sample, SampleSize, voter_positions};
-use crate::views::{View, mixed};
+use crate::views::{View, mixed, tensor_text, text_tensor};
 
 /// Settings of a training.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +50,9 @@ const RISE: f32 = 100.0;
 /// Turns that stand for an axis of revolution.
 const TURNS: usize = 72;
 
+/// Distance by which a symmetry may move the center \[radii\].
+const OFF_CENTER: f64 = 0.05;
+
 /// A network in training.
 pub struct Training {
     settings: TrainSettings,
@@ -70,8 +73,11 @@ impl Training {
         let color_tolerance = Some(settings.color_tolerance).filter(|tolerance| *tolerance < 1.0);
         let symmetry = SymmetrySettings { color_tolerance, ..SymmetrySettings::default() };
         let symmetries = find_symmetries(&object.mesh, &symmetry)?;
-        let motions = symmetries.sampled(TURNS);
-        let turn = |m: &nalgebra::Isometry3<f64>| m.rotation.to_rotation_matrix().into_inner();
+        let mut motions = symmetries.sampled(TURNS);
+        // The network turns about the center.
+        let moved = |m: &Isometry3<f64>| (m * object.center - object.center).norm();
+        motions.retain(|m| moved(m) <= OFF_CENTER * object.radius);
+        let turn = |m: &Isometry3<f64>| m.rotation.to_rotation_matrix().into_inner();
         let turns: Vec<Matrix3<f32>> = motions.iter().map(|m| turn(m).cast()).collect();
         let weights = settings.widths.draw(mixed(settings.seed, 0));
         let zero = |(name, w): (&String, &Array)| (name.clone(), Moments::new(w.values.len()));
@@ -147,11 +153,11 @@ impl Training {
         all
     }
 
-    /// Writes all that is needed to go on to a file, whole or not at all.
+    /// Writes all that is needed to go on with a training on `inputs` to a file, whole or not at all.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn save(&self, file: &Path) -> anyhow::Result<()> {
+    pub fn save(&self, file: &Path, inputs: &str) -> anyhow::Result<()> {
         let mut all = self.weights.clone();
         for (name, moments) in &self.moments {
             let shape = vec![moments.mean.len()];
@@ -161,26 +167,24 @@ impl Training {
         }
         let step = Array { shape: vec![1], values: vec![self.step as f32] };
         all.insert("step".into(), step);
-        let settings: Vec<f32> = self.identity().bytes().map(f32::from).collect();
-        all.insert("settings".into(), Array { shape: vec![settings.len()], values: settings });
+        all.insert("settings".into(), text_tensor(&self.identity(inputs)));
         Ok(write_tensors(file, &all)?)
     }
 
-    /// Goes on from what was [saved](Self::save) with the same settings.
+    /// Goes on from what was [saved](Self::save) with the same settings and inputs.
     ///
     /// # Errors
-    /// If the file is broken or of other settings.
-    pub fn resume(&mut self, file: &Path) -> anyhow::Result<()> {
+    /// If the file is broken or of others.
+    pub fn resume(&mut self, file: &Path, inputs: &str) -> anyhow::Result<()> {
         let mut all = read_tensors(file)?;
         let mut take = |name: &str, count: Option<usize>| {
             let found = all.remove(name).map(|t| t.values);
             let found = found.filter(|v| count.is_none_or(|count| v.len() == count));
             found.with_context(|| format!("{}: no {name} of this training", file.display()))
         };
-        let settings: String =
-            take("settings", None)?.iter().map(|v| char::from(*v as u8)).collect();
-        if settings != self.identity() {
-            let now = self.identity();
+        let settings = tensor_text(&take("settings", None)?);
+        let now = self.identity(inputs);
+        if settings != now {
             bail!(
                 "{}: begun with {settings}, and now {now}: give the same settings, or remove it",
                 file.display()
@@ -197,7 +201,7 @@ impl Training {
         Ok(())
     }
 
-    fn identity(&self) -> String {
-        format!("{:?}", self.settings)
+    fn identity(&self, inputs: &str) -> String {
+        format!("{:?}, {inputs}", self.settings)
     }
 }

@@ -94,7 +94,7 @@ fn view(
 ) -> Option<(SensedPoints, Isometry3<f64>)> {
     let mut random = SplitMix64::new(seed);
     let settings = sensors(object.radius, FAULTS * random.uniform(), seed)?;
-    let (frame, truth) = simulate_frame(&settings, object, hand, moment, seed).ok()?;
+    let (frame, truth) = simulate_frame(&settings, object, hand, moment, mixed(seed, 0)).ok()?;
     if frame.mask.count() < LEAST_SEEN {
         return None;
     }
@@ -167,6 +167,17 @@ pub fn mixed(seed: u64, number: u64) -> u64 {
     state ^ (state >> 31)
 }
 
+/// A tensor that holds the bytes of `text`.
+pub fn text_tensor(text: &str) -> Tensor {
+    Tensor { shape: vec![text.len()], values: text.bytes().map(f32::from).collect() }
+}
+
+/// Text of a [`text_tensor`].
+pub fn tensor_text(values: &[f32]) -> String {
+    let bytes: Vec<u8> = values.iter().map(|v| *v as u8).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
 /// Numbers of a stored point: position, normal, color, force, and what of it is known.
 const STORED: usize = 15;
 /// Numbers of a stored view: how many points were seen and felt, the pose, and the grasp.
@@ -191,7 +202,6 @@ pub fn save_views(file: &Path, views: &[View], of: &str) -> anyhow::Result<()> {
             points.extend(flags.map(|flag| f32::from(u8::from(flag))));
         }
     }
-    let of = of.bytes().map(f32::from).collect();
     let array = |values: Vec<f32>, width: usize| Tensor {
         shape: vec![values.len() / width, width],
         values,
@@ -199,7 +209,7 @@ pub fn save_views(file: &Path, views: &[View], of: &str) -> anyhow::Result<()> {
     let all = [
         ("heads", array(heads, HEAD)),
         ("points", array(points, STORED)),
-        ("settings", array(of, 1)),
+        ("settings", text_tensor(of)),
     ];
     let all: Tensors = all.into_iter().map(|(name, t)| (name.to_owned(), t)).collect();
     Ok(write_tensors(file, &all)?)
@@ -215,7 +225,7 @@ pub fn load_views(file: &Path, of: &str) -> anyhow::Result<Vec<View>> {
         let found = all.get(name).map(|t| t.values.as_slice());
         found.with_context(|| format!("{}: no {name}", file.display()))
     };
-    let stored: String = values("settings")?.iter().map(|v| char::from(*v as u8)).collect();
+    let stored = tensor_text(values("settings")?);
     if stored != of {
         bail!(
             "{}: made with {stored}, and now {of}: give the same settings, or remove it",

@@ -61,9 +61,9 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
     let object = block();
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("views");
-    save_views(&file, &views(&object, 20), "block").unwrap();
-    let views = load_views(&file, "block").unwrap();
-    assert!(load_views(&file, "other").unwrap_err().to_string().contains("made with block"));
+    save_views(&file, &views(&object, 20), "blöck").unwrap();
+    let views = load_views(&file, "blöck").unwrap();
+    assert!(load_views(&file, "other").unwrap_err().to_string().contains("made with blöck"));
     let begin = || Training::new(&object, settings(), Device::flex()).unwrap();
     let [mut whole, mut first, mut again] = [begin(), begin(), begin()];
     for _ in 0..20 {
@@ -75,9 +75,9 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
         first.step(&views, &object);
     }
     let checkpoint = dir.path().join("checkpoint");
-    first.save(&checkpoint).unwrap();
+    first.save(&checkpoint, "block").unwrap();
     let mut second = begin();
-    second.resume(&checkpoint).unwrap();
+    second.resume(&checkpoint, "block").unwrap();
     assert_eq!(second.steps_done(), 10);
     for _ in 0..10 {
         second.step(&views, &object);
@@ -85,7 +85,7 @@ fn a_training_that_goes_on_is_that_of_one_piece_and_both_are_the_same_again() {
     assert_eq!(second.network(&object), whole.network(&object));
     let other = TrainSettings { seed: 1, ..settings() };
     let mut other = Training::new(&object, other, Device::flex()).unwrap();
-    let refused = other.resume(&checkpoint).unwrap_err().to_string();
+    let refused = other.resume(&checkpoint, "block").unwrap_err().to_string();
     assert!(refused.contains("give the same settings"), "{refused}");
 }
 

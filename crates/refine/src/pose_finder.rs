@@ -21,7 +21,7 @@ pub trait PoseFinder: Send + Sync {
     /// Poses of the object of `frame`, the most likely first.
     ///
     /// # Errors
-    /// [`RefineError::NothingFits`] if there are none; that of a frame which lacks what is needed.
+    /// [`RefineError::NothingFits`] if there are none; that of a frame which lacks what is needed; [`RefineError::Finder`] for what else fails.
     fn find(&self, frame: &PreparedFrame<'_>) -> Result<Vec<PoseCandidate>, RefineError>;
 }
 
@@ -30,7 +30,7 @@ pub trait PoseFinder: Send + Sync {
 pub struct Hypotheses {
     /// The most likely one.
     pub best: Isometry3<f64>,
-    /// Its alternatives, if a search found it: the rotation is then unknown, and all rotations and what looks alike by shape are hypotheses.
+    /// Its alternatives, if a finder proposed it: the rotation is then unknown, and all rotations and what looks alike by shape are hypotheses.
     pub alternatives: Option<Vec<Isometry3<f64>>>,
 }
 

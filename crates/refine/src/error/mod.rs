@@ -22,6 +22,9 @@ pub enum RefineError {
     /// The mask selects nothing.
     #[error("the object's mask is empty or missing")]
     EmptyMask,
+    /// A [`PoseFinder`](crate::PoseFinder) of a user failed.
+    #[error("pose finder: {0}")]
+    Finder(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// No depth where the object is.
     #[error("no pixel of the object's mask has a depth")]
     NoDepth,

@@ -91,7 +91,7 @@ impl Estimator {
         Self { backend: Some(backend), ..self }
     }
 
-    /// Poses by sensors alone, the most likely one first: those of the finder, or else of a search. [`Hypotheses::found`] has them to be refined.
+    /// Poses by sensors alone, the most likely one first: those of the finder, or else of a search. [`Hypotheses::found`] converts them for [`refine`](Self::refine).
     ///
     /// # Errors
     /// Those of [`PoseFinder::find`]; [`RefineError::Setting`] for a setting of the search out of range.

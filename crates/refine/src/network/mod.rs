@@ -12,7 +12,18 @@
 //! | `vote.N.weight`, `vote.N.bias` | the same | inputs of the first: the outputs of the last `point` but one, then those of the last `global`; the last has [`VOTE`] outputs |
 //! | `object.center` | \[3\] | center of the bounding box \[m\] |
 //! | `object.radius` | \[1\] | half the diagonal of the bounding box \[m\] |
-//! | `object.symmetries` | \[n, 3, 3\] | rotations that change nothing, the identity first |
+//! | `object.symmetries` | \[n, 3, 3\] | rotations about `object.center` that change nothing, the identity first |
+//!
+//! Points of a set are numbers of [`CHANNELS`], in axes whose z is the line of sight to the mean of the points that are seen, turned about it at will:
+//!
+//! | channels | number |
+//! |---|---|
+//! | 0 to 2 | position less that mean, over the radius; points beyond two radii of the median are left out |
+//! | 3 to 5 | outward unit normal, of 20 neighbors; of a contact, against that of the skin; 0 if unknown |
+//! | 6 to 8 | color over the root mean square of all colors, at most 3, less 0.5; 0 if unknown |
+//! | 9 | 1 if the color is known |
+//! | 10 to 12 | force of the object on the skin, f/(‖f‖ + 0.5 N), of taxels with more than 0.05 N; 0 if unknown |
+//! | 13, 14 | 1 of a contact; 1 if its force is known |
 //!
 //! A vote is the center relative to the point in radii (3), the first two columns of the rotation object → network axes (6; orthonormalized by Gram and
 //! Schmidt), and the logit of the confidence.
@@ -209,7 +220,9 @@ impl PoseNetwork {
         let columns = Matrix3::from_columns(&[first, second, first.cross(&second)]);
         let rotation = Rotation3::from_matrix_unchecked(columns);
         let pose = view.pose(&self.center, &position, &UnitQuaternion::from(rotation));
-        Some(Vote { pose, weight: 1.0 / (1.0 + f64::from(-logit).exp()) })
+        let weight = 1.0 / (1.0 + f64::from(-logit).exp());
+        let is_finite = weight.is_finite() && position.iter().all(|v: &f64| v.is_finite());
+        is_finite.then_some(Vote { pose, weight })
     }
 }
 

@@ -7,8 +7,7 @@ use prehend_geometry::cloud::estimate_normals;
 use crate::error::RefineError;
 use crate::scene::{HandMeasurement, PreparedFrame, TouchReading};
 
-/// Numbers a point, in this order: position and normal (3 each), color (3) and 1 if it is known, force (3), 1 if the point is a contact, 1 if its force is
-/// known. What is unknown is zero.
+/// Number of [input channels](super) of a point.
 pub const CHANNELS: usize = 15;
 
 /// Neighbors that a normal is estimated from.

@@ -19,7 +19,7 @@ settings! {
         pub hypotheses: usize = 5,
         /// Number of votes that are gathered, those of the highest confidence.
         pub votes: usize = 96,
-        /// Standard deviation of votes for the same pose: angle [rad] plus distance of the centers [radii of the object].
+        /// Standard deviation of votes for the same pose: angle \[rad\] plus distance of the centers \[radii of the object\].
         pub spread: f64 = 0.15,
         /// Relative difference of radii or centers from which on an object is not that of the network.
         pub size_tolerance: f64 = 0.05,
@@ -38,8 +38,9 @@ impl NetworkSettings {
             ("votes", self.votes),
         ];
         let zero = counts.iter().find(|(_, count)| *count == 0).map(|(name, _)| *name);
-        let wrong = Some("spread").filter(|_| !(self.spread.is_finite() && self.spread > 0.0));
-        match zero.or(wrong) {
+        let sizes = [("spread", self.spread), ("size_tolerance", self.size_tolerance)];
+        let wrong = sizes.iter().find(|(_, size)| !(size.is_finite() && *size > 0.0));
+        match zero.or(wrong.map(|(name, _)| *name)) {
             Some(name) => Err(RefineError::Setting { name, problem: "must be above zero".into() }),
             None => Ok(()),
         }

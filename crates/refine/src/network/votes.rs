@@ -55,18 +55,17 @@ impl Shape<'_> {
         Difference { angle: 2.0 * most.min(1.0).acos(), distance, turn: best }
     }
 
-    /// Hypotheses, the one with most votes first; scores are shares of the confidence of all votes.
+    /// Hypotheses, the one with most votes first; scores are shares of the confidence of the votes that are gathered.
     pub(super) fn gathered(
         &self,
         mut votes: Vec<Vote>,
         settings: &NetworkSettings,
     ) -> Vec<PoseCandidate> {
         let &NetworkSettings { votes: most, spread, hypotheses, .. } = settings;
-        let total: f64 = votes.iter().map(|v| v.weight).sum();
         votes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let kept: f64 = votes.iter().take(most).map(|v| v.weight).sum();
         votes.truncate(most);
-        if kept.is_nan() || kept <= 0.0 || total.is_nan() {
+        if kept.is_nan() || kept <= 0.0 {
             return Vec::new();
         }
         let count = votes.len();

@@ -147,7 +147,6 @@ impl PoseSearch {
     }
 }
 
-/// `poses`, best first, with their shares.
 impl PoseFinder for PoseSearch {
     /// Poses that differ from each other; their weights sum to one, in proportion to exp(score).
     ///
@@ -167,6 +166,7 @@ impl PoseFinder for PoseSearch {
     }
 }
 
+/// `poses`, best first, with their shares.
 fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
     let least = poses.first().map_or(0.0, |(_, cost)| *cost);
     let share = |cost: f64| (least - cost).exp();

@@ -19,7 +19,7 @@ use crate::search::SearchSettings;
 use crate::strategy::{Fused, FusedSettings};
 use crate::tracker::TrackerSettings;
 
-/// Settings of estimator, search, tracker and calibration: what the command's `--settings FILE` and `--set PATH=VALUE` change, and Python's `settings`.
+/// Settings of estimator, search, networks, tracker and calibration: what the command's `--settings FILE` and `--set PATH=VALUE` change, and Python's `settings`.
 ///
 /// Settings that a file leaves out keep their values: each table of it is merged into that of the defaults; an array replaces the whole array.
 ///
@@ -39,7 +39,7 @@ pub struct Settings {
     pub estimator: FusedSettings,
     /// The search for poses from sensors alone.
     pub search: SearchSettings,
-    /// Networks that propose poses.
+    /// Networks that propose poses ([`PoseNetwork::with_settings`](crate::network::PoseNetwork::with_settings)).
     pub network: NetworkSettings,
     /// The tracker.
     pub tracker: TrackerSettings,

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use log::debug;
+use log::{debug, warn};
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 
@@ -38,7 +38,10 @@ impl Tracker {
             Some(pose) => pose.into(),
             None => {
                 let finder = self.finder.clone();
-                let found = finder.and_then(|finder| self.find(frame, Some(&*finder)).ok());
+                let found = finder.and_then(|finder| {
+                    let found = self.find(frame, Some(&*finder));
+                    found.map_err(|error| warn!("searched, because {error}")).ok()
+                });
                 found.map_or_else(|| self.find(frame, None), Ok)?
             }
         };
@@ -249,6 +252,10 @@ impl Tracker {
         match self.find(&frame, finder) {
             Ok(found) => Ok(Some(found)),
             Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
+            Err(error) if finder.is_some() => {
+                warn!("not found: {error}");
+                Ok(None)
+            }
             Err(error) => Err(error),
         }
     }

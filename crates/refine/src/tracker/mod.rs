@@ -149,7 +149,7 @@ impl Tracker {
         Self { rig: Some(rig), ..self }
     }
 
-    /// With a finder of the object, such as a network: it is asked where the object is before any search.
+    /// With a finder of the object, such as a network: it is asked where the object is before any search, in frames with depth. If it fails, the search goes on.
     pub fn with_finder(self, finder: Arc<dyn PoseFinder>) -> Self {
         Self { finder: Some(finder), ..self }
     }

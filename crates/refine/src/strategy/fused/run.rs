@@ -286,7 +286,7 @@ impl<'a> Run<'a> {
         let few = Solver { iterations: self.hypotheses().shortlist_steps, ..*solver };
         let (mut states, usual) = (states.to_vec(), (*hypotheses).max(1));
         while states.len() > usual {
-            let found = self.distinct(problem.solve_all(&states, &few)).into_iter();
+            let found = self.compared(problem, problem.solve_all(&states, &few)).into_iter();
             states = found.take(usual.max(states.len() / 2)).map(|found| found.at.state).collect();
         }
         states
