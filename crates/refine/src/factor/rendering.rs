@@ -44,8 +44,9 @@ settings! {
         pub mode: RenderingMode = RenderingMode::Contour,
         /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
         pub contour_half_width: f64 = 0.645,
-        /// Softness σ of borders in the SoftRas mode \[NDC²\]: PyTorch3D's; the shorter side of the image is 2 long.
-        pub softras_sigma: f64 = 1e-4,
+        /// Softness σ of borders in the SoftRas mode \[NDC²\]; the shorter side of the image is 2 long. PyTorch3D's 1e-4 makes outlines wider by some pixels, which
+        /// biases poses.
+        pub softras_sigma: f64 = 5e-6,
         /// Softness γ of the choice among faces by depth in the SoftRas mode \[m\].
         pub softras_gamma: f64 = 1e-3,
     }
