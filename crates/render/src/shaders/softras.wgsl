@@ -141,12 +141,7 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
     }
     if with_derivatives() {
         softras_rows(h, p, nearest, blend, &pixel);
-        for (var k = 0u; k < 3u; k++) {
-            pixel.color_rows[k] = scaled_sum(pixel.coverage, pixel.color_rows[k], pixel.color[k], pixel.coverage_row);
-        }
     }
-    // Over black, as targets are.
-    pixel.color *= pixel.coverage;
     pixel.near_outline = true;
     if (*nearest).inside != NONE {
         let f = soft_face(h, (*nearest).inside);

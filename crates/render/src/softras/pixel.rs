@@ -64,22 +64,18 @@ impl<T: Number> Pixels<T> {
     #[inline(always)]
     pub(crate) fn seen<const DERIVATIVES: bool>(&self, at: usize) -> Seen {
         let hit = self.hit.lanes()[at] > 0.0;
-        let (color, coverage) = (lane(&self.color, at), self.coverage.lanes()[at]);
-        // Over black, as targets are.
         let mut pixel = Pixel {
-            color: color.map(|level| level * coverage),
-            coverage,
+            color: lane(&self.color, at),
+            coverage: self.coverage.lanes()[at],
             z: self.z.lanes()[at],
             depth_weight: if hit { 1.0 } else { 0.0 },
             ..Pixel::default()
         };
         if DERIVATIVES {
-            pixel.coverage_row = lane(&self.coverage_row, at);
             for k in 0..3 {
-                let row = lane(&self.color_rows[k], at);
-                pixel.color_rows[k] =
-                    std::array::from_fn(|i| coverage * row[i] + color[k] * pixel.coverage_row[i]);
+                pixel.color_rows[k] = lane(&self.color_rows[k], at);
             }
+            pixel.coverage_row = lane(&self.coverage_row, at);
             pixel.z_row = lane(&self.z_row, at);
         }
         Seen { pixel, hit, near_outline: !hit }
