@@ -14,7 +14,7 @@
 //! # Ok::<(), prehend_refine::RefineError>(())
 //! ```
 //!
-//! A [`Factor`] adds evidence, a [`Strategy`] another way to refine; both read a [`PreparedFrame`].
+//! A [`Factor`] adds evidence, a [`Strategy`] another way to refine, a [`PoseFinder`] another way to search; all read a [`PreparedFrame`].
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -2,7 +2,6 @@
 
 use crate::baselines::{GradientKind, Heuristic, Icp, IcpMetric};
 use crate::error::RefineError;
-use crate::factor::RenderingMode;
 use crate::problem::State;
 use crate::scene::PreparedFrame;
 use crate::strategy::{Estimate, Fused, FusedSettings, Modality, Nuisance, Observer, Strategy};
@@ -102,10 +101,9 @@ impl From<Icp> for Method {
 
 impl Method {
     /// Names of the methods with what each is, in the order of the paper's tables.
-    pub const ALL: [(&str, &str); 19] = [
+    pub const ALL: [(&str, &str); 17] = [
         ("fused", "all evidence in one least-squares problem, with calibrations estimated"),
         ("combined", "all four gradients, checkpointing"),
-        ("combined-softras", "all four gradients, checkpointing, rendered by the soft rasterizer"),
         ("combined-last", "all four gradients, the last pose"),
         ("combined-free", "all four gradients, no regularization, the last pose"),
         ("combined-free-best", "all four gradients, no regularization, checkpointing"),
@@ -115,7 +113,6 @@ impl Method {
         ("tactile-best", "this gradient alone, checkpointing"),
         ("rendering", "this gradient alone, the last pose"),
         ("rendering-best", "this gradient alone, checkpointing"),
-        ("rendering-softras", "this gradient alone, by the soft rasterizer, the last pose"),
         ("physics", "this gradient alone, the last pose"),
         ("physics-best", "this gradient alone, checkpointing"),
         ("physics-free", "this gradient alone, no regularization, the last pose"),
@@ -146,9 +143,7 @@ impl Method {
             return ablated(settings.clone(), ablation).map(|settings| Fused::new(settings).into());
         }
         Self::ALL.iter().find(|(known, _)| *known == name)?;
-        let softras = name.ends_with("-softras");
-        let checkpoint =
-            name == "combined" || name == "combined-softras" || name.ends_with("-best");
+        let checkpoint = name == "combined" || name.ends_with("-best");
         let gradients = match name.split('-').next()? {
             "icp" => return Some(Icp { checkpoint, ..Icp::default() }.into()),
             "robust" => return Some(Icp::robust().into()),
@@ -159,9 +154,6 @@ impl Method {
         if name.contains("-free") {
             // Without the pull to the initial pose.
             heuristic.stability.displacement_sigma = f64::INFINITY;
-        }
-        if softras {
-            heuristic.rendering.mode = RenderingMode::Softras;
         }
         Some(heuristic.into())
     }

@@ -6,10 +6,9 @@ use nalgebra::{Isometry3, SMatrix};
 use prehend_geometry::RobustKernel;
 use prehend_render::{
     Backend, BackendError, ContourOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss,
-    PoseProblem, Session, SoftRasOptions, Tile, light_samples,
+    PoseProblem, Session, Tile, light_samples,
 };
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::patch_sums::PatchSums;
 use crate::defaults::settings;
@@ -40,46 +39,8 @@ settings! {
         /// Number of pixels that the light is solved from at most, none of them beside one where the object is not seen. EXPERIMENTS: Light from pixels away
         /// from outlines.
         pub light_samples: usize = 1000,
-        /// How visibility is softened: `contour`, a hard z-buffer with a smooth step across contours, or `softras`, in which faces spread and blend by depth: a wider basin, slower.
-        pub mode: RenderingMode = RenderingMode::Contour,
         /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
         pub contour_half_width: f64 = 0.645,
-        /// Softness σ of borders in the SoftRas mode \[NDC²\]; the shorter side of the image is 2 long. PyTorch3D's 1e-4 makes outlines wider by some pixels, which
-        /// biases poses.
-        pub softras_sigma: f64 = 5e-6,
-        /// Softness γ of the choice among faces by depth in the SoftRas mode \[m\].
-        pub softras_gamma: f64 = 1e-3,
-    }
-}
-
-/// How visibility is softened ([`Mode`]).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum RenderingMode {
-    /// [`Mode::Contour`].
-    Contour,
-    /// [`Mode::SoftRas`].
-    Softras,
-}
-
-impl RenderingSettings {
-    /// The renderer's mode.
-    fn mode(&self) -> Mode {
-        let &Self { contour_half_width: half_width, softras_sigma: sigma, softras_gamma, .. } =
-            self;
-        match self.mode {
-            RenderingMode::Contour => {
-                Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
-            }
-            RenderingMode::Softras => {
-                let all = SoftRasOptions::default();
-                // Borders fade to 10⁻⁴, as PyTorch3D recommends.
-                let blur_radius = (1.0_f64 / 1e-4 - 1.0).ln() * sigma;
-                let gamma = softras_gamma / (all.z_far - all.z_near);
-                Mode::SoftRas(SoftRasOptions { sigma, gamma, blur_radius, ..all })
-            }
-        }
     }
 }
 
@@ -123,11 +84,13 @@ impl RenderingFactor {
             kernel: RobustKernel::Cauchy { scale: settings.kernel_scale * CAUCHY_WIDTH * sigma },
             ..LossOptions::default()
         };
+        let half_width = settings.contour_half_width;
+        let contour = ContourOptions { half_width, ..ContourOptions::default() };
         let object = Arc::clone(frame.object());
         let problem = PoseProblem {
             model: Arc::clone(&object.model),
             target: image.target,
-            loss: PoseLoss::new(settings.mode(), options),
+            loss: PoseLoss::new(Mode::Contour(contour), options),
         };
         let session = |backend: &Arc<dyn Backend>| backend.prepare(&problem).map_err(warn).ok();
         Ok(Self {
@@ -332,22 +295,6 @@ mod tests {
             state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3, 1e-3]);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&factor.lit_at(&state), &state, Block::Camera, 5e-5, 0.1);
-        }
-    }
-
-    #[test]
-    fn gradient_of_the_soft_rasterizer_matches_differences() {
-        for seed in 0..2 {
-            let (frame, state) = fixture(seed);
-            let settings = RenderingSettings {
-                downsample: 4,
-                mode: RenderingMode::Softras,
-                ..RenderingSettings::default()
-            };
-            let factor = RenderingFactor::new(&frame, &settings).unwrap();
-            for step in [5e-5, 1e-4, 1e-3] {
-                assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, step, 0.05);
-            }
         }
     }
 
