@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 15_780),
     ("sim", 16_390),
     ("render", 10_610),
-    ("refine", 30_606),
+    ("refine", 30_600),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;
