@@ -63,13 +63,13 @@ struct Arguments {
 }
 
 impl Arguments {
-    /// What a training is of: the content of its files, and how they are read.
-    fn inputs(&self) -> anyhow::Result<String> {
-        let Self { object, hand, taxels, unit, mass, grasps, views_per_grasp, .. } = self;
+    /// What frames are of: the content of files, how they are read, and `settings`.
+    fn inputs(&self, settings: &ViewSettings) -> anyhow::Result<String> {
+        let Self { object, hand, taxels, unit, mass, .. } = self;
         let files = [Some(object), hand.as_ref(), taxels.as_ref()].into_iter().flatten();
         let files: Result<Vec<String>, _> = files.map(|file| file_fingerprint(file)).collect();
-        let (files, frames) = (files?.join(" "), grasps * views_per_grasp);
-        Ok(format!("files {files}, unit {unit:?}, mass {mass:?}, {frames} frames"))
+        let files = files?.join(" ");
+        Ok(format!("files {files}, unit {unit:?}, mass {mass:?}, {settings:?}"))
     }
 }
 
@@ -96,22 +96,23 @@ fn main() -> anyhow::Result<()> {
     let object = Arc::new(object(&arguments)?);
     let (views_file, checkpoint) =
         (beside(&arguments.out, "views"), beside(&arguments.out, "checkpoint"));
-    let Arguments { grasps, views_per_grasp, .. } = arguments;
+    let Arguments { grasps, views_per_grasp, steps, seed, color_tolerance, .. } = arguments;
     if grasps < 10 || views_per_grasp == 0 {
         bail!("--grasps, --views-per-grasp: at least 10 and 1 are needed");
     }
     if grasps.checked_mul(views_per_grasp).is_none_or(|frames| frames > MOST_FRAMES) {
         bail!("--grasps, --views-per-grasp: at most {MOST_FRAMES} frames");
     }
-    if arguments.steps == 0 {
+    if steps == 0 {
         bail!("--steps: at least one is needed");
     }
     check_writable(&arguments.out)?;
-    if !(0.0..=1.0).contains(&arguments.color_tolerance) {
+    if !(0.0..=1.0).contains(&color_tolerance) {
         bail!("--color-tolerance: must be from 0 to 1");
     }
-    let inputs = arguments.inputs()?;
-    let views = views(&arguments, &object, &views_file, &inputs)?;
+    let settings = ViewSettings { grasps, views_per_grasp, seed };
+    let inputs = arguments.inputs(&settings)?;
+    let views = views(&arguments, &settings, &object, &views_file, &inputs)?;
     // Whole grasps are held back.
     let (held, kept): (Vec<View>, Vec<View>) =
         views.into_iter().partition(|view| view.grasp % 10 == 9);
@@ -120,7 +121,6 @@ fn main() -> anyhow::Result<()> {
     if kept.is_empty() || held.is_empty() {
         bail!("{}: too few grasps hold: more --grasps are needed", object.name);
     }
-    let Arguments { steps, seed, color_tolerance, .. } = arguments;
     let settings = TrainSettings { steps, seed, color_tolerance, ..TrainSettings::default() };
     let device = match arguments.device {
         Kind::Cpu => Device::flex(),
@@ -174,28 +174,26 @@ fn main() -> anyhow::Result<()> {
 /// Views as an interrupted call left them, or new ones.
 fn views(
     arguments: &Arguments,
+    settings: &ViewSettings,
     object: &Arc<Object>,
     file: &Path,
     inputs: &str,
 ) -> anyhow::Result<Vec<View>> {
-    let &Arguments { grasps, views_per_grasp, seed, .. } = arguments;
-    let settings = ViewSettings { grasps, views_per_grasp, seed };
-    let identity = format!("{settings:?}, {inputs}");
     if file.exists() {
-        return load_views(file, &identity);
+        return load_views(file, inputs);
     }
     let hand = match &arguments.hand {
         Some(urdf) => HandFiles::load(urdf, arguments.taxels.as_deref())?,
         None => HandFiles::built_in()?,
     };
-    let bar = bar(u64::from(grasps) * u64::from(views_per_grasp), "frames")?;
+    let bar = bar(u64::from(settings.grasps) * u64::from(settings.views_per_grasp), "frames")?;
     let start = Instant::now();
-    let views = make_views(object, &hand.robot, &settings, &|done| bar.inc(done))?;
+    let views = make_views(object, &hand.robot, settings, &|done| bar.inc(done))?;
     bar.finish_and_clear();
     println!("{} frames in {:.0} s", views.len(), start.elapsed().as_secs_f64());
-    save_views(file, &views, &identity)?;
+    save_views(file, &views, inputs)?;
     // Rounded as stored: a training that goes on is the same.
-    load_views(file, &identity)
+    load_views(file, inputs)
 }
 
 fn object(arguments: &Arguments) -> anyhow::Result<Object> {

@@ -70,7 +70,7 @@ impl Training {
     /// # Errors
     /// If the mesh cannot be searched for symmetries.
     pub fn new(object: &Object, settings: TrainSettings, device: Device) -> anyhow::Result<Self> {
-        let color_tolerance = Some(settings.color_tolerance).filter(|tolerance| *tolerance < 1.0);
+        let color_tolerance = Some(settings.color_tolerance);
         let symmetry = SymmetrySettings { color_tolerance, ..SymmetrySettings::default() };
         let symmetries = find_symmetries(&object.mesh, &symmetry)?;
         let mut motions = symmetries.sampled(TURNS);
