@@ -33,6 +33,7 @@ pub use identity::Identity;
 pub use journal::Journal;
 pub use mask_source::MaskSource;
 pub use pose::PlainPose;
+pub(crate) use robots::load_robot;
 pub use targets::find_targets;
 pub(crate) use targets::listed_targets;
 pub use times::{timed_methods, write_times};

@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::hash::Hash;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use prehend_geometry::hand::{Taxel, load_taxels};
-use prehend_geometry::robot::KinematicTree;
-use prehend_geometry::{GridCache, TriMesh};
+use prehend_geometry::robot::{KinematicTree, RobotError};
+use prehend_geometry::{GridCache, ReadOptions, TriMesh};
 
 use crate::data::assets::AssetError;
 use crate::data::bodies::{Bodies, PlacedBody, plane, solid};
@@ -103,7 +103,7 @@ impl Robots {
     ) -> Result<PlacedBody<'b>, AssetError> {
         let tree = kept(&mut self.trees, body.kind.clone(), || -> Result<_, AssetError> {
             Ok(Arc::new(match &body.kind {
-                BodyKind::Hand { urdf } => KinematicTree::from_file(urdf)?,
+                BodyKind::Hand { urdf } => load_robot(urdf)?,
                 BodyKind::Plane => plane(),
                 BodyKind::Object { obj_id } => match objects.get(obj_id) {
                     Some(object) => solid(&object.mesh),
@@ -121,6 +121,14 @@ impl Robots {
         let Some(file) = &sensor.taxels else { return Ok(Arc::default()) };
         kept(&mut self.layouts, file.clone(), || Ok(load_taxels(file)?.into()))
     }
+}
+
+/// The robot of a dataset's or frame's URDF or MJCF file, with packages of ROS where the environment says.
+///
+/// # Errors
+/// If it or a file that it names cannot be read.
+pub(crate) fn load_robot(description: &Path) -> Result<KinematicTree, RobotError> {
+    KinematicTree::from_file_with(description, &ReadOptions::default().with_ros_packages())
 }
 
 /// Value of `key`, made and kept if it is not there yet.

@@ -105,10 +105,13 @@ pub enum RefineError {
 }
 
 impl RefineError {
-    /// Refuses the first of these settings that is not above zero.
+    /// Refuses the first of these settings that is not finite and above zero.
     pub(crate) fn require_positive(settings: &[(&'static str, f64)]) -> Result<(), Self> {
-        match settings.iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
-            Some((name, value)) => Err(Self::Setting { name, problem: format!("is {value}") }),
+        match settings.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            Some((name, value)) => {
+                let problem = format!("is {value}, must be finite and above zero");
+                Err(Self::Setting { name, problem })
+            }
             None => Ok(()),
         }
     }

@@ -10,7 +10,7 @@ use prehend_render::DepthImage;
 
 use super::model::{EvaluationModel, model_info};
 use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
-use crate::data::{AssetError, ContactModel};
+use crate::data::{AssetError, ContactModel, load_robot};
 use crate::evaluate::metrics::{Contact, ScoredRow, oe_symmetric_deg, pe_cm};
 use crate::symmetry::Symmetries;
 
@@ -154,7 +154,7 @@ impl<'a> Scorer<'a> {
     /// The robot's description alone: contact is measured exactly, so no distance grid is needed.
     fn tree(&mut self, urdf: &Path) -> Result<&KinematicTree, AssetError> {
         if !self.trees.contains_key(urdf) {
-            self.trees.insert(urdf.to_owned(), KinematicTree::from_file(urdf)?);
+            self.trees.insert(urdf.to_owned(), load_robot(urdf)?);
         }
         Ok(&self.trees[urdf])
     }

@@ -26,10 +26,12 @@ settings! {
         pub hand_translation: f64 = 2.1e-3,
         /// Standard deviation of the hand's rotation about each axis \[rad\].
         pub hand_rotation: f64 = 7e-3,
-        /// Standard deviation of each joint position \[rad or m\].
+        /// Standard deviation of each position of a revolute joint \[rad\].
         pub joints: f64 = 0.014,
-        /// Standard deviations of joints of which they are known, in the order of the joints: beyond the end of the list and where there is none, as all
-        /// others.
+        /// Standard deviation of each position of a prismatic joint \[m\].
+        pub prismatic_joints: f64 = 1e-3,
+        /// Standard deviations of joints of which they are known, in the order of the joints: beyond the end of the list and where there is none, as of
+        /// revolute ones.
         #[serde(skip)]
         pub known_joints: Vec<Option<f64>> = Vec::new(),
         /// Standard deviation of the depth scale, as a part of depth.
@@ -89,9 +91,13 @@ impl PriorSettings {
         let [translation, rotation] = hand.pose_sigmas;
         prior.hand_translation = translation.unwrap_or(prior.hand_translation);
         prior.hand_rotation = rotation.unwrap_or(prior.hand_rotation);
-        if !hand.joint_sigmas.is_empty() {
-            prior.known_joints.clone_from(&hand.joint_sigmas);
-        }
+        let said =
+            if hand.joint_sigmas.is_empty() { &self.known_joints } else { &hand.joint_sigmas };
+        let sigma = |(joint, slides): (usize, bool)| {
+            let said = said.get(joint).copied().flatten();
+            said.or_else(|| slides.then_some(self.prismatic_joints))
+        };
+        prior.known_joints = hand.hand.prismatic().into_iter().enumerate().map(sigma).collect();
         prior
     }
 

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use prehend_geometry::KinematicTree;
 use prehend_geometry::hand::load_taxels;
 use serde_json::{Value, json};
 
 use super::mesh;
 use crate::data::bop::{Body, DatasetError, Tactile, TactileReading};
-use crate::data::{AssetError, FrameParts};
+use crate::data::{AssetError, FrameParts, load_robot};
 
 /// From this force on a taxel counts as touched \[N\].
 const TOUCH: f64 = 0.1;
@@ -33,7 +32,7 @@ pub(super) fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Value, Ass
     }
     let mut hand = None;
     if let Some((urdf, joints)) = bodies.iter().find_map(Body::as_hand) {
-        let tree = KinematicTree::from_file(urdf)?;
+        let tree = load_robot(urdf)?;
         tree.joint_vector(joints)?;
         let joints = tree.joint_names().len();
         hand = Some(

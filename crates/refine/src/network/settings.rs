@@ -30,19 +30,14 @@ impl NetworkSettings {
     /// # Errors
     /// [`RefineError::Setting`] naming the first that is out of range.
     pub(super) fn check(&self) -> Result<(), RefineError> {
-        let counts = [
-            ("seen", self.seen),
-            ("voters", self.voters),
-            ("rolls", self.rolls),
-            ("hypotheses", self.hypotheses),
-            ("votes", self.votes),
-        ];
-        let zero = counts.iter().find(|(_, count)| *count == 0).map(|(name, _)| *name);
-        let sizes = [("spread", self.spread), ("size_tolerance", self.size_tolerance)];
-        let wrong = sizes.iter().find(|(_, size)| !(size.is_finite() && *size > 0.0));
-        match zero.or(wrong.map(|(name, _)| *name)) {
-            Some(name) => Err(RefineError::Setting { name, problem: "must be above zero".into() }),
-            None => Ok(()),
-        }
+        RefineError::require_positive(&[
+            ("seen", self.seen as f64),
+            ("voters", self.voters as f64),
+            ("rolls", self.rolls as f64),
+            ("hypotheses", self.hypotheses as f64),
+            ("votes", self.votes as f64),
+            ("spread", self.spread),
+            ("size_tolerance", self.size_tolerance),
+        ])
     }
 }

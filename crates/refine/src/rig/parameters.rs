@@ -224,6 +224,7 @@ impl Rig {
             prior.hand_translation = sigma(hand, 3);
             prior.hand_rotation = sigma(hand + 3, 3);
             prior.joints = sigma(joints, count);
+            prior.prismatic_joints = prior.joints;
         }
         Ok(PriorSettings {
             depth_scale: sigma(camera, 1),

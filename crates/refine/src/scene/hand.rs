@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::{
-    ArticulatedRobot, KinematicTree, PosedRobot, RobotError, RobotShape,
+    ArticulatedRobot, Drive, KinematicTree, Motion, PosedRobot, RobotError, RobotShape,
 };
 use prehend_geometry::{GridCache, ReadOptions};
 use prehend_render::RenderModel;
@@ -145,6 +145,18 @@ impl Hand {
         })
     }
 
+    /// Whether each of the [`joint_names`](KinematicTree::joint_names) is prismatic.
+    pub(crate) fn prismatic(&self) -> Vec<bool> {
+        let mut prismatic = vec![false; self.tree.joint_names().len()];
+        for joint in self.tree.joints() {
+            if let (Motion::Prismatic, Drive::Variable { index, .. }) = (joint.motion, joint.drive)
+            {
+                prismatic[index] = true;
+            }
+        }
+        prismatic
+    }
+
     /// Whether `forces` has one for each taxel.
     pub(crate) fn check_forces(&self, forces: &[Vector3<f64>]) -> Result<(), RefineError> {
         let (forces, taxels) = (forces.len(), self.taxels.len());
@@ -187,7 +199,9 @@ mod tests {
     use super::*;
     use crate::check::check_frame;
     use crate::estimator::Estimator;
+    use crate::factor::PriorSettings;
     use crate::pose_finder::Hypotheses;
+    use crate::problem::Block;
     use crate::scene::{Frame, PreparedFrame, default_scene};
 
     #[test]
@@ -230,10 +244,14 @@ mod tests {
         let center = scene.initial * object.center;
         let t_cam_hand = Isometry3::translation(center.x, center.y, center.z + 0.05);
         let refined = |hand: Arc<Hand>| {
-            let frame = Frame {
-                hand: Some(hand.measured(t_cam_hand, vec![-0.04, 0.1])),
-                ..scene.frame.clone()
-            };
+            let mut measured = hand.measured(t_cam_hand, vec![-0.04, 0.1]);
+            let prior = PriorSettings::default();
+            let sigmas = |m: &HandMeasurement| prior.of_hand(Some(m)).sigmas(Block::Joints(2));
+            assert_eq!(sigmas(&measured), [prior.prismatic_joints, prior.joints]);
+            measured.joint_sigmas = vec![Some(0.1)];
+            assert_eq!(sigmas(&measured), [0.1, prior.joints]);
+            measured.joint_sigmas.clear();
+            let frame = Frame { hand: Some(measured), ..scene.frame.clone() };
             let estimator = Estimator::new(Arc::clone(&object));
             let initial = Hypotheses::from(scene.initial);
             *estimator.refine(&frame, &initial).unwrap().t_cam_object()

@@ -70,26 +70,19 @@ impl SearchSettings {
     /// # Errors
     /// [`RefineError::Setting`] naming the first that is out of range.
     pub(super) fn check(&self) -> Result<(), RefineError> {
-        let counts = [
-            ("rotations", self.rotations),
-            ("points", self.points),
-            ("placed", self.placed),
-            ("turned", self.turned),
-            ("seen", self.seen),
-            ("last", self.last),
-        ];
-        if let Some((name, _)) = counts.iter().find(|(_, value)| *value == 0) {
-            return Err(RefineError::Setting { name, problem: "must be above zero".into() });
-        }
+        RefineError::require_positive(&[
+            ("rotations", self.rotations as f64),
+            ("points", self.points as f64),
+            ("placed", self.placed as f64),
+            ("turned", self.turned as f64),
+            ("seen", self.seen as f64),
+            ("last", self.last as f64),
+            ("scale", self.scale),
+            ("separation", self.separation),
+        ])?;
         if !(8..=256).contains(&self.cells) {
             let problem = format!("is {}, must be from 8 to 256", self.cells);
             return Err(RefineError::Setting { name: "cells", problem });
-        }
-        for (name, length) in [("scale", self.scale), ("separation", self.separation)] {
-            if !(length.is_finite() && length > 0.0) {
-                let problem = format!("is {length}, must be finite and above zero");
-                return Err(RefineError::Setting { name, problem });
-            }
         }
         Ok(())
     }

@@ -159,12 +159,6 @@ impl TrackerSettings {
             ("gating.least_shown", self.gating.least_shown),
         ];
         RefineError::require_positive(&positive)?;
-        if self.time_constant.is_infinite() {
-            return Err(RefineError::Setting {
-                name: "time_constant",
-                problem: "is infinite".into(),
-            });
-        }
         for (name, gain) in [("in_hand.gain", self.in_hand.gain), ("free.gain", self.free.gain)] {
             if !(0.0..=1.0).contains(&gain) {
                 let problem = format!("is {gain}, not between 0 and 1");
@@ -184,7 +178,10 @@ mod tests {
         let mut settings = TrackerSettings::default();
         assert!(settings.check().is_ok());
         settings.time_constant = 0.0;
-        assert_eq!(settings.check().unwrap_err().to_string(), "time_constant is 0");
+        assert_eq!(
+            settings.check().unwrap_err().to_string(),
+            "time_constant is 0, must be finite and above zero"
+        );
         settings = TrackerSettings::default();
         settings.free.gain = f64::NAN;
         assert!(settings.check().unwrap_err().to_string().contains("free.gain is NaN"));

@@ -159,6 +159,21 @@ fn frames() {
         "{}",
         said.out
     );
+    // A mesh of the hand in a package of ROS.
+    let part = "<link name=\"part\"><collision><geometry><mesh filename=\"package://parts/part.ply\"/></geometry>\
+                </collision></link><joint name=\"to_part\" type=\"fixed\"><parent link=\"base_link\"/><child link=\"part\"/></joint></robot>";
+    place.replace("ds/hand/hand.urdf", "</robot>", part);
+    std::fs::create_dir_all(place.path("ros/src/parts")).unwrap();
+    place.copy("ds/models/obj_000005.ply", "ros/src/parts/part.ply");
+    let without =
+        place.command("info ds/frame.json").env_remove("ROS_PACKAGE_PATH").output().unwrap();
+    assert!(!without.status.success());
+    let found = place
+        .command("info ds/frame.json")
+        .env("ROS_PACKAGE_PATH", place.path("ros"))
+        .output()
+        .unwrap();
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
     place.replace("ds/frame.json", "\"mesh_unit\":\"mm\"", "\"mesh_unit\":\"cm\"");
     let said = place.prehend("info ds/frame.json");
     assert!(said.code == 1 && said.err.contains("ds/frame.json: mesh_unit: "), "{}", said.err);

@@ -51,7 +51,7 @@ fn any_number_of_threads_finds_the_same() {
 fn bad_input_is_an_error() {
     let none = SearchSettings { rotations: 0, ..SearchSettings::default() };
     let error = search(none).unwrap_err().to_string();
-    assert!(error.contains("rotations must be above zero"), "{error}");
+    assert!(error.contains("rotations is 0, must be finite and above zero"), "{error}");
     let nan = SearchSettings { scale: f64::NAN, ..SearchSettings::default() };
     assert!(search(nan).unwrap_err().to_string().contains("scale is NaN"));
 

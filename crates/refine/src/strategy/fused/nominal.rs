@@ -47,12 +47,13 @@ impl Quantity {
 type Field = fn(&mut FusedSettings) -> Option<&mut f64>;
 
 /// All sizes: standard deviations of the errors, for most objects and rigs.
-const SIZES: [(&str, Quantity, Field); 16] = [
+const SIZES: [(&str, Quantity, Field); 17] = [
     ("object.translation", Quantity::Length, |s| Some(&mut s.prior.object_translation)),
     ("object.rotation", Quantity::Angle, |s| Some(&mut s.prior.object_rotation)),
     ("hand.translation", Quantity::Length, |s| Some(&mut s.prior.hand_translation)),
     ("hand.rotation", Quantity::Angle, |s| Some(&mut s.prior.hand_rotation)),
     ("joints", Quantity::Angle, |s| Some(&mut s.prior.joints)),
+    ("joints.prismatic", Quantity::Length, |s| Some(&mut s.prior.prismatic_joints)),
     ("depth.scale", Quantity::Ratio, |s| Some(&mut s.prior.depth_scale)),
     ("depth.bias", Quantity::Length, |s| Some(&mut s.prior.depth_bias)),
     ("depth.noise", Quantity::Length, |s| Some(&mut s.depth.noise.sigma)),

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_geometry::robot::{Drive, Motion};
 use prehend_render::{
     Camera, DepthImage, DistortionError, Mask, RenderModel, RgbImage, SurfacePoint, depth_map,
     render_scene,
@@ -66,7 +65,7 @@ impl<'a> SensorRig<'a> {
     ) -> Self {
         let (camera, settings) = (settings.camera(), &settings.sensor);
         Self {
-            errors: settings.calibration.draw(&slides(robot), noise),
+            errors: settings.calibration.draw(&robot.prismatic(), noise),
             depth: settings.depth.bias(&camera, noise),
             taxels: settings.touch.condition(robot.taxels.len(), noise),
             paint: random_paint(noise),
@@ -163,7 +162,7 @@ impl<'a> SensorRig<'a> {
         }
         let forces = self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise);
         let (mut t_cam_hand_told, mut joints) = self.errors.hand.apply(&t_cam_hand, &moment.joints);
-        if let Some(play) = self.settings.play.draw(&slides(self.robot), noise) {
+        if let Some(play) = self.settings.play.draw(&self.robot.prismatic(), noise) {
             (t_cam_hand_told, joints) = play.apply(&t_cam_hand_told, &joints);
         }
         let mut still = film.map(|(film, _)| film.surroundings.clone());
@@ -239,15 +238,4 @@ fn random_paint(noise: &mut SplitMix64) -> [[f32; 3]; 3] {
         let lighter = 0.8 + 0.5 * noise.uniform() as f32;
         tone.map(|v: f32| v * lighter)
     })
-}
-
-/// True of each of the robot's joints that is prismatic.
-fn slides(robot: &Hand) -> Vec<bool> {
-    let mut slides = vec![false; robot.tree.joint_names().len()];
-    for joint in robot.tree.joints() {
-        if let (Motion::Prismatic, Drive::Variable { index, .. }) = (joint.motion, joint.drive) {
-            slides[index] = true;
-        }
-    }
-    slides
 }

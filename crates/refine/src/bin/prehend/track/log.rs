@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use prehend_geometry::TriMesh;
+use prehend_geometry::{ReadOptions, TriMesh};
 use prehend_refine::data::FrameInput;
 use prehend_refine::data::mcap::{ImageTopics, RecordedFrame, Recording, RecordingWriter};
 use prehend_refine::scene::{Frame, Hand, Object};
@@ -49,7 +49,9 @@ impl Log {
         let object = Arc::new(Object::with_mass(&name, surface, options.mass, 0)?);
         let mut hand = None;
         if let Some(urdf) = &options.hand {
-            let prepared = Hand::load(urdf, options.taxels.as_deref(), cache().as_ref());
+            let read = ReadOptions::default().with_ros_packages();
+            let taxels = options.taxels.as_deref();
+            let prepared = Hand::load_with(urdf, taxels, cache().as_ref(), &read);
             let prepared = prepared.map_err(|e| anyhow!("{}: {e}", urdf.display()))?;
             hand = Some(Arc::new(prepared));
         }
