@@ -32,11 +32,11 @@ const DEPTH: f64 = 1e-4;
 /// Spring of the plunger \[N/m\], and radius of its tip \[m\].
 const SPRING: f64 = 1500.0;
 const TIP: f64 = 0.03;
-/// Of the camera: its frames, and standard deviations of x and y \[m\] and yaw \[rad\].
+/// Frames of the camera, and standard deviations of x and y \[m\] and yaw \[rad\].
 const FRAMES: TimeSteps = TimeSteps { dt: 1.0 / 60.0, steps: 42 };
 const NOISE: [f64; 3] = [1e-4, 1e-4, 1e-3];
 
-/// What is to be found, radius of gyration about the vertical among it. The first guess is a uniform box.
+/// Unknowns, radius of gyration about the vertical among them. The first guess is a uniform box.
 const COUNT: usize = 6;
 const NAMES: [&str; COUNT] =
     ["friction", "mass [kg]", "center x [mm]", "center y [mm]", "center z [mm]", "gyration [mm]"];

@@ -49,7 +49,7 @@ fn vase() -> TriMesh {
     mesh
 }
 
-/// What is to be found: rings, stripes and dots.
+/// True texels: rings, stripes and dots.
 fn painting() -> Vec<[f32; 3]> {
     let texel = |at: usize| {
         let (x, y) = ((at % SIZE) as f32, (at / SIZE) as f32);

@@ -27,10 +27,10 @@ const THROWS: usize = 1024;
 /// Radius \[m\] and density \[kg/m³\] of the ball.
 const RADIUS: f64 = 0.03;
 const DENSITY: f64 = 600.0;
-/// What is to be found, and the first guess.
+/// True friction coefficient, and the first guess.
 const FRICTION: f64 = 0.37;
 const GUESS: f64 = 0.15;
-/// Standard deviation of what is seen \[m\].
+/// Standard deviation of measured positions \[m\].
 const NOISE: f64 = 3e-3;
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 0.4, steps: 1 };
 

@@ -28,7 +28,7 @@ const MARBLES: [usize; 2] = [8, 4];
 /// Side of the ground \[m\], and its nodes along each.
 const SIDE: f64 = 1.2;
 const NODES: usize = 49;
-/// What is looked at \[s\].
+/// Duration of the simulation \[s\].
 const TIME: f64 = 0.8;
 
 /// Height of the ground at x and z \[m\]: a slope along x with dunes.

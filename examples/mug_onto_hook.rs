@@ -27,7 +27,7 @@ use prehend::sim::{
 /// Radius of the hook's rod, and where along it the mug is to hang \[m\].
 const ROD: f64 = 4e-3;
 const PLACE: f64 = 0.03;
-/// What is looked at, one after the other: how long after the throw \[s\].
+/// Horizons after the throw, one after the other \[s\].
 const HORIZONS: [f64; 2] = [0.12, 0.6];
 /// Units of velocity \[m/s\] and spin \[rad/s\] in which the throw is looked for.
 const UNITS: [f64; 6] = [0.1, 0.1, 0.1, 1.0, 1.0, 1.0];

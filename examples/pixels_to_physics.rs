@@ -21,7 +21,7 @@ use prehend::sim::{
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };
 const HALF: [f64; 3] = [0.04, 0.03, 0.03];
-/// What is to be found: velocity [m/s], spin [rad/s] and friction coefficient, in these units.
+/// Unknowns: velocity [m/s], spin [rad/s] and friction coefficient, in these units.
 const UNITS: [f64; 4] = [0.1, 0.1, 1.0, 0.1];
 const TRUTH: [f64; 4] = [0.7, 0.25, 4.0, 0.22];
 const GUESS: [f64; 4] = [0.5, 0.0, 0.0, 0.3];

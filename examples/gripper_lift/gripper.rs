@@ -35,14 +35,14 @@ const URDF: &str = r#"<robot name="slides">
 /// A gripper that hangs on a lift, over the origin.
 pub(crate) struct Gripper {
     pub(crate) name: String,
-    /// What the lift moves.
+    /// Base, which the lift moves.
     pub(crate) base: BodyId,
-    /// What presses.
+    /// Pads, which press.
     pub(crate) pads: [BodyId; 2],
     /// Corners of each body that is drawn.
     pub(crate) corners: Vec<(BodyId, Vec<Point3<f64>>)>,
     lift: JointForceId,
-    /// What closes it, with the parameter to set and its value when closed.
+    /// Joint forces that close it, with the parameter to set and its value when closed.
     closers: Vec<(JointForceId, &'static str, f64)>,
 }
 

@@ -1,4 +1,4 @@
-//! What a body looks like from afar.
+//! Convex hulls in the plane.
 
 /// The corners of the convex hull, one after the other (A. M. Andrew, 1979).
 pub(crate) fn convex_hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {

@@ -26,7 +26,7 @@ const CLOSED: f64 = 0.5;
 const LIFTED: f64 = 1.1;
 const HELD: f64 = 1.4;
 const LIFT: f64 = 0.1;
-/// What the pads should press with \[N\].
+/// Desired force of each pad \[N\].
 const GRIP: f64 = 6.0;
 
 pub(crate) fn main() -> anyhow::Result<()> {

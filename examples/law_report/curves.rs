@@ -7,9 +7,9 @@ use super::point_contact::{DEPTH, PointContact};
 /// Something to be drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Curve {
-    /// What it is.
+    /// Name.
     pub(crate) name: String,
-    /// What the axes are, with units.
+    /// Names of the axes, with units.
     pub(crate) axes: [&'static str; 2],
     /// The points.
     pub(crate) points: Vec<[f64; 2]>,

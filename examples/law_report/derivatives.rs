@@ -13,7 +13,7 @@ use super::point_contact::{AREA, DEPTH, PointContact};
 const CONTACTS: usize = 200;
 /// Steps of differences: of the gap \[m\] and the speeds \[m/s\].
 const STEPS: [f64; 4] = [1e-9, 1e-6, 1e-6, 1e-6];
-/// Of parameters, relative to their size.
+/// Steps of differences by parameters, relative to their size.
 const PARAMETER_STEP: f64 = 1e-6;
 /// Error that is none, relative to the largest derivative by the same input.
 const TOLERANCE: f64 = 1e-5;

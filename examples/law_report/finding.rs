@@ -1,19 +1,19 @@
-//! What is said of a law.
+//! Findings about a law.
 
 /// One thing that was tried.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
-    /// What was measured, with its unit.
+    /// Measured quantity, with its unit.
     pub(crate) what: String,
-    /// The figure.
+    /// Its value.
     pub(crate) measured: f64,
-    /// What to think of it.
+    /// Verdict on it.
     pub(crate) verdict: Verdict,
-    /// What was expected, or what it means.
+    /// Expected value, or meaning.
     pub(crate) remark: String,
 }
 
-/// What to think of a finding.
+/// Verdict on a finding.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Verdict {
     /// As it should be.

@@ -13,10 +13,10 @@ use super::motion::{GRAVITY, Specimen};
 use super::passivity;
 use super::point_contact::{DEPTH, PointContact};
 
-/// What was found of a law, see [`law_report`].
+/// Findings about a law, see [`law_report`].
 #[derive(Clone, Debug)]
 pub(crate) struct LawReport {
-    /// What was tried, one line each.
+    /// Findings, one line each.
     pub(crate) findings: Vec<Finding>,
     /// Forces and motions, to be drawn.
     pub(crate) curves: Vec<Curve>,

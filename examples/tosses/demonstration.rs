@@ -13,7 +13,7 @@ use super::recording::{RATE, Row, Start, Toss};
 const TOSSES: u32 = 24;
 const ROWS: usize = 100;
 const STEPS: Steps<RungeKutta4> = Steps { integrator: RungeKutta4, per_row: 16, board: true };
-/// What is not as usual, and how nearly it has to be found.
+/// Parameters with unusual values, and tolerances of their estimates.
 const UNUSUAL: [(&str, f64, f64); 5] = [
     ("half_width", 0.0512, 1e-4),
     ("inertia_z", 2.6e-3, 7e-5),

@@ -1,4 +1,4 @@
-//! What may be identified: the parameters of the cube, of its contacts and of the recording.
+//! Identifiable parameters: those of the cube, of its contacts and of the recording.
 
 use std::ops::Range;
 

@@ -50,7 +50,7 @@ pub(crate) struct Start<S: Scalar = f64> {
 }
 
 impl<S: Scalar> Start<S> {
-    /// The same numbers without derivatives.
+    /// Values without derivatives.
     pub(crate) fn value(&self) -> Start {
         let state = State { pose: self.pose, linear: self.velocity, angular: self.spin }.value();
         Start { pose: state.pose, velocity: state.linear, spin: state.angular }

@@ -13,7 +13,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of `count` numbers before the first step.
+    /// Moments of `count` numbers before the first step.
     pub fn new(count: usize) -> Self {
         Self { mean: vec![0.0; count], square: vec![0.0; count] }
     }

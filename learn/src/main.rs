@@ -57,13 +57,13 @@ struct Arguments {
     /// Decides everything that is random
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// What computes; results of graphics devices differ a little from call to call
+    /// Computing device; results of graphics devices differ a little from call to call
     #[arg(long, value_enum, default_value = "cpu")]
     device: Kind,
 }
 
 impl Arguments {
-    /// What frames are of: the content of files, how they are read, and `settings`.
+    /// Description of the frames' inputs: the content of files, how they are read, and `settings`.
     fn inputs(&self, settings: &ViewSettings) -> anyhow::Result<String> {
         let Self { object, hand, taxels, unit, mass, .. } = self;
         let files = [Some(object), hand.as_ref(), taxels.as_ref()].into_iter().flatten();

@@ -10,11 +10,11 @@ use prehend_refine::network::{CHANNELS, Tensor as Array, Tensors, VOTE};
 /// Widths of the layers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Widths {
-    /// Of each point, alone.
+    /// Layers of each point, alone.
     pub point: Vec<usize>,
-    /// Of all points together.
+    /// Layers of all points together.
     pub global: Vec<usize>,
-    /// Of each vote, but for the last.
+    /// Layers of each vote, but for the last.
     pub vote: Vec<usize>,
 }
 

@@ -16,7 +16,7 @@ use prehend_refine::synth::{
 use prehend_refine::{Hand, Object, PreparedFrame};
 use rayon::prelude::*;
 
-/// What was seen and felt of the object, and where it was.
+/// Points of the object from images and touch, and its true pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Points in the camera frame.

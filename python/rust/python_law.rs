@@ -14,7 +14,7 @@ use crate::world::laws::Values;
 /// Gap, its rate, slip, normal and area.
 const MOTION: usize = 9;
 
-/// What a law has raised. Laws have no way to fail: they answer what is no number, which ends the simulation, and this says why.
+/// Exception that a law has raised. Laws have no way to fail: they return NaN, which ends the simulation, and this says why.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
 
 /// Sees to it that what a law raises from now on is raised in the end.
@@ -47,7 +47,7 @@ pub(crate) struct PythonLaw {
 }
 
 impl PythonLaw {
-    /// Of an object with a method `law(p, contact)`, and the values of its parameters in the order of `parameters`, its list of names.
+    /// Law of an object with a method `law(p, contact)`, and the values of its parameters in the order of `parameters`, its list of names.
     pub(crate) fn new(law: &Bound<'_, PyAny>, mut given: Values) -> PyResult<Self> {
         let names: Vec<String> = match law.getattr_opt("parameters")? {
             Some(names) => names.extract()?,

@@ -178,7 +178,7 @@ impl Rollout {
         Ok(Inputs { states, parameters, controls, batch })
     }
 
-    /// What `compute` makes of each world, side by side, with Python's other threads running on.
+    /// Results of `compute` for all worlds, in parallel, while Python's other threads run on.
     fn each<T: Send>(
         &self,
         py: Python<'_>,

@@ -70,7 +70,7 @@ impl<T> Arena<T> {
         self.full.get(index).unwrap_or(&self.current)
     }
 
-    /// What lies between `bottom` and `top` in the topmost chunk that holds any of it, and the mark below it.
+    /// Items between `bottom` and `top` in the topmost chunk that holds any, and the mark below them.
     pub(crate) fn top_chunk(&self, bottom: Mark, mut top: Mark) -> (&[T], Mark) {
         loop {
             let start = if top.chunk == bottom.chunk { bottom.len } else { 0 };

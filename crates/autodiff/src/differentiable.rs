@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 /// Implementing these five functions is all that a differentiation mode needs: `real_field.rs` derives
 /// the whole of `RealField` from them.
 pub(crate) trait Differentiable: Copy {
-    /// What values and slopes are made of: `f64`, or another scalar for derivatives of derivatives.
+    /// Scalar type of values and slopes: `f64`, or another one for derivatives of derivatives.
     type Inner: Scalar;
 
     /// A plain number as a value or slope.

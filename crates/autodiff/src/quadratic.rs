@@ -26,7 +26,7 @@ pub struct Quadratic<const N: usize> {
 }
 
 impl<const N: usize> Quadratic<N> {
-    /// Of no residuals.
+    /// Zero, the sum over no residuals.
     pub fn zeros() -> Self {
         Self { value: 0.0, gradient: SVector::zeros(), hessian: SMatrix::zeros() }
     }

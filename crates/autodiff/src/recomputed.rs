@@ -63,7 +63,7 @@ fn active_places(x: &[Var]) -> Box<[u32]> {
 struct Recomputed<F> {
     function: F,
     values: Box<[f64]>,
-    /// Of [`active_places`].
+    /// Indices of the inputs that carry derivatives, from [`active_places`].
     active: Box<[u32]>,
 }
 

@@ -25,7 +25,7 @@ use crate::vjp::CustomVjp;
 /// `powf` by the exponent at a negative base. Elsewhere a finite value has no NaN among its first derivatives; what is beyond the range
 /// of `f64`, such as the slope 1/x of a logarithm at a subnormal number, is infinite.
 pub trait Scalar: RealField + Copy + Default {
-    /// Of which order the derivatives are that it carries: 0 for plain numbers, 2 for forward mode over another mode.
+    /// Order of the derivatives that it carries: 0 for plain numbers, 1 for one mode, 2 for forward mode over another mode.
     ///
     /// An operation that brings its own first derivatives cannot serve numbers of a higher order, and should refuse
     /// them when it is compiled: `const { assert!(S::ORDER <= 1) }`.

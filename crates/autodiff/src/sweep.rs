@@ -213,7 +213,7 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
     std::array::from_fn(|lane| a[lane] + b[lane])
 }
 
-/// What flows back through `slope`: just the product, or looking carefully.
+/// Adjoint passed to a parent: `slope` · `adjoint`, or [`chain`] of them if `CAREFUL`.
 #[inline]
 fn carry_over<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
     adjoint.map(|a| if CAREFUL { chain(slope, a) } else { slope * a })

@@ -12,7 +12,7 @@ use crate::differentiable::{chain, chain_active};
 use crate::var::Var;
 use crate::vjp::CustomVjp;
 
-/// What the sweep reads: 24 bytes for a node of two parents.
+/// Entry of the tape: a node's two parents and partial derivatives (24 bytes), or a group.
 #[derive(Clone, Copy)]
 pub(crate) struct Entry {
     pub(crate) slopes: [f64; 2],

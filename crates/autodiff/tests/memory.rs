@@ -1,5 +1,4 @@
-//! What the tape promises of memory: nothing is allocated for a gradient like the last one, and a node takes
-//! 24 bytes.
+//! Memory of the tape: nothing is allocated for a gradient like the last one, and a node takes 24 bytes.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

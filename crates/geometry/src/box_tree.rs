@@ -85,7 +85,7 @@ pub(crate) struct BoxTree {
     nodes: Vec<Node>,
     /// Boxes by their places, in the tree's order.
     order: Vec<u32>,
-    /// The same boxes.
+    /// Boxes in the order of `order`.
     boxes: Vec<Bounds>,
 }
 

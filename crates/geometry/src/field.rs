@@ -1,4 +1,4 @@
-//! What a contact simulator asks of a shape: signed distance with two derivatives.
+//! Signed distance fields with gradient and Hessian, for contact simulation.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

@@ -14,7 +14,7 @@ pub struct Inertial {
 }
 
 impl Inertial {
-    /// The same after a motion of the body, or in the frame that `t_new_body` leads to.
+    /// Mass and inertia in the frame that `t_new_body` leads to, or after that motion of the body.
     #[must_use]
     pub fn moved(&self, t_new_body: &Isometry3<f64>) -> Self {
         let r = t_new_body.rotation.to_rotation_matrix();

@@ -82,7 +82,7 @@ pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassPropert
 }
 
 impl MassProperties {
-    /// The same solid weighing `mass` \[kg\].
+    /// Mass properties of the solid at the mass `mass` \[kg\], with its inertia in proportion.
     ///
     /// # Errors
     /// [`MassError::BadScale`] where the mass is not positive and finite, [`MassError::Range`] where the inertia would not be.

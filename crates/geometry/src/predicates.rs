@@ -29,7 +29,7 @@ pub(super) struct Side {
 pub(super) struct Plane<'a> {
     corners: [&'a Point3<f64>; 3],
     normal: Vector3<f64>,
-    /// What `normal` would be had its terms not canceled: bounds its error.
+    /// Sum of the absolute terms of each component of `normal`: bounds its error.
     bound: Vector3<f64>,
     /// How the points asked about move relative to the triangle: along or against the infinitesimal motion.
     motion: i8,
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix64;
 
-    /// The same in integers, of which the coordinates are multiples.
+    /// Triple product (u × v)·w of points with integer coordinates.
     fn integer_triple(u: Arrow<'_>, v: Arrow<'_>, w: Arrow<'_>) -> i128 {
         let d = |a: Arrow<'_>| [0, 1, 2].map(|k| a[1][k] as i128 - a[0][k] as i128);
         let (u, v, w) = (d(u), d(v), d(w));

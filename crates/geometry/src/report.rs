@@ -1,8 +1,8 @@
-//! What was wrong with a mesh, what was done about it, and what still is.
+//! Report of a mesh's repairs and remaining defects.
 
 use std::fmt;
 
-/// What [`TriMesh::cleaned`](crate::TriMesh::cleaned) changed, and what is still wrong with its result.
+/// Repairs made by [`TriMesh::cleaned`](crate::TriMesh::cleaned), and the defects that its result still has.
 ///
 /// Printed, it is one line that names what is not zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

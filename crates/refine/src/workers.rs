@@ -45,7 +45,7 @@ impl Workers {
     /// come, in no particular order. Once `done` fails, no further job is begun.
     ///
     /// # Errors
-    /// What `done` returns.
+    /// The error of `done`.
     pub fn run<J, T, E, W>(
         &self,
         jobs: &[J],

@@ -66,7 +66,7 @@ fn start(seed: u64, angle: f64, shift: f64) -> Isometry3<f64> {
     perturb_about(&truth(), &truth().translation.vector, &twist)
 }
 
-/// What the camera sees of the bottle alone, averaged over 9 by 9 samples a pixel.
+/// Color and coverage of the bottle alone, averaged over 9 by 9 samples a pixel.
 struct Picture {
     color: RgbImage,
     coverage: Vec<f32>,

@@ -56,7 +56,7 @@ pub enum CameraError {
         index: usize,
         /// The entry.
         value: f64,
-        /// What a matrix without skew holds there.
+        /// Value of the entry in a matrix without skew.
         expected: f64,
     },
     /// The image has no pixels.
@@ -142,7 +142,7 @@ impl Camera {
         Vector3::new((u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0)
     }
 
-    /// The same view with `factor` times the resolution, for pyramid levels (0.5) and supersampling (3).
+    /// Camera of the same view with `factor` times the resolution, for pyramid levels (0.5) and supersampling (3).
     ///
     /// Image borders are kept in place, so the principal point moves to `(cx + 0.5) factor - 0.5`. Sizes
     /// round down and stay at least one pixel.

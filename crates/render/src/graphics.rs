@@ -34,7 +34,7 @@ const RIGID: f64 = 1e-4;
 /// A model's pose in the view space of a graphics engine (x right, y up, z back): what its model-view matrix says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelView {
-    /// The same pose before a camera of this crate (x right, y down, z forward) \[m\].
+    /// Pose, model to camera frame of this crate (x right, y down, z forward) \[m\].
     pub t_cam_model: Isometry3<f64>,
 }
 

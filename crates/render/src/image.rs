@@ -240,7 +240,7 @@ impl DepthImage {
         Self::decode(&read(path)?, scale, path)
     }
 
-    /// The same of the file whose contents are `bytes`; errors call it `name`.
+    /// Depth image of a 16-bit gray PNG file with contents `bytes`, whose unit is `scale` meters; errors call it `name`.
     ///
     /// # Errors
     /// When they cannot be decoded or are not 16-bit gray, or `scale` is not positive.
@@ -280,8 +280,8 @@ impl DepthImage {
         Self::downsampled_of(self.width, self.height, factor, all, |at| self.pixels[at])
     }
 
-    /// The same of an image of `width` by `height` pixels that is stored nowhere: `depth` says what it has at an index, and it has nothing
-    /// beyond the columns and rows `within`.
+    /// Lower medians as of [`downsampled`](Self::downsampled), for an image of `width` by `height` pixels that is not stored: `depth` is its
+    /// depth \[m\] at a row-major index, taken as 0 beyond the columns and rows `within`.
     pub fn downsampled_of(
         width: usize,
         height: usize,

@@ -49,7 +49,7 @@ pub enum LightError {
 }
 
 impl Light {
-    /// The same light from everywhere: colors are shown as stored times `strength`.
+    /// Uniform ambient light: colors are shown as stored times `strength`.
     pub fn ambient(strength: f64) -> Self {
         Self { ambient: [strength; 3], directional: [Vector3::zeros(); 3], offset: [0.0; 3] }
     }

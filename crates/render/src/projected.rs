@@ -70,7 +70,7 @@ impl Region {
         Self { x0: (x0 / factor).min(x1), y0: (y0 / factor).min(y1), x1, y1 }
     }
 
-    /// The same rectangle in an image of `factor` times the resolution.
+    /// Rectangle in an image of `factor` times the resolution.
     pub(crate) fn scaled(&self, factor: usize) -> Self {
         let Self { x0, y0, x1, y1 } = *self;
         Self { x0: x0 * factor, y0: y0 * factor, x1: x1 * factor, y1: y1 * factor }

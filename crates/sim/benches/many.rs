@@ -83,7 +83,7 @@ fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
     Ok((world, states))
 }
 
-/// The same world with every contact of its groups by itself.
+/// The world with every contact of its groups by itself.
 fn every_pair(grouped: &World) -> anyhow::Result<World> {
     let mut world = World { contact_groups: Vec::new(), ..grouped.clone() };
     for group in &grouped.contact_groups {

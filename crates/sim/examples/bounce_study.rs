@@ -58,10 +58,10 @@ impl ContactLaw for Power {
 
 /// Errors over all phases.
 struct Errors {
-    /// Of the derivative: the median and the worst.
+    /// Median and worst error of the derivative.
     median: f64,
     worst: f64,
-    /// Of the speed after the bounce, the worst \[m/s\].
+    /// Worst error of the speed after the bounce \[m/s\].
     speed: f64,
 }
 

@@ -77,7 +77,7 @@ impl Dataset {
         Ok(Object { object })
     }
 
-    /// What is listed as to be found, by the numbers of scene, image, object and mask.
+    /// Targets that the dataset lists, by the numbers of scene, image, object and mask.
     fn _listed(&self) -> PyResult<Vec<(u32, u32, u32, usize)>> {
         let all = find_targets(&self.dataset, None).raise()?;
         Ok(all.iter().map(|t| (t.scene_id, t.im_id, t.obj_id, t.instance)).collect())

@@ -1,4 +1,4 @@
-//! What was found, as Python's dataclasses.
+//! Estimates, as Python's dataclasses.
 
 use nalgebra::Isometry3;
 use prehend_refine::Refined;

@@ -180,7 +180,7 @@ impl Frame {
         Ok((array(py, poses, &[found.len(), 4, 4])?, array(py, weights, &[found.len()])?))
     }
 
-    /// What looks wrong with object, frame and a pose in it, in words.
+    /// Warnings about object, frame and a pose in it, in words.
     fn warnings(&self, py: Python<'_>, pose: Numbers<'_>) -> PyResult<Vec<String>> {
         let pose = self::pose(&pose, "pose")?;
         let warnings = detached(py, || {

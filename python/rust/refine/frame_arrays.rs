@@ -1,4 +1,4 @@
-//! What a frame holds, as arrays.
+//! Arrays of a frame.
 
 use std::sync::Arc;
 
@@ -102,7 +102,7 @@ impl Frame {
         gravity.map(|gravity| array(py, gravity.as_slice().to_vec(), &[3])).transpose()
     }
 
-    /// Of a frame of a dataset: the numbers of scene, image and object.
+    /// Numbers of scene, image and object; None of a frame without a dataset.
     #[getter]
     fn ids(&self) -> Option<(u32, u32, u32)> {
         self.target.map(|target| (target.scene_id, target.im_id, target.obj_id))

@@ -1,4 +1,4 @@
-//! What is said and felt of a hand.
+//! Measurements of a hand: its pose, joints and touch.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

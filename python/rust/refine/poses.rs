@@ -16,7 +16,7 @@ pub(super) fn pose(array: &Numbers<'_>, what: &str) -> PyResult<Isometry3<f64>> 
     }
 }
 
-/// The same of its sixteen numbers.
+/// The pose of a matrix's sixteen numbers.
 fn pose_of(numbers: &[f64], what: &str) -> PyResult<Isometry3<f64>> {
     let rows = <&[f64; 16]>::try_from(numbers).raise()?;
     prehend_refine::data::pose_from_matrix(rows).map_err(|e| wrong(format!("{what}: {e}")))

@@ -13,7 +13,7 @@ use crate::arrays::array;
 use crate::error::Raise;
 use crate::threads::detached;
 
-/// What a rig of camera and hand gets wrong in all of its frames, as `calibrate` has found it.
+/// Calibration of a rig of camera and hand: errors that all of its frames share, as `calibrate` has found them.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Rig {
     pub(super) rig: Arc<prehend_refine::rig::Rig>,
@@ -32,14 +32,14 @@ impl Rig {
         self.rig.save(&path).raise()
     }
 
-    /// The object of that number with the surface and the mass that the rig has found; as it is, if the rig does not know the number.
+    /// The object of that number with the surface that the rig has found and its own mass; as it is, if the rig does not know the number.
     fn corrected(&self, py: Python<'_>, object: &Object, object_id: u32) -> PyResult<Object> {
         let given = Arc::clone(&object.object);
         let corrected = detached(py, || self.rig.corrected_object(object_id, &given))?.raise()?;
         Ok(Object { object: corrected.map_or(given, Arc::new) })
     }
 
-    /// What it corrects by name [m, rad; focal lengths], but for the smooth field that depth is off by.
+    /// Corrections by name [m, rad; focal lengths], without the smooth field of depth offsets.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let parameters = PyDict::new(py);

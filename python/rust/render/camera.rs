@@ -16,7 +16,7 @@ pub(super) fn camera(k: &Numbers<'_>, (rows, columns): (usize, usize)) -> PyResu
     }
 }
 
-/// The same with other fx, fy, cx and cy \[px\].
+/// `camera` with other fx, fy, cx and cy \[px\]; unchanged without values.
 pub(super) fn with_intrinsics(camera: &Camera, values: &[f64]) -> PyResult<Camera> {
     let [fx, fy, cx, cy] = *values else { return Ok(*camera) };
     let camera = Camera { fx, fy, cx, cy, ..*camera };

@@ -30,7 +30,7 @@ pub(super) fn to_array<'py>(
     array(py, light.parameters(), &SHAPE)
 }
 
-/// The same light from everywhere, as an array of 3 × 5: colors are shown as stored times `strength`.
+/// Ambient light, as an array of 3 × 5: colors are shown as stored times `strength`.
 ///
 /// Rows of a light are the channels red, green and blue; columns are its ambient factor a, its directional vector d (3 numbers, camera frame,
 /// towards the light) and its offset o. A surface of color c with the unit normal n shows c·max(0, a + d·n) + o.

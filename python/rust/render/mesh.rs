@@ -1,4 +1,4 @@
-//! What is rendered, from whatever Python gives for it.
+//! Meshes to be rendered, from files or arrays of Python.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -15,7 +15,7 @@ use super::renderer::Renderer;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
 
-/// What pictures can be made with, each once for all, or a batch.
+/// Inputs of pictures, each once for all, or a batch.
 pub(super) struct Inputs<'a> {
     pose: Input<'a>,
     /// In the order of [`NAMES`].

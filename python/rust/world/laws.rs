@@ -18,7 +18,7 @@ const SLOW: &std::ffi::CStr = c"a contact law in Python is slow: it is called at
 /// Parameters by name, from keyword arguments.
 pub(crate) type Values = BTreeMap<String, f64>;
 
-/// What is said of a law: a line, then name, unit and meaning of its parameters.
+/// Description of a law: a line, then name, unit and meaning of its parameters.
 type Description = (String, Vec<(&'static str, &'static str, &'static str)>);
 
 fn described(summary: &str, parameters: &[LawParameter]) -> Description {

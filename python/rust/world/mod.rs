@@ -50,7 +50,7 @@ impl World {
         })
     }
 
-    /// What `change` makes of the world, with the parameters that are new since, each by its last name. If it fails, nothing has changed.
+    /// Changes the world by `change`; returns the names of its new parameters by their last part. If it fails, nothing has changed.
     pub(crate) fn naming<T>(
         &mut self,
         change: impl FnOnce(&mut prehend_sim::World) -> PyResult<T>,
@@ -76,7 +76,7 @@ impl World {
     }
 }
 
-/// What is said of a parameter that there is not.
+/// Error message for an unknown parameter.
 fn unknown(name: &str, names: &[String]) -> String {
     let near = names.iter().max_by(|a, b| strsim::jaro(a, name).total_cmp(&strsim::jaro(b, name)));
     let near = near.map_or_else(String::new, |near| format!(": do you mean '{near}'?"));

@@ -1,4 +1,4 @@
-//! What sensors feel, and how short steps have to be.
+//! Sensors of a world, and its longest stable step.
 
 use prehend_sim::Integrator;
 use pyo3::prelude::*;
@@ -11,7 +11,7 @@ use crate::integrator::AnyIntegrator;
 
 #[pymethods]
 impl World {
-    /// What contacts and bushings do to a body: force [N] and torque [N m] about its center of mass, of a link about the origin of its frame; world frame.
+    /// Wrench of contacts and bushings on a body, world frame: force [N] and torque [N m] about its center of mass, of a link about its frame's origin.
     fn contact_wrench<'py>(
         &self,
         py: Python<'py>,
@@ -23,7 +23,7 @@ impl World {
         array(py, wrench.as_slice().to_vec(), &[6])
     }
 
-    /// What an accelerometer at a point of a body shows [m/s²], both in the body's frame: acceleration less that of free fall.
+    /// Acceleration of a point of a body less that of free fall [m/s²], as an accelerometer measures it; point and result in the body's frame.
     fn accelerometer<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! What is tried one after the other, and what came of it.
+//! Attacks, run one after the other, and their results.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,7 +19,7 @@ pub struct Attack<'a> {
 }
 
 impl<'a> Attack<'a> {
-    /// What `run` does, which returns its row of the table. The name is of it alone.
+    /// Attack by `run`, which returns its row of the table. The name is of it alone.
     pub fn new(name: impl Into<String>, run: impl FnOnce() -> Result<Row> + 'a) -> Self {
         Self { name: name.into(), run: Box::new(run) }
     }

@@ -54,7 +54,7 @@ fn watch(parser: &Parser, current: &Current, done: &AtomicBool) {
     }
 }
 
-/// What came of the files so far.
+/// Results of the files so far.
 struct Trials<'a> {
     parser: &'a Parser,
     dataset: SmallDataset,

@@ -24,7 +24,7 @@ struct Arguments {
 enum Command {
     /// Give every parser broken files
     Parsers(Parsers),
-    /// The same, guided by coverage, with AddressSanitizer (installs cargo-fuzz)
+    /// Give every parser files of a coverage-guided fuzzer, with AddressSanitizer (installs cargo-fuzz)
     Fuzz(Fuzz),
     /// Kill long commands, fill the disk, break inputs, at random moments
     Faults(Faults),
@@ -42,7 +42,7 @@ enum Command {
 
 #[derive(Args)]
 struct Chosen {
-    /// Of these alone; may be repeated
+    /// Name of one to run instead of all; may be repeated
     #[arg(long)]
     only: Vec<String>,
 }
@@ -88,7 +88,7 @@ struct Loads {
     /// The command `prehend` [default: built]
     #[arg(long)]
     program: Option<PathBuf>,
-    /// Of their full size
+    /// Factor of the loads' full size
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// Folder for the curves of memory over time
@@ -227,7 +227,7 @@ impl All {
     }
 }
 
-/// What a command's options are if none is given.
+/// Default options of a command.
 fn defaults<T: Args>() -> Result<T> {
     let command = T::augment_args(clap::Command::new("defaults"));
     Ok(T::from_arg_matches(&command.try_get_matches_from(["defaults"])?)?)

@@ -17,7 +17,7 @@ pub struct Mutated {
     package: &'static str,
     /// Its files, from the root of the repository.
     files: &'static str,
-    /// What it is built with.
+    /// Features that it is built with.
     features: &'static str,
     /// Which tests have to notice, the fastest first.
     rounds: &'static [Round],
@@ -137,7 +137,7 @@ pub fn run(part: &Mutated, count: usize, seed: usize) -> Result<Row> {
     Ok(Row { tried, wrong, required: NOTICED, note, ..row })
 }
 
-/// What became of some mutants.
+/// Results of some mutants.
 struct Found {
     missed: BTreeSet<String>,
     /// Those that ran into the limit of time among them.
@@ -146,7 +146,7 @@ struct Found {
 }
 
 impl Found {
-    /// What cargo-mutants left in `folder`.
+    /// Results of cargo-mutants in `folder`.
     fn read(folder: &Path) -> Result<Self> {
         let names = |file: &str| -> Result<BTreeSet<String>> {
             let text = std::fs::read_to_string(folder.join(file))?;
@@ -176,7 +176,7 @@ impl Mutated {
         ["mutants", "--package", self.package, "--file", self.files]
     }
 
-    /// What came of a round with all mutants that the options `chosen` choose. Nothing of another run in `output` is left.
+    /// Results of a round with all mutants that the options `chosen` choose. Nothing of another run in `output` is left.
     fn found(&self, chosen: &[String], round: &Round, output: &Path) -> Result<Found> {
         if output.exists() {
             std::fs::remove_dir_all(output)?;

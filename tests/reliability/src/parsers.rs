@@ -44,16 +44,16 @@ pub enum Form {
     Grid,
 }
 
-/// What reads a kind of file.
+/// Parser of a kind of file.
 pub struct Parser {
     /// Its name: that of the folder of its corpus.
     pub name: &'static str,
-    /// What its files are made of.
+    /// Form of its files.
     pub form: Form,
     /// Reads `bytes`. Whether they are right does not matter; what comes of them is checked.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The parser's error.
     pub read: fn(&SmallDataset, &[u8]) -> Result<()>,
 }
 

@@ -1,4 +1,4 @@
-//! What is simulated.
+//! Simulated worlds.
 
 use std::sync::Arc;
 

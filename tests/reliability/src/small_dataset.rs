@@ -92,7 +92,7 @@ impl SmallDataset {
         self.folder.path().join(name)
     }
 
-    /// The same box with an image around it.
+    /// The box with an image around it.
     pub fn textured() -> TriMesh {
         let mut mesh = Self::object();
         let uv = |v: &Point3<f64>| [10.0 * v.x + 0.5, 10.0 * v.y + 0.5];

@@ -7,26 +7,26 @@ use serde::{Deserialize, Serialize};
 /// One kind of attack.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Row {
-    /// What was attacked, and how.
+    /// Target and kind of the attack.
     pub what: String,
-    /// How often.
+    /// Number of trials.
     pub tried: usize,
-    /// What ended in a panic or by a signal.
+    /// Trials that ended in a panic or by a signal.
     pub crashes: usize,
-    /// What did not end in time.
+    /// Trials that did not end in time.
     pub hangs: usize,
-    /// What ended in another result than it should.
+    /// Trials that ended in another result than they should.
     pub wrong: usize,
     /// The share that has to hold.
     pub required: f64,
-    /// What else is to be said: sizes, times.
+    /// Note with sizes and times.
     pub note: String,
     /// The commit of the code, if it is told.
     pub commit: String,
 }
 
 impl Row {
-    /// Of attacks that must all be withstood; none yet.
+    /// Row of attacks that must all be withstood; none yet.
     pub fn new(what: impl Into<String>) -> Self {
         let (what, note, commit) = (what.into(), String::new(), String::new());
         Self { what, tried: 0, crashes: 0, hangs: 0, wrong: 0, required: 1.0, note, commit }

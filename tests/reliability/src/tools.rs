@@ -92,7 +92,7 @@ pub fn numbers() -> Vec<Attack<'static>> {
     attacks
 }
 
-/// What `cargo test` says.
+/// Results of `cargo test`.
 fn tested(mut command: Command, what: &str) -> Result<Row> {
     let output = command.stderr(Stdio::inherit()).output().context("cargo")?;
     let said = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -1,4 +1,4 @@
-//! What this crate brings to the comparison: one line for each workload and mode.
+//! Modes of this crate in the comparison: one line for each workload and mode.
 
 use prehend_autodiff::{Fwd, LocalFunction, Recording, Scalar, Var, gradient_into};
 
@@ -105,7 +105,7 @@ fn reverse<const N: usize>(
     }
 }
 
-/// What two neighbors in the Rosenbrock chain add.
+/// Term of two neighbors in the Rosenbrock chain.
 struct RosenbrockTerm;
 
 impl LocalFunction<2, 1> for RosenbrockTerm {

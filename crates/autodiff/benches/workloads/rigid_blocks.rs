@@ -9,7 +9,7 @@ use super::workloads::rigid_body::{
     GRAVITY, INERTIA, STEP, Scene, State, TARGET, Wrench, push, wrench,
 };
 
-/// What `rigid_body::miss` computes.
+/// `rigid_body::miss` in block nodes.
 pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
     let [r0, r1, r2, x, y, z, vx, vy, vz, wx, wy, wz] = *inputs;
     let inertia = Matrix3::from_diagonal(&Vector3::from(INERTIA));

@@ -133,7 +133,7 @@ pub(crate) fn wrench<T: RealField + Copy>(state: &State<T>, scene: &Scene) -> Wr
     sum
 }
 
-/// What the floor does to one point of the body, if that is below it: a Hunt–Crossley penalty with
+/// Wrench of the floor on one point of the body, if that is below it: a Hunt–Crossley penalty with
 /// regularized Coulomb friction.
 #[inline]
 pub(crate) fn contact<T: RealField + Copy>(

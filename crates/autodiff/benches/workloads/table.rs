@@ -34,7 +34,7 @@ pub(crate) struct Comparison<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Comparison<'a, N> {
-    /// Of the gradients of `primal` at `inputs`.
+    /// Comparison of the gradients of `primal` at `inputs`.
     pub(crate) fn new(
         workload: &'static str,
         inputs: [f64; N],

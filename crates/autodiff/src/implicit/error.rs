@@ -1,4 +1,4 @@
-//! What can be wrong with a solution.
+//! Errors of implicit equations.
 
 use crate::solve::SolveError;
 

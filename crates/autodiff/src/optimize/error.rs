@@ -48,9 +48,9 @@ pub enum OptimizeError {
     Setting {
         /// Name of the field.
         name: &'static str,
-        /// What it holds.
+        /// Value of the field.
         value: f64,
-        /// What it may hold.
+        /// Range of values that it may have, such as `at least 0`.
         range: &'static str,
     },
 }

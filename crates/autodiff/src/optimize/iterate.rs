@@ -7,7 +7,7 @@ use super::{Criteria, Iteration, OptimizeError, Outcome, Stop};
 /// Least ratio of actual to predicted decrease at which a step is taken (Armijo's condition).
 const SUFFICIENT_GAIN: f64 = 1e-4;
 
-/// What an objective says of one point.
+/// Value and gradient of an objective at one point.
 pub(super) trait Evaluation {
     fn value(&self) -> f64;
     fn gradient(&self) -> &[f64];

@@ -209,7 +209,7 @@ impl LevenbergMarquardt {
     }
 }
 
-/// What a solve ends with: its outcome, and the linearization there.
+/// Outcome of a solve, and the linearization at its last parameters.
 pub type Solved<P> = (Outcome<<P as LeastSquares>::Point>, <P as LeastSquares>::Linearization);
 
 /// Where the parameters of a problem live.

@@ -1,4 +1,4 @@
-//! What a least-squares problem is to the solver.
+//! Least-squares problems on manifolds and their quadratic models.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +9,7 @@ use super::iterate::Evaluation;
 pub trait LeastSquares {
     /// Where the parameters are.
     type Point: Clone;
-    /// What is known of the sum about a point.
+    /// Quadratic model of the sum about a point.
     type Linearization: QuadraticModel;
 
     /// The sum about `at`, by the directions of the tangent space there.

@@ -1,4 +1,4 @@
-//! What an optimization says of itself, on the way and at the end.
+//! Iterations and outcome of an optimization, for its caller.
 
 /// Why an optimization ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

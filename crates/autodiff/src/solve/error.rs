@@ -1,4 +1,4 @@
-//! What can be wrong with a linear system.
+//! Errors of linear systems.
 
 /// A linear system that cannot be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,7 +15,7 @@ pub enum SolveError {
     /// The number of values does not fit the matrix: rows of a right-hand side, or entries of a pattern.
     #[error("{expected} {what} are needed, {found} were given")]
     Length {
-        /// What was counted.
+        /// Name of the values, such as `entries`.
         what: &'static str,
         /// How many the matrix needs.
         expected: usize,

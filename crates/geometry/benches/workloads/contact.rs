@@ -6,7 +6,7 @@ use prehend_geometry::{ClosestPoints, TriMesh};
 use super::oracle;
 use super::table::Comparison;
 
-/// What counts as contact \[m\].
+/// Largest distance of a contact \[m\].
 pub(crate) const REACH: f64 = 0.005;
 
 /// The answers are the distances from the hand, or the reach where they are larger.

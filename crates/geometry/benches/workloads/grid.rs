@@ -27,7 +27,7 @@ impl Lattice {
         Self { points: (0..COUNT.pow(3)).map(point).collect(), low, spacing }
     }
 
-    /// The same points as this crate describes them.
+    /// The lattice in this crate's type.
     fn ours(&self) -> prehend_geometry::sdf::Lattice {
         let lattice = prehend_geometry::sdf::Lattice::new(self.low, self.spacing, [COUNT; 3]);
         lattice.expect("a sound lattice")

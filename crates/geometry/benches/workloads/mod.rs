@@ -23,7 +23,7 @@ use self::points::QuerySet;
 use self::sign::Tetrahedron;
 use self::table::Comparison;
 
-/// What the workloads are made of.
+/// Geometry of the workloads.
 pub(crate) struct Scenes {
     /// The body that is queried, 16 128 faces.
     pub(crate) body: TriMesh,

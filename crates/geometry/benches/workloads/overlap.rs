@@ -11,7 +11,7 @@ const CM3: &str = "cm³";
 const CM3_PER_M3: f64 = 1e6;
 /// \[cm³\]
 const TOLERANCE: f64 = 1e-6;
-/// What CGAL and manifold3d agree on \[cm³\].
+/// Volumes on which CGAL and manifold3d agree \[cm³\].
 const UNION: f64 = 372.7082880;
 const PAIR: f64 = 408.32317224;
 const GRASP: f64 = 22.64425805;
@@ -39,7 +39,7 @@ pub(crate) fn grasp<'a>(links: &[TriMesh], body: &'a TriMesh) -> Comparison<'a> 
     job
 }
 
-/// The same in 200 poses, of which the first is the one above.
+/// Intersection in 200 poses of the body, of which the first is that of [`grasp`].
 pub(crate) fn in_poses<'a>(links: &[TriMesh], posed: &'a [TriMesh]) -> Comparison<'a> {
     let mut job = Comparison::new("volume, 200 poses", CM3, TOLERANCE, vec![(0, GRASP)]);
     let union = prepared(links);

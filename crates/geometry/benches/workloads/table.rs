@@ -1,8 +1,8 @@
 //! Times several ways to do one job, taking turns so that a disturbance of the machine hits all of them
 //! alike, and prints a Markdown table.
 //!
-//! What counts is the time that the processor spent on this process: everything runs on one thread, and
-//! other programs on the machine disturb that far less than the time on the clock.
+//! Times are of the processor on this process: everything runs on one thread, and other programs on the
+//! machine disturb that far less than the time on the clock.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use cpu_time::ProcessTime;
 /// Turns that each way gets, if they take no longer than [`PATIENCE`]; the median counts.
 const ROUNDS: usize = 15;
 const FEWEST_ROUNDS: usize = 3;
-/// What the turns of one job may take before the fewest rounds must do.
+/// Time that the turns of one job may take before the fewest rounds must do.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Ways to do one job, which all answer with a list of numbers.

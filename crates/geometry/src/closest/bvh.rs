@@ -32,7 +32,7 @@ pub(super) struct Node {
     pub(super) used: usize,
 }
 
-/// What a child reference leads to.
+/// Target of a child reference.
 pub(super) enum Child {
     /// Index of another node.
     Node(usize),

@@ -296,7 +296,7 @@ fn build(mesh: &TriMesh) -> Result<Bvh, ClosestError> {
     check(mesh).map(|()| Bvh::new(mesh))
 }
 
-/// What [`ClosestPoints::new`] refuses.
+/// Checks a mesh for [`ClosestPoints::new`].
 pub(crate) fn check(mesh: &TriMesh) -> Result<(), ClosestError> {
     if mesh.faces.is_empty() {
         return Err(ClosestError::Empty);

@@ -77,7 +77,7 @@ struct Search<'a> {
     slack: f32,
     /// Smallest squared distance seen \[m²\].
     nearest: f32,
-    /// What measures more cannot be the nearest \[m²\].
+    /// Squared distance, with slack, beyond which no triangle can be the nearest \[m²\].
     limit: f32,
     kept: [(f32, u32); KEPT],
     count: usize,

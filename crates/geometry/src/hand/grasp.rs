@@ -8,7 +8,7 @@ use crate::objects::YcbObject;
 /// An object held in the built-in hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grasp {
-    /// What is held.
+    /// Object held.
     pub object: YcbObject,
     /// Joint angles \[rad\] in the order of [`super::JOINT_NAMES`].
     pub joints: [f64; JOINT_COUNT],

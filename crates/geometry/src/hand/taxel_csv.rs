@@ -16,7 +16,7 @@ pub enum TaxelError {
     Csv {
         /// The file.
         path: PathBuf,
-        /// What the reader says; names the line where there is one.
+        /// Error of the CSV reader, with the line where there is one.
         source: csv::Error,
     },
     /// The header lacks a column.
@@ -36,9 +36,9 @@ pub enum TaxelError {
         line: u64,
         /// Column name.
         column: &'static str,
-        /// What belongs there.
+        /// Value expected, such as `the name of a link`.
         expected: &'static str,
-        /// What is there.
+        /// Text found.
         found: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with the file of a mesh or of a distance grid.
+//! Errors of mesh and distance grid files.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ pub enum MeshError {
         path: PathBuf,
         /// The element or field, such as `vertex 12` or `header`.
         element: String,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
     },
     /// The file asks for more than [`limits`](crate::limits) allow.
@@ -42,7 +42,7 @@ pub enum MeshError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// What there is too much of, such as `file, bytes` or `vertices`.
+        /// Quantity above its limit, such as `file, bytes` or `vertices`.
         element: String,
         /// How much.
         count: u64,
@@ -64,7 +64,7 @@ pub enum MeshError {
         path: PathBuf,
         /// The texture as the mesh names it.
         texture: String,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
     },
     /// The file holds no triangles.

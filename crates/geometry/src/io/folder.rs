@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-/// What an error says about a name that leads elsewhere.
+/// Error message for a name that leads out of the folder.
 pub(crate) const OUTSIDE: &str = "the path leaves the folder of the file that names it";
 
 /// The file `name` in `folder` or below it, whether or not it exists.

@@ -42,7 +42,7 @@ pub fn read_plain(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
     Ok(content)
 }
 
-/// Where what is written to `path` belongs: the end of the symbolic links that begin there, which need not exist.
+/// Target of a write to `path`: the end of the symbolic links that begin there. It need not exist.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] where something other than a plain file is in the way, or `path` names no file;

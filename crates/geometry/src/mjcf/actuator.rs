@@ -1,4 +1,4 @@
-//! What drives joints, tendons and sites.
+//! Actuators of joints, tendons, sites and bodies.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use super::names::{Names, Taken};
 use super::value::Limited;
 use super::{JointIndex, Model};
 
-/// What an actuator pulls at.
+/// Transmission of an actuator: the joint, tendon, site or body on which its force acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Transmission {
     /// A joint. Of a ball the first three numbers of `gear` are along the body's axes, or the parent's with `in_parent`; of a free
@@ -96,7 +96,7 @@ pub struct Muscle {
 pub struct Actuator {
     /// Its name, empty where it has none.
     pub name: String,
-    /// What it pulls at.
+    /// Transmission: where its force acts.
     pub transmission: Transmission,
     /// Its length for that of what it pulls at: the first number, but of sites, balls and free joints, which have one for each direction.
     pub gear: [f64; 6],
@@ -121,7 +121,7 @@ pub struct Actuator {
     pub damping_ratio: Option<f64>,
 }
 
-/// What is known of an actuator before it is complete.
+/// Attributes of an actuator: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     gear: [f64; 6],

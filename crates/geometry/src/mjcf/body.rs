@@ -106,7 +106,7 @@ struct Reader<'a> {
     classes: &'a Classes,
     assets: &'a Assets<'a>,
     tree: Tree,
-    /// What the geoms of each body weigh, where its inertia is theirs.
+    /// Mass and inertia of the geoms of each body, in its frame; `None` where its own `inertial` element counts.
     weights: Vec<Option<Vec<Inertial>>>,
     body_names: Taken,
     joint_names: Taken,
@@ -115,7 +115,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What is in a body, in a frame or in the world.
+    /// Reads the children of a body, of a frame or of the world.
     fn content(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         for child in &e.children {
             match child.tag.as_str() {

@@ -199,7 +199,7 @@ impl Drive {
         Ok(())
     }
 
-    /// Of a servo that holds the length at its input.
+    /// Reads a position servo: force kp (u − l) − kv v at the input u, the length l and its rate v.
     fn read_position(&mut self, e: &Element) -> Result<(), MjcfError> {
         let stiffness = e.number("kp")?.unwrap_or(self.gain[0]);
         let damping = e.magnitude("kv")?.map(|kv| -kv);
@@ -220,8 +220,8 @@ impl Drive {
 
 /// A drive for each element that an actuator may be written with.
 ///
-/// What a default class says of one of the shorthands also is what `general` begins with, and what it says of `general`
-/// all of them begin with.
+/// In a default class, a shorthand also sets the defaults of `general`, and `general` sets gain and bias of all
+/// shorthands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drives([Drive; 9]);
 

@@ -10,7 +10,7 @@ use nalgebra::Isometry3;
 
 use super::error::{MjcfError, Place};
 
-/// What has become of an element or an attribute.
+/// Reading state of an element or an attribute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Use {
     /// Nothing has asked for it.

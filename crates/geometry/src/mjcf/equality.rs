@@ -15,7 +15,7 @@ use super::{JointIndex, Model};
 pub struct Equality {
     /// Its name, empty where it has none.
     pub name: String,
-    /// What it holds together.
+    /// Kind, with the bodies, joints or tendons that it constrains.
     pub kind: EqualityKind,
     /// Whether it acts from the beginning.
     pub active: bool,
@@ -23,7 +23,7 @@ pub struct Equality {
     pub solver: SolverParameters,
 }
 
-/// What a constraint holds together. Of bodies, `None` is the world.
+/// Kind of an equality constraint. A body of `None` is the world.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EqualityKind {
     /// A point of one body is at a point of the other.
@@ -61,7 +61,7 @@ pub enum EqualityKind {
     },
 }
 
-/// What is known of a constraint before it is complete.
+/// Attributes of an equality constraint: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     active: bool,

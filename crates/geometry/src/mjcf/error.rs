@@ -1,4 +1,4 @@
-//! What can be wrong with an MJCF model, and where.
+//! Errors of MJCF models, with file, line and element.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ pub enum MjcfError {
     Xml {
         /// The file; none where the model was given as text.
         file: Option<PathBuf>,
-        /// What is wrong, with line and column where the parser tells them.
+        /// Message of the parser, with line and column where it gives them.
         message: String,
     },
     /// A model too large or nested too deeply.
@@ -74,7 +74,7 @@ pub enum MjcfError {
         place: Box<Place>,
         /// The attribute.
         field: &'static str,
-        /// What is wrong with it.
+        /// Reason, such as `must be positive`.
         reason: String,
     },
     /// An attribute that must be there and is not.
@@ -111,7 +111,7 @@ pub enum MjcfError {
     Structure {
         /// The element.
         place: Box<Place>,
-        /// What is wrong with it.
+        /// Reason, such as `the world has no joints`.
         reason: String,
     },
 }

@@ -4,7 +4,7 @@ use super::Model;
 use super::element::Element;
 use super::error::MjcfError;
 
-/// What the `flag` elements say, as far as it changes smooth dynamics.
+/// Flags of the `flag` elements that turn off parts of the smooth dynamics.
 #[derive(Default)]
 pub(super) struct Flags {
     pub(super) no_gravity: bool,

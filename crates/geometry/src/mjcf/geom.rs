@@ -29,7 +29,7 @@ pub struct Geom {
     pub contact_affinity: u32,
     /// Dimensions of its contacts: 1 without friction, 3 with sliding, 4 with torsional, 6 with rolling friction.
     pub contact_dimensions: u32,
-    /// Of two geoms the one of higher priority says how they touch.
+    /// Contact priority: of two geoms, the one of higher priority sets the contact parameters.
     pub priority: i32,
     /// Coefficients of sliding \[1\], torsional \[m\] and rolling \[m\] friction.
     pub friction: [f64; 3],
@@ -50,7 +50,7 @@ impl Geom {
     }
 }
 
-/// What is known of a geom before it is complete.
+/// Attributes of a geom: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     kind: Kind,
@@ -199,7 +199,7 @@ impl Spec {
             && self.kind != Kind::Plane
     }
 
-    /// What a geom of this shape weighs, in the shape's frame.
+    /// Mass and inertia of a geom of this `shape`, in the shape's frame; `None` up to 1e-15 kg.
     fn inertial(
         &self,
         e: &Element,
@@ -250,7 +250,7 @@ impl Spec {
     }
 }
 
-/// What geoms refer to by name.
+/// Assets that geoms refer to by name; `materials` are their colors.
 pub(super) struct Assets<'a> {
     pub(super) meshes: Meshes<'a>,
     pub(super) height_fields: HeightFields<'a>,

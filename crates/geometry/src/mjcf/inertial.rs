@@ -8,7 +8,7 @@ use super::error::MjcfError;
 use super::orientation;
 use crate::inertial::Inertial;
 
-/// What the `inertial` element of `body` says; `None` without one, or where it weighs nothing.
+/// Mass and inertia of the `inertial` element of `body`, in its frame; `None` without one, or where both are zero.
 pub(super) fn written(body: &Element, compiler: &Compiler) -> Result<Option<Inertial>, MjcfError> {
     let mut all = body.sections("inertial");
     let Some(e) = all.next() else { return Ok(None) };

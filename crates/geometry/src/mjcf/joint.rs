@@ -83,7 +83,7 @@ pub struct Joint {
     pub spring_damper: Option<[f64; 2]>,
 }
 
-/// What is known of a joint before it is complete.
+/// Attributes of a joint: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     kind: JointKind,

@@ -17,7 +17,7 @@ use crate::io::load_shape;
 use crate::limits::MAX_ELEMENTS;
 use crate::mesh::TriMesh;
 
-/// What is known of a mesh before it is read.
+/// Attributes of a mesh asset: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     scale: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! What a mesh weighs, by MuJoCo's rules.
+//! Mass and inertia of meshes, by MuJoCo's rules.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

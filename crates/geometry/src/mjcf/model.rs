@@ -52,7 +52,7 @@ pub struct Model {
     pub world_geoms: Vec<Geom>,
     /// Marked places of the world.
     pub world_sites: Vec<Site>,
-    /// What drives it.
+    /// Its actuators.
     pub actuators: Vec<Actuator>,
     /// Its tendons.
     pub tendons: Vec<Tendon>,
@@ -64,7 +64,7 @@ pub struct Model {
     pub keyframes: Vec<Keyframe>,
     /// Sensors whose readings follow from a state.
     pub sensors: Vec<Sensor>,
-    /// What has not been read.
+    /// Parts that have not been read.
     pub warnings: Vec<Warning>,
 }
 

@@ -1,4 +1,4 @@
-//! What the names in a model refer to.
+//! Bodies, joints, tendons, sites and geoms by name.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::element::Element;
 
-/// What can have a name that others refer to.
+/// Kind of an element that others refer to by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Named {
     Body,
@@ -24,7 +24,7 @@ pub(super) enum Named {
 /// Names of one tree, by what has them.
 pub(super) type Names = BTreeSet<(Named, String)>;
 
-/// What the attribute `field` of `e` refers to.
+/// Kind of element that the attribute `field` of `e` refers to; `None` where it is no reference.
 pub(super) fn referred(e: &Element, field: &str) -> Option<Named> {
     let of_object = |field: &str| match e.peek(field)? {
         "body" | "xbody" => Some(Named::Body),
@@ -54,7 +54,7 @@ pub(super) fn referred(e: &Element, field: &str) -> Option<Named> {
     })
 }
 
-/// What an element is of the kind that `section` holds, where it has a name.
+/// Kind of the element `e`, which is in `section`.
 pub(super) fn named(e: &Element, section: &str) -> Named {
     match (section, e.tag.as_str()) {
         ("worldbody", "body") => Named::Body,

@@ -50,7 +50,7 @@ pub enum Shape {
     HeightField(Arc<HeightField>),
 }
 
-/// What the `type` of a geom may be.
+/// Kind of a shape: the `type` of a geom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Plane,

@@ -16,7 +16,7 @@ pub struct Site {
     pub t_body_site: Isometry3<f64>,
 }
 
-/// What is known of a site before it is complete.
+/// Attributes of a site: the defaults of its class, replaced by those of its element.
 #[derive(Clone, Default)]
 pub(super) struct Spec {
     position: Vector3<f64>,

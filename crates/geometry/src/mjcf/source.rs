@@ -104,7 +104,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// What is in the outermost element of the file that `element` names.
+    /// Children of the outermost element of the file that `element` names.
     fn include(
         &mut self,
         element: &Element,

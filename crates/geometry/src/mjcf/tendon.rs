@@ -81,7 +81,7 @@ pub struct Tendon {
     pub limit_solver: SolverParameters,
 }
 
-/// What is known of a tendon before it is complete.
+/// Attributes of a tendon: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
     range: [f64; 2],

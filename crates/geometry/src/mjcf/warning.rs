@@ -1,4 +1,4 @@
-//! What of a model was not read.
+//! Warnings of parts of a model that were not read.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,7 +15,7 @@ pub struct Warning {
     pub attribute: Option<String>,
     /// How often it occurs.
     pub count: usize,
-    /// What became of it.
+    /// Reason, such as `not read`.
     pub reason: &'static str,
     /// Whether it changes masses, degrees of freedom, contacts or actuation.
     pub changes: bool,

@@ -12,7 +12,7 @@ use super::Moments;
 const FLAT: f64 = 1e-9;
 
 impl<S: Scalar> Moments<S> {
-    /// What a closed surface of triangles encloses, which see it on their left from outside.
+    /// Moments of the solid within a closed surface of triangles, corners counterclockwise from outside.
     ///
     /// Sums over the tetrahedra that the faces span with the origin (B. Mirtich, "Fast and accurate computation of polyhedral mass
     /// properties", 1996): volume det/6, first moment det/24·s, second det/120·(s sᵀ + Σ vᵢ vᵢᵀ), s = Σ vᵢ.

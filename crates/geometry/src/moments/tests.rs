@@ -16,7 +16,7 @@ fn cuboid<S: Scalar>(half: [S; 3]) -> (Vec<Point3<S>>, Vec<[usize; 3]>) {
     (corners, triangles)
 }
 
-/// The same by a sum over cells, where `distance` is negative, within `reach` of the origin.
+/// Moments of the region of negative `distance`, by a sum over cells within `reach` of the origin.
 fn counted(distance: impl Fn(&Vector3<f64>) -> f64, reach: f64) -> Moments {
     let cells = 160;
     let edge = 2.0 * reach / f64::from(cells);

@@ -99,7 +99,7 @@ impl KinematicTree {
 }
 
 impl Drive {
-    /// The same in a joint vector that has so many entries before.
+    /// Drive in a joint vector with `entries` entries before its own.
     fn after(self, entries: usize) -> Self {
         match self {
             Self::None => Self::None,

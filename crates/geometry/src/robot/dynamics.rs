@@ -1,4 +1,4 @@
-//! What a URDF says of masses, damping and the strength of joints.
+//! Mass and inertia of links, and damping, friction, speed and effort limits of joints, from URDF.
 
 use nalgebra::{Matrix3, Point3};
 

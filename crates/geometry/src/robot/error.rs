@@ -1,4 +1,4 @@
-//! What can be wrong with a robot description or a joint state.
+//! Errors of robot descriptions and joint states.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ pub enum RobotError {
     InFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// Error in it.
         source: Box<RobotError>,
     },
     /// Two links or two joints share a name.
@@ -95,7 +95,7 @@ pub enum RobotError {
         owner: String,
         /// Which number.
         field: &'static str,
-        /// What it must be.
+        /// Requirement that it breaks, such as `must be finite`.
         requirement: &'static str,
     },
     /// No position of a joint is within all its limits and those of the joints that mimic it.

@@ -18,7 +18,7 @@ use crate::sdf::SdfGrid;
 pub struct PosedRobot {
     shape: Arc<RobotShape>,
     t_world_links: Vec<Isometry3<f64>>,
-    /// Of the links that have a shape.
+    /// Links that have a shape.
     solid: Vec<Solid>,
 }
 

@@ -11,11 +11,11 @@ use crate::mesh::TriMesh;
 /// Changes with whatever changes the grids of a link, of which a test below has some numbers.
 const VERSION: u32 = 1;
 
-/// A folder of distance grids, by what they were made of.
+/// A folder of distance grids, by a hash of meshes, spacing and margin.
 ///
-/// Any number of processes may share one: grids are written atomically, and the same one by whoever writes it.
-/// What is damaged, or another version's, is made anew. A folder that cannot be written is as good as none. Nothing is ever
-/// removed.
+/// Any number of processes may share one: grids are written atomically, and every process writes the same one. Grids
+/// that are damaged, or of another version, are built again. Where the folder cannot be written, grids are built but not
+/// kept. Nothing is ever removed.
 #[derive(Clone, Debug)]
 pub struct GridCache {
     folder: PathBuf,

@@ -16,9 +16,9 @@ pub enum SdfError {
     Length {
         /// "spacing", "margin", "band" or "offset".
         name: &'static str,
-        /// What was given \[m\].
+        /// Value given \[m\].
         value: f64,
-        /// What it must be.
+        /// Requirement that it breaks, such as `finite and not negative`.
         requirement: &'static str,
     },
     /// The box around the shape is not finite or turned around.

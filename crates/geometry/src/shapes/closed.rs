@@ -11,7 +11,7 @@ pub(crate) fn closed_volume(mesh: &TriMesh) -> f64 {
     closed_volume_of_genus(mesh, 0)
 }
 
-/// The same of a body with `genus` holes through it.
+/// Signed volume \[m³\] as of [`closed_volume`], of a body with `genus` holes through it.
 pub(crate) fn closed_volume_of_genus(mesh: &TriMesh, genus: usize) -> f64 {
     let faces = mesh.weld_within(0.0).faces(mesh);
     assert!(!faces.iter().any(is_collapsed), "degenerate face");

@@ -108,7 +108,7 @@ fn outside(
 
 /// Joins equal positions and drops faces without extent and pairs that cancel.
 ///
-/// What is left of walls between bodies that touch is such pairs where both have the same triangles.
+/// Walls between touching bodies leave such pairs where both bodies have the same triangles.
 fn tidied(positions: Vec<Point3<f64>>, faces: &[[u32; 3]]) -> Chain {
     let mesh = TriMesh::new(positions, faces.to_vec());
     let weld = mesh.weld_within(0.0);

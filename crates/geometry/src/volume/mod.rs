@@ -64,7 +64,7 @@ pub enum VolumeError {
     Invalid {
         /// `part N of the body`, `the other mesh` or `the pose`.
         what: String,
-        /// What is wrong with it.
+        /// Defect, such as `a vertex index out of range`.
         problem: &'static str,
     },
 }

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3, Vector6};
 use super::arrangement::{Arrangement, Cut};
 use super::chain::{Chain, SIDES};
 
-/// What two bodies share.
+/// Intersection volume of two bodies, and its derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overlap {
     /// Volume \[m³\].
@@ -38,7 +38,7 @@ impl Integrals {
     }
 }
 
-/// What `a` and `b` share, every part as often as both wind about it; twists of `b` turn about `center`.
+/// Intersection volume ∫ w_a w_b of `a` and `b` with winding numbers w, and its derivative by a twist of `b` about `center`.
 ///
 /// By the divergence theorem the volume is a third of ∫ x·n over the pieces of each surface inside the other body,
 /// and its derivative is ∫ n and ∫ (x − center) × n over those of `b` (Reynolds' transport theorem). A piece is a

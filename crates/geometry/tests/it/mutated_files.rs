@@ -253,7 +253,7 @@ fn glb() {
     check(&json_with_data_uri(&json, &bin), "m.gltf");
 }
 
-/// The same document with its buffer in a base64 data URI.
+/// The document with its buffer in a base64 data URI.
 fn json_with_data_uri(json: &[u8], bin: &[u8]) -> Vec<u8> {
     const SYMBOLS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();

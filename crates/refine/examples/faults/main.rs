@@ -21,13 +21,13 @@ use prehend_refine::strategy::{Consistency, Fit, Fused};
 use prehend_refine::{PreparedFrame, refine};
 use rayon::prelude::*;
 
-/// What became of a frame.
+/// Outcome of a frame.
 struct Outcome {
     /// `None` without a fault.
     kind: Option<String>,
     wrong: bool,
     probability: f64,
-    /// What the estimator thinks is wrong in the first place.
+    /// Most probable misfit, if there is one.
     named: Option<&'static str>,
     /// Scene, image and object; errors \[cm; °\]; probability that the pose is right if model and data are; logarithms of scales.
     frame: String,

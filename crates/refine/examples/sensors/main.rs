@@ -1,4 +1,4 @@
-//! What each sensor adds: frames of the built-in world with errors that calibrations have, refined with one sensor more at a time.
+//! Contribution of each sensor: frames of the built-in world with errors that calibrations have, refined with one sensor more at a time.
 //!
 //! ```sh
 //! cargo run --release -p prehend-refine --example sensors -- [FRAMES] [FOLDER]
@@ -19,7 +19,7 @@ use prehend_refine::{PreparedFrame, refine};
 use crate::sensing::{Extra, write_frame};
 use crate::world::World;
 
-/// What is compared with the first row: a world, and the sensors.
+/// Rows compared with the first of them: a world, and the sensors.
 type Group =
     (&'static str, fn(u64) -> anyhow::Result<World>, &'static [(&'static str, &'static [Extra])]);
 

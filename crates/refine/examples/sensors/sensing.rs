@@ -1,4 +1,4 @@
-//! What sensors make of a world, written as a frame file with the errors that calibrations have.
+//! Sensor readings of a world, written as a frame file with the errors that calibrations have.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::world::{CAMERA, World, eye_at};
 
-/// What differs from color and depth of one camera.
+/// Difference from color and depth of one camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extra {
     /// Forces on taxels.
@@ -45,10 +45,10 @@ const HAND_PLACE: f64 = 2.1e-3;
 const HAND_TURN: f64 = 7e-3;
 const JOINTS: f64 = 0.014;
 const DEPTH_SCALE: f64 = 4e-3;
-/// Of where the table and the other object are said to be \[m\], \[rad\].
+/// Standard deviations of the nominal poses of the table and the other object \[m\], \[rad\].
 const TABLE: [f64; 2] = [1e-3, 2e-3];
 const OTHER: [f64; 2] = [3e-3, 0.02];
-/// Of where to begin: in all \[m\], \[rad\].
+/// Root mean square error of the initial pose \[m\], \[rad\].
 const START: [f64; 2] = [0.012, 0.14];
 
 /// Skin feels what is so near \[m\].
@@ -87,8 +87,8 @@ impl Errors {
     }
 }
 
-/// Writes a frame of `world` with `extras` into `folder`: `frame.json` and what it names. What is drawn for a `seed` is the same for whatever there is besides. Where
-/// the table is said to be, whether or not the frame says so, table → camera \[m\].
+/// Writes a frame of `world` with `extras` into `folder`: `frame.json` and the files that it names. Errors drawn for a `seed` do not depend on `extras`.
+/// Returns the table's nominal pose, table → camera \[m\], whether or not the frame has it.
 pub(crate) fn write_frame(
     folder: &Path,
     world: &World,
@@ -222,7 +222,7 @@ fn matrix(pose: &Isometry3<f64>) -> Value {
     json!({ "unit": "m", "matrix": rows })
 }
 
-/// What the first hand feels.
+/// Tactile readings of the first hand.
 fn felt(
     folder: &Path,
     world: &World,
@@ -285,7 +285,7 @@ fn felt(
     Ok(said)
 }
 
-/// What soft skins take of the object's shape, on every link that touches it.
+/// Contact patches of soft skins, on every link that touches the object.
 fn patches(world: &World, errors: &mut Errors) -> anyhow::Result<Vec<Value>> {
     let posed = world.posed(0)?;
     let names = posed.shape().link_names();

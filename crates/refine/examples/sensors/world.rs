@@ -113,7 +113,7 @@ impl World {
         Ok(ClosestPoints::new(&self.object.cleaned().0)?)
     }
 
-    /// What `camera` at `t_world_cam` sees, with noise.
+    /// Frame of `camera` at `t_world_cam`, with noise.
     pub(crate) fn seen(
         &self,
         camera: &Camera,

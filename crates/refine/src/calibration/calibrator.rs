@@ -19,8 +19,8 @@ use crate::strategy::{Fused, Modality};
 /// A frame of a rig, and where its object is thought to be.
 #[derive(Clone)]
 pub struct CalibrationFrame {
-    /// What was observed, as it was. Without a mask, the object is looked for where it should be, which needs a good pose: its outline then
-    /// says nothing.
+    /// Observation without corrections. Without a mask, the object's pixels are predicted from [`initial`](Self::initial), which needs a good pose, and
+    /// the silhouette is not used.
     pub frame: Frame,
     /// The object's number.
     pub obj_id: u32,
@@ -47,7 +47,7 @@ pub struct Calibrator {
     models: BTreeMap<u32, Model>,
     /// How much frames disagree with the rig, half of them less; unknown as long as it is nominal.
     usual_disagreement: Option<f64>,
-    /// What frames have said that are not visited any more, about the parameters that there are now.
+    /// Sums over frames that are no longer visited, about the present parameters.
     kept: Pass,
     /// Passes that were solved for since then.
     solved: usize,
@@ -151,7 +151,7 @@ impl Calibrator {
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings, has_mask)
     }
 
-    /// What a frame shows when the rig is corrected, and how it is refined.
+    /// Observation of a frame corrected by the rig, and the strategy that refines it.
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Frame, Fused), RefineError> {
         let CalibrationFrame { frame: observation, obj_id, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
@@ -177,7 +177,7 @@ impl Calibrator {
         [self.settings.same_view_angle, self.settings.same_view_distance]
     }
 
-    /// What `frame`, corrected, says of the rig if its state is `state`.
+    /// Normal equations of the corrected `frame` at `state` for the rig's parameters.
     fn information(
         &self,
         frame: &PreparedFrame<'_>,

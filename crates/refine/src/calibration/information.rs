@@ -1,4 +1,4 @@
-//! What one frame says of a rig.
+//! Normal equations of one frame for the parameters of its rig.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -25,8 +25,8 @@ pub(super) struct FramePlay {
 }
 
 impl FrameInformation {
-    /// Of `evidence`, in a frame that says `said` of its calibrations when corrected by `rig`, of an object whose surface has a `field` of
-    /// deviations; `sigmas` are the standard deviations of the object's pose. `None` if the evidence lacks the camera.
+    /// Normal equations of `evidence`, about the calibrations `said` that the frame states after correction by `rig`. `field` is the deviation of the
+    /// object's surface, `sigmas` are the standard deviations of its pose. `None` if the evidence lacks pose, camera or image warp, or is singular.
     pub(super) fn new(
         evidence: &Evidence,
         said: &State,
@@ -51,7 +51,7 @@ impl FrameInformation {
         let (_, first_warp) = equations.image_warp()?;
         let (gradient, hessian) = equations.dense();
         let (n, first_patch) = (gradient.len(), equations.dimension());
-        // What the evidence is about, by the rig's parameters and the object's coefficients.
+        // Derivatives of the evidence's parameters by the rig's parameters and the object's coefficients.
         let coefficients = field.map_or(0, |field| 3 * field.count());
         let mut by_shared = DMatrix::zeros(n, rig.len() + coefficients);
         let jacobian = rig.jacobian(said).select_rows(&in_state);
@@ -157,7 +157,7 @@ impl FramePlay {
 
 /// An object's coefficients, eliminated from normal equations.
 pub(super) struct Elimination {
-    /// What that adds to the part of the rig's parameters.
+    /// Change of the rig parameters' normal equations by the elimination (Schur complement).
     pub(super) hessian: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
@@ -167,7 +167,8 @@ pub(super) struct Elimination {
 }
 
 impl Elimination {
-    /// Of normal equations of the rig's parameters and then of `coefficients`, which are independent and of unit variance about zero beforehand.
+    /// Elimination of the object's coefficients, which follow the rig's parameters in the equations. Their values are `coefficients`, their prior is
+    /// N(0, I). `None` if the equations are singular.
     pub(super) fn new(
         hessian: &DMatrix<f64>,
         gradient: &DVector<f64>,
@@ -255,7 +256,7 @@ mod tests {
         }
     }
 
-    /// What is seen in a small window is shifted by radial distortion as by a principal point that is off.
+    /// Derivatives by radial distortion equal those by a shift of the principal point, in a small window.
     #[test]
     fn derivatives_by_distortion_are_those_of_a_shift_there() {
         let scene = default_scene(1).unwrap();

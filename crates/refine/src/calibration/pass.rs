@@ -1,4 +1,4 @@
-//! What frames have said of their rig.
+//! Normal equations of a rig, summed over frames.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Isometry3};
 use super::information::{Elimination, FrameInformation, FramePlay};
 use super::views::Views;
 
-/// What a visit has found of a frame.
+/// Result of visiting a frame.
 pub struct Visit {
     pub(super) obj_id: u32,
     pub(super) information: FrameInformation,
@@ -24,7 +24,7 @@ pub struct Visit {
     pub(super) same_view: [f64; 2],
 }
 
-/// What the frames of a pass have said. Sums are the same for the same order of frames.
+/// Normal equations, play and disagreements of the frames of a pass. Sums are reproducible for a given order of frames.
 #[derive(Clone, Default)]
 pub struct Pass {
     pub(super) sums: Sums,
@@ -52,7 +52,7 @@ impl Sums {
         }
     }
 
-    /// Says the same of parameters that have changed so, as have the coefficients of objects.
+    /// Moves the point of expansion by `change` of the parameters and by `of_objects` of the coefficients of objects.
     pub(super) fn shift(
         &mut self,
         change: &DVector<f64>,

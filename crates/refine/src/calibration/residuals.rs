@@ -11,7 +11,7 @@ use crate::problem::State;
 use crate::scene::{PreparedFrame, median};
 use crate::strategy::{FusedSettings, Pixels};
 
-/// What is off in one frame where calibrations are believed.
+/// Residuals of one frame at its given calibrations, by sensor.
 #[derive(Clone, Debug)]
 pub struct FrameResiduals {
     /// How far behind the surfaces of object and hand depth is \[m\], with column and row.
@@ -26,7 +26,7 @@ pub struct FrameResiduals {
 const FEWEST: usize = 30;
 
 impl FrameResiduals {
-    /// Of `frame` with the object at `t_cam_object` \[m\].
+    /// Residuals of `frame` with the object at `t_cam_object` (object → camera) \[m\], by default settings.
     ///
     /// # Errors
     /// If the pose is not finite, or forces do not fit the taxels.
@@ -79,13 +79,13 @@ impl FrameResiduals {
 /// Residuals of a sensor: medians of a frame, or over frames, the medians of those.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorResidual {
-    /// What is measured.
+    /// Name of the measured quantity, such as `outline`.
     pub sensor: &'static str,
     /// The unit.
     pub unit: &'static str,
-    /// How large residuals are.
+    /// Median of absolute residuals.
     pub size: f64,
-    /// Of those with a sign, what they have in common: depth is positive behind a surface, skin outside of it.
+    /// Median of residuals with a sign: depth is positive behind a surface, skin outside of it. `None` of the outline.
     pub offset: Option<f64>,
 }
 
@@ -109,11 +109,11 @@ const CELL: usize = 16;
 /// Pixels that a cell must have.
 const FULL: usize = 50;
 
-/// What counts at most of a residual in a cell \[m\].
+/// Limit to which residuals of depth are clamped in a cell \[m\].
 const FAR: f64 = 10e-3;
 
 impl Residuals {
-    /// Of no frame yet, of images of so many columns and rows.
+    /// No residuals yet, of images of `width` × `height` pixels.
     pub fn new((width, height): (usize, usize)) -> Self {
         let cells = width.div_ceil(CELL) * height.div_ceil(CELL);
         Self { frames: BTreeMap::new(), size: [width, height], cells: vec![(0.0, 0); cells] }
@@ -134,7 +134,7 @@ impl Residuals {
         }
     }
 
-    /// Of each sensor that any frame has.
+    /// Medians over frames, of each sensor that any frame has.
     pub fn sensors(&self) -> Vec<SensorResidual> {
         let of =
             |(&(sensor, unit), frames): (&(&'static str, &'static str), &Vec<SensorResidual>)| {

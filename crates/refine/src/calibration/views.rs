@@ -28,8 +28,8 @@ impl Views {
         }
     }
 
-    /// What part of an object's frames is not like others: the weight of what each says of its surface, so that a thousand frames of a film count as the
-    /// few views that they have of it.
+    /// Share of distinct views among an object's frames: the weight of each frame's evidence on the surface, so that a thousand frames of a film count as
+    /// its few views.
     pub(super) fn share(&self, obj_id: u32) -> f64 {
         self.0.get(&obj_id).map_or(1.0, |(frames, distinct)| distinct.len() as f64 / *frames as f64)
     }

@@ -58,12 +58,12 @@ pub enum AssetError {
     Frame {
         /// Which.
         target: Target,
-        /// What is wrong with it.
+        /// Its error.
         error: Box<AssetError>,
     },
 }
 
-/// What a frame may bring beside color, depth and mask, each in a file of its own.
+/// Measurement of a frame beside color, depth and mask, in a file of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     /// Pose and joints of the hand, and gravity: `scene_bodies.json`.
@@ -276,7 +276,7 @@ impl Assets {
     }
 }
 
-/// What was read; `None` where the file or its entry is absent and need not be there.
+/// Result of `read`; `None` where the file or its entry is missing and not `required`.
 fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>, DatasetError> {
     match read {
         Err(DatasetError::Missing { .. }) if !required => Ok(None),

@@ -94,7 +94,7 @@ impl<'b> Bodies<'b> {
         measured
     }
 
-    /// What `link` of the body called `name` is called in [`tree`](Self::tree).
+    /// Name in [`tree`](Self::tree) of `link` of the body called `name`.
     ///
     /// # Errors
     /// If there is none.
@@ -128,10 +128,10 @@ impl<'b> Bodies<'b> {
         taxels.iter().map(named).collect()
     }
 
-    /// What a sensor that measures no forces says, on links of `tree`, that of all bodies; `layout` are its taxels, if it has such. Forces are no such reading.
+    /// Reading of a sensor on links of `tree`, that of all bodies; `layout` are its taxels, if it has such. `None` of one that measures forces.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If a link does not exist, or there is not one value a taxel.
     pub(crate) fn reading(
         &self,
         tree: &KinematicTree,

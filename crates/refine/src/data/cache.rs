@@ -1,4 +1,4 @@
-//! Where what takes long to prepare is kept between runs.
+//! Cache of distance grids, kept between runs.
 
 use std::path::PathBuf;
 

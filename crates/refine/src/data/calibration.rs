@@ -21,7 +21,7 @@ const ROUGH_PASSES: usize = 2;
 
 /// Frames of a dataset, each with a rough pose (object → camera \[m\]); they are read when they are visited.
 pub struct CalibrationFrames {
-    /// What each shows, and where that is said to be.
+    /// Target of each, and its rough pose.
     pub poses: Vec<(Target, Isometry3<f64>)>,
     assets: Mutex<Assets>,
 }
@@ -32,9 +32,9 @@ pub struct Calibrated {
     pub calibrator: Calibrator,
     /// Object → camera \[m\], by the frames' indices.
     pub poses: BTreeMap<usize, Isometry3<f64>>,
-    /// What is to be said of frames that disagree with the rig, by their indices.
+    /// Messages about frames that are left out as they disagree with the rig, by their indices.
     pub left_out: BTreeMap<usize, String>,
-    /// What is wrong with the frames that could not be visited, by their indices.
+    /// Errors of the frames that could not be visited, by their indices.
     pub failed: BTreeMap<usize, AssetError>,
     /// Frames that have no mask.
     pub without_mask: usize,
@@ -44,7 +44,7 @@ pub struct Calibrated {
 type VisitProgress<'a> = dyn FnMut(usize) + 'a;
 
 impl CalibrationFrames {
-    /// Of these objects and hands. Masks may be missing where `assets` has them [optional](Assets::with_optional_masks).
+    /// Frames of the objects and hands of `assets`. Masks may be missing where it has them [optional](Assets::with_optional_masks).
     pub fn new(assets: Assets, poses: Vec<(Target, Isometry3<f64>)>) -> Self {
         Self { poses, assets: Mutex::new(assets) }
     }

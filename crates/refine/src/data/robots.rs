@@ -18,7 +18,7 @@ use crate::scene::{Hand, HandMeasurement, Object};
 /// Names and shapes of bodies, and the body and the layout of the sensor of forces.
 type HandKey = (Vec<(String, BodyKind)>, Option<(String, Option<PathBuf>)>);
 
-/// What is shared by frames.
+/// Robots and tactile layouts that frames share.
 #[derive(Default)]
 pub(super) struct Robots {
     /// Robots and other bodies, each alone.

@@ -7,9 +7,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 #[error("the program is at fault: {0}")]
 pub struct Panicked(String);
 
-/// What `work` returns, or its panic as an error: of many frames one fails, and the others go on.
+/// Result of `work`, or its panic as an error, so that one frame fails and the others go on.
 ///
-/// What `work` shares with others must stand being left in the middle: caches do, to which only whole things are added.
+/// State that `work` shares must stay valid if it panics midway. Caches do: only whole entries are added to them.
 ///
 /// # Errors
 /// Those of `work`, and [`Panicked`].

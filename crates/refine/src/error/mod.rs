@@ -16,7 +16,7 @@ pub enum RefineError {
     Object {
         /// Name of the object.
         object: String,
-        /// What is wrong with it.
+        /// Why it cannot be used.
         reason: String,
     },
     /// The mask selects nothing.
@@ -31,7 +31,7 @@ pub enum RefineError {
     /// A factor needs something that was not observed.
     #[error("the {factor} factor needs the {what}, which the observation lacks")]
     Missing {
-        /// What is missing.
+        /// Name of the missing quantity.
         what: &'static str,
         /// The factor that needs it.
         factor: &'static str,
@@ -41,7 +41,7 @@ pub enum RefineError {
     Gravity {
         /// The factor that needs it.
         factor: &'static str,
-        /// What is wrong with it.
+        /// Fault of the gravity vector.
         problem: String,
     },
     /// Forces and taxels do not match.
@@ -87,7 +87,7 @@ pub enum RefineError {
     Setting {
         /// The field of the settings.
         name: &'static str,
-        /// What is wrong with it.
+        /// Fault of its value.
         problem: String,
     },
     /// Kinematics failed.

@@ -9,7 +9,7 @@ use crate::data::{AssetError, ContactModel, load_mesh};
 use crate::error::RefineError;
 use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
 
-/// What `models_info.json` says of an object, if it says anything.
+/// Entry of an object in `models_info.json`, if there is one.
 ///
 /// # Errors
 /// If the file is broken: without its symmetries, a symmetric object would be scored wrongly.
@@ -28,7 +28,7 @@ pub(super) struct EvaluationModel {
     /// Its diameter \[m\].
     pub(super) diameter: f64,
     drawn: RenderModel,
-    /// What contact with the hand is measured by.
+    /// Its model of contact with the hand.
     pub(super) contact: ContactModel,
 }
 

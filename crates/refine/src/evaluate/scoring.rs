@@ -14,7 +14,7 @@ use crate::data::{AssetError, ContactModel, load_robot};
 use crate::evaluate::metrics::{Contact, ScoredRow, oe_symmetric_deg, pe_cm};
 use crate::symmetry::Symmetries;
 
-/// What scoring needs of one image.
+/// Truth of the hand and measured depth of one image, for scoring.
 pub(super) struct Image {
     scene_and_image: (u32, u32),
     /// `None` until it is asked for; the inner one if the dataset says of no hand, or of several.

@@ -50,7 +50,7 @@ struct InFront {
 }
 
 impl FreeSpaceFactor {
-    /// Of the depth image of `frame`, which may be missing everywhere: the cost is then zero.
+    /// Factor of the depth image of `frame`, which may be missing everywhere: the cost is then zero.
     pub fn new(frame: &PreparedFrame<'_>, settings: &FreeSpaceSettings) -> Self {
         Self {
             object: Arc::clone(frame.object()),

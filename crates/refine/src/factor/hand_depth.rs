@@ -29,8 +29,7 @@ settings! {
 
 /// Distances from the depth points on the hand, outside of the object's mask, to the hand's surface.
 ///
-/// What the camera sees of the hand says where it is relative to the object in the same image, which is what touch
-/// needs to know, whatever depth's common errors are.
+/// The distances determine the hand's pose relative to the object in the same image, whatever errors depth has in common. Touch needs it.
 pub struct HandDepthFactor {
     hand: Arc<Hand>,
     points: Vec<Point>,

@@ -13,7 +13,7 @@ pub(super) struct PatchSums<const N: usize> {
 }
 
 impl<const N: usize> PatchSums<N> {
-    /// Of `count` patches, none of which shows anything.
+    /// Zero sums of `count` patches.
     pub(super) fn new(count: usize) -> Self {
         Self {
             gradient: SVector::zeros(),
@@ -37,7 +37,7 @@ impl<const N: usize> PatchSums<N> {
         }
     }
 
-    /// The same of ½ `weight` r² of a `residual` r whose derivatives by the parameters are `row`.
+    /// Adds the gradient and Hessian of ½ `weight` r² of a `residual` r whose derivatives by the parameters are `row`, as [`add`](Self::add) does.
     pub(super) fn add_row(
         &mut self,
         patch: Option<usize>,

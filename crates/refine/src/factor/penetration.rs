@@ -26,12 +26,12 @@ settings! {
 pub struct PenetrationFactor {
     object: Arc<Object>,
     hand: Arc<Hand>,
-    /// Of one sample.
+    /// Weighting of one sample.
     weighting: Weighting,
 }
 
 impl PenetrationFactor {
-    /// Of the object and the hand of `frame`.
+    /// Factor of the object and the hand of `frame`.
     ///
     /// # Errors
     /// If the hand is unknown.

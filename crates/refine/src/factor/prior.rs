@@ -1,4 +1,4 @@
-//! What is known beforehand: of the pose, and of how accurate calibrations are.
+//! Priors of the pose and of the calibrations.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
@@ -84,7 +84,7 @@ impl PriorSettings {
         state.blocks().into_iter().flat_map(of).collect()
     }
 
-    /// The same with what is known of the pose and the joints of `hand`.
+    /// Settings with the standard deviations that are stated of the pose and joints of `hand`.
     pub(crate) fn of_hand(&self, hand: Option<&HandMeasurement>) -> Self {
         let mut prior = self.clone();
         let Some(hand) = hand else { return prior };

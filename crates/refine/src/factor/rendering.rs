@@ -52,7 +52,7 @@ settings! {
 pub struct RenderingFactor {
     object: Arc<Object>,
     problem: PoseProblem,
-    /// The same on a device, if there is one beside the processor; gone after its first failure.
+    /// Session of the problem on a device, if there is one beside the processor; gone after its first failure.
     device: Mutex<Option<Box<dyn Session>>>,
     /// Nats per unit of the renderer's loss, and how many independent measurements the pixels amount to.
     scale: f64,
@@ -66,7 +66,7 @@ pub struct RenderingFactor {
 }
 
 impl RenderingFactor {
-    /// Of the segmented image of `frame`.
+    /// Factor of the segmented image of `frame`.
     ///
     /// # Errors
     /// If the images do not fit the camera or nothing of the mask is left.
@@ -106,7 +106,7 @@ impl RenderingFactor {
         })
     }
 
-    /// The same where the object may be off from its model in `patches`; the image is `downsample` times smaller than theirs.
+    /// This factor for an object that may deviate from its model in `patches`; the image is `downsample` times smaller than theirs.
     pub(crate) fn with_patches(self, patches: Arc<SurfacePatches>, downsample: usize) -> Self {
         let side = patches.side() / downsample;
         Self { patches: Some((patches, side)), ..self }
@@ -130,7 +130,7 @@ impl RenderingFactor {
         Lit { factor: self, light: self.light(state) }
     }
 
-    /// What is to be rendered at each of several states, each under the light that is best there.
+    /// Hypothesis of each of `states`, under the light that fits best there.
     fn hypotheses(&self, states: &[State]) -> Vec<Hypothesis> {
         let lit = |state: &State| self.hypothesis(state, self.light(state));
         states.par_iter().map(lit).collect()
@@ -140,7 +140,7 @@ impl RenderingFactor {
         Hypothesis { t_cam_object: reprojected(state), light }
     }
 
-    /// What `ask` makes of the device; `None` without one, or if it fails.
+    /// Result of `ask` on the device; `None` without one, or if it fails.
     fn on_device<T>(
         &self,
         ask: impl FnOnce(&mut dyn Session) -> Result<T, BackendError>,

@@ -49,9 +49,9 @@ impl SupportSettings {
 
 /// Whether forces of the hand, where it is near the object, could balance weight and felt forces.
 ///
-/// What the skin feels is a lower bound of what acts there; contacts off the skin are unseen, and may bear anything
-/// within their cones. So nothing is said of how strong the grasp is, only that the object would not stay where no contact
-/// opposes its weight or the fingers' pressure.
+/// Felt forces are lower bounds of the contact forces; contacts off the skin are not measured, and may bear any force
+/// within their friction cones. So the factor does not judge the grasp's strength. It only penalizes states in which no contact
+/// opposes the object's weight or the fingers' pressure.
 pub struct SupportFactor {
     object: Arc<Object>,
     robot: Arc<Hand>,
@@ -88,7 +88,7 @@ struct Held {
 }
 
 impl SupportFactor {
-    /// Of the object in the hand of `frame`.
+    /// Factor of the object in the hand of `frame`.
     ///
     /// # Errors
     /// If gravity or the hand is unknown, the hand has a skin and its forces are not one a taxel, or a setting is out of range.
@@ -118,7 +118,7 @@ impl SupportFactor {
         Ok(Self { object, robot, gravity, felt, size, settings })
     }
 
-    /// What holds the object at `state`. A hand that cannot be posed holds nothing, and says nothing.
+    /// Balance of contact forces on the object at `state`; `None` of a hand that cannot be posed.
     fn held(&self, state: &State) -> Option<Held> {
         let hand = self.robot.articulated(&state.t_cam_hand, &state.joints).ok()?;
         let mass_center = state.t_cam_object * self.object.inertial.center_of_mass;
@@ -291,7 +291,7 @@ mod tests {
         SupportFactor::new(frame, &SupportSettings::default()).unwrap()
     }
 
-    /// Of the built-in scene, with another observation.
+    /// Factor of the built-in scene, with another observation.
     fn seen(observation: &Frame) -> SupportFactor {
         let scene = scene();
         factor(&PreparedFrame::new(observation, &scene.object).unwrap())

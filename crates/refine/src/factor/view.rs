@@ -1,4 +1,4 @@
-//! What another camera sees.
+//! Factors of another camera.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ pub struct ViewFactor {
 }
 
 impl ViewFactor {
-    /// Of `factors`, which are of the frame of the other camera so many after the first, whose coordinates `t_view_cam` takes those of the first to \[m\].
+    /// Factor of `factors`, which are of the frame of the view `index`; `t_view_cam` maps the first camera's coordinates to that camera's \[m\].
     pub fn new(index: usize, factors: Vec<Arc<dyn Factor>>, t_view_cam: Isometry3<f64>) -> Self {
         Self { index, factors, t_view_cam }
     }

@@ -66,7 +66,7 @@ impl Auxiliary {
         }
     }
 
-    /// What the Hessian by these alone has beside the parts of patches.
+    /// Hessian by the auxiliary parameters alone, without the patches' own blocks.
     pub(super) fn others_mut(&mut self) -> &mut DMatrix<f64> {
         let count = self.len();
         self.others.get_or_insert_with(|| DMatrix::zeros(count, count))

@@ -44,11 +44,11 @@ impl<const N: usize> Default for PatchPart<N> {
     }
 }
 
-/// What [`NormalEquations::marginalize`] finds.
+/// Schur complement of the auxiliary parameters ([`NormalEquations::marginalize`]).
 pub(crate) struct SchurComplement {
     /// The equations of the blocks.
     pub(crate) rest: NormalEquations,
-    /// How much lower the least value is.
+    /// Decrease of the least value of ½‖r‖².
     pub(crate) gain: f64,
     /// Logarithm of the determinant of the auxiliary parameters' Hessian.
     pub(crate) log_determinant: f64,
@@ -77,13 +77,13 @@ impl NormalEquations {
         }
     }
 
-    /// The same over the coefficients by which the image may be off, too.
+    /// Equations over the coefficients of an image warp, too.
     pub(crate) fn with_image_warp(self, warp: Arc<ImageWarp>) -> Self {
         let auxiliary = Auxiliary::new(self.patches, warp.len(), self.dimension());
         Self { image_warp: Some(warp), by_auxiliary: Some(auxiliary), ..self }
     }
 
-    /// By which the image may be off, and where its coefficients begin among the parameters of [`dense`](Self::dense).
+    /// The image warp, and the index of its first coefficient among the parameters of [`dense`](Self::dense).
     pub(crate) fn image_warp(&self) -> Option<(&Arc<ImageWarp>, usize)> {
         let first = self.dimension() + self.displacements();
         self.image_warp.as_ref().map(|warp| (warp, first))
@@ -162,7 +162,7 @@ impl NormalEquations {
     /// `precision`, the inverse of its covariance in one direction, is added. `None` if the sum is singular.
     ///
     /// # Panics
-    /// Of equations over the coefficients of a warp, or of another number of patches than `precision` has.
+    /// If the equations have coefficients of a warp, or another number of patches than `precision`.
     pub(crate) fn marginalize(&self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
         assert!(self.image_warp.is_none(), "coefficients of a warp are not eliminated");
         assert_eq!(precision.nrows(), self.patches, "precision of the patches");
@@ -258,8 +258,7 @@ impl NormalEquations {
         }
     }
 
-    /// The same with derivatives by auxiliary parameters, after those by the blocks: by all displacements and, if asked for, by the coefficients of
-    /// the warp.
+    /// Adds a gradient and Hessian by the parameters of `blocks`, followed by all displacements and, optionally, the coefficients of the warp.
     pub(crate) fn add_with_auxiliary(
         &mut self,
         blocks: &[Block],
@@ -378,7 +377,7 @@ mod tests {
         assert_eq!((pose_only.gradient()[0], pose_only.hessian()[(0, 1)]), (6.0, 607.0));
     }
 
-    /// Of three blocks, one of which has nothing to do with patches.
+    /// Three blocks, one of which shares no residual with the patches.
     #[test]
     fn what_is_eliminated_is_the_schur_complement() {
         let mut random = SplitMix64::new(7);

@@ -1,4 +1,4 @@
-//! What one kind of evidence says of a state.
+//! Factors: negative log-likelihoods of a state.
 
 use std::fmt;
 

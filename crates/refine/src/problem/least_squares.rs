@@ -20,7 +20,7 @@ use super::{
 /// Factors, and the blocks of the state that are solved for.
 #[derive(Clone)]
 pub struct Problem {
-    /// What is known beforehand, if anything.
+    /// Prior of the state, if there is one.
     prior: Option<Arc<dyn Factor>>,
     factors: Vec<Arc<dyn Factor>>,
     blocks: Vec<Block>,
@@ -41,15 +41,15 @@ pub struct Linearization {
     pub cost: f64,
     /// Gradient and Gauss–Newton Hessian of the sum.
     pub equations: NormalEquations,
-    /// What the prior contributes, if there is one.
+    /// Cost and derivatives of the prior, if there is one.
     pub prior: Option<Contribution>,
-    /// What each of the other factors contributes, in order.
+    /// Cost and derivatives of each of the other factors, in order.
     pub factors: Vec<Contribution>,
-    /// What was eliminated.
+    /// Eliminated displacements, if there are surface patches.
     pub(crate) marginal: Option<Marginal>,
 }
 
-/// What one factor contributes.
+/// Cost and derivatives of one factor.
 #[derive(Clone)]
 pub struct Contribution {
     /// The factor's name.
@@ -159,7 +159,7 @@ impl Problem {
         Self { prior: Some(prior), ..self }
     }
 
-    /// The same where the object may be off from its model in `patches`.
+    /// Problem with displacements of the surface in `patches`.
     pub(crate) fn with_patches(self, patches: Option<Arc<SurfacePatches>>) -> Self {
         Self { patches, ..self }
     }
@@ -259,7 +259,7 @@ impl Problem {
         sum
     }
 
-    /// What `factor` contributes, under the scale of its noise.
+    /// Contribution of `factor`, given its cost and equations at a noise scale of one.
     fn contribution(
         &self,
         factor: &dyn Factor,

@@ -57,12 +57,12 @@ impl NoiseModel {
     }
 }
 
-/// What a residual counts.
+/// Information, kernel and degrees of freedom of a residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighting {
-    /// Nats of half a squared unit.
+    /// Information min(1, m/n) / σ² \[nat by half a squared unit of the residual\].
     pub information: f64,
-    /// What forgives outliers.
+    /// Robust kernel.
     pub kernel: RobustKernel,
     /// How many independent measurements the residual amounts to.
     pub degrees: f64,
@@ -86,7 +86,7 @@ impl Weighting {
         self.kernel.weight(r * r) >= 0.5 * self.kernel.weight(0.0)
     }
 
-    /// What a residual counts that is worth `share` of one.
+    /// Weighting of a residual whose information and degrees of freedom are `share` of these.
     pub(crate) fn shared(&self, share: f64) -> Self {
         let (information, degrees) = (share * self.information, share * self.degrees);
         Self { information, degrees, ..*self }
@@ -108,7 +108,7 @@ pub(crate) struct NoiseScale {
 impl NoiseScale {
     pub(crate) const ONE: Self = Self { scale: 1.0, cost: 0.0 };
 
-    /// What costs are multiplied by.
+    /// Weight of costs, scale⁻².
     pub(super) fn weight(&self) -> f64 {
         self.scale.powi(-2)
     }

@@ -4,19 +4,18 @@ use nalgebra::{DMatrix, Point3, Vector3};
 
 use crate::scene::{Frame, ModelErrorSettings, squared_exponential};
 
-/// What is independent in patches however near they are, as a share of the variance; keeps their covariance regular.
+/// Independent variance of a patch as a share of σ²: keeps the covariance of near patches regular.
 const OWN: f64 = 1e-3;
 
-/// What an observation shows of the object, cut into patches by square tiles of the image, where the object may be off from its
-/// model: each patch is displaced, and neighbors alike, by a Gaussian process over space.
+/// Patches of the object's visible surface, one per square tile of the image, each displaced from the model. Their prior is a Gaussian process over space.
 ///
-/// Patches are of the image rather than of the model, so that only what is seen has any.
+/// Patches tile the image rather than the model, so that only visible surface has any.
 #[derive(Clone, Debug)]
 pub(crate) struct SurfacePatches {
     tiles: Tiles,
     /// Number of the patch in each tile.
     numbers: Vec<Option<usize>>,
-    /// Where each patch is, in the middle of what is seen of it (camera frame) \[m\].
+    /// Centroid of the visible points of each patch (camera frame) \[m\].
     places: Vec<Point3<f64>>,
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
     precision: DMatrix<f64>,
@@ -59,9 +58,8 @@ impl Tiles {
 }
 
 impl SurfacePatches {
-    /// Of the object in `observation`, which is about `distance` from the camera \[m\] where no depth is measured; tiles are a multiple
-    /// of `unit` pixels wide, to be of whole pixels in images that are smaller by that. `None` if there is nothing of it to be seen, or models are
-    /// exact.
+    /// Patches of the object in `observation`, taken at `distance` from the camera \[m\] where no depth near that is measured. Tiles are a multiple
+    /// of `unit` pixels wide, so that they are whole pixels of images downsampled by it. `None` if the mask is empty or the model exact.
     pub(crate) fn new(
         observation: &Frame,
         distance: f64,
@@ -123,13 +121,13 @@ impl SurfacePatches {
         patches.with_covariance(covariance)
     }
 
-    /// The same, displaced with this covariance in each direction \[m²\]; `None` if it is singular.
+    /// Patches with this covariance of the displacements in each direction \[m²\]; `None` if it is singular.
     pub(crate) fn with_covariance(self, covariance: DMatrix<f64>) -> Option<Self> {
         let factor = covariance.cholesky()?;
         Some(Self { precision: factor.inverse(), ..self })
     }
 
-    /// Where each patch is (camera frame) \[m\].
+    /// Centroid of each patch (camera frame) \[m\].
     pub(crate) fn places(&self) -> &[Point3<f64>] {
         &self.places
     }

@@ -9,7 +9,7 @@ pub(crate) struct ScaledCholesky {
 }
 
 impl ScaledCholesky {
-    /// Of `matrix` with `ridge` of its diagonal added; `None` if it is not positive definite.
+    /// Cholesky factor of `matrix` + `ridge` · diag(`matrix`); `None` if that is not positive definite.
     pub(crate) fn new(matrix: &DMatrix<f64>, ridge: f64) -> Option<Self> {
         let (scaled, scale) = jacobi_scaled(matrix);
         let n = scale.len();
@@ -34,8 +34,7 @@ impl ScaledCholesky {
         2.0 * root - 2.0 * self.scale.iter().map(|s| s.ln()).sum::<f64>()
     }
 
-    /// What makes deviations of this covariance independent and of unit variance: the inverse of its lower factor. `None` if
-    /// that is singular.
+    /// Whitening matrix L⁻¹ of this covariance L Lᵀ: whitened deviations are independent and of unit variance. `None` if L is singular.
     pub(crate) fn whitener(&self) -> Option<DMatrix<f64>> {
         let lower = self.factor.l();
         let mut whitener = lower.solve_lower_triangular(&DMatrix::from_diagonal(&self.scale))?;

@@ -1,4 +1,4 @@
-//! What a solve may move: named blocks of parameters.
+//! State of a problem: named blocks of parameters.
 
 use nalgebra::{DVector, Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
@@ -47,9 +47,9 @@ pub struct State {
     pub t_cam_hand: Isometry3<f64>,
     /// Joint positions of the hand \[rad or m\]; none without a hand.
     pub joints: Vec<f64>,
-    /// How the camera differs from what is said of it.
+    /// Calibration error of the camera.
     pub camera: CameraCalibrationError,
-    /// The same of the other cameras, whether or not they see the object.
+    /// Calibration errors of the other cameras, whether or not they see the object.
     pub views: Vec<ViewCalibrationError>,
 }
 
@@ -62,7 +62,7 @@ impl State {
         Self::measured(frame.observation(), frame.object(), initial)
     }
 
-    /// The same of an object in `observation`.
+    /// State of an object in `observation` at the pose `initial`; everything else is where it was measured.
     ///
     /// # Errors
     /// See [`new`](Self::new).

@@ -1,4 +1,4 @@
-//! What a rig corrects.
+//! Correction of frames and objects by the calibration of a rig.
 
 use nalgebra::Isometry3;
 use prehend_render::{BrownConrady, Distortion};
@@ -11,7 +11,7 @@ use crate::scene::{Frame, Object};
 const STRAIGHT: f64 = 0.05;
 
 impl Rig {
-    /// What a frame of this rig would have shown and said without its errors.
+    /// The frame with the rig's errors corrected in its images, camera and hand.
     ///
     /// # Errors
     /// If images are of another size, or the hand has another number of joints.
@@ -77,7 +77,7 @@ impl Rig {
     }
 }
 
-/// Of coefficients k1 and k2.
+/// Brown–Conrady lens of radial coefficients k1 and k2.
 fn lens([k1, k2]: [f64; 2]) -> BrownConrady {
     BrownConrady { radial: [k1, k2, 0.0, 0.0, 0.0, 0.0], tangential: [0.0; 2] }
 }

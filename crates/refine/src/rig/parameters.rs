@@ -1,4 +1,4 @@
-//! What is wrong with a rig.
+//! Calibration parameters of a rig.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,14 +31,14 @@ pub struct Play {
 /// Changes that bring what is said and measured in the frames of a rig to what is true, the same in all of them.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    /// Of the camera and its depth.
+    /// Calibration error of the camera and its depth.
     pub camera: CameraCalibrationError,
     /// k1 and k2 of the radial distortion (Brown and Conrady) that the corrected camera has beside that which is said of its lens.
     pub distortion: [f64; RADIAL],
     pub(crate) warp: Arc<ImageWarp>,
-    /// What undistorts images, kept for the last camera.
+    /// Undistortion maps of the last cameras.
     pub(crate) remaps: Arc<RemapCache>,
-    /// By what depth is off beside scale and bias: coefficients of a smooth field over the image, to be added \[m\].
+    /// Depth offsets beside scale and bias: coefficients of a smooth field over the image, to be added \[m\].
     pub(crate) depth_offsets: Vec<f64>,
     /// The hand's pose in the frame of where it is said to be, as if it were mounted so.
     pub in_hand: Isometry3<f64>,
@@ -46,7 +46,7 @@ pub struct Rig {
     pub in_camera: Isometry3<f64>,
     /// To be added to joint positions \[rad or m\].
     pub joints: Vec<f64>,
-    /// What changes from frame to frame.
+    /// Standard deviations of the errors that change from frame to frame.
     pub play: Play,
     /// Covariance of the parameters: displacement and rotation vector of `in_hand` and of `in_camera` \[m, rad\], joints, camera,
     /// distortion, coefficients of depth's field.
@@ -91,7 +91,7 @@ impl Rig {
         self.first_warp() + self.warp.len()
     }
 
-    /// Where what the image is off by begins among them: distortion, then coefficients of depth's field.
+    /// Index of the first parameter of the image warp: distortion, then coefficients of depth's field.
     pub(crate) fn first_warp(&self) -> usize {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
     }

@@ -8,11 +8,11 @@ use prehend_render::Camera;
 /// The default changes nothing. The parameters of [`Block::Camera`](crate::problem::Block::Camera) are the fields, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraCalibrationError {
-    /// What measured depth has to be multiplied by.
+    /// Factor of measured depth.
     pub depth_scale: f64,
-    /// What is to be added then \[m\].
+    /// Offset of depth after the factor \[m\].
     pub depth_bias: f64,
-    /// Where the center of projection really is, right of where it is said to be, and below \[focal lengths\].
+    /// Offset of the true principal point from the stated one, right and below \[focal lengths\].
     pub principal_point: Vector2<f64>,
     /// How much larger the images of things are than focal length and models say, as a part of their size.
     pub focal_scale: f64,
@@ -29,7 +29,7 @@ pub struct ViewCalibrationError {
     pub translation: Vector3<f64>,
     /// How things are turned about that, as a rotation vector \[rad\].
     pub rotation: Vector3<f64>,
-    /// Of the camera itself.
+    /// Calibration error of the camera itself.
     pub camera: CameraCalibrationError,
 }
 

@@ -35,7 +35,7 @@ impl HandMeasurement {
         Self { hand, t_cam_hand, joints, forces, touch, pose_sigmas: [None; 2], joint_sigmas }
     }
 
-    /// The same with the force of the object on each taxel, in its link's frame \[N\].
+    /// Measurement with the force of the object on each taxel, in its link's frame \[N\].
     pub fn with_forces(self, forces: Vec<Vector3<f64>>) -> Self {
         Self { forces, ..self }
     }
@@ -197,7 +197,7 @@ impl Frame {
         Ok(())
     }
 
-    /// The same as an error of a refinement.
+    /// Refuses images that have not the camera's size, as a refinement does.
     ///
     /// # Errors
     /// [`RefineError::Images`].
@@ -230,7 +230,7 @@ const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
 /// Refuses a gravity that cannot be in m/s² or that presses nothing into the hand.
 ///
 /// # Errors
-/// What is wrong with it.
+/// A message with the norm of the gravity \[m/s²\].
 pub fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
     let norm = gravity.norm();
     if PLAUSIBLE_GRAVITY.contains(&norm) {

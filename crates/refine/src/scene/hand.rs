@@ -169,7 +169,7 @@ impl Hand {
         link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })
     }
 
-    /// What there is to draw of the hand, with link → camera poses.
+    /// Render models of the hand's links, with link → camera poses.
     ///
     /// # Panics
     /// If there is not one joint position a joint: see [`check_joints`](Self::check_joints).

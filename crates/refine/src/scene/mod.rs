@@ -1,4 +1,4 @@
-//! What there is: one [`Frame`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
+//! The scene: one [`Frame`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
 
 mod calibration;
 mod example;

@@ -49,7 +49,7 @@ pub struct Object {
     pub name: String,
     /// The mesh in meters, as loaded, its faces turned outward.
     pub mesh: TriMesh,
-    /// What cleaning found and did.
+    /// Report of the cleaning of the mesh.
     pub report: MeshReport,
     /// Mass and its distribution.
     pub inertial: Inertial,
@@ -65,7 +65,7 @@ pub struct Object {
     pub area: f64,
     /// By what the surface was corrected, where it was: how far it may still be from where the mesh has it.
     pub deviation: Option<Arc<SurfaceDeviation>>,
-    /// What decided where the surface is sampled.
+    /// Seed of the surface samples.
     pub(crate) seed: u64,
     pub(crate) surface: ClosestPoints,
     /// Outward unit normal of each face that `surface` may answer; zero for a face without area.

@@ -121,10 +121,10 @@ impl<'a> PreparedFrame<'a> {
         Ok(frame)
     }
 
-    /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures
-    /// there, all hypotheses of a call at once. What it fails to answer, the processor does; a device
-    /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
-    /// must not wait for each other.
+    /// The frame on another rendering device ([`Device::open`](prehend_render::Device::open)): factors compare all hypotheses of a call there at once.
+    ///
+    /// The processor renders where the device fails. Pass no device [`WithFallback`](prehend_render::WithFallback): it would be called under a lock,
+    /// in which the tasks of the processor must not wait for each other.
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
         let of_view = |view: CameraView<'a>| {
             let frame = view.frame.with_backend(Arc::clone(&backend));
@@ -324,7 +324,7 @@ pub(crate) fn hand_depth(camera: &Camera, hand: Option<&HandMeasurement>) -> Dep
     depth
 }
 
-/// The same into an image that is there already.
+/// Draws the depth of a hand, whose joints must have been checked, into an existing image \[m\].
 pub(crate) fn draw_hand_depth(
     depth: &mut DepthImage,
     camera: &Camera,

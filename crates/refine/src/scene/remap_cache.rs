@@ -12,7 +12,7 @@ const KEPT: usize = 2;
 pub(crate) struct RemapCache(Mutex<Vec<(Camera, Distortion, Arc<Remap>)>>);
 
 impl RemapCache {
-    /// Of images of `camera` behind `lens`, for a pinhole of the same matrix and size.
+    /// Map from images of `camera` behind `lens` to those of a pinhole of the same matrix and size.
     pub(crate) fn get(&self, camera: Camera, lens: Distortion) -> Arc<Remap> {
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_same = |known: &(Camera, Distortion, _)| (known.0, known.1) == (camera, lens);

@@ -1,8 +1,8 @@
-//! What sensors of touch say that measure no forces.
+//! Readings of tactile sensors that measure no forces.
 
 use nalgebra::{Point3, Vector3};
 
-/// What one such sensor says. Places are in the frame of the link at that index of the hand's
+/// Reading of one such sensor. Positions are in the frame of the link at that index of the hand's
 /// [`links`](prehend_geometry::robot::KinematicTree::links).
 #[derive(Clone, Debug, PartialEq)]
 pub enum TouchReading {

@@ -7,7 +7,7 @@ use super::prepared_frame::hand_depth;
 use super::{Frame, Object};
 use crate::error::RefineError;
 
-/// What should be seen, and what is.
+/// Expected and measured pixels of a frame, for an object at a pose.
 pub(crate) struct View<'a> {
     pub(crate) frame: &'a Frame,
     /// Depth of the whole object at the pose \[m\], 0 where it is not.
@@ -93,7 +93,7 @@ impl<'a> View<'a> {
         self.covered.iter().map(move |&i| ([i % width, i / width], self.pixel(i)))
     }
 
-    /// The same of those that are farther than `margin` \[px\] from the image's border, each with its index, row by row.
+    /// Those of [`pixels`](Self::pixels) that are at least `margin` \[px\] from the image's border, each with its index, row by row.
     pub(crate) fn inner_pixels(&self, margin: usize) -> impl Iterator<Item = (usize, Pixel)> {
         let (width, height) = self.size();
         let inside = move |at: usize, size: usize| at >= margin && at + margin < size;
@@ -124,8 +124,8 @@ impl<'a> View<'a> {
         [mask, model]
     }
 
-    /// What moves the object, its center at depth `z`, to where mask and depth have it (camera frame) \[m\]; none if mask and
-    /// object do not meet.
+    /// Translation of the object, its center at depth `z` \[m\], to the mask and its depth (camera frame) \[m\]. `None` without depth where mask and
+    /// object overlap.
     pub(crate) fn toward_seen(&self, z: f64) -> Option<Vector3<f64>> {
         let [mask, model] = self.sums();
         let forward = median(self.depths_on_object().map(|(sensor, object)| sensor - object))?;

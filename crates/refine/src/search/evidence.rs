@@ -1,4 +1,4 @@
-//! What the sensors say, in the form that very many hypotheses are judged by.
+//! Evidence of a frame, in the form by which very many hypotheses are scored.
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::cloud::estimate_normals;
@@ -18,12 +18,12 @@ pub(super) struct SearchEvidence {
     pub(super) touched: Vec<Point3<f64>>,
     /// Points of the hand, quiet taxels among them, that are not inside the object.
     pub(super) outside: Vec<Point3<f64>>,
-    /// What is seen where.
+    /// Visible object and depth.
     pub(super) map: SightMap,
 }
 
 impl SearchEvidence {
-    /// What `frame` shows; the hand's surface is as many points as stage 2 looks at.
+    /// Evidence of `frame`; the hand's surface is as many points as stage 2 looks at.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
@@ -72,7 +72,7 @@ fn shuffled<T>(items: Vec<T>) -> Vec<T> {
     keyed.into_iter().map(|(_, item)| item).collect()
 }
 
-/// What the camera sees where, at a low resolution.
+/// Image of the visible object and of depth, at a low resolution.
 pub(super) struct SightMap {
     camera: Camera,
     pixels: Vec<Sight>,

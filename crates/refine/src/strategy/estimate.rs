@@ -1,4 +1,4 @@
-//! What a strategy is.
+//! Strategies of refinement and their estimates.
 
 use std::ops::ControlFlow;
 
@@ -63,7 +63,7 @@ pub struct Estimate {
     pub iteration: usize,
     /// How uncertain it is: some from the fused estimator, none from the other strategies.
     pub posterior: Option<Posterior>,
-    /// What happened on the way.
+    /// History of the refinement.
     pub trace: Trace,
 }
 
@@ -93,7 +93,7 @@ impl Estimate {
 pub(crate) struct Recorder<'a, 'b> {
     observe: &'a mut Observer<'b>,
     iterations: usize,
-    /// What decides which state is the best, if not the last one.
+    /// Factor of which the best state has the lowest cost; without one, the last state is the best.
     judge: Option<RenderingFactor>,
     lowest: f64,
     best: State,
@@ -102,8 +102,8 @@ pub(crate) struct Recorder<'a, 'b> {
 }
 
 impl<'a, 'b> Recorder<'a, 'b> {
-    /// Of a walk from `initial` of at most `iterations`, whose values are called `names`. With a `judge`, the state of the lowest
-    /// cost by it is the best; else the last one is.
+    /// Recorder of a walk from `initial` of at most `iterations`, whose values are called `names`. The best state is that of the lowest cost
+    /// by `judge`, or the last one without it.
     pub(crate) fn new<'n>(
         names: impl Iterator<Item = &'n str>,
         initial: &State,

@@ -1,4 +1,4 @@
-//! What happened during a refinement, iteration by iteration.
+//! The history of a refinement, iteration by iteration.
 
 use serde::{Deserialize, Deserializer, Serialize};
 

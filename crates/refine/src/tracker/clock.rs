@@ -1,8 +1,8 @@
-//! What a frame's time is spent on, and when it is up.
+//! Computation time of a frame, and its budget.
 
 use std::time::{Duration, Instant};
 
-/// What the time of a frame went into.
+/// Computation time of a frame, by task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// Preparing images, points and factors.

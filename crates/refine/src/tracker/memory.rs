@@ -1,4 +1,4 @@
-//! What a tracker keeps from one frame to the next.
+//! Track of an object from one frame to the next.
 
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ pub(super) struct TrackState {
     /// Twist about the object's center, in the camera frame of then, relative to the hand where that was known
     /// \[m/s; rad/s\].
     velocity: Vector6<f64>,
-    /// Of the solution, in the order of its [`blocks`](State::blocks).
+    /// Covariance of the solution, in the order of its [`blocks`](State::blocks).
     covariance: DMatrix<f64>,
     /// Running level of the misfit \[nat\].
     pub(super) level: f64,
@@ -50,11 +50,11 @@ pub(super) struct TrackState {
     followed: u32,
     /// Other poses that fit.
     pub(super) modes: Modes,
-    /// What the object looks like.
+    /// Keyframe of the object's appearance.
     pub(super) keyframe: Option<Keyframe>,
 }
 
-/// What is expected of a frame before it is looked at.
+/// Prediction of a frame's state.
 pub(super) struct Prediction {
     pub(super) state: State,
     pub(super) covariance: DMatrix<f64>,
@@ -62,7 +62,7 @@ pub(super) struct Prediction {
     zero_velocity_pose: Isometry3<f64>,
     velocity: Vector6<f64>,
     pub(super) seconds: f64,
-    /// Covariance of the motion from the last frame: a left twist about the object's center \[m², rad²\].
+    /// Covariance of the motion from the last frame: a left twist about the object's center \[m², m rad, rad²\].
     pub(super) motion_covariance: Matrix6<f64>,
     /// The last keyframe, where images have measured the motion since.
     pub(super) keyframe: Option<Keyframe>,
@@ -79,7 +79,7 @@ impl Prediction {
 }
 
 impl TrackState {
-    /// Of `at`, the solution of a frame.
+    /// Track at `at`, the solution of a frame.
     pub(super) fn new(
         moment: &Moment,
         at: &Linearization,
@@ -157,7 +157,7 @@ impl TrackState {
         next
     }
 
-    /// What is expected of a frame.
+    /// Prediction of the state at `moment`.
     pub(super) fn predict(
         &self,
         moment: &Moment,
@@ -237,7 +237,7 @@ fn both(turn: &UnitQuaternion<f64>, twist: &Vector6<f64>) -> Vector6<f64> {
     Vector6::from_iterator(halves.iter().flatten().copied())
 }
 
-/// What takes the `n` deviations of one frame to those of the next: twists turn with the hand, calibrations fade.
+/// Transition matrix of the `n` errors of a state: twists turn with the hand, calibrations decay by `kept`.
 fn transition(turn: &UnitQuaternion<f64>, kept: f64, n: usize) -> DMatrix<f64> {
     let mut transition = DMatrix::identity(n, n) * kept;
     let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();

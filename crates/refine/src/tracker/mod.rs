@@ -81,7 +81,7 @@ pub struct Tracker {
     settings: TrackerSettings,
     /// Factors of all frames besides.
     pub(crate) factors: Vec<Arc<dyn Factor>>,
-    /// What renders, if not the processor at hand.
+    /// Renderer, if not the processor.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<Arc<Rig>>,
     /// How accurate the first frame's initial pose and calibrations are.
@@ -96,7 +96,7 @@ pub struct Tracker {
     /// Asked before any search.
     finder: Option<Arc<dyn PoseFinder>>,
     segmenter: Segmenter,
-    /// Of the frame before.
+    /// Images of the frame before.
     images: Images,
 }
 
@@ -144,7 +144,7 @@ impl Tracker {
         Self { backend: Some(backend), ..self }
     }
 
-    /// Of frames that are corrected by `rig` already, as the object is: calibrations are as accurate as the rig is known.
+    /// Tracker of frames that are corrected by `rig` already, as the object is: calibrations are as accurate as the rig is known.
     pub fn with_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig: Some(rig), ..self }
     }

@@ -17,7 +17,7 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// The same part at half the resolution.
+    /// Level of the same part at half the resolution.
     fn halved(&self) -> Self {
         let Self { camera: full, pixels } = self;
         let camera = full.scaled(0.5);

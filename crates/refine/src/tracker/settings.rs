@@ -13,7 +13,7 @@ use crate::error::RefineError;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
-/// What is known of how an object moves from frame to frame; in files, all of it or nothing.
+/// Process noise of an object's motion from frame to frame; in files, all of it or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -139,7 +139,7 @@ settings! {
 }
 
 impl TrackerSettings {
-    /// Of an object in a hand that is known, or of one anywhere.
+    /// Process noise of an object in a hand that is known, or of one anywhere.
     pub(super) fn motion(&self, in_hand: bool) -> &ProcessNoise {
         if in_hand { &self.in_hand } else { &self.free }
     }

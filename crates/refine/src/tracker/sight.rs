@@ -38,7 +38,7 @@ pub(super) struct Images {
 }
 
 impl Sight {
-    /// Of a hand whose joints were checked.
+    /// Sight of a frame, the joints of whose hand were checked.
     pub(super) fn new(mut observation: Frame, images: Images) -> Self {
         let Images { mask, mut hand_depth, mut depth } = images;
         let hand = observation.hand.as_ref();
@@ -69,7 +69,7 @@ impl Sight {
         [range(place.x, camera.width), range(place.y, camera.height)]
     }
 
-    /// What is left of it for the next one.
+    /// Its images, whose memory serves the next one.
     pub(super) fn into_images(self) -> Images {
         let Self { frame: observation, hand_depth, depth, .. } = self;
         Images { mask: observation.mask, hand_depth, depth }

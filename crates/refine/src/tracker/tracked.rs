@@ -1,4 +1,4 @@
-//! What becomes of a frame.
+//! Outcome of a frame.
 
 use std::fmt;
 
@@ -74,7 +74,7 @@ impl fmt::Display for Rejection {
 pub struct Tracked {
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_object: Isometry3<f64>,
-    /// The same with the hand, its joints and the camera as they are estimated to be.
+    /// State: the object's pose with estimates of the hand, its joints and the camera.
     pub state: State,
     /// How the pose came about.
     pub status: TrackStatus,
@@ -88,7 +88,7 @@ pub struct Tracked {
     pub iterations: usize,
     /// Cost of the evidence, without what was known before \[nat\]; not a number if the frame was not looked at.
     pub cost: f64,
-    /// What the time was spent on.
+    /// Computation time, by task.
     pub timing: Timing,
 }
 

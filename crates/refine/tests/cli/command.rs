@@ -1,4 +1,4 @@
-//! What the commands do when all is well.
+//! Commands with valid inputs.
 
 use std::fs;
 use std::process::Stdio;
@@ -312,7 +312,7 @@ fn what_is_kept_between_runs_changes_no_pose() {
     assert_eq!(kept(), grids);
 }
 
-/// The same evidence as a dataset and as a frame file gives the same pose.
+/// A dataset and a frame file with equal evidence give the same pose.
 #[test]
 fn a_frame_file_is_as_good_as_a_dataset() {
     let place = Workplace::new();

@@ -37,7 +37,7 @@ pub(crate) struct Workplace {
     dir: tempfile::TempDir,
 }
 
-/// What the program said.
+/// Exit code and output of the program.
 pub(crate) struct Said {
     pub(crate) code: i32,
     pub(crate) out: String,

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::fixture::Workplace;
 
-/// What is told of a path, as JSON.
+/// Output of `info` for a path, as JSON.
 fn told(place: &Workplace, arguments: &str) -> Value {
     let text = place.succeed(&format!("info --json {arguments}"));
     serde_json::from_str(&text).unwrap()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::fixture::Workplace;
 
-/// What `prehend settings` prints is what `docs/SETTINGS.md` has; `PREHEND_WRITE_GOLDEN=1` puts it there.
+/// `docs/SETTINGS.md` has the output of `prehend settings`; `PREHEND_WRITE_GOLDEN=1` puts it there.
 #[test]
 fn the_page_has_all_settings() {
     let printed = Workplace::empty().succeed("settings");

@@ -1,4 +1,4 @@
-//! What estimators must not see changes nothing.
+//! Estimates do not depend on the ground truth.
 
 use std::collections::BTreeSet;
 use std::fs;

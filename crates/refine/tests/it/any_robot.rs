@@ -29,7 +29,7 @@ const TABLE: &str = r#"<robot name="table"><link name="top"><collision><origin x
 const CAMERA: Camera =
     Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
 
-/// What is held or carried by what, and where.
+/// An object on a robot, and its pose.
 struct Setting {
     object: Arc<Object>,
     robot: Arc<Hand>,
@@ -58,7 +58,7 @@ impl Setting {
         self.t_cam_robot * self.t_robot_object
     }
 
-    /// What a perfect camera sees; gravity is the robot's −z.
+    /// Frame of a perfect camera; gravity is the robot's −z.
     fn observation(&self) -> Frame {
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             self.robot.render_bodies(&self.t_cam_robot, &self.joints);

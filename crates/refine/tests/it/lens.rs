@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 const CAMERA: Camera = Camera { fx: 150.0, fy: 152.0, cx: 79.0, cy: 60.5, width: 160, height: 120 };
 
-/// Of an ordinary lens that bends much, and of a fisheye.
+/// Distortions of an ordinary lens that bends much, and of a fisheye.
 fn lenses() -> [Value; 2] {
     [
         json!({ "model": "brown_conrady", "coefficients": [-0.3, 0.1, 2e-3, -1e-3, -0.02] }),
@@ -28,7 +28,7 @@ fn lens_of(value: &Value) -> Distortion {
     Distortion::by_name(value["model"].as_str().unwrap(), &coefficients).unwrap()
 }
 
-/// What `camera` sees of a box: color, depth and mask.
+/// Color, depth and mask of a box before `camera`.
 fn seen(camera: &Camera) -> (RgbImage, DepthImage, Mask) {
     let model = RenderModel::new(&cuboid(Vector3::new(0.08, 0.12, 0.06))).unwrap();
     let pose = Isometry3::new(Vector3::new(0.04, -0.02, 0.3), Vector3::new(0.4, 0.5, 0.1));

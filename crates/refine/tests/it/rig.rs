@@ -19,7 +19,7 @@ const DEPTH_SCALE: f64 = 1.006;
 const JOINT: f64 = 0.012;
 const HAND: Vector3<f64> = Vector3::new(2e-3, -1e-3, 1.5e-3);
 
-/// What a rig that is wrong says of a frame.
+/// Frame of a rig with calibration errors.
 fn said(truth: &Frame) -> Frame {
     let mut said = truth.clone();
     said.camera.cx -= SHIFT_PX;

@@ -142,7 +142,7 @@ fn count(mask: &[bool]) -> f64 {
     mask.iter().filter(|m| **m).count() as f64
 }
 
-/// What holds at any preset; `exact` says whether what is told is also true.
+/// Checks of any preset; `exact` says whether stated values are also true.
 fn inspect(root: &Path, rgb: &str, exact: bool) {
     let scene = root.join("test/000005");
     let file = |name: &str| json(scene.join(name));

@@ -1,4 +1,4 @@
-//! What can go wrong on a device.
+//! Errors of devices.
 
 use crate::pose_loss::OptionError;
 
@@ -29,7 +29,7 @@ pub enum BackendError {
     TooLarge {
         /// The device's name.
         device: String,
-        /// What is too large.
+        /// Name of the data or dispatch that is too large.
         what: &'static str,
         /// Bytes needed.
         needed: u64,

@@ -22,7 +22,7 @@ use crate::light::Light;
 use crate::model::RenderModel;
 use crate::pose_loss::{Linearized, Loss, PoseImage, PoseLoss, Target, Tile};
 
-/// What many poses have in common.
+/// Object, target and loss that many poses have in common.
 #[derive(Clone, Debug)]
 pub struct PoseProblem {
     /// The object.
@@ -72,7 +72,7 @@ pub struct Hypothesis {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Backend: Send + Sync {
-    /// What computes, for people to read.
+    /// Name of the device, for people to read.
     fn name(&self) -> &str;
 
     /// Uploads a problem. What the session allocates serves all its calls.
@@ -95,7 +95,7 @@ impl Backend for Arc<dyn Backend> {
 /// A problem on its device. Results come in the order of the hypotheses, and a hypothesis has the same result whatever
 /// the others are.
 pub trait Session: Send {
-    /// What computes at present, for people to read.
+    /// Name of the device in use at present, for people to read.
     fn name(&self) -> &str;
 
     /// The loss of each hypothesis.

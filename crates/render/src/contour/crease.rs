@@ -70,7 +70,7 @@ pub(crate) fn creases<'a>(
 }
 
 impl Crease {
-    /// The same edge as the face beyond it has it.
+    /// Edge as the face beyond has it.
     pub(crate) fn reversed(&self) -> Piece {
         Piece { face: self.other, corners: self.other_corners, ..self.piece }
     }

@@ -22,7 +22,7 @@ pub(super) type Around = [Option<u32>; 4];
 const STEPS: [Vec2; 4] = [Vec2::NEG_X, Vec2::X, Vec2::NEG_Y, Vec2::Y];
 
 impl ContourView<'_> {
-    /// What is seen around a pixel that shows `face`, of depth `z` and near this inner contour, if any.
+    /// Faces around a pixel that shows `face` at depth `z` \[m\], near this inner contour, if any.
     pub(super) fn around(&self, place: &Place, face: u32, z: f32, inner: Option<&Inner>) -> Around {
         STEPS.map(|step| {
             let (dx, dy) = (step.x as i64, step.y as i64);
@@ -65,11 +65,11 @@ impl ContourView<'_> {
     }
 }
 
-/// What a pixel that a face covers has around it.
+/// Surroundings of a pixel that a face covers.
 pub(super) enum Beside {
-    /// Of its own surface.
+    /// Faces of its own surface.
     Surface(Around),
-    /// Of both, where an inner contour is near and cuts pixels.
+    /// Near and far surface, where an inner contour is near and cuts pixels.
     Layers(Layers),
 }
 
@@ -115,7 +115,7 @@ impl Scene<'_> {
     /// them, and that is what the mean over an area changes by when what it shows moves. Two faces that meet between two
     /// pixels each have half a say in the color there, so a jump of color counts, too.
     ///
-    /// Of a pixel through which a contour runs only the part inside counts; that the contour moves is left to the caller.
+    /// With a contour `cut` through the pixel, only the part inside counts; the caller adds the motion of the contour.
     pub(super) fn rows_over_footprint(
         &self,
         at: Vec2,

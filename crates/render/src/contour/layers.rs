@@ -63,7 +63,7 @@ struct Crowded {
 /// How far a segment may go sideways in a strip to be sorted \[px\].
 const WIDEST: f32 = 1.0;
 
-/// What rounding may change of where a segment is \[px\].
+/// Bound of the rounding error of a segment's position \[px\].
 const ROUNDING: f32 = 0.01;
 
 impl Layers {

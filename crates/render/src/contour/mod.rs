@@ -39,7 +39,7 @@ use near::{Bands, Found, Hit, Place};
 use walk::Walk;
 
 impl ContourView<'_> {
-    /// What the pixel at `place` shows, given what was found there.
+    /// Values of the pixel at `place`, given the face and contours there; `None` without the object.
     #[inline]
     fn seen<const DERIVATIVES: bool>(&self, place: Place, found: Found) -> Option<Seen> {
         let scene = &self.scene;

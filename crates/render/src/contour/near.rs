@@ -1,4 +1,4 @@
-//! What is near each pixel of a block of rows: a face, and the contours and creases within whose bands the pixel lies.
+//! Face at each pixel of a block of rows, and the contours and creases within whose bands the pixel lies.
 
 use super::contours::ContourView;
 use super::crease::Crease;
@@ -18,7 +18,7 @@ pub(super) struct Place<'a> {
     pub(super) at: usize,
 }
 
-/// What is at a pixel.
+/// Face and contours at a pixel.
 #[derive(Clone, Copy)]
 pub(super) enum Found<'a> {
     Nothing,
@@ -52,7 +52,7 @@ pub(super) struct Bands<'a> {
     outline: Band,
     /// The first pixel's index in the outline's band, which has a row more above and below where slopes look at neighbors.
     start: usize,
-    /// Of inner contours and creases, if there are any.
+    /// Bands of inner contours and of creases, if there are any.
     inner: Option<Band>,
     crease: Option<Band>,
 }
@@ -79,7 +79,7 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Of each pixel, whether it is in no band.
+    /// True for each pixel in no band.
     pub(super) fn clear(&self) -> Vec<bool> {
         let count = self.visible.face.len();
         let outline = &self.outline.piece[self.start..self.start + count];
@@ -90,7 +90,7 @@ impl<'a> Bands<'a> {
         clear
     }
 
-    /// What is at pixel (x, y) of the block.
+    /// Face and contours at pixel (x, y) of the image, within the block.
     #[inline]
     pub(super) fn found(&self, x: usize, y: usize) -> (Place<'_>, Found<'a>) {
         let Region { x0, y0, .. } = self.visible.region;

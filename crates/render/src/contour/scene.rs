@@ -1,4 +1,4 @@
-//! What the contour mode draws.
+//! Scene of the contour mode.
 
 use glam::Vec3;
 

@@ -17,9 +17,9 @@ use crate::image::ImageError;
 /// How a lens shows what a pinhole would show elsewhere. Positions are X/Z, Y/Z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
-    /// Of ordinary lenses.
+    /// Radial–tangential distortion of ordinary lenses.
     BrownConrady(BrownConrady),
-    /// Of fisheyes.
+    /// Distortion of fisheyes.
     KannalaBrandt(KannalaBrandt),
 }
 

@@ -1,4 +1,4 @@
-//! What of a model can be estimated, and models with other values of it.
+//! Estimable values of a model, and models with other values.
 
 use nalgebra::{Point3, Vector3};
 
@@ -42,9 +42,8 @@ impl RenderModel {
         }
     }
 
-    /// The same topology with other welded vertices \[m\]. Normals follow them. The [center](Self::center), the
-    /// [radius](Self::radius) and the choice of texture levels stay those of the original, so that images
-    /// change smoothly.
+    /// Model of the same topology with other welded vertices, mesh frame \[m\]. Normals follow them. The [center](Self::center),
+    /// the [radius](Self::radius) and the choice of texture levels stay those of the original, so that images change smoothly.
     ///
     /// # Errors
     /// When there are not as many, or one is not finite.
@@ -66,7 +65,7 @@ impl RenderModel {
         Ok(self)
     }
 
-    /// The same shape with a color a welded vertex (0..=1).
+    /// Model of the same shape with a color a welded vertex (0..=1).
     ///
     /// # Errors
     /// When there are not as many.
@@ -79,7 +78,7 @@ impl RenderModel {
         Ok(self)
     }
 
-    /// The same model with other texels (as of [`Self::texture`]).
+    /// Model with other texels, in the order of [`Self::texture`].
     ///
     /// # Errors
     /// When there are not as many; without a texture the model has none.
@@ -92,7 +91,7 @@ impl RenderModel {
         Ok(self)
     }
 
-    /// The same shape in one color (0..=1).
+    /// Model of the same shape in one color (0..=1).
     pub fn with_uniform_color(mut self, color: [f32; 3]) -> Self {
         self.albedo = Albedo::Uniform(color);
         self.texel_density = 0.0;

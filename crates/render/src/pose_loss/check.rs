@@ -12,7 +12,7 @@ pub struct OptionError {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// What it should be.
+    /// Range that it should be in.
     pub expected: &'static str,
 }
 

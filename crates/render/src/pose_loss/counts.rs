@@ -1,6 +1,6 @@
-//! What became of the pixels.
+//! Numbers of pixels by their part in the loss.
 
-/// Numbers of pixels by what became of them.
+/// Numbers of pixels by their part in the loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// The object is seen here.

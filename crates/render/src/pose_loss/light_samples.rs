@@ -1,4 +1,4 @@
-//! What the estimation of light needs from a posed model and an image.
+//! Samples for the estimation of light, from a posed model and an image.
 
 use glam::vec2;
 use nalgebra::Isometry3;
@@ -11,11 +11,11 @@ use crate::projected::barycentric;
 use crate::raster::{Visible, rasterize};
 use crate::shading::surface::{albedo, posed_normal};
 
-/// What [`Light::fit`](crate::Light::fit) needs: unlit color, normal and observed color where the object is seen inside the
-/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, about.
+/// Samples for [`Light::fit`](crate::Light::fit): unlit color, normal and observed color of at most about `most` pixels in
+/// the mask. The object is seen at each of them, and `margin` pixels to the left, to the right, above and below.
 ///
-/// They are those of a lattice in the image, so that pixels that a moving object covers or leaves come and go one by one, and the
-/// light hardly changes. The lattice is twice as wide where there would be too many.
+/// They lie on a lattice in the image, so that pixels that a moving object covers or leaves come and go one by one, and the
+/// light hardly changes. The density of the lattice halves until there are not too many.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,

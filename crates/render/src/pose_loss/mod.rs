@@ -74,7 +74,7 @@ const MOST_SAMPLES: usize = 16;
 pub struct PoseLoss {
     /// How visibility is softened.
     pub mode: Mode,
-    /// What is compared.
+    /// Terms of the loss.
     pub options: LossOptions,
     /// The object is drawn with so many samples a pixel, across and down (1..=16). One takes the color at the pixel's
     /// center, and its derivative, for that of the whole pixel; with more the loss is nearer to that of a camera, whose pixels
@@ -111,7 +111,7 @@ impl PoseLoss {
         Self { mode, options, samples: 1 }
     }
 
-    /// The same with `samples` by `samples` samples a pixel.
+    /// Loss with `samples` by `samples` samples a pixel.
     pub fn with_samples(self, samples: usize) -> Self {
         Self { samples, ..self }
     }

@@ -1,8 +1,8 @@
-//! What the loss of a pose consists of.
+//! Terms of the loss of a pose.
 
 use prehend_geometry::RobustKernel;
 
-/// What a [`PoseLoss`](super::PoseLoss) consists of, whatever the mode.
+/// Terms of a [`PoseLoss`](super::PoseLoss), whatever the mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossOptions {
     /// Weight of the squared color difference a channel. Zero leaves it out.
@@ -14,9 +14,9 @@ pub struct LossOptions {
     pub depth: Option<DepthOptions>,
     /// Loss of a color difference; its scale is in units of color.
     pub kernel: RobustKernel,
-    /// What becomes of a pixel of the mask where a known body lies in front of the rendered object: `false`
-    /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
-    /// behind the body does not lower the loss. Neither has a derivative.
+    /// Cost of a pixel of the mask where a known body lies in front of the rendered object: `false` gives it no
+    /// residual. `true` costs as much as a pixel that the object misses: hiding behind the body does not lower the loss.
+    /// Neither has a derivative.
     pub penalize_occluded: bool,
 }
 

@@ -11,7 +11,7 @@ use super::target::Target;
 use crate::image::DepthImage;
 use crate::view::{LANES, Patch, Seen};
 
-/// What a view is compared with, and how.
+/// Residuals of a view against the target.
 #[derive(Clone, Copy)]
 pub(super) struct Residuals<'a> {
     pub(super) options: &'a LossOptions,
@@ -71,7 +71,7 @@ impl Residuals<'_> {
         self.add_but_color::<DERIVATIVES>(sums, at, &seen);
     }
 
-    /// Of each of these pixels, whether it costs something if nothing of the object is seen there.
+    /// True for each of these pixels that costs something if nothing of the object is seen there.
     #[inline]
     pub(super) fn missed_if_empty(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
         self.target.coverage[at].iter().map(|coverage| *coverage > 0.0)

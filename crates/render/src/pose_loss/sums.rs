@@ -24,7 +24,7 @@ pub(crate) struct Sums {
     row: [f32; ENTRIES],
 }
 
-/// The same sums of pixels side by side, over one block of rows.
+/// [`Sums`] lane by lane, over pixels side by side of one block of rows.
 pub(crate) struct LaneSums {
     pub(crate) color: [f64; LANES],
     pub(crate) mask: [f64; LANES],

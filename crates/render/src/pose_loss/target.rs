@@ -1,4 +1,4 @@
-//! What the rendered object is compared with.
+//! Target of the loss: a segmented image.
 
 use crate::camera::{Camera, CameraError};
 use crate::image::{DepthImage, Mask, RgbImage};

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::loss::Linearized;
 use super::sums::Sums;
 
-/// What the pixels of one square tile of the image bring to a loss.
+/// Share of one square tile of the image in a loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tile {
     /// How many tiles are left of it.

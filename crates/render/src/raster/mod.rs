@@ -53,7 +53,7 @@ pub(crate) struct Visible {
     pub(crate) inverse_z: Vec<f32>,
 }
 
-/// What is seen at the pixel nearest to an image point.
+/// Face at the pixel nearest to an image point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// The pixel.
@@ -69,7 +69,7 @@ impl Visible {
         Self { region, face: vec![MISS; count], inverse_z: vec![0.0; count] }
     }
 
-    /// What the blocks show at the pixel nearest to a point of the image, if anything.
+    /// Face that the blocks show at the pixel nearest to a point of the image, if any.
     pub(crate) fn seen(blocks: &[Self], at: Vec2) -> Option<Seen> {
         let at = at.round();
         if at.x < 0.0 || at.y < 0.0 {
@@ -184,7 +184,7 @@ pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> 
     depth
 }
 
-/// The same into an image that is there already; what it has shown is gone.
+/// Depth as of [`depth_map`], written over the contents of an existing image.
 pub fn draw_depth(
     depth: &mut DepthImage,
     camera: &Camera,

@@ -78,7 +78,7 @@ impl SideBySide {
         }
     }
 
-    /// The same expressions as those of a large face.
+    /// Covered pixel centers and their 1/Z, by the expressions for large faces.
     #[inline(always)]
     fn cover(&mut self, visible: &Visible) {
         let region = &visible.region;

@@ -1,4 +1,4 @@
-//! What comes out of a rendering, and the adjoints that go back in.
+//! Images of a rendering, and their adjoints.
 
 use nalgebra::Vector3;
 

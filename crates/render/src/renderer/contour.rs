@@ -26,7 +26,7 @@ pub(super) struct Contours {
     pub(super) blocks: Vec<Block>,
 }
 
-/// What is visible in a block of rows.
+/// Visible faces and nearby contours of a block of rows.
 pub(super) struct Block {
     pub(super) visible: Visible,
     /// Outline piece, inner contour and crease in whose band each pixel is.
@@ -37,7 +37,7 @@ pub(super) struct Block {
     side: Vec<f32>,
 }
 
-/// What was decided about a pixel: which face is at its center, and which contours are near.
+/// Face at a pixel's center, and the contours near it.
 #[derive(Clone, Copy)]
 pub(super) struct Decision<'a> {
     pub(super) face: Option<usize>,
@@ -61,7 +61,7 @@ enum Site {
 struct Step {
     piece: Piece,
     foot: Foot,
-    /// Of the edge in space.
+    /// Share of the edge in space at the foot.
     share: f64,
     /// Weight of the near side, and its derivative by the signed distance.
     alpha: f64,
@@ -224,7 +224,7 @@ fn is_near(frame: &Frame, inner: &Inner, own: usize, z: f64) -> bool {
     }
 }
 
-/// What [`Foot`] is a function of.
+/// Inputs of [`Foot`]: both ends of the edge, camera frame \[m\], and fx, fy, cx, cy \[px\].
 #[inline]
 fn foot_inputs(frame: &Frame, piece: &Piece) -> [f64; 10] {
     let corners = frame.corners(piece.face as usize);

@@ -5,7 +5,7 @@ use crate::softras::Settings;
 /// Corners of the edges that a distance is taken to; of equally near ones the first counts.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
-/// The same as the fragment of the loss of a pose ([`crate::softras`] has the formulas).
+/// Fragment as in the loss of a pose ([`crate::softras`] has the formulas).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fragment {
     /// Barycentric coordinates of the surface point.
@@ -18,7 +18,7 @@ pub(super) struct Fragment {
     corner: [[f64; 2]; 3],
     depth: [f64; 3],
     perspective: bool,
-    /// What an edge function is multiplied with for its weight, and the weights before they are clamped.
+    /// Factors of the edge functions in their weights, and the weights before clamping.
     share: [f64; 3],
     weight: [f64; 3],
     least_weight: f64,
@@ -36,7 +36,7 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 impl Fragment {
-    /// Of the face with corners at (column, row, Z) \[px, m\], at a pixel (column, row).
+    /// Fragment of the face with corners at (column, row, Z) \[px, m\], at a pixel (column, row).
     #[inline]
     pub(super) fn new(corners: &[[f64; 3]; 3], pixel: [f64; 2], settings: &Settings) -> Self {
         let corner = corners.map(|c| [c[0] - pixel[0], c[1] - pixel[1]]);

@@ -38,7 +38,7 @@ pub(super) struct Frame {
     pub(super) facing: Vec<i8>,
 }
 
-/// The same scene projected in f32, for the discrete part: what is visible.
+/// Scene projected in f32, for the discrete decisions on visibility.
 pub(super) struct Flat {
     edges: Vec<Edge>,
     /// Those at which normals or colors of an object jump.

@@ -17,7 +17,7 @@ pub(super) struct Hit {
 /// Adjoints of what a hit depends on.
 pub(super) struct HitAdjoint {
     pub(super) corners: [Vector3<f64>; 3],
-    /// Of the ray X/Z.
+    /// Adjoint of the ray X/Z.
     pub(super) ray: Vector3<f64>,
 }
 

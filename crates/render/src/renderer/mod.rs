@@ -2,9 +2,9 @@
 //!
 //! [`Renderer::render`] makes the images of a [`Scene`]; [`Rendering::vjp`] carries a loss's derivatives by their pixels
 //! back to poses, vertices, colors, texels, camera, light and background.
-//! What is visible is decided in f32, by the code that also serves the loss of a pose; everything that has a derivative is
-//! computed in f64. A [`Mode`] is one file (`contour`, `softras`), which says what places on which faces a pixel shows, with
-//! what weights. Results do not depend on the number of threads.
+//! Visibility is decided in f32, by the code that also serves the loss of a pose; everything that has a derivative is
+//! computed in f64. A [`Mode`] is one file (`contour`, `softras`), which gives the places on faces that a pixel shows, with
+//! their weights. Results do not depend on the number of threads.
 
 mod buffers;
 mod contour;
@@ -87,7 +87,7 @@ pub struct Rendering<Sh> {
     visible: Visible,
 }
 
-/// What a mode has decided.
+/// Visibility as the mode decided it.
 enum Visible {
     Contour(Contours),
     SoftRas(SoftFaces),

@@ -1,4 +1,4 @@
-//! What is rendered.
+//! Scenes: posed models before a camera.
 
 use std::sync::Arc;
 

@@ -37,7 +37,7 @@ struct Spread {
     absence: f64,
 }
 
-/// What the faces of a pixel make of it.
+/// Fragments of a pixel and their blend, for the reverse derivative.
 #[derive(Default)]
 pub(super) struct Trace {
     spreads: Vec<Spread>,

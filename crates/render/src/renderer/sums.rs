@@ -8,9 +8,9 @@ use crate::model::NONE;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceAdjoint {
     pub(super) face: u32,
-    /// Of the positions, camera frame.
+    /// Adjoints of the positions, camera frame.
     pub(super) position: [Vector3<f64>; 3],
-    /// Of the corner normals, mesh frame.
+    /// Adjoints of the corner normals, mesh frame.
     pub(super) normal: [Vector3<f64>; 3],
     pub(super) albedo: [[f64; 3]; 3],
 }
@@ -26,22 +26,22 @@ pub(super) struct TexelUse {
 /// Adjoints that belong to an object as a whole.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BodySums {
-    /// Of a turn of its normals, camera frame.
+    /// Adjoint of a rotation of its normals, camera frame.
     pub(super) turn: Vector3<f64>,
-    /// Of the pyramid level.
+    /// Adjoint of the pyramid level.
     pub(super) level: f64,
-    /// Of its one color.
+    /// Adjoint of its uniform color.
     pub(super) uniform: [f64; 3],
 }
 
-/// What a block of rows adds up.
+/// Sums of adjoints over a block of rows.
 pub(super) struct Sums {
     /// Place in `faces` of each face of the scene.
     slots: Vec<u32>,
     pub(super) faces: Vec<FaceAdjoint>,
     pub(super) texels: Vec<TexelUse>,
     pub(super) bodies: Vec<BodySums>,
-    /// Of fx, fy, cx, cy.
+    /// Adjoints of fx, fy, cx, cy.
     pub(super) intrinsics: [f64; 4],
     pub(super) parameters: Vec<f64>,
     pub(super) background: [f64; 3],

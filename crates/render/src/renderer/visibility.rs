@@ -1,4 +1,4 @@
-//! What a mode tells the code that all modes share: which places on which faces a pixel shows, and with what weights.
+//! Visibility as a mode gives it to the code that all modes share: the places on faces that a pixel shows, with their weights.
 
 use super::frame::Frame;
 use super::sums::Sums;
@@ -14,7 +14,7 @@ pub(super) struct Part {
     pub(super) weight: f64,
 }
 
-/// What the parts make of a pixel.
+/// Blend of the parts of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blend {
     /// Weight of the background's color.
@@ -44,7 +44,7 @@ pub(super) struct BlendAdjoint {
 /// Which faces and contours count at a pixel is decided once, in f32; weights and places are functions of corners and
 /// intrinsics in f64.
 pub(super) trait Visibility: Sync {
-    /// What a pixel leaves for its reverse derivative; the same one serves many pixels, so that its room is reused.
+    /// Intermediate values of a pixel for its reverse derivative; one serves many pixels, so that its memory is reused.
     type Trace: Default;
 
     /// The pixels of each block of rows.

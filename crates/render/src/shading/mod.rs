@@ -22,7 +22,7 @@ pub struct SurfacePoint<S> {
     pub albedo: [S; 3],
 }
 
-/// What lights a scene: one function, generic over the scalar, from which the renderer takes all derivatives.
+/// Color of a lit surface point: one function, generic over the scalar, from which the renderer takes all derivatives.
 ///
 /// Colors above one are kept: pictures clamp when they are saved. A shader of fog, whose density and color can be
 /// estimated from images:

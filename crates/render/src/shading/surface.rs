@@ -64,7 +64,7 @@ impl Unlit {
         }
     }
 
-    /// Of a texel at a point of a face with texture coordinates `uv` at its corners.
+    /// Unlit color of a texel at a point of a face with texture coordinates `uv` at its corners.
     #[inline(always)]
     pub(crate) fn textured(texel: &Texel, uv: &[[f32; 2]; 3]) -> Self {
         let [origin, first, second] = uv.map(Vec2::from);

@@ -17,10 +17,10 @@ pub(crate) struct Part<T> {
 #[derive(Clone, Copy)]
 pub(crate) struct Candidate<T> {
     pub(crate) face: u32,
-    /// Of plain numbers that come to nothing where the face does not count.
+    /// Fragment; `b`, `z`, `distance` and `inverse_sum` are finite where the face does not count.
     pub(crate) fragment: Fragment<T>,
     /// 1 where the face counts, else 0.
     pub(crate) counts: T,
-    /// What [`Blend`](super::blend::Blend) finds.
+    /// Part in the pixel, set by [`Blend`](super::blend::Blend).
     pub(crate) part: Part<T>,
 }

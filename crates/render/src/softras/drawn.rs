@@ -15,8 +15,8 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
-    /// Of the faces `corners`, as indices into `screen` (see [`project`]); `closed` says of a face whether its surface is
-    /// closed. `facing` learns of those that have an image on which side they are lit.
+    /// Drawn faces among `corners`, as indices into `screen` (see [`project`]); `closed` says of a face whether its
+    /// surface is closed. `facing` receives the lit side of each face that has an image.
     pub(crate) fn new(
         corners: &[[u32; 3]],
         screen: &[[f64; 3]],

@@ -18,8 +18,8 @@ pub(crate) struct Face {
     pub(crate) inverse_length: [f32; 3],
     /// 1 for the very short edges, which count as their second end, else 0.
     pub(crate) short: [f32; 3],
-    /// What a corner's edge function is multiplied with for its weight: 1/Z with the perspective correction, 1
-    /// without; with the sign of the face's area, so that weights are positive inside.
+    /// Factors of the corners' edge functions in their weights: 1/Z with the perspective correction, 1 without; with the
+    /// sign of the face's area, so that weights are positive inside.
     pub(crate) share: [f32; 3],
     /// One over the Z of the corners \[1/m\].
     pub(crate) inverse_z: [f32; 3],

@@ -1,4 +1,4 @@
-//! What a face looks like from a pixel.
+//! Fragments: faces as seen from pixels.
 
 use super::face::Face;
 use super::number::Number;
@@ -29,7 +29,7 @@ pub(crate) struct Fragment<T> {
     pub(crate) sum_active: T,
 }
 
-/// Of each lane, whether the face counts there, and whether the pixel's center lies inside it.
+/// Lanes in which the face counts, and those whose pixel center lies inside it.
 #[derive(Clone, Copy)]
 pub(crate) struct Extent<M> {
     pub(crate) kept: M,

@@ -24,7 +24,7 @@ struct Problem {
 }
 
 impl Problem {
-    /// What is farther than the blur radius has a weight of e⁻³⁵, and none of the faces is one too many.
+    /// Problem with weights below e⁻³⁵ beyond the blur radius, and with the most faces a pixel.
     fn new(sigma: f64, gamma: f64) -> Self {
         let model = RenderModel::new(&painted(lump(0.045, 9), 0.05)).unwrap();
         let options = SoftRasOptions {

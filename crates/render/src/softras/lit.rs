@@ -56,7 +56,7 @@ fn unlit<T: Number>(posed: &Posed, face: usize, b: [T; 3]) -> ([T; 3], [[T; 3]; 
     }
 }
 
-/// The same of a texture, point by point.
+/// Unlit color of a texture with its derivatives, point by point.
 #[inline(always)]
 fn textured<T: Number>(posed: &Posed, face: usize, b: [T; 3]) -> ([T; 3], [[T; 3]; 2], [T; 3]) {
     let mut values = [[0.0f32; MOST_LANES]; 12];

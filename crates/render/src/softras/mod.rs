@@ -214,13 +214,13 @@ impl View for SoftRasView<'_> {
     }
 }
 
-/// What is done with the pixels of each run.
+/// Visitor of the pixels of each run.
 trait EachRun {
-    /// With the first `count` pixels from (column, row) on.
+    /// Visits the first `count` pixels from (column, row) on.
     fn run<T: Number>(&mut self, scene: &Scene, run: &mut Run<T>, pixel: [usize; 2], count: usize);
 }
 
-/// What the pixels show.
+/// Visitor of the pixels' values and derivatives.
 struct Shown<const DERIVATIVES: bool, F>(F);
 
 impl<const DERIVATIVES: bool, F> EachRun for Shown<DERIVATIVES, F>
@@ -243,7 +243,7 @@ where
     }
 }
 
-/// The faces at the pixels' centers.
+/// Visitor of the faces at the pixels' centers.
 struct Centers<F>(F);
 
 impl<F: FnMut(usize, usize, u32, Vec3)> EachRun for Centers<F> {

@@ -23,7 +23,7 @@ pub(crate) fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Of a face that moves with the body.
+/// Motion of a face with the body: its terms in derivatives by the twist.
 #[derive(Clone, Debug)]
 pub(crate) struct FaceMotion {
     /// X_i − c \[m\].
@@ -70,7 +70,7 @@ pub(crate) struct Ray<T> {
     pub(crate) focal: [T; 2],
 }
 
-/// What an image position moves by: the derivative of a distance \[px²\] by the twist.
+/// Derivative of a signed squared distance \[px²\] by the twist.
 pub(crate) struct DistanceRow<T> {
     linear: [T; 3],
     angular: [T; 3],

@@ -12,7 +12,7 @@ use crate::precision::double;
 use crate::shading::surface::albedo;
 use crate::shading::{Shader, SurfacePoint};
 
-/// What a face looks like from a point of the image.
+/// Fragment of a face at a point of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct NaiveFragment {
     pub(super) face: usize,

@@ -22,7 +22,7 @@ pub(crate) trait Number:
     /// How many there are.
     const LANES: usize;
 
-    /// The same number in all lanes, as many as here.
+    /// `value` in all lanes, as many as `self` has.
     fn like(self, value: f32) -> Self;
 
     /// The first numbers of `values`; 0 where there are too few.

@@ -1,4 +1,4 @@
-//! What pixels show, and its derivatives by the pose.
+//! Color, coverage and depth of pixels, and their derivatives by the pose.
 
 #![allow(clippy::needless_range_loop)] // closures from elsewhere would be compiled for the plain instructions
 
@@ -20,7 +20,7 @@ use crate::precision::single;
 use crate::shading::surface::{PosedLight, posed_normal};
 use crate::view::{Pixel, Seen};
 
-/// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its color.
+/// Least share of a fragment in its pixel. Smaller ones are left out: 64 of them are less than 1e-6 of its color.
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
 
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).

@@ -32,7 +32,7 @@ pub(crate) struct Settings {
     pub(crate) farthest: f32,
     pub(crate) faces: usize,
     pub(crate) perspective: bool,
-    /// What barycentric coordinates are clamped to: zero or minus infinity.
+    /// Lower bound of barycentric weights: zero or minus infinity.
     pub(crate) least_weight: f32,
     pub(crate) cull: bool,
 }

@@ -44,11 +44,11 @@ pub(crate) trait View: Sync {
     }
 }
 
-/// What is made of the pixels of a view.
+/// Consumer of the pixels of a view.
 ///
-/// A view hands over each pixel of a block once: all by [`pixel`](Self::pixel), or window by window in another way. There,
-/// what shows nothing is told by [`nothing`](Self::nothing), if that counts. Of the others the depth comes first; of those that it does not
-/// [take as hidden](Self::take_hidden), either [`covered`](Self::covered) and later a [`patch`](Self::patch) with the pixel, or
+/// A view hands over each pixel of a block once: all by [`pixel`](Self::pixel), or window by window in another way. There, an
+/// empty pixel comes by [`nothing`](Self::nothing), if [that counts](Self::counts_if_empty). Any other begins with its depth. Unless it is
+/// [hidden](Self::take_hidden), either [`covered`](Self::covered) and later a [`patch`](Self::patch) with the pixel follow, or
 /// [`all_but_color`](Self::all_but_color) and later [`colors`](Self::colors) with it. `at` is the index of a pixel in the image, which is
 /// as large as that of the view's camera.
 pub(crate) trait Sink<const DERIVATIVES: bool> {
@@ -67,7 +67,7 @@ pub(crate) trait Sink<const DERIVATIVES: bool> {
     /// After the last pixel of a window.
     fn end(&mut self);
 
-    /// Of each of these pixels, whether it has to be told if nothing is seen there.
+    /// True for each of these pixels that has to be handed over if it is empty.
     fn counts_if_empty(&self, at: Range<usize>) -> impl Iterator<Item = bool>;
 
     /// Nothing is seen here.
@@ -82,7 +82,7 @@ pub(crate) trait Sink<const DERIVATIVES: bool> {
     /// Pixels that it covers.
     fn patch(&mut self, patch: &Patch);
 
-    /// What is seen in this pixel, but for its color.
+    /// Values of this pixel, but for its color.
     fn all_but_color(&mut self, at: usize, seen: &Seen);
 
     /// The colors of such pixels.

@@ -1,4 +1,4 @@
-//! What a pixel shows of the posed object, in either mode.
+//! Values of a pixel that shows the posed object, in either mode.
 
 /// A derivative by the twist (translation, rotation).
 pub(crate) type Row = [f32; 6];
@@ -9,8 +9,8 @@ pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
     std::array::from_fn(|i| p * a[i] + q * b[i])
 }
 
-/// What a pixel shows of the object: color and coverage after blending with the black background, the
-/// depth of the surface there, and their derivatives by the twist.
+/// Color and coverage of a pixel after blending with the black background, the depth of the surface there, and their
+/// derivatives by the twist.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
     /// α C.

@@ -79,7 +79,7 @@ pub(crate) fn loss<S: Scalar>(state: &State<S>) -> S {
 /// Loss and its gradient by the initial translation \[1/m\] and turn \[1/rad\] of the ellipsoid.
 pub(crate) type Derivatives = (f64, [f64; 6]);
 
-/// What JAX finds for 2000 samples and 20 steps with Grasp'D's leak of a tenth at any distance.
+/// Reference of JAX for 2000 samples and 20 steps with Grasp'D's leak of a tenth at any distance.
 pub(crate) const LEAKY_REFERENCE: Derivatives = (
     2.0984574920526,
     [
@@ -92,7 +92,7 @@ pub(crate) const LEAKY_REFERENCE: Derivatives = (
     ],
 );
 
-/// What JAX 0.10 in double precision finds for `count` samples and `steps` steps.
+/// Reference of JAX 0.10 in double precision for `count` samples and `steps` steps.
 ///
 /// # Panics
 /// For numbers that it was not asked about.

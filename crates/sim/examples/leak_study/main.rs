@@ -91,7 +91,7 @@ fn cosine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.dot(b) / (a.norm() * b.norm())
 }
 
-/// What one time_steps shows.
+/// Gradients over one number of steps.
 struct Study {
     /// Smoothed, from values.
     smoothed: SmoothedGradient<3>,

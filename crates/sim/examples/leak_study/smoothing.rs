@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// What a [`Smoothing`] cannot do.
+/// Errors of a [`Smoothing`].
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub(crate) enum SmoothingError {
     /// A variance needs two pairs of samples.

@@ -46,9 +46,9 @@ pub(crate) enum Scope {
 /// Energies \[J\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy<S: Scalar = f64> {
-    /// Of motion, armature included.
+    /// Kinetic energy, armature included.
     pub kinetic: S,
-    /// In the gravity field, zero where the world's origin is.
+    /// Potential energy in the gravity field, zero at the world's origin.
     pub potential: S,
 }
 

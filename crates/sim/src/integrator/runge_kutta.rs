@@ -17,8 +17,8 @@ use crate::time::Step;
 use crate::world::World;
 use crate::world::body::Body;
 
-/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a joint the same
-/// of its state, with its angular velocity. Of a contact with bristles: the two halves of its deflection, and nothing.
+/// Change of a state, or its rate. Body: position of the center of mass, its velocity, rotation vector, angular momentum. Joint:
+/// position, velocity, rotation vector, angular velocity. Contact with bristles: both halves of its deflection, two zeros.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on

@@ -24,9 +24,9 @@ type Constructor = fn(&[f64]) -> Result<Arc<dyn DynJointLaw>, LawError>;
 pub struct JointLawEntry {
     /// Its name.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Summary in one line.
     pub summary: &'static str,
-    /// What it is made of, in order.
+    /// Parameters, then constants, in order.
     pub parameters: Vec<LawParameter>,
     constructor: Constructor,
 }

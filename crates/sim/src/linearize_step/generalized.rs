@@ -20,10 +20,10 @@ pub(super) struct Generalized {
     pub(super) joints: usize,
     /// As [`World::wrenches`] has them.
     pub(super) wrenches: Vec<Vector6<f64>>,
-    /// Of wrenches on free bodies and of accelerations of joints: by displacements and by velocities.
+    /// Derivatives of wrenches on free bodies and accelerations of joints, by displacements and by velocities.
     pub(super) by_position: DMatrix<f64>,
     pub(super) by_velocity: DMatrix<f64>,
-    /// Of accelerations of joints, by efforts.
+    /// Derivatives of accelerations of joints by efforts.
     pub(super) by_effort: DMatrix<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What damps, bounds and couples the joints of a robot, and what these constraints have to move.
+//! Damping, limits and couplings of the joints of a robot, and the inertia that they act on.
 
 use std::sync::Arc;
 
@@ -96,12 +96,12 @@ pub(super) fn limits((lower, upper): (f64, f64), stiffness: f64) -> Arc<dyn DynJ
 /// The inverse of a mass matrix.
 pub(super) struct Mobility {
     pub(super) dofs: usize,
-    /// Of the mass matrix; none where something that moves has no mass.
+    /// Factor of the mass matrix; `None` where something that moves has no mass.
     factor: Option<TreeFactor<'static>>,
 }
 
 impl Mobility {
-    /// M⁻¹ B; no numbers where something that moves has no mass.
+    /// M⁻¹ B; NaN where something that moves has no mass.
     pub(super) fn times(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         let Some(factor) = &self.factor else { return b.map(|_| f64::NAN) };
         let mut transposed = b.transpose();

@@ -31,7 +31,7 @@ struct Foot {
 }
 
 impl HeightField {
-    /// Of heights y over x and z.
+    /// Height field y = h(x, z).
     pub(crate) fn new(heights: HeightSpline) -> Self {
         let steepest = heights.steepest();
         let least_part = 1.0 / (1.0 + steepest * steepest).sqrt();

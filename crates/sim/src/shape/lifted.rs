@@ -12,11 +12,11 @@ use super::round::Round;
 
 /// A distance field over numbers that carry derivatives.
 pub(crate) enum LiftedField<T: Scalar> {
-    /// Of a solid whose dimensions do.
+    /// Field of a solid whose dimensions carry derivatives.
     Round(Round<T>),
-    /// The nearest of several, each where it is.
+    /// Nearest of several fields, each with its pose.
     Parts(Vec<(Isometry3<f64>, Self)>),
-    /// Of one that has none.
+    /// Field without variable dimensions.
     Constant(Arc<dyn DistanceField>),
 }
 

@@ -13,7 +13,7 @@ pub(crate) struct Matter<S: Scalar> {
 }
 
 impl<S: Scalar> Matter<S> {
-    /// The same, each number through `f`.
+    /// Shape and density with each number mapped by `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matter<T> {
         Matter { shape: self.shape.map(&f), density: self.density.map(f) }
     }

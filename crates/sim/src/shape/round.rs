@@ -127,7 +127,7 @@ impl DistanceField for Round {
 }
 
 impl<T: Scalar> Nearest<T> {
-    /// Of a solid of revolution around y, from the derivatives in the half-plane of the point: by distance from the axis and height.
+    /// Distance, gradient and Hessian of a solid of revolution around y, from the derivatives by radius and height at the point.
     pub(super) fn revolved(
         distance: T,
         [by_out, by_up]: [T; 2],

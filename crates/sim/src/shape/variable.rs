@@ -42,7 +42,7 @@ impl VariableShapes<'_> {
         [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     }
 
-    /// Of a contact with bristles, then the rate of its deflection.
+    /// [`wrench`](Self::wrench) of a contact with bristles, then the rate of its deflection.
     pub(crate) fn bristles(&self, function: &BristleFunction<'_>) -> [Lane; 12] {
         function.wrench_by_dimensions(|touch, cutoff| self.lift(touch, cutoff))
     }

@@ -44,7 +44,7 @@ struct LinearContact {
 }
 
 impl LinearContacts {
-    /// Of a world of `bodies`.
+    /// Function without contacts, for a world of `bodies`.
     pub(super) fn new(bodies: usize) -> Self {
         Self { places: vec![None; bodies], ..Self::default() }
     }

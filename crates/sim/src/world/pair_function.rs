@@ -51,7 +51,7 @@ struct Change<S: Scalar> {
 }
 
 impl<S: Scalar> Change<S> {
-    /// Of coordinates `x`, less their values.
+    /// Change of `state` by the coordinates `x` less their values.
     #[inline(always)]
     fn new(x: &[S; STATE], state: &State) -> Self {
         let less = |i: usize| x[i].plus(-x[i].value());
@@ -124,7 +124,7 @@ struct Relative {
 }
 
 impl<W: LocalFunction<12, 6>> PairFunction<W> {
-    /// Of the states of both bodies, where that with the field may be one that does not move.
+    /// Wrench as a function of the states of both bodies; that of the field may be constant.
     #[inline]
     pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
         let (samples, field) = (samples.coordinates(), field.coordinates());

@@ -124,7 +124,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Of the rotors of an articulation the inertia, the derivatives of the length by each degree of freedom, and its drift.
+    /// Inertia of each rotor of an articulation, derivatives of its length by each degree of freedom, and its drift.
     fn rotors(
         &self,
         own: &ArticulatedBody<S>,

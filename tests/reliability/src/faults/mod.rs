@@ -1,4 +1,4 @@
-//! What may befall a run: it is killed, the disk is full, its inputs vanish. Resumed, it must end with the same bytes, and nothing half-written may
+//! Faults of a run: it is killed, the disk is full, its inputs vanish. Resumed, it must end with the same bytes, and nothing half-written may
 //! ever be seen.
 
 mod place;

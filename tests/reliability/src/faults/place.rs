@@ -16,9 +16,9 @@ pub struct LongCommand {
     pub words: &'static str,
     /// Folders of what it reads.
     pub inputs: &'static [&'static str],
-    /// What it writes: files and folders.
+    /// Outputs: files and folders.
     pub outputs: &'static [&'static str],
-    /// Of its files those that a folder may be in the way of.
+    /// Output files that a folder may be in the way of.
     pub blockable: &'static [&'static str],
     /// Tables each row of which is of one frame alone, whatever becomes of the others.
     pub tables: &'static [&'static str],

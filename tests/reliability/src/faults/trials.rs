@@ -12,7 +12,7 @@ use super::run::Ended;
 use crate::mutate::Dice;
 use crate::table::Row;
 
-/// What may befall a run.
+/// Faults of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
 pub enum Fault {
     /// It is killed, and run again.
@@ -109,7 +109,7 @@ fn seed_of(seed: u64, command: &LongCommand, fault: Fault) -> u64 {
 struct Trial<'a> {
     place: &'a Place,
     command: &'a LongCommand,
-    /// What it writes undisturbed.
+    /// Files that it writes undisturbed.
     expected: &'a Files,
     took: Duration,
 }
@@ -214,7 +214,7 @@ impl Trial<'_> {
         Ok(false)
     }
 
-    /// What can be seen is as it will be in the end.
+    /// Checks that files which do not grow are as they will be in the end.
     fn nothing_half_written(&self) -> Result<()> {
         let is_growing =
             |path: &Path| self.command.growing.iter().any(|name| path == Path::new(name));

@@ -14,7 +14,7 @@ use super::{LoadContext, NOISE, Outcome};
 /// Frames of the dataset of which [`frames`] makes many.
 const ORIGINALS: usize = 4;
 
-/// The same few frames, each as often under another number.
+/// Load of many frames: a few, each as often under another number.
 pub(super) fn frames(context: &LoadContext<'_>) -> Result<Outcome> {
     let count = context.scaled(10_000);
     let objects = format!("synth --objects 061_foam_brick --frames {ORIGINALS} --out ds");

@@ -11,14 +11,14 @@ use plotters::prelude::*;
 
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// What a process had in memory.
+/// Resident memory of a process over time.
 pub(super) struct Memory {
     /// When \[s\], and how much \[MB\].
     samples: Vec<(f64, f64)>,
 }
 
 impl Memory {
-    /// Of `process` while `work` goes on.
+    /// Memory of `process` while `work` goes on.
     ///
     /// # Errors
     /// Those of `work`, and if the system does not tell memory as Linux does.

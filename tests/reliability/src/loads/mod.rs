@@ -12,14 +12,14 @@ use anyhow::{Result, ensure};
 use crate::table::Row;
 use memory::Memory;
 
-/// What the pages of a process vary by \[MB\].
+/// Variation of a process's pages \[MB\].
 const NOISE: f64 = 4.0;
 
 /// One of them.
 pub struct Load {
     /// Its name.
     pub name: &'static str,
-    /// What it is, at its full size.
+    /// Description, at its full size.
     pub what: &'static str,
     run: fn(&LoadContext<'_>) -> Result<Outcome>,
 }
@@ -52,7 +52,7 @@ struct LoadContext<'a> {
     /// The command `prehend`.
     program: &'a Path,
     folder: PathBuf,
-    /// Of the full size.
+    /// Factor of the full size.
     scale: f64,
 }
 
@@ -63,12 +63,12 @@ impl LoadContext<'_> {
     }
 }
 
-/// What came of a load.
+/// Result of a load.
 struct Outcome {
     memory: Memory,
     /// How much memory may grow from the third tenth of the time to the last \[MB\], where work goes on evenly.
     growth: Option<f64>,
-    /// What to say of the result.
+    /// Note on the result.
     note: String,
 }
 

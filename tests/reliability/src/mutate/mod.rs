@@ -11,11 +11,11 @@ use prehend_geometry::SplitMix64;
 
 use crate::parsers::Form;
 
-/// What draws changes.
+/// Random number generator of changes.
 pub struct Dice(SplitMix64);
 
 impl Dice {
-    /// The same for the same seed.
+    /// Generator with this seed.
     pub fn new(seed: u64) -> Self {
         Self(SplitMix64::new(seed))
     }

@@ -49,7 +49,7 @@ pub struct SparseSolver {
     analysis: Analysis,
 }
 
-/// What is known of the factors before the values are.
+/// Symbolic factorization: the structure of the factors, without their values.
 #[derive(Clone, Debug)]
 enum Analysis {
     Lu(Arc<SymbolicLu<usize>>),
@@ -206,7 +206,7 @@ mod tests {
         mix(&solver.factor(p).unwrap().solve(&right_hand_side(size, p)).unwrap())
     }
 
-    /// The same function through the dense solver; the matrix is its lower triangle mirrored if `mirror`.
+    /// [`by_sparse`] with the dense solver; `mirror` copies the lower triangle to the upper one.
     fn by_dense<S: Operand>(size: usize, places: &[(usize, usize)], mirror: bool, p: &[S]) -> S {
         let mut a = dense(size, places, p);
         if mirror {

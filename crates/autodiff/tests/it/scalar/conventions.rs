@@ -1,4 +1,4 @@
-//! What the slopes are where there is no derivative, or only one from one side.
+//! Slopes where there is no derivative, or only one from one side.
 
 use std::f64::consts::{FRAC_PI_2, LN_2, PI};
 

@@ -29,7 +29,7 @@ fn reverse(case: &Case, x: f64, y: f64) -> Jet {
     (z.value(), [adjoints.wrt(vx), adjoints.wrt(vy)])
 }
 
-/// The same with each operand in turn a constant, so that single-operand paths are taken.
+/// Jets with each operand in turn a constant, so that single-operand paths are taken.
 fn one_by_one(case: &Case, x: f64, y: f64) -> [Jet; 2] {
     let [fx, fy] = Fwd::variables([x, y]);
     let by_x = (case.forward)(fx, Fwd::from(y));

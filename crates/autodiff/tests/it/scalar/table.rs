@@ -6,14 +6,14 @@ use prehend_autodiff::{Fwd, Scalar, Var};
 
 use Changes::{ByItsSize, ByOne, InPieces};
 
-/// Over which lengths a function changes with an operand.
+/// Length over which a function changes with an operand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Changes {
-    /// Of the operand's own size, like a power.
+    /// The operand's own size, as for a power.
     ByItsSize,
-    /// Of 1, like a sine.
+    /// One, as for a sine.
     ByOne,
-    /// Of 1, and it jumps or bends in places.
+    /// One, with jumps or bends in places.
     InPieces,
 }
 
@@ -223,7 +223,7 @@ pub(crate) fn cases() -> Vec<Case> {
     }
 }
 
-/// What simba's `ComplexField` and `RealField` (0.10) declare, in their order. When a new version adds a
+/// Methods of simba's `ComplexField` and `RealField` (0.10), in their order. When a new version adds a
 /// method, it belongs here and gets a line in the table.
 #[rustfmt::skip]
 pub(crate) const METHODS: &[&str] = &[

@@ -7,7 +7,7 @@ use super::header::{Element, Encoding, Header, Number, Property};
 use crate::io::MeshError;
 use crate::io::limits::MAX_ELEMENTS;
 
-/// What is left of the values.
+/// Values that are still to be read.
 pub(super) struct Body<'a> {
     pub(super) path: &'a Path,
     bytes: &'a [u8],

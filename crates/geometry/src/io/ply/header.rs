@@ -44,7 +44,7 @@ impl Number {
         }
     }
 
-    /// What a stored color value of this type means in 0..=1.
+    /// Color in 0..=1 from a stored `value`: integers of 8 or 16 bits over 255 or 65535, others as they are.
     pub(super) fn color(self, value: f64) -> f32 {
         let full = match self {
             Self::U8 | Self::I8 => 255.0,

@@ -22,7 +22,7 @@ fn scenes() -> impl Iterator<Item = Scene> {
     })
 }
 
-/// What is found in four scenes that are changed alike, with hand and depth or without.
+/// Findings in four scenes with the same `change`, without hand and depth if `bare`.
 fn found(bare: bool, change: &dyn Fn(&mut Scene)) -> Vec<Finding> {
     found_in(4, bare, change)
 }

@@ -9,7 +9,7 @@ use prehend_geometry::open_plain;
 
 use super::dataset::{Dataset, DatasetScene};
 
-/// What tells a JSON file from what it was before: its size, and when it was written.
+/// Size \[bytes\] and modification time of a JSON file; `None` if they cannot be read.
 pub type Stamp = Option<(u64, SystemTime)>;
 
 /// Bytes at the end of a file in which its format says that it ends.
@@ -50,7 +50,7 @@ impl Dataset {
 }
 
 impl DatasetScene {
-    /// What tells its JSON files, which are read once, from what they become: [`Dataset::reread`] if it changes.
+    /// Stamps of its JSON files, which are read once: if they change, [`Dataset::reread`] is needed.
     pub fn stamps(&self) -> [Stamp; 3] {
         [&self.camera, &self.bodies, &self.tactile].map(|file| {
             let about = fs::metadata(file.path()).ok()?;

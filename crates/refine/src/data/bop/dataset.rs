@@ -25,7 +25,7 @@ pub struct Dataset {
     split_dir: PathBuf,
     scenes: Arc<BTreeMap<u32, DatasetScene>>,
     models: Arc<Models>,
-    /// What all cameras have in common.
+    /// `camera.json`, which all cameras share.
     pub(super) camera: Arc<JsonFile>,
     /// Optics that the images of all scenes share.
     pub(super) optics: Arc<SharedOptics>,
@@ -56,7 +56,7 @@ enum RigName {
     Text(String),
 }
 
-/// Of what rig an image is.
+/// Rig of an image, in its entry of `scene_camera.json`.
 #[derive(Deserialize)]
 struct RigEntry {
     rig: Option<RigName>,
@@ -130,7 +130,7 @@ impl Dataset {
         }
     }
 
-    /// The same with files that are read anew, for somebody may have gone on writing them.
+    /// This dataset with its files to be read anew, since they may have been written further.
     pub fn reread(&self) -> Self {
         let scenes = self.scenes.values().map(|scene| (scene.id, scene.dir.clone())).collect();
         Self::of(&self.root, &self.split_dir, scenes, Arc::clone(&self.optics))

@@ -1,4 +1,4 @@
-//! What can be wrong with a dataset.
+//! Errors of datasets.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ pub enum DatasetError {
     Unusable {
         /// The file or folder.
         file: PathBuf,
-        /// What is wrong, after the field's path inside the file, such as `3.bodies[0].cam_R_b2c`, or the place, where it is known.
+        /// Problem, after the field's path inside the file, such as `3.bodies[0].cam_R_b2c`, or the place, where it is known.
         problem: String,
     },
     /// An image that does not decode; the message names the file.

@@ -17,10 +17,10 @@ pub(crate) fn read_bytes(file: &Path) -> Result<Vec<u8>, DatasetError> {
     read_plain(file, MAX_TEXT_BYTES).map_err(|e| DatasetError::reading(file, &e))
 }
 
-/// The same of a file of text.
+/// The text of a plain file of at most [`MAX_TEXT_BYTES`].
 ///
 /// # Errors
-/// Those of [`read_bytes`]; what is not UTF-8.
+/// Those of [`read_bytes`], and if it is not UTF-8.
 pub(crate) fn read_text(file: &Path) -> Result<String, DatasetError> {
     String::from_utf8(read_bytes(file)?)
         .map_err(|_| DatasetError::unusable(file, "is no text in UTF-8"))

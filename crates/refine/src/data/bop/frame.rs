@@ -48,7 +48,7 @@ struct CameraEntry {
     depth_translation: Option<Numbers<3>>,
 }
 
-/// What places the camera of an image beside others that took theirs at the same moment. Of other images the estimator never reads it.
+/// World → camera pose of an image, which the estimator reads only of images that a rig took together.
 #[derive(Deserialize)]
 struct PlaceEntry {
     #[serde(rename = "cam_R_w2c")]
@@ -210,7 +210,7 @@ impl DatasetImage<'_> {
         self.segment_by(observation, &self.mask_path(instance)?)
     }
 
-    /// The same of the mask in `file`.
+    /// Gives `observation`, which is of this image, the mask in `file`.
     fn segment_by(&self, observation: &mut Frame, file: &Path) -> Result<(), DatasetError> {
         let image = if self.has_color() { self.rgb_path()? } else { self.depth_path()? };
         let Camera { width, height, .. } = observation.camera;
@@ -259,8 +259,8 @@ impl DatasetImage<'_> {
         self.scene.dir().join("depth")
     }
 
-    /// The same with an empty mask. A scene without color has black pictures, one without depth measures nothing, and so do depth images of zeros beside
-    /// color, of which is warned once a dataset.
+    /// The image as a [`Frame`] with an empty mask. Without color, pictures are black. Without depth nothing is measured, as in depth images of zeros
+    /// beside color, of which is warned once a dataset.
     ///
     /// # Errors
     /// If an image is absent or does not decode, or they differ in size.
@@ -275,8 +275,8 @@ impl DatasetImage<'_> {
         self.optics.observation(color.as_deref(), depth.as_deref())
     }
 
-    /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
-    /// a mask of the object. Nothing for an image without a rig.
+    /// Frames of the rig's other cameras at the same moment that have a mask of the object, each with the transform from its camera's coordinates to this
+    /// image's \[m\]. None for an image without a rig.
     ///
     /// # Errors
     /// Those of [`DatasetImage::observation`] of each, and if one lacks its place.
@@ -338,7 +338,7 @@ impl DatasetImage<'_> {
         SceneBodies::read(&self.scene.bodies, self.im_id, self.dataset.root())
     }
 
-    /// What is felt, from `scene_tactile.json`.
+    /// Readings of tactile sensors, from `scene_tactile.json`.
     ///
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.

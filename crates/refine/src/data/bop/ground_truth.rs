@@ -11,7 +11,7 @@ use super::models::Models;
 use super::numbers::Numbers;
 use super::pose::{Rotation, pose};
 
-/// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
+/// Ground truth, which scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
 /// `models_eval/`.
 #[derive(Debug)]
 pub struct GroundTruth<'a> {

@@ -258,7 +258,7 @@ mod tests {
         file
     }
 
-    /// What is wrong with entry `id` as a `T`.
+    /// Problem of reading entry `id` as a `T`.
     fn fault<T: DeserializeOwned>(file: &JsonFile, id: u32) -> String {
         match file.entry::<T>(id).map(|_| ()).unwrap_err() {
             DatasetError::Unusable { problem, .. } => problem,

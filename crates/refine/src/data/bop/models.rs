@@ -22,7 +22,7 @@ pub struct Models {
     info: JsonFile,
 }
 
-/// What `models_info.json` says of one object, in the model frame.
+/// Entry of an object in `models_info.json`, in the model frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelInfo {
     /// Largest distance between two vertices \[m\].
@@ -74,7 +74,7 @@ impl Models {
         Ok(ids)
     }
 
-    /// What is known of an object.
+    /// Entry of an object in `models_info.json`.
     ///
     /// # Errors
     /// [`DatasetError::Missing`] when `models_info.json` is absent or does not list the object; when it is broken, or a field is malformed.

@@ -32,7 +32,7 @@ pub struct ResultRow {
     pub time: f64,
 }
 
-/// What one results file holds: the rows that could be read, and what is wrong with the others.
+/// Rows of a results file that could be read, and the faults of the others.
 #[derive(Clone, Debug, Default)]
 pub struct ReadResults {
     /// The well-formed rows in file order.
@@ -42,8 +42,8 @@ pub struct ReadResults {
     pub instances: Vec<usize>,
     /// The line of each of `rows`, from 1, the header included.
     pub lines: Vec<u64>,
-    /// What is wrong with each malformed row, in file order, such as `line 3: R: "x" is not a number`: the line number is
-    /// from 1, the header included, and the column is `row` where the columns themselves are wrong in number.
+    /// Fault of each malformed row, in file order, such as `line 3: R: "x" is not a number`: the line number is
+    /// from 1, the header included, and the column is `row` where the number of columns is wrong.
     pub errors: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What is felt, in `scene_tactile.json`.
+//! Tactile readings in `scene_tactile.json`.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub struct Tactile {
     pub body: String,
     /// Layout: a table of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of the readings; none of a patch.
     pub taxels: Option<PathBuf>,
-    /// What it says.
+    /// Its reading.
     pub reading: TactileReading,
     pub(crate) origin: Origin,
 }

@@ -1,6 +1,6 @@
 //! A column of a table.
 
-/// What a column holds, all rows one after the other, each row-major.
+/// Values of a column, all rows one after the other, each row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     /// Whole numbers.
@@ -29,7 +29,7 @@ pub(super) struct TableColumn {
     pub(super) name: &'static str,
     /// Shape of what it has in a row: empty for a single value.
     pub(super) shape: Vec<usize>,
-    /// What it has.
+    /// Its values.
     pub(super) values: Values,
 }
 

@@ -1,4 +1,4 @@
-//! What is known of a frame, and the columns that this makes.
+//! Details of the result for a frame, and their columns.
 
 use nalgebra::Isometry3;
 
@@ -7,14 +7,14 @@ use crate::scene::Target;
 use crate::strategy::PosteriorSummary;
 use crate::tracker::{Rejection, TrackStatus};
 
-/// What is known of a frame.
+/// Details of the result for a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameDetails {
     /// Which object in which image.
     pub target: Target,
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_model: Isometry3<f64>,
-    /// The same as it was before, where a pose was refined.
+    /// Initial pose (object → camera) \[m\], where one was refined.
     pub initial: Option<Isometry3<f64>>,
     /// How uncertain it is, where that is known.
     pub posterior: Option<PosteriorSummary>,
@@ -22,13 +22,13 @@ pub struct FrameDetails {
     pub iterations: usize,
     /// Time that it took \[s\], where that is wanted.
     pub seconds: Option<f64>,
-    /// What looked wrong.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// How it was followed, if it was.
     pub track: Option<TrackDetails>,
 }
 
-/// What is known of a frame of a film besides.
+/// Further details of a tracked frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackDetails {
     /// How its pose came about.
@@ -73,7 +73,7 @@ pub(super) fn details_table(frames: &[FrameDetails]) -> Vec<TableColumn> {
     columns
 }
 
-/// What is known of how uncertain poses are.
+/// Columns of the uncertainty of poses.
 fn of_posteriors(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter().map(|frame| frame.posterior.as_ref());
     let array = |name, shape: &[usize], of: fn(&PosteriorSummary) -> Vec<f64>| {
@@ -100,7 +100,7 @@ fn of_posteriors(frames: &[FrameDetails]) -> Vec<TableColumn> {
     ]
 }
 
-/// What is known of how objects were followed.
+/// Columns of tracking; none if no frame was tracked.
 fn of_tracks(frames: &[FrameDetails]) -> Vec<TableColumn> {
     let rows = || frames.iter().map(|frame| frame.track.as_ref());
     if rows().all(|track| track.is_none()) {

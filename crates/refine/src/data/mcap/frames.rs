@@ -23,7 +23,7 @@ const LONGEST: usize = 32;
 pub struct RecordedFrame {
     /// When the image was taken, by the clock of the recording \[ns\].
     pub nanoseconds: i64,
-    /// What was sensed.
+    /// Its observation.
     pub frame: Result<Frame, DatasetError>,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// What the images of one moment show.
+    /// Observation from the images of the moment `at` \[ns\].
     fn observe(
         &self,
         at: i64,

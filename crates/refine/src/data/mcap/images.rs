@@ -11,7 +11,7 @@ use super::messages::{
     COMPRESSED_IMAGE, CompressedImage, Header, IMAGE, RosImage, Stamped, decode,
 };
 
-/// What a topic of images shows.
+/// Kind of the images of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
     Color,

@@ -35,7 +35,7 @@ impl Time {
         i64::from(self.sec) * 1_000_000_000 + i64::from(self.nanosec)
     }
 
-    /// Of nanoseconds; the first or last moment that there is for what is out of range.
+    /// Time of `nanoseconds`, with seconds clamped to the range of `i32`.
     pub(super) fn from_nanoseconds(nanoseconds: i64) -> Self {
         let sec = nanoseconds.div_euclid(1_000_000_000);
         let sec = sec.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
@@ -127,7 +127,7 @@ impl From<&Isometry3<f64>> for RosTransform {
 }
 
 impl RosTransform {
-    /// The same for computing; none if the numbers are no pose.
+    /// Its isometry; `None` if a number is not finite or the quaternion is not of unit length.
     pub(super) fn isometry(&self) -> Option<Isometry3<f64>> {
         let (q, t) = (Quaternion::from(self.1), Vector3::from(self.0));
         let off = (q.norm() - 1.0).abs();
@@ -184,7 +184,7 @@ impl Marker {
     pub(super) const TRIANGLES: i32 = 11;
 }
 
-/// What comes before a message: that it is CDR, in which order of bytes.
+/// CDR encapsulation header of little-endian messages; then the first two bytes of a big-endian one.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 const BIG_ENDIAN: [u8; 2] = [0, 0];
 

@@ -26,11 +26,11 @@ use crate::scene::{Hand, HandMeasurement, RemapCache, check_gravity};
 
 /// A robot's log: ROS 2 messages in an [MCAP](https://mcap.dev) file. `docs/LOGS.md` lists what is read.
 ///
-/// What is small, poses of frames, joints and forces, is kept in memory; images are read as they are asked for.
+/// Poses of frames, joints and forces are kept in memory; images are read on demand.
 pub struct Recording {
     pub(super) file: PathBuf,
     pub(super) topics: Chosen,
-    /// Of the images that are the frames, and of depth if that has one of its own.
+    /// Camera of the images that are the frames, and that of depth if it has one of its own.
     pub(super) camera: LensedCamera,
     pub(super) depth_camera: Option<LensedCamera>,
     readings: Readings,
@@ -56,7 +56,7 @@ struct Readings {
     gravity: Option<(String, TimeSeries<Vector3<f64>>)>,
 }
 
-/// What the first reading finds.
+/// Content of a recording, from its first reading.
 #[derive(Default)]
 struct RecordingIndex {
     images: Known,
@@ -126,7 +126,7 @@ impl Recording {
         })
     }
 
-    /// What was wrong with messages, which were left out.
+    /// Faults of messages, which were left out.
     pub fn faults(&self) -> &[String] {
         &self.faults
     }
@@ -173,10 +173,10 @@ impl Recording {
         place.ok_or_else(|| format!("no transform says where {from:?} is in {camera:?} then"))
     }
 
-    /// Where `hand` is at a moment, and what it feels.
+    /// Pose, joints and taxel forces of `hand` at the moment `at` \[ns\].
     ///
     /// # Errors
-    /// What is not known.
+    /// If its pose or a joint is not known.
     pub(super) fn hand(&self, hand: &Arc<Hand>, at: i64) -> Result<HandMeasurement, String> {
         let root = &hand.tree.links()[0].name;
         let t_cam_hand = self.in_camera(root, at)?;

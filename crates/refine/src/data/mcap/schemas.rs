@@ -6,7 +6,7 @@ use std::iter;
 /// One after the other, each after its name.
 const DEFINITIONS: &str = include_str!("definitions.txt");
 
-/// What stands between the definitions of a schema.
+/// Length of the line of `=` between the definitions of a schema.
 const RULE: usize = 80;
 
 /// The schema of the type `name`, such as `sensor_msgs/msg/Image`: its definition, and those of what it is made of (`ros2msg` in MCAP).

@@ -14,7 +14,7 @@ pub struct ImageTopics {
     pub color: Option<String>,
     /// Depth.
     pub depth: Option<String>,
-    /// What of the image is the object, where that is known; by itself a gray one whose name ends in `mask`.
+    /// Mask of the object, where there is one; by default the gray topic whose name ends in `mask`.
     pub mask: Option<String>,
 }
 
@@ -43,10 +43,10 @@ pub(super) struct Chosen {
 pub(super) type Known = BTreeMap<String, ImageTopic>;
 
 impl Chosen {
-    /// Of the topics that a recording has, those that are `wanted`.
+    /// Topics that are `wanted`, among those that the recording has.
     ///
     /// # Errors
-    /// What is looked for, and why it is not found.
+    /// If one is not found: its name, and the problem.
     pub(super) fn new(known: &Known, wanted: &ImageTopics) -> Result<Self, (String, String)> {
         let is_mask = |name: &str| name.ends_with("mask");
         let among = |content: Content, masks: bool| {

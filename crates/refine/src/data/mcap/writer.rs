@@ -136,7 +136,7 @@ impl RecordingWriter {
         self.stamped(("/prehend/object", MARKER), at, OBJECT, marker)
     }
 
-    /// What was found of the object, and `overlay`, a picture of it.
+    /// Pose of the object at the moment `at` \[ns\], its covariance, probability and status, and `overlay`, a picture of it.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -14,11 +14,11 @@ pub struct AverageRecall {
     pub targets: usize,
     /// Number of estimates that count, at most one an instance.
     pub estimates: usize,
-    /// Of the visible surface discrepancy, over tolerances and thresholds; none unless depth was measured of all targets.
+    /// Average recall of the visible surface discrepancy, over tolerances and thresholds; none unless depth was measured of all targets.
     pub ar_vsd: Option<f64>,
-    /// Of the maximum symmetry-aware surface distance, over thresholds.
+    /// Average recall of the maximum symmetry-aware surface distance, over thresholds.
     pub ar_mssd: f64,
-    /// Of the maximum symmetry-aware projection distance, over thresholds.
+    /// Average recall of the maximum symmetry-aware projection distance, over thresholds.
     pub ar_mspd: f64,
     /// The mean of the three, if there are three.
     pub ar: Option<f64>,

@@ -1,4 +1,4 @@
-//! What is to be localized, and how well it was.
+//! Targets of localization, and their scores.
 
 /// An object to be localized in one image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -29,7 +29,7 @@ pub(crate) struct NormalizedErrors {
 }
 
 impl NormalizedErrors {
-    /// Of VSD for each tolerance, MSSD and `diameter` \[m\], MSPD \[px\] and the image's `width` \[px\].
+    /// Normalized errors: VSD for each tolerance, MSSD and `diameter` \[m\], MSPD \[px\] and the image's `width` \[px\].
     pub(crate) fn new(
         vsd: &[f64; VSD_TOLERANCES.len()],
         mssd: f64,
@@ -59,11 +59,11 @@ impl NormalizedErrors {
 /// Recalls, each the mean over its metric's thresholds (0..=1): of one pose, the fraction of thresholds it stays below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Recall {
-    /// Of VSD: below 0.05, 0.1 … 0.5, for each of its ten tolerances.
+    /// Recall of VSD: below 0.05, 0.1 … 0.5, for each of its ten tolerances.
     pub(crate) vsd: f64,
-    /// Of MSSD: below 0.05, 0.1 … 0.5 of the diameter.
+    /// Recall of MSSD: below 0.05, 0.1 … 0.5 of the diameter.
     pub(crate) mssd: f64,
-    /// Of MSPD: below 5, 10 … 50 px in an image 640 px wide.
+    /// Recall of MSPD: below 5, 10 … 50 px in an image 640 px wide.
     pub(crate) mspd: f64,
 }
 

@@ -11,7 +11,7 @@ use super::score::PoseScore;
 use crate::MM_PER_M;
 use crate::symmetry::Symmetries;
 
-/// What scoring needs to know of an object, prepared once for many poses.
+/// Vertices and symmetries of an object, prepared once for scoring many poses.
 #[derive(Debug)]
 pub struct ScoredModel {
     points: Vec<Point3<f64>>,

@@ -26,7 +26,7 @@ use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::error::RefineError;
 use crate::scene::{Hand, Object};
 
-/// What the page is made of; the data take the place of the last.
+/// Parts of the page; style, data and scripts replace their marks in the skeleton.
 const SKELETON: &str = include_str!("page/index.html");
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPTS: [&str; 8] = [

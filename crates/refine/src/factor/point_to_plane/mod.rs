@@ -101,7 +101,7 @@ struct Residual {
 }
 
 impl PointToPlaneFactor {
-    /// Of the masked depth of `frame`, but where masks have leaked onto the hand.
+    /// Factor of the masked depth of `frame`, except where the mask leaks onto the hand.
     ///
     /// # Errors
     /// If no pixel of the mask, beside the hand, has a depth.
@@ -138,12 +138,12 @@ impl PointToPlaneFactor {
         Ok(Self { object, points, field, patches: None, settings })
     }
 
-    /// The same where the object may be off from its model in `patches`.
+    /// This factor for an object that may deviate from its model in `patches`.
     pub(crate) fn with_patches(self, patches: Arc<SurfacePatches>) -> Self {
         Self { patches: Some(patches), ..self }
     }
 
-    /// Of each point at `state`; none of those that are nearest to nothing.
+    /// Residual of each point at `state`; `None` without a nearest place on the surface.
     fn residuals(&self, state: &State) -> Vec<Option<Residual>> {
         let (t_object_cam, weighting) = (state.t_cam_object.inverse(), self.weighting());
         let residual = |point: &Point| {

@@ -80,7 +80,7 @@ mod tests {
     use crate::problem::NoiseModel;
     use crate::scene::PreparedFrame;
 
-    /// Of the built-in scene's depth, to which normal errors are added: of each point, and one of all points in tiles of some pixels.
+    /// Noise estimate from the built-in scene's depth with normal errors \[m\]: `independent` of each point, `shared` in tiles of `tile` pixels.
     fn estimate(independent: f64, [shared, tile]: [f64; 2]) -> NoiseEstimate {
         let scene = scene();
         let (_, state) = fixture(0);

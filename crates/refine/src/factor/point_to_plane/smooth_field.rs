@@ -24,7 +24,7 @@ pub(super) struct FieldFit {
     pub(super) left: Vec<f64>,
     /// Their weights, with which it was found \[1/m²\].
     pub(super) weights: Vec<f64>,
-    /// What it costs: half the squares of its coefficients \[nat\].
+    /// Cost of its coefficients c, ½‖c‖² \[nat\].
     pub(super) cost: f64,
     /// Factor of the coefficients' information matrix.
     information: Option<Cholesky<f64, Dyn>>,

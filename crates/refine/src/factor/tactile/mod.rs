@@ -25,7 +25,7 @@ use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Hand, HandMeasurement, Object, PreparedFrame};
 
-/// What taxels that feel force say.
+/// Evidence from taxels that feel force.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -64,7 +64,7 @@ settings! {
 
 /// Distances of places of the hand from the object's surface: of taxels and contacts ([`new`](Self::new)), and of sensors that measure no forces.
 ///
-/// What is touched is drawn to the surface from either side; inactive taxels are pushed out of it, which the
+/// Touched taxels and contacts are drawn to the surface from either side; inactive taxels are pushed out of it, which the
 /// paper leaves unused. Both have Cauchy's kernel, because some taxels are dead and some report false forces.
 pub struct TactileFactor {
     name: &'static str,
@@ -114,7 +114,7 @@ impl TactileFactor {
     }
 }
 
-/// What taxels on `links` that feel `forces` say of where they are.
+/// Probes of the taxels on `links` that feel `forces`.
 fn probes(
     hand: &Hand,
     links: &[usize],

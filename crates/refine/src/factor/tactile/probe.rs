@@ -15,7 +15,7 @@ pub(super) struct Probe {
     pub(super) weighting: Weighting,
 }
 
-/// What is known of a distance.
+/// Constraint on a probe's distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Distance {
     /// So far from the surface, positive outside \[m\].

@@ -18,7 +18,7 @@ use crate::strategy::{Estimate, Strategy};
 pub struct Diagnosis {
     /// The evidence left out, `color`, `depth`, `touch`, `views` (other cameras) or the name of a user-defined factor; `None` with all of it.
     pub excluded: Option<&'static str>,
-    /// What is found without it.
+    /// Estimate without that evidence.
     pub estimate: Estimate,
 }
 

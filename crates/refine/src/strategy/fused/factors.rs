@@ -14,7 +14,7 @@ use crate::factor::{
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
 use crate::scene::{CameraView, Occluders, PreparedFrame, TouchReading};
 
-/// What of a frame is seen.
+/// Modalities of a camera.
 const SEEN: [Modality; 5] = [
     Modality::Color,
     Modality::Silhouette,
@@ -55,7 +55,7 @@ pub(crate) fn surface_patches(
     patches.with_covariance(deviation.left_covariance(&places)).map(Arc::new)
 }
 
-/// What `stage` solves but for the prior: all factors, the `own` ones among them, by the pose and all nuisances of `initial`.
+/// Problem of `stage` without its prior: all factors, the `own` ones among them, over the pose and all nuisances of `initial`.
 pub(crate) fn problem_of(
     frame: &PreparedFrame<'_>,
     initial: &State,
@@ -93,8 +93,8 @@ impl StageFactors<'_> {
         self.settings.modalities.contains(&modality)
     }
 
-    /// What other cameras see, one factor each. Where the object may be off from its model in patches of the first camera's image, what that does to
-    /// another camera's depth is as large.
+    /// Factors of the other cameras, one each. Surface patches belong to the first camera's image: in another camera's depth, their standard deviation is
+    /// added to the model error.
     fn views(&self) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
         if self.frame.views().is_empty() || !self.settings.views {
             return Ok(Vec::new());
@@ -117,7 +117,7 @@ impl StageFactors<'_> {
         self.frame.views().iter().map(view).collect()
     }
 
-    /// What compares pictures, if anything does; of the outline nothing where a region factor tells it.
+    /// Rendering factor of color and outline, if either is used; without the outline where a region factor has it.
     fn picture(&self) -> Result<Option<Arc<dyn Factor>>, RefineError> {
         let &Self { frame, stage, settings, patches } = self;
         let region = self.has_region();

@@ -46,7 +46,7 @@ pub struct Consistency {
 pub struct Fit {
     /// Probability that model and data are what they are taken for.
     pub probability: f64,
-    /// What was compared.
+    /// Consistency of each kind of evidence.
     pub consistency: Vec<Consistency>,
     /// Probability that the intrinsics are not those of the images.
     pub camera: f64,
@@ -74,7 +74,7 @@ impl Fit {
         Self::of_logs(camera, &logs, settings)
     }
 
-    /// Of a solution whose calibrations deviate from their nominal values by a χ² of so many degrees of freedom.
+    /// Test of a solution whose calibrations deviate from their nominal values by a χ² of so many degrees of freedom.
     pub(crate) fn of_tracked(
         camera: &Camera,
         point: &Linearization,

@@ -66,7 +66,7 @@ pub(super) fn with_rotations(
     states
 }
 
-/// What `motions` in object coordinates make of `states`, where it is turned otherwise than these and each other.
+/// `states` after the `motions` in object coordinates that turn the object otherwise than all of `states` and than each other.
 pub(super) fn turned(states: &[State], motions: &[Isometry3<f64>]) -> Vec<State> {
     let poses: Vec<_> = states.iter().map(|state| state.t_cam_object).collect();
     let of = |(from, t_cam_object): (usize, _)| State { t_cam_object, ..states[from].clone() };

@@ -140,18 +140,18 @@ impl Fused {
     }
 }
 
-/// What a frame says of its state and of the object's surface, beside what is known beforehand.
+/// Normal equations of a frame by its state and by displacements of the object's surface, without the prior.
 pub(crate) struct Evidence {
-    /// Where it was asked.
+    /// State at which it is linearized.
     pub(crate) state: State,
     /// Derivatives by the object's pose, by all calibrations, by displacements of the patches and by what the image is off by.
     pub(crate) equations: NormalEquations,
-    /// Where the object may be off from its model.
+    /// Surface patches, where the object may be off from its model.
     pub(crate) patches: Option<Arc<SurfacePatches>>,
 }
 
 impl Fused {
-    /// What all factors of the last stage say at `state`, from where noise is measured. `None` if there are none.
+    /// Evidence of all factors of the last stage at `state`, with the noise measured there. `None` without stages.
     ///
     /// # Errors
     /// Those of a run.

@@ -1,4 +1,4 @@
-//! What should be seen in each pixel, beside what was measured there.
+//! Expected and measured values of each pixel.
 
 use prehend_render::depth_map;
 
@@ -46,7 +46,7 @@ impl<'a> Pixels<'a> {
         self.residuals(|p| p.object, |p| p.shows_object())
     }
 
-    /// The same of the hand's surface beside the mask.
+    /// Offsets of measured depth behind the hand's surface \[m\], with column and row, outside the mask.
     pub(crate) fn on_hand(&self) -> Vec<([usize; 2], f64)> {
         self.residuals(|p| p.hand, |p| p.hand > 0.0 && !p.shows_object() && !p.masked)
     }

@@ -101,7 +101,7 @@ pub(crate) struct ScaleMixture {
 }
 
 impl Posterior {
-    /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion.
+    /// Posterior of the solutions `found`, the best first; `radius` \[m\] turns radians into meters of surface motion.
     pub(crate) fn new(found: &[Solution], radius: f64, settings: &PosteriorSettings) -> Self {
         let best = &found[0];
         let bounds: Vec<(Matrix6<f64>, f64)> =
@@ -190,7 +190,7 @@ impl Posterior {
         self.modes[0].covariance
     }
 
-    /// The same of a left twist about `point` (camera frame) \[m\] instead of the center.
+    /// Covariance of a left twist about `point` (camera frame) \[m\] instead of the center.
     pub fn covariance_at(&self, point: &Point3<f64>) -> Matrix6<f64> {
         let moves = about(&(point.coords - self.center));
         moves * self.covariance() * moves.transpose()
@@ -260,7 +260,7 @@ impl Posterior {
     }
 }
 
-/// What takes a left twist about a center to that about a point which is `arm` away from it \[m\]: the point is displaced by t + ω × arm.
+/// Matrix from a left twist (t, ω) about a center to that about a point which is `arm` away from it \[m\]: (t + ω × arm, ω).
 fn about(arm: &Vector3<f64>) -> Matrix6<f64> {
     let mut moves = Matrix6::identity();
     moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());

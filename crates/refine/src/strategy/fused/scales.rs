@@ -49,7 +49,7 @@ pub(super) struct ScaleEvidence {
 }
 
 impl ScaleEvidence {
-    /// Of the solution `point`, found with errors of the scales `now`; `None` without a prior, or of scales that are known.
+    /// Evidence of scales about the solution `point`, found with the scales `now`; `None` without a prior, or if the scales are known.
     pub(super) fn new(
         point: &Linearization,
         now: &Scales,

@@ -33,7 +33,7 @@ pub enum Modality {
     HandDepth,
     /// Depth behind where the object is not.
     FreeSpace,
-    /// What is felt: taxels with a force, contact, proximity and patches of the surface.
+    /// Touch: taxels with a force, contact, proximity and patches of the surface.
     Touch,
     /// Taxels that feel nothing.
     Quiet,
@@ -253,7 +253,7 @@ impl FusedSettings {
         settings
     }
 
-    /// What is solved for from `state` that it holds; of a hand that is not `known`, nothing.
+    /// Blocks of `state` that are solved for; those of the hand only if it is `known`.
     pub(super) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
         let nuisances = self.nuisances.iter().filter(|n| known || **n == Nuisance::Camera);
         let blocks = nuisances.filter_map(|nuisance| nuisance.block(state.joints.len()));

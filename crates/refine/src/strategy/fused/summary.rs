@@ -1,4 +1,4 @@
-//! A confidence in numbers that fit a line.
+//! Summary of a posterior.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Posterior;
 use crate::MM_PER_M;
 
-/// What reports and files say of a [`Posterior`].
+/// Summary of a [`Posterior`] for reports and files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PosteriorSummary {
     /// Probability that model, data and pose are right, the last within 5 mm and 5° of the true one.

@@ -296,7 +296,7 @@ impl Segmenter {
         };
     }
 
-    /// What it tells that a pixel is in the mask of `sight`, and that it is not \[nat\].
+    /// Log-likelihood ratios of the object at a pixel inside the mask of `sight`, and outside of it \[nat\].
     fn mask_evidence(&self, sight: &Sight) -> [f32; 2] {
         if !sight.tells {
             return [0.0; 2];
@@ -327,7 +327,7 @@ mod tests {
     use crate::scene::default_scene;
     use crate::tracker::sight::Images;
 
-    /// What is seen of an object where it is, at least.
+    /// Least share of an object's pixels that show it at its true pose.
     const LEAST_OF_TRUTH: f64 = 0.5;
 
     /// Overlap of two masks over what either has.

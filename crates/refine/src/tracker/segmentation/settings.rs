@@ -3,7 +3,7 @@
 use crate::defaults::settings;
 
 settings! {
-    /// What of a picture shows the object, by where it should be, depth, colors and masks.
+    /// Segmentation of the object in a picture by its predicted pose, depth, colors and masks.
     #[derive(Copy)]
     pub struct SegmentationSettings {
         /// Distance of the rows and columns of which colors, depth and masks are asked \[px\]: that of the window below.

@@ -10,7 +10,7 @@ use super::SegmentationSettings;
 use crate::scene::{BoxSums, Object, color_index, squares};
 use crate::tracker::sight::Sight;
 
-/// What a pixel surely shows.
+/// Certain label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Label {
     Object,
@@ -37,7 +37,7 @@ pub(super) struct Pixel {
 pub(super) struct Window {
     pixels: Vec<Pixel>,
     range: [Range<usize>; 2],
-    /// Of the whole picture.
+    /// Camera of the whole picture.
     camera: Option<Camera>,
     /// The object where it should be.
     drawn: DepthImage,
@@ -131,14 +131,14 @@ impl Window {
         Self { pixels, range, camera: Some(*full), settings: *settings, ..Self::default() }
     }
 
-    /// Where what is seen at a pixel of a whole picture is, camera frame \[m\].
+    /// Point that is visible at a pixel of a whole picture, camera frame \[m\].
     pub(super) fn place(&self, pixel: &Pixel) -> Vector3<f32> {
         let [x, y] = pixel.at.map(f64::from);
         let place = self.camera.map(|camera| camera.unproject(x, y, f64::from(pixel.sensor)));
         place.map_or_else(Vector3::zeros, |place| place.coords.cast())
     }
 
-    /// The middle of what of the hand is seen, camera frame \[m\]; none without one.
+    /// Centroid of the visible points of the hand, camera frame \[m\]; none without one.
     pub(super) fn hand_center(&self) -> Option<Vector3<f32>> {
         let on_hand = self.pixels.iter().filter(|pixel| pixel.is_on_hand(&self.settings));
         let (sum, count) = on_hand.fold((Vector3::zeros(), 0.0), |(sum, count), pixel| {
@@ -166,7 +166,7 @@ impl Window {
 }
 
 impl Pixel {
-    /// What was sensed at a column and row, of which nothing is expected.
+    /// Measured pixel at a column and row, without an expectation.
     fn sensed(sight: &Sight, at: [usize; 2]) -> Self {
         let Sight { frame: observation, given, hand_depth, .. } = sight;
         let index = at[1] * observation.camera.width + at[0];
@@ -229,7 +229,7 @@ impl Pixel {
         self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < reach
     }
 
-    /// Whether what is seen here, at `place`, may be held by a hand about that place \[nat\].
+    /// Log-evidence that the point at `place` is held by a hand about `center` (both in the camera frame \[m\]), at most 0 \[nat\].
     pub(super) fn near_hand(
         &self,
         center: Option<Vector3<f32>>,
@@ -261,7 +261,7 @@ impl Pixel {
         }
     }
 
-    /// What it surely shows, where that is known.
+    /// Certain label, if it has one.
     pub(super) fn label(&self, settings: &SegmentationSettings) -> Option<Label> {
         let off = (self.sensor - self.object).abs();
         let measured = self.sensor > 0.0;

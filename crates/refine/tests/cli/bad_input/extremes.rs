@@ -141,7 +141,7 @@ fn sizes_of_images_are_compared_before_they_are_decoded() {
     assert!(bytes < 300 << 20, "color: {bytes} bytes");
 }
 
-/// What the program says, and the most memory that it takes; where the system does not tell, nothing.
+/// Messages of the program, and its peak memory \[byte\]; 0 where the system does not tell.
 fn peak(place: &Workplace, arguments: &str) -> (String, u64) {
     // A program that ends at once on a busy machine may do so before it is looked at: then again.
     for _ in 0..10 {
@@ -234,7 +234,7 @@ fn what_is_no_plain_file_is_not_waited_for() {
     }
 }
 
-/// What is written goes to where links lead, and nowhere but into plain files.
+/// Outputs go to where links lead, and nowhere but into plain files.
 #[cfg(unix)]
 #[test]
 fn outputs_keep_links_and_devices() {

@@ -84,7 +84,7 @@ fn hopeless_runs() {
     }
 }
 
-/// What cannot be written is known before anything else is looked at: here, that there are no poses.
+/// Unwritable outputs are known before anything else is looked at: here, that there are no poses.
 #[test]
 fn unwritable_outputs_fail_before_the_work() {
     let place = workplace();

@@ -1,4 +1,4 @@
-//! What comes back from the device, in the form that is asked for.
+//! Losses, tiles and pictures from the results of the device.
 
 use super::layout::{
     PICTURE_COLUMNS, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH, SUM_GRADIENT,

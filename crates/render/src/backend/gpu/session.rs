@@ -17,7 +17,7 @@ use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::mode::Mode;
 use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 
-/// What a call wants to know.
+/// Results that a call asks for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     Value,

@@ -11,7 +11,7 @@ use crate::backend::BackendError;
 /// Memory that a session's work buffers may take together \[bytes\]. More hypotheses are worked off in turns.
 pub(super) const BUDGET: u64 = 768 << 20;
 
-/// What one hypothesis needs, in numbers of entries.
+/// Numbers of buffer entries that one hypothesis needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Capacity {
     /// Faces in tiles, on average over the hypotheses, who share a pool.
@@ -153,7 +153,7 @@ pub(super) fn check_dispatch(device: &Device, params: &Params) -> Result<(), Bac
 pub(super) struct Work {
     pub(super) hypotheses: usize,
     pub(super) capacity: Capacity,
-    /// Of the written buffers \[bytes\].
+    /// Sizes of the written buffers \[bytes\].
     sizes: [u64; 9],
     pub(super) poses: wgpu::Buffer,
     pub(super) tallies: wgpu::Buffer,

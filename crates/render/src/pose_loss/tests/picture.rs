@@ -1,4 +1,4 @@
-//! What a picture of the object shows besides its colors.
+//! Normals, faces and the light's offset in a picture of the object.
 
 use super::*;
 

@@ -42,7 +42,7 @@ impl Scene<'_> {
         render_scene(camera, &bodies, SAMPLES, |_, p| self.light.color(p), |_, _| [0.0; 3]).color
     }
 
-    /// What a camera sees of the object at `pose`; whatever it touches belongs to the mask.
+    /// Camera image of the object at `pose`; every pixel that it touches belongs to the mask.
     fn target(&self, pose: &Isometry3<f64>) -> Target {
         let window = self.window(pose);
         let picture = self.picture(&window, pose);

@@ -1,12 +1,12 @@
-//! What the contour mode decides.
+//! Discrete decisions of the contour mode.
 
 use super::super::contour::{Contours, Decision};
 use super::*;
 use crate::contour::{Inner, Piece};
 
-/// What was decided about a pixel. None where the nearest point of a contour is the end of a piece within an edge, which is
-/// where the visibility of the contour changes, and on faces seen within 3 degrees of their plane, where colors are so steep
-/// that differences are no measure.
+/// Discrete decisions about a pixel. None where the nearest point of a contour is the end of a piece within an edge: there the
+/// visibility of the contour changes. None on faces seen within 3 degrees of their plane, whose colors are too steep for
+/// finite differences.
 pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Option<Vec<u32>> {
     let Decision { face, edge, inner, crease } = contours.decision(place.block, place.i);
     let (x, y) = (place.x as f32, place.y as f32);

@@ -75,7 +75,7 @@ fn scene() -> Scene {
     scene
 }
 
-/// What was decided about each pixel: while this stays the same, the pixel is a smooth function. None where that is not so.
+/// Discrete decisions about each pixel: while they stay the same, the pixel is a smooth function. None where it is not.
 fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<Vec<u32>>> {
     let mut out = vec![None; rendering.buffers.alpha.len()];
     let (frame, width) = (&rendering.frame, rendering.buffers.width);

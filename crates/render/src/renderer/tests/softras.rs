@@ -1,4 +1,4 @@
-//! What the SoftRas mode decides.
+//! Discrete decisions of the SoftRas mode.
 
 use super::super::softras::SoftFaces;
 use super::*;

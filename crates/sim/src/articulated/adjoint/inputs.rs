@@ -24,14 +24,14 @@ pub(super) struct LinkAdjoint {
 pub(super) struct Inputs<S> {
     /// The numbers that vary.
     pub(super) varying: Vec<S>,
-    /// Of all numbers in their order, whether they do.
+    /// True for each number that varies, among all in their order.
     pub(super) varies: Vec<bool>,
     /// True if numbers of links are among them.
     pub(super) links: bool,
 }
 
 impl<S: Scalar> Inputs<S> {
-    /// Of `first` and, if one of them varies, the numbers of all links.
+    /// Inputs `first` and, if any number of a link varies, those of all links.
     pub(super) fn new(first: impl Iterator<Item = S>, tree: &Articulation<S>) -> Self {
         let links = tree.links().iter().any(|link| link.numbers().any(|x| !x.is_constant()));
         let mut inputs = Self { varying: Vec::new(), varies: Vec::new(), links };

@@ -11,10 +11,10 @@ law_part! {
     /// Coulomb friction: f_t = −μ f_n u/√(|u|² + v_s²) for slip u, friction coefficient μ and slip scale v_s
     /// ([`regularized_coulomb`](super::regularized_coulomb)).
     ///
-    /// What should stick creeps at v_s times its share of the friction that it could use, so v_s is the creep that you can
-    /// bear: a hundredth of the speeds that matter, often 1 cm/s for impacts and 0.1 mm/s for grasps. Fixed steps must be
-    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) sees to it. What has
-    /// to hold for seconds wants [`BristleFriction`](super::bristle::BristleFriction) around it.
+    /// A sticking contact creeps: a tangential force s μ f_n, s < 1, takes the slip v_s s/√(1 − s²). Choose v_s as the tolerable
+    /// creep: a hundredth of the speeds that matter, often 1 cm/s for impacts and 0.1 mm/s for grasps. Fixed steps must be
+    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) takes such steps. To
+    /// hold for seconds, a contact needs [`BristleFriction`](super::bristle::BristleFriction) around it.
     pub struct Coulomb: "Coulomb friction" {
         friction [""] NotNegative "friction coefficient";
     }

@@ -83,7 +83,7 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
 }
 
 impl ErrorNorm {
-    /// Of a step that starts at `states`.
+    /// Error norm of a step from `states`.
     pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
         let wrenches = LazyCell::new(|| world.wrenches(states, 0));
         let scale = |body: BodyId| {

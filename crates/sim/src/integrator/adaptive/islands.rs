@@ -93,8 +93,7 @@ impl Island {
         islands
     }
 
-    /// What happens to it follows from its bodies and these of its contacts, the group and bodies of those of groups; the others are
-    /// first among all, as many as `single`.
+    /// Key of the island: its bodies, and group and bodies of each of its contacts but the first `single` of all, which have no group.
     pub(super) fn links(&self, single: usize, candidates: &[CandidateContact]) -> Links {
         let candidates =
             self.contacts.iter().filter_map(|i| candidates.get(i.checked_sub(single)?));

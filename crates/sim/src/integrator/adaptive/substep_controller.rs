@@ -70,7 +70,7 @@ pub(super) struct SubstepController {
 }
 
 impl SubstepController {
-    /// Of a step from `states`, which carry the sensitivity, whose first substep is about `first` \[s\] long, if that is known.
+    /// Controller of a step from `states`, which carry the sensitivity; its first substep is about `first` \[s\] long, if that is known.
     pub(super) fn new(
         settings: &Adaptive,
         plain: World,

@@ -70,7 +70,7 @@ struct Passage<'a> {
 }
 
 impl<'a> Passage<'a> {
-    /// Of `pair` in a step of `dt` \[s\].
+    /// Samples of `pair` beside its field at both `ends` of a step of `dt` \[s\].
     fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
         let ends = ends.map(|states| world.relative_value(pair, states));
         let query = world.contact_query(pair, ends[0])?;

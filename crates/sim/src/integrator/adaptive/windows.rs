@@ -141,8 +141,8 @@ struct Window {
 }
 
 impl Window {
-    /// Of `step`. Where a body comes farther from uniform motion than contacts were looked for, they are looked for again; schedules of
-    /// islands which that leaves alone are kept.
+    /// Window of `step`. Contacts are searched again where a body deviates farther from uniform motion than the search assumed;
+    /// schedules of islands that stay the same are kept.
     fn find(
         settings: &Adaptive,
         search: &BroadPhase<'_, f64>,

@@ -1,4 +1,4 @@
-//! What acts along the joints and tendons of a model.
+//! Forces along the joints and tendons of a model.
 
 use std::sync::Arc;
 

@@ -16,12 +16,12 @@ pub(super) enum Along {
     Path(Arc<Path>),
 }
 
-/// What lengths are found by.
+/// Lengths along the joints and tendons of a model.
 pub(super) struct Lengths<'a> {
     pub(super) model: &'a Model,
     /// The link that each body is.
     pub(super) bodies: &'a [usize],
-    /// Of each joint of the model, its axis and its link.
+    /// Axis and link of each joint of the model, in ascending order.
     pub(super) axes: &'a [(JointIndex, JointAxis, usize)],
     pub(super) t_world_model: nalgebra::Isometry3<f64>,
 }

@@ -81,7 +81,8 @@ impl World {
         stiffness(solver, self.mass_between(bodies, points, at), softness)
     }
 
-    /// What a force between points of two bodies of the last articulation has to accelerate at most \[kg\].
+    /// Largest effective mass 1/λ \[kg\] between points of two bodies of the last articulation: λ is the least eigenvalue of
+    /// J M⁻¹ Jᵀ that counts, J the Jacobian of the relative velocity.
     fn mass_between(
         &self,
         bodies: [BodyId; 2],

@@ -66,7 +66,7 @@ pub struct MjcfRobot {
     names: Vec<String>,
     mocaps: Vec<BodyId>,
     sensors: sensors::Sensors,
-    /// Of each joint, in the order of positions in MuJoCo, the link that it moves.
+    /// Kind and link of each joint, in MuJoCo's order of positions.
     moved: Vec<(JointKind, BodyId)>,
 }
 
@@ -115,7 +115,7 @@ pub enum MjcfError {
     Shape {
         /// The body's name.
         body: String,
-        /// What is wrong.
+        /// Error of the shape.
         error: ShapeError,
     },
     /// Its bodies are no articulation, or a force does not fit.
@@ -149,7 +149,7 @@ pub enum MjcfError {
     /// Something that changes how the model moves, and that a world has no counterpart of.
     #[error("{what}: there is no counterpart (with `partial`, it is left out)")]
     NoCounterpart {
-        /// What, with its name.
+        /// Element with its name, and its part without counterpart.
         what: String,
     },
 }

@@ -85,7 +85,7 @@ impl World {
     }
 }
 
-/// Of all geoms of a body that collide; none if there are none.
+/// Shape of the colliding geoms of a body; `None` if there are none.
 fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeError> {
     let mut parts = Vec::new();
     for geom in geoms.iter().filter(|geom| touches(geom)) {

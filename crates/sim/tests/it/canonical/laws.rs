@@ -13,7 +13,7 @@ use prehend_sim::{
 /// Gravity \[m/s²\].
 pub(crate) const G: f64 = 9.81;
 
-/// What a law should do in a problem.
+/// Requirements on a law in a problem.
 #[derive(Clone, Copy)]
 pub(crate) struct Spec {
     /// Mass of the body \[kg\].

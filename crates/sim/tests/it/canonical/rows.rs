@@ -1,4 +1,4 @@
-//! What a canonical problem is, and how its results are judged and printed.
+//! Canonical problems, and how their results are judged and printed.
 
 use super::integrators::Scheme;
 use super::laws::Law;
@@ -9,7 +9,7 @@ pub(crate) struct Problem {
     pub(crate) over: Over,
 }
 
-/// What a problem is solved with; it gives no rows where it does not apply.
+/// Integrators and laws over which a problem is solved; it gives no rows where it does not apply.
 pub(crate) enum Over {
     Integrators(fn(&Scheme) -> Vec<Row>),
     Laws(fn(&Law) -> Vec<Row>),

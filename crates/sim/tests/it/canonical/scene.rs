@@ -42,7 +42,7 @@ pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> World {
     on_floor(law, spec, GapSmoothing::Hard, gravity, &feet, 1e-3)
 }
 
-/// What carries the slab: it sinks in by half a millimeter under gravity.
+/// Contact of the slab, which sinks in by half a millimeter under gravity.
 pub(crate) const SLAB: Spec = Spec {
     mass: 0.3,
     depth: 5e-4,

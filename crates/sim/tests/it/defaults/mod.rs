@@ -20,7 +20,7 @@ use scene::Scene;
 const CONVERGED: Adaptive =
     Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_substeps: 10_000_000 };
 
-/// What is found in a scene.
+/// Results of a scene.
 struct Findings {
     value: f64,
     slope: f64,
@@ -29,7 +29,7 @@ struct Findings {
     /// Values and differences of converged runs, with the nudge and half of it.
     converged: f64,
     differences: [f64; 2],
-    /// What is said of a step that is too long.
+    /// Resolution or error of a run whose step is too long.
     bad: Result<prehend_sim::Resolution, prehend_sim::SimulationError>,
 }
 

@@ -1,4 +1,4 @@
-//! What went wrong without a word once.
+//! Regressions: errors that once passed without a message.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

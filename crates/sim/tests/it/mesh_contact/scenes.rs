@@ -20,7 +20,7 @@ pub(crate) struct Scene {
     pub(crate) name: &'static str,
     pub(crate) world: World,
     pub(crate) start: Vec<State>,
-    /// What the bodies look like.
+    /// Meshes of the bodies.
     #[allow(dead_code)] // the example mesh_contacts draws them
     pub(crate) meshes: [TriMesh; 2],
     /// The body that is started.
@@ -54,7 +54,7 @@ pub(crate) fn shape(mesh: &TriMesh, lengths: Lengths) -> anyhow::Result<Shape> {
     Ok(Shape::from_parry_with(&mesh, &lengths.options())?)
 }
 
-/// What all of the scenes are made of: a law that carries the body `depth` \[m\] deep on `area` \[m²\].
+/// Contact law of all scenes, which carries the body `depth` \[m\] deep on `area` \[m²\].
 fn law(
     mass: f64,
     area: f64,

@@ -13,7 +13,7 @@ use super::scenes::Scene;
 const CONVERGED: Adaptive =
     Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_substeps: 10_000_000 };
 
-/// What a scene is differentiated by, in this order: pose and velocity of the moving body along the directions of
+/// Inputs by which a scene is differentiated, in this order: pose and velocity of the moving body along the directions of
 /// [`State::tangent`], the logarithms of [`LAW`], and a dimension \[m\].
 const INPUTS: usize = 16;
 const LAW: [&str; 3] = ["stiffness", "damping", "friction"];

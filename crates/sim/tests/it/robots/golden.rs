@@ -56,7 +56,7 @@ fn urdf(golden: &Value) -> Robot {
     Robot { joints, bodies: names.zip(bodies.clone()).collect(), world }
 }
 
-/// Of each joint of the golden values, its degree of freedom.
+/// Degree of freedom of each joint of the golden values.
 fn velocity_places(world: &World, joints: &[BodyId]) -> Vec<usize> {
     let own = &world.articulations[0];
     let place = |body: &BodyId| own.bodies().iter().position(|link| link == body).unwrap();

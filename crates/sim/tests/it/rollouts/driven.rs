@@ -19,7 +19,7 @@ use crate::scenes::{floor, sticking};
 const TIME: f64 = 0.06;
 /// Speed \[m/s\], then the waypoint: aside \[m\] and turned \[rad\].
 const INPUTS: [f64; 4] = [0.2, 1e-3, 2e-3, 0.05];
-/// What counts as one of them.
+/// Units of the inputs.
 const UNITS: [f64; 4] = [0.1, 1e-2, 1e-2, 0.1];
 
 /// Along x at a speed, by a waypoint at half of the time.

@@ -220,7 +220,7 @@ impl Scene {
         })
     }
 
-    /// What is measured in the end.
+    /// Measure of the last states.
     fn last<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
         let (world, states) = self.set_up(x);
         self.measure(
@@ -228,7 +228,7 @@ impl Scene {
         )
     }
 
-    /// What is measured over all steps, while a load swings whose six amplitudes are the last of `x`.
+    /// Mean measure over all steps, while a load swings whose six amplitudes are the last of `x`.
     fn all<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
         let (mut world, mut states) = self.set_up(x);
         let load = world.bodies[1].external_wrench;

@@ -1,4 +1,4 @@
-//! What every integrator must do.
+//! Requirements on every integrator.
 
 use std::sync::Arc;
 

@@ -54,7 +54,7 @@ pub struct FilmCamera {
 pub struct GlbFilm {
     /// Base frame → glTF's, whose y-axis points up.
     pub r_gltf_base: UnitQuaternion<f64>,
-    /// What is shown.
+    /// Rigid bodies shown.
     pub bodies: Vec<FilmBody>,
     /// From where images were taken, if from somewhere.
     pub camera: Option<FilmCamera>,

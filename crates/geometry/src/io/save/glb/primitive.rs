@@ -19,7 +19,7 @@ pub(super) enum ColorSpace {
     Linear,
 }
 
-/// What primitives have beside the chunk: materials, and textures, each of which is there once.
+/// Materials, images and textures of primitives, each texture once.
 #[derive(Default)]
 pub(super) struct Parts {
     materials: Vec<Value>,

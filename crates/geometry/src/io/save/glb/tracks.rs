@@ -10,7 +10,7 @@ use super::film::FilmKey;
 use crate::io::MeshError;
 use crate::io::save::invalid;
 
-/// What moves.
+/// Samplers and channels of an animation.
 #[derive(Default)]
 pub(super) struct Tracks {
     pub(super) samplers: Vec<Value>,

@@ -1,4 +1,4 @@
-//! What the page's scripts read: plain data, which becomes JSON.
+//! Data for the page's scripts, which becomes JSON.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -29,7 +29,7 @@ pub(super) struct LabeledPicture {
     pub(super) picture: String,
 }
 
-/// What a column of the table of frames holds.
+/// Column of the table of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Column {
     /// The word that filters know it by.
@@ -62,7 +62,7 @@ pub type Figure = (Column, Option<f64>);
 pub struct Chart {
     /// The heading.
     pub title: String,
-    /// What is to the right, and up.
+    /// Labels of the horizontal and the vertical axis.
     pub axes: [String; 2],
     /// Whether the upward axis is logarithmic; what is not positive is left out then.
     pub logarithmic: bool,

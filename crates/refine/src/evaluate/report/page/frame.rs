@@ -1,4 +1,4 @@
-//! What a page shows of a frame.
+//! A frame on the page.
 
 use std::collections::BTreeMap;
 
@@ -19,9 +19,9 @@ use crate::strategy::{PosteriorSummary, Trace};
 pub struct FrameReport {
     /// Which frame.
     pub name: String,
-    /// What became of it in a word or two; empty where there is nothing to say.
+    /// Status in a word or two; empty where there is nothing to say.
     pub status: String,
-    /// What to look at, each in a word or two: filters know them.
+    /// Flags, each in a word or two: filters know them.
     pub flags: Vec<String>,
     /// Sentences.
     pub remarks: Vec<String>,
@@ -73,9 +73,9 @@ fn by_key<S: Serializer>(figures: &[Figure], serializer: S) -> Result<S::Ok, S::
     serializer.collect_map(known.collect::<BTreeMap<_, _>>())
 }
 
-/// What there is to draw of a frame.
+/// Input and result of a frame to draw.
 pub struct FrameDrawing<'a> {
-    /// What was sensed.
+    /// The observation and the object.
     pub input: &'a EstimatorInput<'a>,
     /// Where the object was said to be, where that is known (object → camera) \[m\].
     pub initial: Option<&'a Isometry3<f64>>,

@@ -27,7 +27,7 @@ pub(super) struct EncodedMesh {
 }
 
 impl EncodedMesh {
-    /// Of a mesh of fewer than 65 536 vertices, with colors.
+    /// Encoding of `mesh`, which has fewer than 65 536 vertices, with colors.
     fn new(mesh: &TriMesh) -> Self {
         let positions = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z].map(|c| c as f32));
         let colors = mesh.colors.iter().flatten().flatten().map(|c| (c * 255.0).round() as u8);
@@ -69,7 +69,7 @@ pub(super) struct EncodedScene {
     pose: [f32; 12],
     initial: Option<[f32; 12]>,
     links: Vec<[f32; 12]>,
-    /// What the view turns about: the object's center \[m\].
+    /// Center of the view's rotation: the object's center \[m\].
     center: [f32; 3],
     /// Against gravity, or the camera's up.
     up: [f32; 3],

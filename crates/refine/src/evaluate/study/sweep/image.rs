@@ -8,7 +8,7 @@ use crate::synth::{SensorSettings, smooth_field};
 /// Edge of a patch, for an image of 640 columns \[px\].
 const PATCH: usize = 8;
 
-/// What has to be added to noise of deviation one to make it `factor` times as much.
+/// Standard deviation of noise to add to noise of deviation 1, so that their sum has deviation `factor`.
 fn added(factor: f64) -> f64 {
     (factor * factor - 1.0).max(0.0).sqrt()
 }

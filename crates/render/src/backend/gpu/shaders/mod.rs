@@ -30,7 +30,7 @@ macro_rules! sources {
     };
 }
 
-/// What passes import, each after all that it imports itself.
+/// Modules that passes import, each after its own imports.
 const MODULES: [Source; 27] = sources![
     "params.wgsl",
     "hypotheses.wgsl",
@@ -81,7 +81,7 @@ const PASSES: [Source; 13] = sources![
 /// The key of the constant that says whether a pass computes derivatives; see `shaders/derivatives.wgsl`.
 pub(super) const DERIVATIVES: &str = "0";
 
-/// What the pipelines of one entry point are made of.
+/// Shader module of one entry point, for its pipelines.
 pub(super) struct Composed {
     /// Name of the entry point.
     pub(super) entry: &'static str,
@@ -91,7 +91,7 @@ pub(super) struct Composed {
 /// The module of every entry point, with what it uses alone. Names of what it imports are mangled.
 ///
 /// # Errors
-/// What is wrong with a file, and where.
+/// Message of the composer, with file and place.
 pub(super) fn compose() -> Result<Vec<Composed>, String> {
     // The device validates what it is given.
     let mut composer = Composer::non_validating();
