@@ -259,10 +259,10 @@ impl ClosestPoints {
 
     fn is_inside(&self, point: &Point3<f64>, closest: &Closest) -> bool {
         match &self.sign {
-            Sign::Winding(winding) => winding.at(&self.bvh, &point.coords).abs() > 0.5,
+            Sign::Winding(winding) => winding.is_inside(&self.bvh, &point.coords),
             Sign::PseudoNormal(normals, orientation, winding) => {
                 if normals.is_folded(closest.face as usize) {
-                    return winding.at(&self.bvh, &point.coords).abs() > 0.5;
+                    return winding.is_inside(&self.bvh, &point.coords);
                 }
                 let offset = point - closest.point;
                 let face = closest.face as usize;

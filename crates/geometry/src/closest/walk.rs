@@ -17,15 +17,17 @@ struct Ball {
 /// A walk from point to point near a mesh.
 pub(crate) struct Walk<'a> {
     mesh: &'a ClosestPoints,
-    /// The face of the last answer.
+    /// Face of the last answer.
     face: Option<u32>,
+    /// Last point.
+    last: Option<Vector3<f64>>,
     balls: Vec<Ball>,
     oldest: usize,
 }
 
 impl<'a> Walk<'a> {
     pub(crate) fn new(mesh: &'a ClosestPoints) -> Self {
-        Self { mesh, face: None, balls: Vec::new(), oldest: 0 }
+        Self { mesh, face: None, last: None, balls: Vec::new(), oldest: 0 }
     }
 
     /// As [`ClosestPoints::signed_distance_within`], the distance alone.
@@ -35,11 +37,16 @@ impl<'a> Walk<'a> {
         let Sign::Winding(winding) = &self.mesh.sign else {
             return Some(self.mesh.signed(point, Some(closest)).0);
         };
+        let step = self.last.replace(point.coords).map_or(0.0, |last| (point.coords - last).norm());
         let within = |b: &&Ball| (point.coords - b.center).norm_squared() < b.squared_radius;
         let known = self.balls.iter().find(within).map(|ball| ball.inside);
         let inside = known.unwrap_or_else(|| {
-            let (center, distance) = (point.coords, closest.distance);
-            let (inside, radius) = winding.around(&self.mesh.bvh, &center, distance);
+            let (bvh, center, distance) = (&self.mesh.bvh, point.coords, closest.distance);
+            if distance < step {
+                // No other point would lie in its ball.
+                return winding.is_inside(bvh, &center);
+            }
+            let (inside, radius) = winding.around(bvh, &center, distance);
             let ball = Ball { center, squared_radius: radius * radius, inside };
             match self.balls.len() {
                 BALLS => self.balls[self.oldest] = ball,

@@ -23,7 +23,7 @@ struct Dipole {
 ///
 /// Jacobson, Kavan and Sorkine-Hornung, Robust inside-outside segmentation using generalized winding
 /// numbers, 2013; far groups as in Barill et al., Fast winding numbers for soups and clouds, 2018, with
-/// the first-order term only, which an accuracy parameter of 4 radii keeps well within what the threshold at one half needs.
+/// the first-order term only, in two steps of [`Accuracy`].
 #[derive(Clone, Debug)]
 pub(super) struct Winding {
     dipoles: Vec<[Dipole; LANES]>,
@@ -34,19 +34,45 @@ pub(super) struct Winding {
 /// An edge at which more faces end that run along it one way than the other.
 #[derive(Clone, Copy, Debug)]
 struct End {
-    middle: Vector3<f64>,
-    half: f64,
-    /// Its length times how many.
-    length: f64,
+    vertices: [Vector3<f64>; 2],
+    /// By how many.
+    surplus: f64,
 }
 
-const FAR: f64 = 4.0;
+impl End {
+    /// Distance r from `p` \[m\], and ∫ dl/|x − p|² along the edge, times the surplus \[1/m\].
+    fn seen_from(&self, p: &Vector3<f64>) -> [f64; 2] {
+        let [a, b] = self.vertices.map(|v| v - p);
+        let along = b - a;
+        let length = along.norm();
+        let nearest = a + along * (-a.dot(&along) / length.powi(2)).clamp(0.0, 1.0);
+        let distance = nearest.norm();
+        let cross = a.cross(&b).norm();
+        let height = cross / length;
+        // The angle of sight over the distance of the line; beside that line rounding would decide.
+        let integral = if height > 1e-3 * distance {
+            cross.atan2(a.dot(&b)) / height
+        } else {
+            length / distance.powi(2)
+        };
+        [distance, integral * self.surplus]
+    }
+}
+
+/// Distance in radii beyond which a group is a dipole, and the distance of the number from one half beyond which its error does not matter then.
+#[derive(Clone, Copy)]
+pub(super) struct Accuracy {
+    far: f64,
+    certain: f64,
+}
+
+pub(super) const FINE: Accuracy = Accuracy { far: 4.0, certain: 0.1 };
+
+/// Three times as fast.
+pub(super) const COARSE: Accuracy = Accuracy { far: 2.0, certain: 0.25 };
 
 /// More ends would take longer to look at than the number itself.
 const MOST_ENDS: usize = 1000;
-
-/// Distance of the winding number from one half beyond which its error does not matter.
-const CERTAIN: f64 = 0.1;
 
 impl Winding {
     pub(super) fn new(mesh: &TriMesh, bvh: &Bvh) -> Self {
@@ -83,7 +109,7 @@ impl Winding {
     }
 
     /// Winding number of the mesh about `p`: 1 inside and 0 outside of a closed mesh, between for an open one.
-    pub(super) fn at(&self, bvh: &Bvh, p: &Vector3<f64>) -> f64 {
+    pub(super) fn at(&self, bvh: &Bvh, p: &Vector3<f64>, accuracy: Accuracy) -> f64 {
         let mut solid_angle = 0.0;
         let mut open = vec![0usize];
         while let Some(n) = open.pop() {
@@ -92,7 +118,7 @@ impl Winding {
                 let dipole = &self.dipoles[n][lane];
                 let r = dipole.center - p;
                 let distance = r.norm();
-                if distance > FAR * dipole.radius {
+                if distance > accuracy.far * dipole.radius {
                     solid_angle += dipole.area_vector.dot(&r) / distance.powi(3);
                     continue;
                 }
@@ -105,24 +131,38 @@ impl Winding {
         solid_angle / (4.0 * PI)
     }
 
+    /// Whether `p` is inside: whether its winding number is above one half.
+    pub(super) fn is_inside(&self, bvh: &Bvh, p: &Vector3<f64>) -> bool {
+        self.side(bvh, p).0
+    }
+
+    /// Whether `p` is inside, and by how much more than its error the number differs from one half.
+    fn side(&self, bvh: &Bvh, p: &Vector3<f64>) -> (bool, f64) {
+        let with = |accuracy: Accuracy| {
+            let number = self.at(bvh, p, accuracy).abs();
+            (number > 0.5, (number - 0.5).abs() - accuracy.certain)
+        };
+        let coarse = with(COARSE);
+        if coarse.1 > 0.0 { coarse } else { with(FINE) }
+    }
+
     /// Whether `p`, at this distance from the surface, is inside, and the radius of a ball around it of which the same is true.
     ///
-    /// Off the surface the number changes as the potential of currents along the ends does (Biot and Savart's law): by less than the sum of their
-    /// lengths over 4π times their squared distances.
+    /// Off the surface the number changes as the potential of currents along the ends does (Biot and Savart's law): by less than the sum of
+    /// ∫ dl/(4π|x − p|²) along them, which grows by less than (1 − ρ/r)⁻² within a radius ρ below their distances r.
     pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>, distance: f64) -> (bool, f64) {
-        let number = self.at(bvh, p).abs();
-        let spare = ((number - 0.5).abs() - CERTAIN) * 4.0 * PI;
+        let (inside, spare) = self.side(bvh, p);
+        let spare = spare * 4.0 * PI;
+        let Some(ends) = &self.ends else { return (inside, 0.0) };
+        let seen: Vec<[f64; 2]> = ends.iter().map(|end| end.seen_from(p)).collect();
         let changes_less = |radius: &f64| {
-            let rate = |end: &End| {
-                let nearest = (end.middle - p).norm() - end.half - radius;
-                end.length / nearest.max(0.0).powi(2)
+            let rate = |[distance, integral]: &[f64; 2]| {
+                integral / (1.0 - radius / distance).max(0.0).powi(2)
             };
-            self.ends
-                .as_ref()
-                .is_some_and(|ends| ends.iter().map(rate).sum::<f64>() * radius < spare)
+            seen.iter().map(rate).sum::<f64>() * radius < spare
         };
         let radii = [distance, 0.5 * distance, 0.25 * distance];
-        (number > 0.5, radii.into_iter().find(changes_less).unwrap_or(0.0))
+        (inside, radii.into_iter().find(changes_less).unwrap_or(0.0))
     }
 }
 
@@ -132,11 +172,9 @@ fn ends(mesh: &TriMesh) -> Option<Vec<End>> {
     for edge in edges(&weld.faces(mesh)) {
         let forward = edge.uses.iter().filter(|side| side.forward).count();
         let surplus = forward.abs_diff(edge.uses.len() - forward);
-        let [a, b] = edge.vertices.map(|v| weld.positions[v as usize].coords);
-        let length = (b - a).norm();
+        let vertices = edge.vertices.map(|v| weld.positions[v as usize].coords);
         if surplus > 0 {
-            let length_of_all = length * surplus as f64;
-            ends.push(End { middle: (a + b) * 0.5, half: 0.5 * length, length: length_of_all });
+            ends.push(End { vertices, surplus: surplus as f64 });
         }
     }
     (ends.len() <= MOST_ENDS).then_some(ends)
