@@ -7,7 +7,7 @@ use super::point_contact::{DEPTH, PointContact};
 /// Something to be drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Curve {
-    /// Name.
+    /// Title of the plot.
     pub(crate) name: String,
     /// Names of the axes, with units.
     pub(crate) axes: [&'static str; 2],

@@ -5,7 +5,7 @@
 pub(crate) struct Finding {
     /// Measured quantity, with its unit.
     pub(crate) what: String,
-    /// Its value.
+    /// Measured value, in the unit of `what`.
     pub(crate) measured: f64,
     /// Verdict on it.
     pub(crate) verdict: Verdict,

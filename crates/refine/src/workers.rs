@@ -45,7 +45,7 @@ impl Workers {
     /// come, in no particular order. Once `done` fails, no further job is begun.
     ///
     /// # Errors
-    /// The error of `done`.
+    /// The first error that `done` returns.
     pub fn run<J, T, E, W>(
         &self,
         jobs: &[J],

@@ -19,7 +19,7 @@ pub struct Attack<'a> {
 }
 
 impl<'a> Attack<'a> {
-    /// Attack by `run`, which returns its row of the table. The name is of it alone.
+    /// Attack by `run`, which returns its row of the table. Each has another name.
     pub fn new(name: impl Into<String>, run: impl FnOnce() -> Result<Row> + 'a) -> Self {
         Self { name: name.into(), run: Box::new(run) }
     }

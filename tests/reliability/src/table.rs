@@ -26,7 +26,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Row of attacks that must all be withstood; none yet.
+    /// Empty row, of attacks that must all be withstood.
     pub fn new(what: impl Into<String>) -> Self {
         let (what, note, commit) = (what.into(), String::new(), String::new());
         Self { what, tried: 0, crashes: 0, hangs: 0, wrong: 0, required: 1.0, note, commit }

@@ -1,7 +1,7 @@
 //! Times several ways to do one job, taking turns so that a disturbance of the machine hits all of them
 //! alike, and prints a Markdown table.
 //!
-//! Times are of the processor on this process: everything runs on one thread, and other programs on the
+//! Times are processor times of this process: everything runs on one thread, and other programs on the
 //! machine disturb that far less than the time on the clock.
 
 use std::hint::black_box;

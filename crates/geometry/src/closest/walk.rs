@@ -32,12 +32,12 @@ impl<'a> Walk<'a> {
 
     /// As [`ClosestPoints::signed_distance_within`], the distance alone.
     pub(crate) fn signed_distance_within(&mut self, point: &Point3<f64>, most: f64) -> Option<f64> {
+        let step = self.last.replace(point.coords).map_or(0.0, |last| (point.coords - last).norm());
         let closest = self.mesh.search(point, most, self.face)?;
         self.face = Some(closest.face);
         let Sign::Winding(winding) = &self.mesh.sign else {
             return Some(self.mesh.signed(point, Some(closest)).0);
         };
-        let step = self.last.replace(point.coords).map_or(0.0, |last| (point.coords - last).norm());
         let within = |b: &&Ball| (point.coords - b.center).norm_squared() < b.squared_radius;
         let known = self.balls.iter().find(within).map(|ball| ball.inside);
         let inside = known.unwrap_or_else(|| {
@@ -47,12 +47,14 @@ impl<'a> Walk<'a> {
                 return winding.is_inside(bvh, &center);
             }
             let (inside, radius) = winding.around(bvh, &center, distance);
-            let ball = Ball { center, squared_radius: radius * radius, inside };
-            match self.balls.len() {
-                BALLS => self.balls[self.oldest] = ball,
-                _ => self.balls.push(ball),
+            if radius > 0.0 {
+                let ball = Ball { center, squared_radius: radius * radius, inside };
+                match self.balls.len() {
+                    BALLS => self.balls[self.oldest] = ball,
+                    _ => self.balls.push(ball),
+                }
+                self.oldest = (self.oldest + 1) % BALLS;
             }
-            self.oldest = (self.oldest + 1) % BALLS;
             inside
         });
         Some(if inside { -closest.distance } else { closest.distance })

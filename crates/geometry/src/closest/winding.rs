@@ -59,17 +59,19 @@ impl End {
     }
 }
 
-/// Distance in radii beyond which a group is a dipole, and the distance of the number from one half beyond which its error does not matter then.
+/// Accuracy of a winding number.
 #[derive(Clone, Copy)]
 pub(super) struct Accuracy {
+    /// Distance in radii from which a group is a dipole.
     far: f64,
-    certain: f64,
+    /// Error of the winding number with a margin, for surfaces of some layers.
+    pub(super) certain: f64,
 }
 
 pub(super) const FINE: Accuracy = Accuracy { far: 4.0, certain: 0.1 };
 
-/// Three times as fast.
-pub(super) const COARSE: Accuracy = Accuracy { far: 2.0, certain: 0.25 };
+/// Twice as fast or more.
+pub(super) const COARSE: Accuracy = Accuracy { far: 2.5, certain: 0.3 };
 
 /// More ends would take longer to look at than the number itself.
 const MOST_ENDS: usize = 1000;

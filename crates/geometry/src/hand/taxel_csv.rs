@@ -38,7 +38,7 @@ pub enum TaxelError {
         column: &'static str,
         /// Value expected, such as `the name of a link`.
         expected: &'static str,
-        /// Text found.
+        /// Text of the cell.
         found: String,
     },
 }

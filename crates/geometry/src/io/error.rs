@@ -34,7 +34,7 @@ pub enum MeshError {
         path: PathBuf,
         /// The element or field, such as `vertex 12` or `header`.
         element: String,
-        /// Reason.
+        /// Reason why it cannot be used.
         reason: String,
     },
     /// The file asks for more than [`limits`](crate::limits) allow.
@@ -64,7 +64,7 @@ pub enum MeshError {
         path: PathBuf,
         /// The texture as the mesh names it.
         texture: String,
-        /// Reason.
+        /// Reason why it cannot be used.
         reason: String,
     },
     /// The file holds no triangles.

@@ -10,7 +10,7 @@ use nalgebra::Isometry3;
 
 use super::error::{MjcfError, Place};
 
-/// Reading state of an element or an attribute.
+/// Whether an element or an attribute was read, left out or not asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Use {
     /// Nothing has asked for it.

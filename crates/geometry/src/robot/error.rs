@@ -29,7 +29,7 @@ pub enum RobotError {
     InFile {
         /// The file.
         path: PathBuf,
-        /// Error in it.
+        /// Error of the description in that file.
         source: Box<RobotError>,
     },
     /// Two links or two joints share a name.

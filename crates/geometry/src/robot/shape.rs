@@ -20,7 +20,7 @@ pub struct LinkShape {
 }
 
 /// Cells along the longest side of a grid at most: those of tables and walls are coarser. Beside a flat face a distance is linear, and exact on any grid.
-const MOST_CELLS: f64 = 128.0;
+const MOST_CELLS: f64 = 200.0;
 
 impl LinkShape {
     fn new(

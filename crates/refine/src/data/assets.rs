@@ -58,7 +58,7 @@ pub enum AssetError {
     Frame {
         /// Which.
         target: Target,
-        /// Its error.
+        /// Reason why the frame cannot be read.
         error: Box<AssetError>,
     },
 }

@@ -23,7 +23,7 @@ pub(crate) struct PlacedBody<'b> {
 }
 
 /// Edge, thickness and largest face of the plate that stands for a plane \[m\]: faces that reach behind the camera are not drawn.
-const PLATE: [f64; 3] = [3.0, 0.4, 0.1];
+const PLATE: [f64; 3] = [3.0, 0.2, 0.1];
 /// Standard deviation of a place that is said to be exact \[m or rad\].
 const EXACT_PLACE: f64 = 1e-6;
 

@@ -41,7 +41,7 @@ pub enum RefineError {
     Gravity {
         /// The factor that needs it.
         factor: &'static str,
-        /// Fault of the gravity vector.
+        /// Reason why the gravity vector is refused.
         problem: String,
     },
     /// Forces and taxels do not match.
@@ -87,7 +87,7 @@ pub enum RefineError {
     Setting {
         /// The field of the settings.
         name: &'static str,
-        /// Fault of its value.
+        /// Reason why the setting is refused, such as `is 0, must be above zero`.
         problem: String,
     },
     /// Kinematics failed.
@@ -105,14 +105,21 @@ pub enum RefineError {
 }
 
 impl RefineError {
-    /// Refuses the first of these settings that is not finite and above zero.
+    /// Refuses the first of these settings that is not above zero.
     pub(crate) fn require_positive(settings: &[(&'static str, f64)]) -> Result<(), Self> {
-        match settings.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
-            Some((name, value)) => {
-                let problem = format!("is {value}, must be finite and above zero");
-                Err(Self::Setting { name, problem })
-            }
-            None => Ok(()),
-        }
+        Self::require(settings, f64::INFINITY)
+    }
+
+    /// Refuses the first of these settings that is not above zero and finite.
+    pub(crate) fn require_finite(settings: &[(&'static str, f64)]) -> Result<(), Self> {
+        Self::require(settings, f64::MAX)
+    }
+
+    fn require(settings: &[(&'static str, f64)], most: f64) -> Result<(), Self> {
+        let wrong = settings.iter().find(|(_, value)| !(*value > 0.0 && *value <= most));
+        wrong.map_or(Ok(()), |(name, value)| {
+            let range = if most.is_finite() { "finite and above zero" } else { "above zero" };
+            Err(Self::Setting { name, problem: format!("is {value}, must be {range}") })
+        })
     }
 }

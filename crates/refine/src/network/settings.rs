@@ -30,7 +30,7 @@ impl NetworkSettings {
     /// # Errors
     /// [`RefineError::Setting`] naming the first that is out of range.
     pub(super) fn check(&self) -> Result<(), RefineError> {
-        RefineError::require_positive(&[
+        RefineError::require_finite(&[
             ("seen", self.seen as f64),
             ("voters", self.voters as f64),
             ("rolls", self.rolls as f64),

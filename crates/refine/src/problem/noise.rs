@@ -60,7 +60,7 @@ impl NoiseModel {
 /// Information, kernel and degrees of freedom of a residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighting {
-    /// Information min(1, m/n) / σ² \[nat by half a squared unit of the residual\].
+    /// Information η/σ², η = min(1, n_eff/n) \[nat per half a squared unit of the residual\].
     pub information: f64,
     /// Robust kernel.
     pub kernel: RobustKernel,

@@ -223,8 +223,8 @@ impl Rig {
         if let count @ 1.. = said.joints.len() {
             prior.hand_translation = sigma(hand, 3);
             prior.hand_rotation = sigma(hand + 3, 3);
-            prior.joints = sigma(joints, count);
-            prior.prismatic_joints = prior.joints;
+            let each = variances.rows(joints, count);
+            prior.known_joints = each.iter().map(|variance| Some(variance.sqrt())).collect();
         }
         Ok(PriorSettings {
             depth_scale: sigma(camera, 1),

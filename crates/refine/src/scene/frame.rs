@@ -230,7 +230,7 @@ const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
 /// Refuses a gravity that cannot be in m/s² or that presses nothing into the hand.
 ///
 /// # Errors
-/// A message with the norm of the gravity \[m/s²\].
+/// If its norm is implausible: a message with it \[m/s²\].
 pub fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
     let norm = gravity.norm();
     if PLAUSIBLE_GRAVITY.contains(&norm) {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::{
-    ArticulatedRobot, Drive, KinematicTree, Motion, PosedRobot, RobotError, RobotShape,
+    ArticulatedRobot, KinematicTree, Motion, PosedRobot, RobotError, RobotShape,
 };
 use prehend_geometry::{GridCache, ReadOptions};
 use prehend_render::RenderModel;
@@ -147,14 +147,11 @@ impl Hand {
 
     /// Whether each of the [`joint_names`](KinematicTree::joint_names) is prismatic.
     pub(crate) fn prismatic(&self) -> Vec<bool> {
-        let mut prismatic = vec![false; self.tree.joint_names().len()];
-        for joint in self.tree.joints() {
-            if let (Motion::Prismatic, Drive::Variable { index, .. }) = (joint.motion, joint.drive)
-            {
-                prismatic[index] = true;
-            }
-        }
-        prismatic
+        let slides = |name: &String| {
+            let joints = self.tree.joints().iter();
+            joints.filter(|joint| joint.name == *name).any(|j| j.motion == Motion::Prismatic)
+        };
+        self.tree.joint_names().iter().map(slides).collect()
     }
 
     /// Whether `forces` has one for each taxel.

@@ -18,7 +18,7 @@ pub(super) struct SearchEvidence {
     pub(super) touched: Vec<Point3<f64>>,
     /// Points of the hand, quiet taxels among them, that are not inside the object.
     pub(super) outside: Vec<Point3<f64>>,
-    /// Visible object and depth.
+    /// Low-resolution map of the visible object and depth.
     pub(super) map: SightMap,
 }
 

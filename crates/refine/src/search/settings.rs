@@ -70,7 +70,7 @@ impl SearchSettings {
     /// # Errors
     /// [`RefineError::Setting`] naming the first that is out of range.
     pub(super) fn check(&self) -> Result<(), RefineError> {
-        RefineError::require_positive(&[
+        RefineError::require_finite(&[
             ("rotations", self.rotations as f64),
             ("points", self.points as f64),
             ("placed", self.placed as f64),

@@ -150,7 +150,6 @@ impl TrackerSettings {
             ("in_hand.rotation", self.in_hand.rotation),
             ("free.translation", self.free.translation),
             ("free.rotation", self.free.rotation),
-            ("time_constant", self.time_constant),
             ("turn_sigma", self.turn_sigma),
             ("gating.cost_ratio", self.gating.cost_ratio),
             ("gating.cost_margin", self.gating.cost_margin),
@@ -159,6 +158,7 @@ impl TrackerSettings {
             ("gating.least_shown", self.gating.least_shown),
         ];
         RefineError::require_positive(&positive)?;
+        RefineError::require_finite(&[("time_constant", self.time_constant)])?;
         for (name, gain) in [("in_hand.gain", self.in_hand.gain), ("free.gain", self.free.gain)] {
             if !(0.0..=1.0).contains(&gain) {
                 let problem = format!("is {gain}, not between 0 and 1");
@@ -176,6 +176,8 @@ mod tests {
     #[test]
     fn settings_out_of_range_are_named() {
         let mut settings = TrackerSettings::default();
+        assert!(settings.check().is_ok());
+        settings.turn_sigma = f64::INFINITY;
         assert!(settings.check().is_ok());
         settings.time_constant = 0.0;
         assert_eq!(

@@ -91,7 +91,7 @@ fn cosine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.dot(b) / (a.norm() * b.norm())
 }
 
-/// Gradients over one number of steps.
+/// Gradients of a rollout with a given number of steps.
 struct Study {
     /// Smoothed, from values.
     smoothed: SmoothedGradient<3>,

@@ -51,7 +51,7 @@ struct Change<S: Scalar> {
 }
 
 impl<S: Scalar> Change<S> {
-    /// Change of `state` by the coordinates `x` less their values.
+    /// Change of value zero about `state`, with the derivatives of the coordinates `x`.
     #[inline(always)]
     fn new(x: &[S; STATE], state: &State) -> Self {
         let less = |i: usize| x[i].plus(-x[i].value());

@@ -124,7 +124,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Inertia of each rotor of an articulation, derivatives of its length by each degree of freedom, and its drift.
+    /// For each rotor of an articulation its inertia, the derivatives of its length by each degree of freedom, and its drift.
     fn rotors(
         &self,
         own: &ArticulatedBody<S>,

@@ -19,7 +19,7 @@ const NOISE: f64 = 4.0;
 pub struct Load {
     /// Its name.
     pub name: &'static str,
-    /// Description, at its full size.
+    /// Description of the load at scale 1.
     pub what: &'static str,
     run: fn(&LoadContext<'_>) -> Result<Outcome>,
 }

@@ -20,7 +20,7 @@ pub struct Tactile {
     pub body: String,
     /// Layout: a table of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of the readings; none of a patch.
     pub taxels: Option<PathBuf>,
-    /// Its reading.
+    /// Values of the sensor.
     pub reading: TactileReading,
     pub(crate) origin: Origin,
 }

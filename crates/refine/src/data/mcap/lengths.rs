@@ -48,7 +48,7 @@ fn text(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(u32::from_le_bytes(*count) as usize)
 }
 
-/// Bytes after a number of eight bytes that says how many they are, and what follows.
+/// Bytes with a length prefix of eight bytes, and the rest.
 fn counted(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (count, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u64::from_le_bytes(*count)).ok()?)

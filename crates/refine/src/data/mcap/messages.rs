@@ -184,8 +184,9 @@ impl Marker {
     pub(super) const TRIANGLES: i32 = 11;
 }
 
-/// CDR encapsulation header of little-endian messages; then the first two bytes of a big-endian one.
+/// CDR encapsulation header of little-endian messages.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+/// First two bytes of that of big-endian messages.
 const BIG_ENDIAN: [u8; 2] = [0, 0];
 
 /// A message as bytes.

@@ -93,7 +93,7 @@ impl Island {
         islands
     }
 
-    /// Key of the island: its bodies, and group and bodies of each of its contacts but the first `single` of all, which have no group.
+    /// Key of the island: its bodies; of contacts from index `single` on, also group and bodies.
     pub(super) fn links(&self, single: usize, candidates: &[CandidateContact]) -> Links {
         let candidates =
             self.contacts.iter().filter_map(|i| candidates.get(i.checked_sub(single)?));

@@ -149,7 +149,7 @@ pub enum MjcfError {
     /// Something that changes how the model moves, and that a world has no counterpart of.
     #[error("{what}: there is no counterpart (with `partial`, it is left out)")]
     NoCounterpart {
-        /// Element with its name, and its part without counterpart.
+        /// Name of the element, and its part that a world cannot represent.
         what: String,
     },
 }

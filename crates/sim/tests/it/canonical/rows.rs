@@ -9,7 +9,7 @@ pub(crate) struct Problem {
     pub(crate) over: Over,
 }
 
-/// Integrators and laws over which a problem is solved; it gives no rows where it does not apply.
+/// Problem as a function of integrator, law or both; without rows where it does not apply.
 pub(crate) enum Over {
     Integrators(fn(&Scheme) -> Vec<Row>),
     Laws(fn(&Law) -> Vec<Row>),

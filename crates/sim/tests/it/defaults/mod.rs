@@ -29,7 +29,7 @@ struct Findings {
     /// Values and differences of converged runs, with the nudge and half of it.
     converged: f64,
     differences: [f64; 2],
-    /// Resolution or error of a run whose step is too long.
+    /// Outcome of a run with too long a step: its resolution, or the error.
     bad: Result<prehend_sim::Resolution, prehend_sim::SimulationError>,
 }
 

@@ -220,7 +220,7 @@ impl Scene {
         })
     }
 
-    /// Measure of the last states.
+    /// Scalar function of the last states.
     fn last<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
         let (world, states) = self.set_up(x);
         self.measure(
