@@ -32,7 +32,7 @@ impl<'a> Walk<'a> {
 
     /// As [`ClosestPoints::signed_distance_within`], the distance alone.
     pub(crate) fn signed_distance_within(&mut self, point: &Point3<f64>, most: f64) -> Option<f64> {
-        let step = self.last.replace(point.coords).map_or(0.0, |last| (point.coords - last).norm());
+        let last = self.last.replace(point.coords);
         let closest = self.mesh.search(point, most, self.face)?;
         self.face = Some(closest.face);
         let Sign::Winding(winding) = &self.mesh.sign else {
@@ -42,7 +42,7 @@ impl<'a> Walk<'a> {
         let known = self.balls.iter().find(within).map(|ball| ball.inside);
         let inside = known.unwrap_or_else(|| {
             let (bvh, center, distance) = (&self.mesh.bvh, point.coords, closest.distance);
-            if distance < step {
+            if last.is_some_and(|last| distance < (center - last).norm()) {
                 // No other point would lie in its ball.
                 return winding.is_inside(bvh, &center);
             }

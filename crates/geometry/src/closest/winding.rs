@@ -65,7 +65,7 @@ pub(super) struct Accuracy {
     /// Distance in radii from which a group is a dipole.
     far: f64,
     /// Error of the winding number with a margin, for surfaces of some layers.
-    pub(super) certain: f64,
+    certain: f64,
 }
 
 pub(super) const FINE: Accuracy = Accuracy { far: 4.0, certain: 0.1 };
@@ -154,14 +154,14 @@ impl Winding {
     /// ∫ dl/(4π|x − p|²) along them, which grows by less than (1 − ρ/r)⁻² within a radius ρ below their distances r.
     pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>, distance: f64) -> (bool, f64) {
         let (inside, spare) = self.side(bvh, p);
-        let spare = spare * 4.0 * PI;
-        let Some(ends) = &self.ends else { return (inside, 0.0) };
+        let ends = self.ends.as_ref().filter(|_| spare > 0.0);
+        let Some(ends) = ends else { return (inside, 0.0) };
         let seen: Vec<[f64; 2]> = ends.iter().map(|end| end.seen_from(p)).collect();
         let changes_less = |radius: &f64| {
             let rate = |[distance, integral]: &[f64; 2]| {
                 integral / (1.0 - radius / distance).max(0.0).powi(2)
             };
-            seen.iter().map(rate).sum::<f64>() * radius < spare
+            seen.iter().map(rate).sum::<f64>() * radius < spare * 4.0 * PI
         };
         let radii = [distance, 0.5 * distance, 0.25 * distance];
         (inside, radii.into_iter().find(changes_less).unwrap_or(0.0))

@@ -1,12 +1,12 @@
 //! The hand's own numbers: joints within their limits, a base that the camera can see.
 
 use nalgebra::Isometry3;
-use prehend_geometry::robot::{KinematicTree, Motion};
+use prehend_geometry::robot::KinematicTree;
 use prehend_render::{Camera, DepthImage};
 
 use super::limits;
 use super::warning::{Subject, Warnings};
-use crate::scene::{HandMeasurement, hand_depth};
+use crate::scene::{HandMeasurement, hand_depth, prismatic_joints};
 
 /// Adds what is wrong with pose and joints of a hand to `found`; returns its depth image \[m\] if it makes sense to compare anything with that.
 pub(super) fn check(
@@ -43,10 +43,7 @@ pub(super) fn broken(measured: &HandMeasurement) -> Option<String> {
 fn joints(tree: &KinematicTree, joints: &[f64]) -> Option<(String, bool)> {
     let excess = |q: f64, (low, high): (f64, f64)| (low - q).max(q - high).max(0.0);
     let limits = tree.joint_limits();
-    let slides = |name: &String| {
-        tree.joints().iter().any(|j| j.name == *name && j.motion == Motion::Prismatic)
-    };
-    let slides: Vec<bool> = tree.joint_names().iter().map(slides).collect();
+    let slides = prismatic_joints(tree);
     // Relative to what is allowed, so that radians and meters compare.
     let beyond =
         |j: usize, q: f64| excess(q, limits[j]) / limits::JOINT_EXCESS[usize::from(slides[j])];

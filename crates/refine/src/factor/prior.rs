@@ -8,7 +8,7 @@ use super::{ErrorGroup, Scales};
 use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, CAUCHY_WIDTH, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
-use crate::scene::HandMeasurement;
+use crate::scene::{HandMeasurement, prismatic_joints};
 
 settings! {
     /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
@@ -97,7 +97,8 @@ impl PriorSettings {
             let said = said.get(joint).copied().flatten();
             said.or_else(|| slides.then_some(self.prismatic_joints))
         };
-        prior.known_joints = hand.hand.prismatic().into_iter().enumerate().map(sigma).collect();
+        prior.known_joints =
+            prismatic_joints(&hand.hand.tree).into_iter().enumerate().map(sigma).collect();
         prior
     }
 

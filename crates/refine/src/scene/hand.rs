@@ -145,15 +145,6 @@ impl Hand {
         })
     }
 
-    /// Whether each of the [`joint_names`](KinematicTree::joint_names) is prismatic.
-    pub(crate) fn prismatic(&self) -> Vec<bool> {
-        let slides = |name: &String| {
-            let joints = self.tree.joints().iter();
-            joints.filter(|joint| joint.name == *name).any(|j| j.motion == Motion::Prismatic)
-        };
-        self.tree.joint_names().iter().map(slides).collect()
-    }
-
     /// Whether `forces` has one for each taxel.
     pub(crate) fn check_forces(&self, forces: &[Vector3<f64>]) -> Result<(), RefineError> {
         let (forces, taxels) = (forces.len(), self.taxels.len());
@@ -182,6 +173,14 @@ impl Hand {
     fn link_poses(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> Vec<Isometry3<f64>> {
         self.tree.forward_kinematics(joints).iter().map(|t| t_cam_hand * t).collect()
     }
+}
+
+/// True for each of the [`joint_names`](KinematicTree::joint_names) that is prismatic.
+pub(crate) fn prismatic_joints(tree: &KinematicTree) -> Vec<bool> {
+    let slides = |name: &String| {
+        tree.joints().iter().any(|j| j.name == *name && j.motion == Motion::Prismatic)
+    };
+    tree.joint_names().iter().map(slides).collect()
 }
 
 impl fmt::Debug for Hand {

@@ -21,6 +21,7 @@ pub use example::{Scene, Sequence, SequenceFrame, default_scene, default_sequenc
 pub use frame::{AdditionalView, Frame, HandMeasurement, check_gravity};
 pub(crate) use gaussian_process::{InducingPoints, farthest_points, squared_exponential};
 pub use hand::Hand;
+pub(crate) use hand::prismatic_joints;
 pub(crate) use intrinsics::IntrinsicsMistake;
 pub use object::{Inertial, Object, StatedSize};
 pub use prepared_frame::{CameraView, Occluders, PreparedFrame};

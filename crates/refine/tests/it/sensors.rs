@@ -33,7 +33,7 @@ fn errors(extras: &[Extra]) -> [f64; 3] {
     mean_errors(extras, SEEDS)
 }
 
-/// Mean errors over so many worlds, as of [`errors`].
+/// Mean errors over a number of worlds, as of [`errors`].
 fn mean_errors(extras: &[Extra], seeds: u64) -> [f64; 3] {
     let of_seed = |seed| {
         let world = World::held(seed, if extras == [Extra::SecondHand] { 2 } else { 1 }).unwrap();

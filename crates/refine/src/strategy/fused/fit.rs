@@ -74,7 +74,7 @@ impl Fit {
         Self::of_logs(camera, &logs, settings)
     }
 
-    /// Test of a solution whose calibrations deviate from their nominal values by a χ² of so many degrees of freedom.
+    /// Test of a solution whose calibrations deviate from their nominal values by a χ² with that number of degrees of freedom.
     pub(crate) fn of_tracked(
         camera: &Camera,
         point: &Linearization,

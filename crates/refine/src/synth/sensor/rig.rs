@@ -17,7 +17,7 @@ use super::lens::SimulatedLens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::data::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
-use crate::scene::{Frame, Hand, Object};
+use crate::scene::{Frame, Hand, Object, prismatic_joints};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
@@ -65,7 +65,7 @@ impl<'a> SensorRig<'a> {
     ) -> Self {
         let (camera, settings) = (settings.camera(), &settings.sensor);
         Self {
-            errors: settings.calibration.draw(&robot.prismatic(), noise),
+            errors: settings.calibration.draw(&prismatic_joints(&robot.tree), noise),
             depth: settings.depth.bias(&camera, noise),
             taxels: settings.touch.condition(robot.taxels.len(), noise),
             paint: random_paint(noise),
@@ -162,7 +162,7 @@ impl<'a> SensorRig<'a> {
         }
         let forces = self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise);
         let (mut t_cam_hand_told, mut joints) = self.errors.hand.apply(&t_cam_hand, &moment.joints);
-        if let Some(play) = self.settings.play.draw(&self.robot.prismatic(), noise) {
+        if let Some(play) = self.settings.play.draw(&prismatic_joints(&self.robot.tree), noise) {
             (t_cam_hand_told, joints) = play.apply(&t_cam_hand_told, &joints);
         }
         let mut still = film.map(|(film, _)| film.surroundings.clone());
