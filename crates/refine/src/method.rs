@@ -137,7 +137,8 @@ impl Method {
         Self::with_settings(name, &FusedSettings::default())
     }
 
-    /// The method called `name`, as [`named`](Self::named) has it; one of the fused estimator changes `settings`.
+    /// The method called `name`, as [`named`](Self::named) has it; one of the fused estimator changes `settings`, a heuristic one takes the
+    /// renderer's mode from them.
     pub fn with_settings(name: &str, settings: &FusedSettings) -> Option<Self> {
         if let Some(ablation) = name.strip_prefix("fused") {
             return ablated(settings.clone(), ablation).map(|settings| Fused::new(settings).into());
@@ -151,6 +152,8 @@ impl Method {
             gradient => vec![gradient.parse().ok()?],
         };
         let mut heuristic = Heuristic { checkpoint, ..Heuristic::of(&gradients) };
+        heuristic.rendering.mode = settings.rendering.mode;
+        heuristic.rendering.softras_sigma = settings.rendering.softras_sigma;
         if name.contains("-free") {
             // Without the pull to the initial pose.
             heuristic.stability.displacement_sigma = f64::INFINITY;

@@ -71,17 +71,17 @@ pub struct SoftRasOptions {
     pub clip_barycentric: bool,
     /// Leaves out faces seen from inside.
     pub cull_backfaces: bool,
+    /// Colors of a [`PoseLoss`](crate::PoseLoss) fade with the coverage α before the black background, so that outlines move them: the pixel shows α C.
+    /// PyTorch3D's shows C wherever a face is kept.
+    pub fade: bool,
 }
 
 impl SoftRasOptions {
     /// The largest [`Self::faces_per_pixel`].
     pub const MOST_FACES: usize = 64;
-}
 
-impl Default for SoftRasOptions {
-    /// σ = γ = 1e-4, a blur radius at which the border has faded to 1e-4, and 50 faces a pixel.
-    fn default() -> Self {
-        let sigma = 1e-4;
+    /// Options of softness σ (`sigma`), a blur radius at which the border has faded to 1e-4, γ = 1e-4, 50 faces a pixel, and colors that fade.
+    pub fn blurred(sigma: f64) -> Self {
         Self {
             blur_radius: (1.0f64 / 1e-4 - 1.0).ln() * sigma,
             sigma,
@@ -92,6 +92,14 @@ impl Default for SoftRasOptions {
             perspective_correct: true,
             clip_barycentric: true,
             cull_backfaces: false,
+            fade: true,
         }
+    }
+}
+
+impl Default for SoftRasOptions {
+    /// [`Self::blurred`] with σ = 1e-4.
+    fn default() -> Self {
+        Self::blurred(1e-4)
     }
 }

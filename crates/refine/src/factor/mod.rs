@@ -22,7 +22,7 @@ pub(crate) use point_to_plane::NoiseEstimate;
 pub use point_to_plane::{PointToPlaneFactor, PointToPlaneSettings};
 pub use prior::{GaussianPrior, PriorSettings};
 pub use region::{RegionFactor, RegionSettings};
-pub use rendering::{RenderingFactor, RenderingSettings};
+pub use rendering::{RenderingFactor, RenderingMode, RenderingSettings};
 pub use scales::{ErrorGroup, ScaleSettings, Scales};
 pub use support::{SupportFactor, SupportSettings};
 pub use tactile::{

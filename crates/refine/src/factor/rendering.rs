@@ -6,15 +6,27 @@ use nalgebra::{Isometry3, SMatrix};
 use prehend_geometry::RobustKernel;
 use prehend_render::{
     Backend, BackendError, ContourOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss,
-    PoseProblem, Session, Tile, light_samples,
+    PoseProblem, Session, SoftRasOptions, Tile, light_samples,
 };
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::patch_sums::PatchSums;
 use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{CAUCHY_WIDTH, Factor, NormalEquations, State, SurfacePatches};
 use crate::scene::{Object, Occluders, PreparedFrame};
+
+/// Mode of the renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum RenderingMode {
+    /// [`Mode::Contour`]: sharp, surfaces fade across contours.
+    Contour,
+    /// [`Mode::SoftRas`]: faces spread beyond their borders, as in the paper's renderer; some ten times slower.
+    Softras,
+}
 
 settings! {
     /// Settings of [`RenderingFactor`].
@@ -39,6 +51,10 @@ settings! {
         /// Number of pixels that the light is solved from at most, none of them beside one where the object is not seen. EXPERIMENTS: Light from pixels away
         /// from outlines.
         pub light_samples: usize = 1000,
+        /// Mode of the renderer: `contour` or `softras`.
+        pub mode: RenderingMode = RenderingMode::Contour,
+        /// Softness σ of borders in the mode `softras`, p = sigmoid(−d/σ) with the signed squared distance d \[squares of half the image's shorter side\].
+        pub softras_sigma: f64 = 1e-4,
         /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
         pub contour_half_width: f64 = 0.645,
     }
@@ -84,13 +100,20 @@ impl RenderingFactor {
             kernel: RobustKernel::Cauchy { scale: settings.kernel_scale * CAUCHY_WIDTH * sigma },
             ..LossOptions::default()
         };
-        let half_width = settings.contour_half_width;
-        let contour = ContourOptions { half_width, ..ContourOptions::default() };
+        let mode = match settings.mode {
+            RenderingMode::Contour => {
+                let half_width = settings.contour_half_width;
+                Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
+            }
+            RenderingMode::Softras => {
+                Mode::SoftRas(SoftRasOptions::blurred(settings.softras_sigma))
+            }
+        };
         let object = Arc::clone(frame.object());
         let problem = PoseProblem {
             model: Arc::clone(&object.model),
             target: image.target,
-            loss: PoseLoss::new(Mode::Contour(contour), options),
+            loss: PoseLoss::new(mode, options),
         };
         let session = |backend: &Arc<dyn Backend>| backend.prepare(&problem).map_err(warn).ok();
         Ok(Self {
@@ -296,6 +319,15 @@ mod tests {
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&factor.lit_at(&state), &state, Block::Camera, 5e-5, 0.1);
         }
+    }
+
+    #[test]
+    fn gradient_of_the_soft_rasterizer_matches_differences() {
+        let (frame, state) = fixture(1);
+        let mode = RenderingMode::Softras;
+        let settings = RenderingSettings { downsample: 2, mode, ..RenderingSettings::default() };
+        let factor = RenderingFactor::new(&frame, &settings).unwrap();
+        assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.05);
     }
 
     #[test]

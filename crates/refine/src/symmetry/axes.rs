@@ -9,22 +9,19 @@ const TURNS: usize = 36;
 /// Axes nearer than this are one \[rad\].
 const SAME: f64 = 0.1;
 
-/// The axes of revolution: none, one, or, of a sphere, three at right angles.
+/// The axes of revolution among `directions`: none, one, or, of a sphere, three at right angles.
 pub(super) fn axes_of_revolution(
     shape: &SampledSurface,
-    found: &[UnitQuaternion<f64>],
+    directions: impl Iterator<Item = Vector3<f64>>,
 ) -> Vec<Unit<Vector3<f64>>> {
-    // A finite group has few rotations; a continuum is hit by most of what the search began with near it.
-    let principal = shape.principal_axes();
-    let candidates = (0..3)
-        .map(|k| principal.column(k).into_owned())
-        .chain(found.iter().filter_map(rotation_axis));
     let mut axes: Vec<Unit<Vector3<f64>>> = Vec::new();
-    for direction in candidates {
+    let mut tried: Vec<Unit<Vector3<f64>>> = Vec::new();
+    for direction in directions {
         let axis = Unit::new_normalize(direction);
-        if axes.iter().any(|a| across(a, &axis) < SAME) {
+        if axes.iter().chain(&tried).any(|a| across(a, &axis) < SAME) {
             continue;
         }
+        tried.push(axis);
         let axis = refined(shape, axis);
         let is_new = axes.iter().all(|a| across(a, &axis) >= SAME);
         let mut turns = (1..TURNS).map(|k| turn(&axis, k as f64 / TURNS as f64));
@@ -60,7 +57,7 @@ pub(super) fn turn(axis: &Unit<Vector3<f64>>, part: f64) -> UnitQuaternion<f64> 
     UnitQuaternion::from_axis_angle(axis, std::f64::consts::TAU * part)
 }
 
-fn rotation_axis(turn: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
+pub(super) fn rotation_axis(turn: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
     turn.axis().map(Unit::into_inner)
 }
 

@@ -21,6 +21,7 @@ pub use self::deviation::SymmetrySettings;
 pub(crate) use self::near::{alternatives, near_symmetries};
 pub use self::symmetries::{ContinuousSymmetry, Symmetries};
 
+use self::axes::{axes_of_revolution, rotation_axis};
 use self::deviation::SampledSurface;
 use self::symmetries::about;
 
@@ -44,8 +45,16 @@ pub fn find_symmetries(
 
 /// The symmetries of `shape`, the identity left out.
 fn symmetries_of(shape: &SampledSurface) -> Symmetries {
-    let found = symmetric_rotations(shape);
-    let axes = axes::axes_of_revolution(shape, &found);
+    // An axis of revolution is a principal one, if the moments about it and across it differ.
+    let principal = shape.principal_axes();
+    let columns = (0..3).map(|k| principal.column(k).into_owned());
+    let mut axes = axes_of_revolution(shape, columns);
+    let mut found = Vec::new();
+    if axes.is_empty() {
+        // A finite group has few rotations; a continuum is hit by most of what the search began with near it.
+        found = symmetric_rotations(shape);
+        axes = axes_of_revolution(shape, found.iter().filter_map(rotation_axis));
+    }
     let discrete = match axes.as_slice() {
         [] => discrete::finite(shape, found),
         [axis] => discrete::flip(shape, axis).into_iter().collect(),

@@ -18,6 +18,7 @@ const SOFT_MODE: u32 = 1u;
 const SOFT_PERSPECTIVE: u32 = 2u;
 const SOFT_CLIP: u32 = 4u;
 const SOFT_CULL: u32 = 8u;
+const SOFT_FADE: u32 = 16u;
 
 // `Params.faces_per_pixel` is no larger.
 const MOST_FACES: u32 = 64u;

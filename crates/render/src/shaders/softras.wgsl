@@ -6,7 +6,7 @@
 #import prehend::fragment::{Fragment, fragment_of, fragment_row}
 #import prehend::hypotheses::hypotheses
 #import prehend::mesh::NONE
-#import prehend::params::{MOST_FACES, params}
+#import prehend::params::{MOST_FACES, SOFT_FADE, params, soft_flag}
 #import prehend::pixel::Pixel
 #import prehend::row::scaled_sum
 #import prehend::soft_face::{SoftFace, soft_face}
@@ -141,6 +141,13 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
     }
     if with_derivatives() {
         softras_rows(h, p, nearest, blend, &pixel);
+    }
+    if soft_flag(SOFT_FADE) {
+        for (var k = 0u; k < 3u; k++) {
+            pixel.color_rows[k] =
+                scaled_sum(pixel.coverage, pixel.color_rows[k], pixel.color[k], pixel.coverage_row);
+        }
+        pixel.color *= pixel.coverage;
     }
     pixel.near_outline = true;
     if (*nearest).inside != NONE {

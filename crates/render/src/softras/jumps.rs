@@ -32,6 +32,7 @@ impl Problem {
             gamma,
             blur_radius: 35.0 * sigma,
             faces_per_pixel: SoftRasOptions::MOST_FACES,
+            fade: false,
             ..SoftRasOptions::default()
         };
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.5, -0.7, 1.1));

@@ -14,6 +14,8 @@
 //!   clipping, where coordinates then sum up to one exactly.
 //! - The faces of an open mesh are lit by a normal towards the camera, as in the other mode. Those of a closed one keep
 //!   their outward normals, seen from inside too.
+//! - The color of a pixel is multiplied by its coverage in the loss of a pose, unless the options say otherwise: beside a background as black
+//!   as that of a loss, outlines else have no derivative.
 //! - The depth that is compared and shown is that of the nearest face that contains the pixel's center, because the
 //!   nearest of the spread faces is biased towards the camera on slanted surfaces. Where no face contains the center it is
 //!   that of the nearest kept face, and has no weight in a loss.
@@ -24,8 +26,8 @@
 //!   the face is clamped to the opposite border: color and depth jump all over the blur radius. Coarse meshes under a wide
 //!   blur have few but large ones. For 144 faces and a blur of σ = 1e-3, the gradient's cosine with differences over ±5 mrad
 //!   and ±0.5 mm is 0.90; with the jump of the one face that turns over in between taken into account, 0.99999.
-//! - Where a face enters or leaves the K nearest or the blur radius. Where it is the only one there, its color does not fade
-//!   until p is about δ, long beyond the default radius.
+//! - Where a face enters or leaves the K nearest or the blur radius. Where it is the only one there and colors are not to fade, its color does
+//!   not until p is about δ, long beyond the default radius.
 //!
 //! Lengths in the image are pixels inside; the options are in normalized device coordinates, in which the shorter
 //! side of the image is 2 long.
@@ -237,7 +239,10 @@ where
     ) {
         let pixels = scene.pixels::<DERIVATIVES, _>(run, first, y);
         for lane in 0..count {
-            let seen = if run.shows(lane) { Some(pixels.seen::<DERIVATIVES>(lane)) } else { None };
+            let mut seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
+            if let Some(seen) = seen.as_mut().filter(|_| scene.settings.fade) {
+                seen.pixel.fade::<DERIVATIVES>();
+            }
             (self.0)(first + lane, y, seen);
         }
     }

@@ -164,7 +164,9 @@ pub(super) fn naive_picture(
         }
         let sided = |f: &NaiveFragment| 2 * f.face + usize::from(outside(&faces[f.face]));
         let faces = all.iter().map(sided).collect();
-        NaivePixel { color: color.map(|c| c / sum), alpha: 1.0 - clear, faces, depth, inside }
+        let alpha = 1.0 - clear;
+        let faded = if options.fade { alpha } else { 1.0 };
+        NaivePixel { color: color.map(|c| faded * c / sum), alpha, faces, depth, inside }
     };
     (0..camera.height)
         .flat_map(|y| (0..camera.width).map(move |x| (x, y)))

@@ -35,6 +35,7 @@ pub(crate) struct Settings {
     /// Lower bound of barycentric weights: zero or minus infinity.
     pub(crate) least_weight: f32,
     pub(crate) cull: bool,
+    pub(crate) fade: bool,
 }
 
 impl Settings {
@@ -59,6 +60,7 @@ impl Settings {
             perspective: options.perspective_correct,
             least_weight: if options.clip_barycentric { 0.0 } else { f32::NEG_INFINITY },
             cull: options.cull_backfaces,
+            fade: options.fade,
         }
     }
 

@@ -2,12 +2,13 @@
 
 use super::naive::{NaivePixel, naive_picture};
 use super::*;
-use crate::pose_loss::tests::lamp;
+use crate::pose_loss::tests::{lamp, twisted};
 use crate::shapes_for_tests::{self, lump, painted, torus};
 use crate::view::Pixel;
 use crate::{LossOptions, Mask, Mode, PoseLoss, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_geometry::TriMesh;
+use prehend_geometry::shapes::cuboid;
 
 fn camera() -> Camera {
     Camera { fx: 90.0, fy: 94.0, cx: 31.0, cy: 24.5, width: 64, height: 52 }
@@ -263,15 +264,18 @@ fn left_of(x: f64) -> [[f64; 2]; 3] {
 
 #[test]
 fn one_triangle_is_a_sigmoid_of_the_squared_distance() {
-    let options = SoftRasOptions::default();
+    let options = SoftRasOptions { fade: false, ..SoftRasOptions::default() };
     let color = [0.25, 0.5, 1.0];
     // The pixel at the image's center lies 0.02 right of the edge: d = 4e-4 = 4 σ.
     let picture = flat_picture(&[(1.0, left_of(-0.02), color)], &options);
     let pixel = picture(32, 32).unwrap();
     let p = 1.0 / (1.0 + 4.0f32.exp());
     assert!((pixel.coverage - p).abs() < 1e-5, "{pixel:?}");
-    // Colors are divided by the weights, so that they do not fade.
+    // Colors are divided by the weights, so that they do not fade, unless they are to.
     (0..3).for_each(|k| assert!((pixel.color[k] - color[k]).abs() < 1e-5));
+    let fading = SoftRasOptions { fade: true, ..options };
+    let faded = flat_picture(&[(1.0, left_of(-0.02), color)], &fading)(32, 32).unwrap();
+    (0..3).for_each(|k| assert!((faded.color[k] - p * color[k]).abs() < 1e-5));
     assert!((pixel.z - 1.0).abs() < 1e-6 && pixel.depth_weight == 0.0);
     // The next pixel to the right is 0.05125 away: d = 2.6e-3 is beyond the blur radius of 9.2e-4.
     assert!(picture(33, 32).is_none());
@@ -283,7 +287,7 @@ fn one_triangle_is_a_sigmoid_of_the_squared_distance() {
 
 #[test]
 fn two_triangles_are_blended_by_depth_and_the_background_by_its_own() {
-    let options = SoftRasOptions::default();
+    let options = SoftRasOptions { fade: false, ..SoftRasOptions::default() };
     let (red, blue) = ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
     // 9.9 mm in depth are 1e-4 in inverse depth from 1 m to 100 m, one γ.
     let edge = left_of(0.01);
@@ -416,4 +420,43 @@ fn what_cannot_be_seen_shows_nothing_and_odd_settings_stay_finite() {
         assert!(at.loss.total.is_finite(), "{options:?} {at:?}");
         assert!(at.gradient.iter().all(|v| v.is_finite()), "{options:?} {at:?}");
     }
+}
+
+#[test]
+fn the_outline_of_a_white_box_before_black_moves_its_color() {
+    let camera = Camera { fx: 400.0, fy: 400.0, cx: 127.5, cy: 127.5, width: 256, height: 256 };
+    let model = RenderModel::new(&cuboid(Vector3::repeat(0.06))).unwrap();
+    let light = Light::ambient(1.0);
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.5, -0.7, 0.4));
+    let truth = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.35), turn);
+    let options = SoftRasOptions::default();
+    let loss = PoseLoss::new(Mode::SoftRas(options), LossOptions::default());
+    let picture = loss.render(&model, &truth, &camera, &light);
+    let mask = picture.coverage.iter().map(|a| *a >= 0.5).collect();
+    let mask = Mask::new(camera.width, camera.height, mask).unwrap();
+    let target = Target::new(camera, &picture.color, &mask).unwrap();
+    let away = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.08, 0.15));
+    let shift = Translation3::new(0.02, -0.018, 0.33);
+    let guess = Isometry3::from_parts(shift, away * turn);
+    let center = guess * model.center();
+    let gradient = loss.linearize(&model, &guess, &center, &light, &target).gradient;
+    // Translations in units of the box's half diagonal, so that all move the surface alike.
+    let scale = Vector6::new(0.05, 0.05, 0.05, 1.0, 1.0, 1.0);
+    for step in [1e-4, 1e-3, 1e-2] {
+        let difference = Vector6::from_fn(|axis, _| {
+            let value = |s: f64| {
+                let twist = std::array::from_fn(|i| if i == axis { s * scale[i] } else { 0.0 });
+                let pose = twisted(&guess, &center, &twist);
+                loss.evaluate(&model, &pose, &light, &target).total
+            };
+            (value(step) - value(-step)) / (2.0 * step)
+        });
+        let error = (gradient.component_mul(&scale) - difference).norm() / difference.norm();
+        println!("steps of {step}: relative difference {error:.1e}");
+        assert!(error < 0.05);
+    }
+    let plain = SoftRasOptions { fade: false, ..options };
+    let plain = PoseLoss::new(Mode::SoftRas(plain), loss.options);
+    let plain = plain.linearize(&model, &guess, &center, &light, &target).gradient;
+    assert!(plain.norm() < 1e-4 * gradient.norm(), "{plain}");
 }

@@ -27,6 +27,20 @@ pub(crate) struct Pixel {
     pub(crate) depth_weight_row: Row,
 }
 
+impl Pixel {
+    /// Multiplies a color that is not blended yet by the coverage.
+    #[inline(always)]
+    pub(crate) fn fade<const DERIVATIVES: bool>(&mut self) {
+        for k in 0..3 {
+            if DERIVATIVES {
+                let rows = [&self.color_rows[k], &self.coverage_row];
+                self.color_rows[k] = scaled_sum(self.coverage, rows[0], self.color[k], rows[1]);
+            }
+            self.color[k] *= self.coverage;
+        }
+    }
+}
+
 /// A pixel with what kind of pixel it is.
 pub(crate) struct Seen {
     pub(crate) pixel: Pixel,

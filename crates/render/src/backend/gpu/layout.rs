@@ -25,6 +25,7 @@ pub(super) const SOFT_MODE: u32 = 1;
 pub(super) const SOFT_PERSPECTIVE: u32 = 2;
 pub(super) const SOFT_CLIP: u32 = 4;
 pub(super) const SOFT_CULL: u32 = 8;
+pub(super) const SOFT_FADE: u32 = 16;
 
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 8;

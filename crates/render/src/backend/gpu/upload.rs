@@ -6,7 +6,7 @@ use prehend_geometry::RobustKernel;
 use super::layout::{
     ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, KERNEL_CAUCHY,
     KERNEL_GEMAN_MCCLURE, KERNEL_HUBER, KERNEL_SQUARED, KERNEL_TUKEY, LEVELS, Params, SOFT_CLIP,
-    SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE, TILE, TargetPixel, WHOLE_SIDE,
+    SOFT_CULL, SOFT_FADE, SOFT_MODE, SOFT_PERSPECTIVE, TILE, TargetPixel, WHOLE_SIDE,
 };
 use crate::backend::{self, PoseProblem};
 use crate::camera::Camera;
@@ -174,7 +174,8 @@ fn set_softras(params: &mut Params, options: &SoftRasOptions, camera: &Camera) {
     params.soft_flags = SOFT_MODE
         | flag(settings.perspective, SOFT_PERSPECTIVE)
         | flag(options.clip_barycentric, SOFT_CLIP)
-        | flag(settings.cull, SOFT_CULL);
+        | flag(settings.cull, SOFT_CULL)
+        | flag(settings.fade, SOFT_FADE);
 }
 
 fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {

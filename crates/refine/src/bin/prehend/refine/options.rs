@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use prehend_refine::Method;
 use prehend_refine::baselines::GradientKind;
+use prehend_refine::{Method, Settings};
 
 use crate::options::named;
 use crate::settings::{SettingsOptions, assignment};
@@ -151,11 +151,16 @@ impl MethodOptions {
         if self.exhaustive {
             method.set_exhaustive();
         }
+        // A heuristic draws in their mode, and has no other settings.
+        let (mut others, defaults) = (settings.estimator, Settings::default().estimator);
+        others.rendering.mode = defaults.rendering.mode;
+        others.rendering.softras_sigma = defaults.rendering.softras_sigma;
+        let mode_alone = matches!(method, Method::Heuristic(_)) && others == defaults;
         let fused_only = [
             ("--rotation-unknown", self.rotation_unknown),
             ("--fit-scale", self.fit_scale),
             ("--noise", !self.noise.is_empty()),
-            ("--settings, --set", self.settings.is_given()),
+            ("--settings, --set", self.settings.is_given() && !mode_alone),
         ];
         if let Some((option, _)) = fused_only.iter().find(|(_, given)| *given) {
             let Method::Fused(fused) = &mut method else {

@@ -214,6 +214,7 @@ fn constants_are_alike_in_both_languages() {
         ("SOFT_PERSPECTIVE", SOFT_PERSPECTIVE as usize),
         ("SOFT_CLIP", SOFT_CLIP as usize),
         ("SOFT_CULL", SOFT_CULL as usize),
+        ("SOFT_FADE", SOFT_FADE as usize),
         ("MOST_FACES", crate::mode::SoftRasOptions::MOST_FACES),
         ("SUM_COLOR", SUM_COLOR),
         ("SUM_MASK", SUM_MASK),
