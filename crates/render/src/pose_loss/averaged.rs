@@ -240,12 +240,12 @@ mod tests {
         let mut guess = truth;
         guess.translation.vector.x += 0.002;
         let soft = SoftRasOptions::default();
-        for mode in [Mode::default(), Mode::SoftRas(soft)] {
+        // Faded colors of texture beyond a face's border jump, which differences over long steps see (`softras` lists the jumps).
+        for (mode, step) in [(Mode::default(), 4e-5), (Mode::SoftRas(soft), 1e-6)] {
             let loss = PoseLoss::new(mode, full_options()).with_samples(2);
             let center = guess * model.center();
             let at = loss.linearize(&model, &guess, &center, &lamp(), &target);
             for axis in 0..3 {
-                let step = 4e-5;
                 let value = |s: f64| {
                     let mut pose = guess;
                     pose.translation.vector[axis] += s * step;
