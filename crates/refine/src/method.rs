@@ -152,13 +152,21 @@ impl Method {
             gradient => vec![gradient.parse().ok()?],
         };
         let mut heuristic = Heuristic { checkpoint, ..Heuristic::of(&gradients) };
-        heuristic.rendering.mode = settings.rendering.mode;
-        heuristic.rendering.softras_sigma = settings.rendering.softras_sigma;
+        heuristic.rendering.set_mode_of(&settings.rendering);
         if name.contains("-free") {
             // Without the pull to the initial pose.
             heuristic.stability.displacement_sigma = f64::INFINITY;
         }
         Some(heuristic.into())
+    }
+
+    /// Takes what this method has of `settings`: the fused estimator all, a heuristic the renderer's mode.
+    pub(crate) fn configure(&mut self, settings: &FusedSettings) {
+        match self {
+            Self::Fused(fused) => fused.settings.clone_from(settings),
+            Self::Heuristic(heuristic) => heuristic.rendering.set_mode_of(&settings.rendering),
+            Self::Icp(_) => {}
+        }
     }
 }
 
@@ -184,6 +192,7 @@ fn ablated(mut settings: FusedSettings, ablation: &str) -> Option<FusedSettings>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::factor::{RenderingMode, RenderingSettings};
 
     #[test]
     fn names_are_unique_and_found() {
@@ -225,6 +234,21 @@ mod tests {
             assert!(!fixed.nuisances.contains(&group) && fixed.modalities == all.modalities);
         }
         assert!(settings("fused-fixed-all").nuisances.is_empty());
+    }
+
+    #[test]
+    fn heuristics_draw_in_the_mode_of_the_settings() {
+        let mut settings = FusedSettings::default();
+        settings.rendering.mode = RenderingMode::Softras;
+        let Some(Method::Heuristic(soft)) = Method::with_settings("rendering", &settings) else {
+            panic!("not a heuristic")
+        };
+        let Some(Method::Heuristic(plain)) = Method::named("rendering") else {
+            panic!("not a heuristic")
+        };
+        assert_eq!(plain.rendering.mode, RenderingMode::Contour);
+        let mode = RenderingMode::Softras;
+        assert_eq!(soft.rendering, RenderingSettings { mode, ..plain.rendering });
     }
 
     #[test]

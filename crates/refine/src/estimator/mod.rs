@@ -59,9 +59,7 @@ impl Estimator {
 
     /// With these settings.
     pub fn settings(mut self, settings: Settings) -> Self {
-        if let Method::Fused(fused) = &mut self.method {
-            fused.settings.clone_from(&settings.estimator);
-        }
+        self.method.configure(&settings.estimator);
         Self { settings, search: OnceLock::new(), ..self }
     }
 

@@ -24,7 +24,7 @@ use crate::scene::{Object, Occluders, PreparedFrame};
 pub enum RenderingMode {
     /// [`Mode::Contour`]: sharp, surfaces fade across contours.
     Contour,
-    /// [`Mode::SoftRas`]: faces spread beyond their borders, as in the paper's renderer; some ten times slower.
+    /// [`Mode::SoftRas`]: faces spread beyond their borders, as in the paper's renderer; some thirty times slower.
     Softras,
 }
 
@@ -57,6 +57,13 @@ settings! {
         pub softras_sigma: f64 = 1e-4,
         /// Half-width of the contour band \[px\]: the default is nearest to how a box-filtered edge fades.
         pub contour_half_width: f64 = 0.645,
+    }
+}
+
+impl RenderingSettings {
+    /// Takes the renderer's mode and softness from `other`.
+    pub fn set_mode_of(&mut self, other: &Self) {
+        (self.mode, self.softras_sigma) = (other.mode, other.softras_sigma);
     }
 }
 
@@ -100,14 +107,12 @@ impl RenderingFactor {
             kernel: RobustKernel::Cauchy { scale: settings.kernel_scale * CAUCHY_WIDTH * sigma },
             ..LossOptions::default()
         };
+        let half_width = settings.contour_half_width;
+        let contour = ContourOptions { half_width, ..ContourOptions::default() };
+        let softras = SoftRasOptions::blurred(settings.softras_sigma);
         let mode = match settings.mode {
-            RenderingMode::Contour => {
-                let half_width = settings.contour_half_width;
-                Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
-            }
-            RenderingMode::Softras => {
-                Mode::SoftRas(SoftRasOptions::blurred(settings.softras_sigma))
-            }
+            RenderingMode::Contour => Mode::Contour(contour),
+            RenderingMode::Softras => Mode::SoftRas(softras),
         };
         let object = Arc::clone(frame.object());
         let problem = PoseProblem {

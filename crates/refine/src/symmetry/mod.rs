@@ -47,8 +47,7 @@ pub fn find_symmetries(
 fn symmetries_of(shape: &SampledSurface) -> Symmetries {
     // An axis of revolution is a principal one, if the moments about it and across it differ.
     let principal = shape.principal_axes();
-    let columns = (0..3).map(|k| principal.column(k).into_owned());
-    let mut axes = axes_of_revolution(shape, columns);
+    let mut axes = axes_of_revolution(shape, principal.column_iter().map(|c| c.into_owned()));
     let mut found = Vec::new();
     if axes.is_empty() {
         // A finite group has few rotations; a continuum is hit by most of what the search began with near it.

@@ -68,6 +68,15 @@ fn what_is_wrong_with_settings_is_named() {
         assert_eq!((said.code, said.out.as_str()), (1, ""), "{options}");
         assert!(said.err.contains(expected), "{options}: {}", said.err);
     }
-    let said = place.prehend("refine --frame f.json --method icp --set estimator.views=false");
-    assert!(said.err.contains("is of the fused method, not of icp"), "{}", said.err);
+    for (method, setting) in [
+        ("icp", "estimator.views=false"),
+        // Of which a heuristic has the renderer's mode alone.
+        ("combined", "estimator.views=false"),
+        ("combined", "tracker.gating.max_sigma=0.02"),
+    ] {
+        let said =
+            place.prehend(&format!("refine --frame f.json --method {method} --set {setting}"));
+        let expected = format!("is of the fused method, not of {method}");
+        assert!(said.err.contains(&expected), "{}", said.err);
+    }
 }

@@ -143,9 +143,12 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
         softras_rows(h, p, nearest, blend, &pixel);
     }
     if soft_flag(SOFT_FADE) {
-        for (var k = 0u; k < 3u; k++) {
-            pixel.color_rows[k] =
-                scaled_sum(pixel.coverage, pixel.color_rows[k], pixel.color[k], pixel.coverage_row);
+        if with_derivatives() {
+            for (var k = 0u; k < 3u; k++) {
+                pixel.color_rows[k] = scaled_sum(
+                    pixel.coverage, pixel.color_rows[k], pixel.color[k], pixel.coverage_row,
+                );
+            }
         }
         pixel.color *= pixel.coverage;
     }

@@ -31,12 +31,11 @@ impl Pixel {
     /// Multiplies a color that is not blended yet by the coverage.
     #[inline(always)]
     pub(crate) fn fade<const DERIVATIVES: bool>(&mut self) {
-        for k in 0..3 {
+        for (color, row) in self.color.iter_mut().zip(&mut self.color_rows) {
             if DERIVATIVES {
-                let rows = [&self.color_rows[k], &self.coverage_row];
-                self.color_rows[k] = scaled_sum(self.coverage, rows[0], self.color[k], rows[1]);
+                *row = scaled_sum(self.coverage, row, *color, &self.coverage_row);
             }
-            self.color[k] *= self.coverage;
+            *color *= self.coverage;
         }
     }
 }

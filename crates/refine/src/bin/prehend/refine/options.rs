@@ -152,10 +152,10 @@ impl MethodOptions {
             method.set_exhaustive();
         }
         // A heuristic draws in their mode, and has no other settings.
-        let (mut others, defaults) = (settings.estimator, Settings::default().estimator);
-        others.rendering.mode = defaults.rendering.mode;
-        others.rendering.softras_sigma = defaults.rendering.softras_sigma;
-        let mode_alone = matches!(method, Method::Heuristic(_)) && others == defaults;
+        let (mut others, defaults) = (settings, Settings::default());
+        others.estimator.rendering.set_mode_of(&defaults.estimator.rendering);
+        let mode_alone =
+            matches!(method, Method::Heuristic(_)) && others.to_toml()? == defaults.to_toml()?;
         let fused_only = [
             ("--rotation-unknown", self.rotation_unknown),
             ("--fit-scale", self.fit_scale),
