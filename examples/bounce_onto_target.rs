@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
@@ -23,8 +23,8 @@ const TIME: f64 = 0.7;
 /// Where the ball is to be then \[m\].
 const TARGET: [f64; 3] = [1.2, 0.15, 0.3];
 
-/// A rubber ball of 60 g above a floor, and the states of both.
-fn ball_and_floor() -> anyhow::Result<(World, [State; 2])> {
+/// A rubber ball of 60 g above a floor, and where it starts.
+fn ball_and_floor() -> anyhow::Result<(World, State)> {
     let mass = 0.06;
     let (rigid, surface) = (RigidBody::ball(mass, RADIUS)?, Surface::ball(RADIUS)?);
     let contact_area = surface.area();
@@ -36,18 +36,19 @@ fn ball_and_floor() -> anyhow::Result<(World, [State; 2])> {
     let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
     world.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
-    let hand = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.5));
-    Ok((world, [State::at_rest(Isometry3::identity()), hand]))
+    let mut start = world.neutral_state();
+    start[samples].pose.translation.z = 0.5;
+    Ok((world, start))
 }
 
 /// Where the ball is at equal times, thrown with a velocity.
 fn thrown<S: Scalar>(
     world: &World,
-    states: &[State; 2],
+    states: &State,
     velocity: &[S],
     points: usize,
 ) -> Result<Vec<Vector3<S>>, SimulationError> {
-    let mut start = states.each_ref().map(State::cast);
+    let mut start = states.cast();
     start[1].linear = Vector3::from_column_slice(velocity);
     let time_steps = TimeSteps { dt: TIME / points as f64, steps: points };
     let run = world.cast().rollout(&start, time_steps)?;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
@@ -35,8 +35,8 @@ impl ContactLaw for Quadratic {
 const TIME: f64 = 0.1;
 const RADIUS: f64 = 0.05;
 
-/// A ball on the floor, and the states of both.
-fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
+/// A ball on the floor, and where it starts.
+fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, State)> {
     let (ball, mass) = (shapes::sphere(RADIUS, 64), 0.2);
     let points: Vec<Point3<f64>> =
         surface_samples(&ball, 2000, 0).iter().map(|s| s.point).collect();
@@ -47,19 +47,20 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
     let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
-    let resting = rigid.at_rest(&Isometry3::translation(0.0, 0.0, RADIUS));
-    Ok((world, [State::at_rest(Isometry3::identity()), resting]))
+    let mut start = world.neutral_state();
+    start[samples].pose.translation.z = RADIUS;
+    Ok((world, start))
 }
 
 /// Height \[m\] of the ball at the end, dropped from `drop` \[m\] with the law's `stiffness`.
 fn height<S: Scalar>(
     world: &World,
-    states: &[State; 2],
+    states: &State,
     [drop, stiffness]: [S; 2],
 ) -> Result<S, SimulationError> {
     let mut world = world.cast();
     world.contacts[0].params_mut()[0] = stiffness;
-    let mut states = states.each_ref().map(|state| state.cast());
+    let mut states: State<S> = states.cast();
     states[1].pose.translation.z += drop;
     Ok(world.simulate(&states, TIME)?[1].pose.translation.z)
 }

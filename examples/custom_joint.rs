@@ -39,7 +39,7 @@ fn slide<S: Scalar>(
     time: f64,
 ) -> Result<S, SimulationError> {
     let world = world.cast();
-    let mut states: Vec<State<S>> = world.neutral_states();
+    let mut states: State<S> = world.neutral_state();
     world.set_joint(&mut states, *bead, &[q], &[S::zero()])?;
     let end = world.simulate(&states, time)?;
     Ok(along(world.joint_motion(&end, *bead)?[0]))

@@ -70,7 +70,7 @@ struct Doorway {
     world: World,
     leaf: BodyId,
     valves: JointForceId,
-    start: Vec<State>,
+    start: State,
 }
 
 impl Doorway {
@@ -102,7 +102,7 @@ impl Doorway {
         world.add_joint_force(leaf, stop)?;
         let valves = world.add_joint_force(leaf, Valves { sweep: 0.0, latch: 0.0 })?;
 
-        let mut start = world.neutral_states();
+        let mut start = world.neutral_state();
         start[ball] = rigid.at_rest(&Isometry3::translation(0.65, -0.5, 1.0));
         start[ball].linear.y = SPEED;
         Ok(Self { world, leaf, valves, start })
@@ -112,7 +112,7 @@ impl Doorway {
     fn swing<S: Scalar>(&self, dampings: &[S]) -> Result<Vec<[S; 2]>, SimulationError> {
         let mut world = self.world.cast::<S>();
         world.joint_force_mut(self.valves).params_mut().copy_from_slice(dampings);
-        let start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
+        let start: State<S> = self.start.cast();
         let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
         run.iter().map(|states| world.joint_motion(states, self.leaf)).collect()
     }

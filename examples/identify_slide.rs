@@ -22,8 +22,8 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
 use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
-    Motion, RigidBody, State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    KelvinVoigt, Law, Motion, RigidBody, State, Surface, TimeSteps, World,
 };
 
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.
@@ -45,11 +45,11 @@ const TRUTH: [f64; COUNT] = [0.32, 0.55, -6.0, -9.0, 4.0, 37.0];
 const GUESS: [f64; COUNT] = [0.5, 0.4, 0.0, 0.0, 0.0, 41.6];
 
 /// The plunger's path: along x, out and back.
-fn plunger(time: f64) -> State {
+fn plunger(time: f64) -> BodyState {
     let (stroke, duration) = (0.06, 0.2);
     let phase = PI * time.min(duration) / duration;
     let x = stroke * phase.sin().powi(2) - HALF[0] - TIP - 1e-3;
-    let mut state = State::at_rest(Isometry3::translation(x, -0.02, HALF[2]));
+    let mut state = BodyState::at_rest(Isometry3::translation(x, -0.02, HALF[2]));
     state.linear.x = stroke * PI / duration * (2.0 * phase).sin();
     state
 }
@@ -95,10 +95,10 @@ fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> 
     let mut world = scene.cast::<S>();
     world.bodies[1].motion = Motion::Dynamic(rigid);
     *world.contacts[0].param_mut("friction")? = friction;
-    let parcel = rigid.at_rest(&lift(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH)));
-    let still = State::at_rest(Isometry3::identity()).cast();
-    let run = world.rollout(&[still, parcel, still], FRAMES)?;
-    let seen = |states: &Vec<State<S>>| {
+    let mut start = world.neutral_state();
+    start[1] = rigid.at_rest(&lift(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH)));
+    let run = world.rollout(&start, FRAMES)?;
+    let seen = |states: &State<S>| {
         let pose = rigid.model_pose(&states[1].pose);
         let [_, _, k, w] = pose.rotation.coords.into();
         [pose.translation.x, pose.translation.y, k.atan2(w).times(2.0)]

@@ -19,7 +19,7 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Batch, Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    Batch, Body, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
     SimulationError, State, TimeSteps, World,
 };
 
@@ -52,9 +52,9 @@ fn world() -> anyhow::Result<World> {
 }
 
 /// How the ball is thrown: it slides on, for it spins backwards and aside.
-fn throw(random: &mut SplitMix64) -> State {
+fn throw(random: &mut SplitMix64) -> BodyState {
     let mut number = || 2.0 * random.uniform() - 1.0;
-    let mut state = State::at_rest(Isometry3::translation(0.0, RADIUS - 5e-4, 0.0));
+    let mut state = BodyState::at_rest(Isometry3::translation(0.0, RADIUS - 5e-4, 0.0));
     state.linear = Vector3::new(1.2 + 0.3 * number(), 0.0, 0.2 * number());
     state.angular = Vector3::new(20.0 * number(), 0.0, 40.0 + 15.0 * number());
     state
@@ -64,15 +64,16 @@ fn throw(random: &mut SplitMix64) -> State {
 fn ends<S: Scalar>(
     batch: &Batch,
     world: &World,
-    throws: &[State],
+    throws: &[BodyState],
     friction: S,
 ) -> Result<Vec<[S; 2]>, SimulationError> {
     let mut world = world.cast::<S>();
     for group in &mut world.contact_groups {
         *group.contact.param_mut("friction")? = friction;
     }
-    let floor = State::at_rest(Isometry3::identity()).cast();
-    let variants = throws.iter().map(|throw| (world.clone(), vec![floor, throw.cast()]));
+    let floor = BodyState::at_rest(Isometry3::identity());
+    let start = |throw: &BodyState| (world.clone(), State::new([floor, *throw]).cast());
+    let variants = throws.iter().map(start);
     let ends = batch.simulate(variants, TIME_STEPS).into_iter();
     ends.map(|end| end.map(|states| states[1].pose.translation).map(|at| [at.x, at.z])).collect()
 }
@@ -81,7 +82,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let world = world()?;
     let batch = Batch::new(&world)?;
     let mut random = SplitMix64::new(2026);
-    let throws: Vec<State> = (0..THROWS).map(|_| throw(&mut random)).collect();
+    let throws: Vec<BodyState> = (0..THROWS).map(|_| throw(&mut random)).collect();
     let mut seen = ends(&batch, &world, &throws, FRICTION)?;
     seen.iter_mut().flatten().for_each(|x| *x += NOISE * random.normal());
     let guessed = ends(&batch, &world, &throws, GUESS)?;

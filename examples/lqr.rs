@@ -23,12 +23,11 @@ const HOLD: usize = 10;
 /// Commands that a regulator looks ahead.
 const HORIZON: usize = 1500;
 
-/// A world at an equilibrium. Joints have one coordinate each; motors are on the first of them.
+/// A world at an equilibrium. Motors are on the first joints, which have one coordinate each.
 struct Plant {
     world: World,
-    equilibrium: Vec<State>,
+    equilibrium: State,
     free: Option<BodyId>,
-    joints: Vec<BodyId>,
     /// With their efforts at the equilibrium \[N or N m\].
     motors: Vec<(JointForceId, f64)>,
     dt: f64,
@@ -38,7 +37,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let plant = cart_pole()?;
     let gain = plant.regulator(&[1.0, 10.0, 0.1, 0.1], 1e-2)?;
     // The pole leans by a quarter of a radian.
-    let start = plant.displaced(&[0.0, 0.25, 0.0, 0.0])?;
+    let start = plant.world.displaced(&plant.equilibrium, &[0.0, 0.25, 0.0, 0.0]);
     let held = plant.run(&start, Some(&gain), 6.0)?[1];
     let free = plant.run(&start, None, 1.0)?[1];
     println!("pole: {held:.1e} rad from upright after 6 s, without regulator {free:.1} after 1 s");
@@ -51,7 +50,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     // The box is hit along the fingers and from below [m/s].
     let mut hit = [0.0; 20];
     (hit[10], hit[12]) = (0.1, 0.1);
-    let start = plant.displaced(&hit)?;
+    let start = plant.world.displaced(&plant.equilibrium, &hit);
     let away = |gain| Ok::<_, anyhow::Error>(1e3 * plant.run(&start, gain, 3.0)?.rows(0, 3).norm());
     let (held, free) = (away(Some(&gain))?, away(None)?);
     println!("box: {held:.2} mm from its place after 3 s, without regulator {free:.0} mm");
@@ -68,8 +67,8 @@ fn cart_pole() -> anyhow::Result<Plant> {
     let mut world = World::new(Vector3::new(0.0, 0.0, -GRAVITY));
     let joints = world.add_articulation(vec![cart, pole.on(0, Isometry3::identity())])?;
     let motors = vec![(world.add_joint_force(joints[0], Motor { effort: 0.0 })?, 0.0)];
-    let equilibrium = world.neutral_states();
-    Ok(Plant { world, equilibrium, free: None, joints, motors, dt: 2e-3 })
+    let equilibrium = world.neutral_state();
+    Ok(Plant { world, equilibrium, free: None, motors, dt: 2e-3 })
 }
 
 /// A box between two fingers that slide along x on a carriage, that along x on a lift, and that along z; all are driven.
@@ -105,9 +104,8 @@ fn gripper() -> anyhow::Result<Plant> {
     for (joint, effort) in joints.iter().zip(efforts) {
         motors.push((world.add_joint_force(*joint, Motor { effort })?, effort));
     }
-    let mut equilibrium = world.neutral_states();
-    equilibrium[held] = rigid.at_rest(&Isometry3::identity());
-    let plant = Plant { world, equilibrium, free: Some(held), joints, motors, dt: 2e-4 };
+    let equilibrium = world.neutral_state();
+    let plant = Plant { world, equilibrium, free: Some(held), motors, dt: 2e-4 };
     // The fingers close while lift and carriage are held in place.
     let mut hold = DMatrix::zeros(4, 20);
     for joint in 0..2 {
@@ -118,41 +116,9 @@ fn gripper() -> anyhow::Result<Plant> {
 }
 
 impl Plant {
-    /// Displacements from the equilibrium, then velocities, in the order of a linearized step.
-    fn coordinates(&self, states: &[State]) -> Result<DVector<f64>, SimulationError> {
-        let (mut x, mut v) = (Vec::new(), Vec::new());
-        if let Some(body) = self.free {
-            let (now, rest) = (&states[body], &self.equilibrium[body]);
-            x.extend((now.pose.translation.vector - rest.pose.translation.vector).iter());
-            x.extend((now.pose.rotation * rest.pose.rotation.inverse()).scaled_axis().iter());
-            v.extend(now.linear.iter().chain(now.angular.iter()));
-        }
-        for &joint in &self.joints {
-            let [now, rest] =
-                [states, &self.equilibrium].map(|s| self.world.joint_motion(s, joint));
-            x.push(now?[0] - rest?[0]);
-            v.push(self.world.joint_motion(states, joint)?[1]);
-        }
-        x.extend(v);
-        Ok(x.into())
-    }
-
-    /// The equilibrium, displaced and sped up by `x`; its free body is only sped up.
-    fn displaced(&self, x: &[f64]) -> anyhow::Result<Vec<State>> {
-        let mut states = self.equilibrium.clone();
-        let (x, v) = x.split_at(x.len() / 2);
-        let mut first = 0;
-        if let Some(body) = self.free {
-            states[body].linear += Vector3::from_column_slice(&v[..3]);
-            states[body].angular += Vector3::from_column_slice(&v[3..6]);
-            first = 6;
-        }
-        for (k, &joint) in self.joints.iter().enumerate() {
-            let [position, velocity] = self.world.joint_motion(&states, joint)?;
-            let (position, velocity) = (position + x[first + k], velocity + v[first + k]);
-            self.world.set_joint(&mut states, joint, &[position], &[velocity])?;
-        }
-        Ok(states)
+    /// Displacement from the equilibrium, in the order of a linearized step.
+    fn coordinates(&self, state: &State) -> DVector<f64> {
+        self.world.displacement(&self.equilibrium, state).into()
     }
 
     /// Feedback gain K of least cost for a diagonal Q and R = `effort` · 1.
@@ -184,30 +150,29 @@ impl Plant {
     /// States after some seconds from `start`.
     fn states(
         &self,
-        start: &[State],
+        start: &State,
         gain: Option<&DMatrix<f64>>,
         seconds: f64,
-    ) -> anyhow::Result<Vec<State>> {
+    ) -> anyhow::Result<State> {
         let time_steps = TimeSteps { dt: self.dt, steps: (seconds / self.dt) as usize };
-        let control = |step: Step, world: &mut World, states: &mut [State]| {
+        let control = |step: Step, world: &mut World, states: &mut State| {
             let (Some(gain), 0) = (gain, step.index % HOLD) else { return Ok(()) };
-            let correction = gain * self.coordinates(states)?;
+            let correction = gain * self.coordinates(states);
             for ((motor, effort), correction) in self.motors.iter().zip(correction.iter()) {
                 world.joint_force_mut(*motor).set_param("effort", effort - correction)?;
             }
             Ok::<_, SimulationError>(())
         };
-        let run = self.world.rollout_controlled(&SemiImplicitEuler, start, time_steps, control)?;
-        Ok(run[run.len() - 1].clone())
+        Ok(self.world.simulate_controlled(&SemiImplicitEuler, start, time_steps, control)?)
     }
 
     /// Displacements after some seconds from `start`.
     fn run(
         &self,
-        start: &[State],
+        start: &State,
         gain: Option<&DMatrix<f64>>,
         seconds: f64,
     ) -> anyhow::Result<DVector<f64>> {
-        Ok(self.coordinates(&self.states(start, gain, seconds)?)?)
+        Ok(self.coordinates(&self.states(start, gain, seconds)?))
     }
 }

@@ -16,8 +16,8 @@ use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Adaptive, Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
-    SimulationError, State, TimeSteps, World,
+    Adaptive, Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Law, Shape, SimulationError, State, TimeSteps, World,
 };
 
 /// Radius \[m\] and density \[kg/m³\] of a marble.
@@ -43,10 +43,10 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// The marbles above the ground, y up, and the states of all bodies.
-fn marbles() -> anyhow::Result<(World, Vec<State>)> {
+fn marbles() -> anyhow::Result<(World, State)> {
     let mut world = World::new(Vector3::y() * -9.81);
     let ground = world.add(Body::fixed_from_shape("ground", &ground()?));
-    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let mut balls: Vec<BodyId> = Vec::new();
     for i in 0..MARBLES[0] * MARBLES[1] {
@@ -54,7 +54,7 @@ fn marbles() -> anyhow::Result<(World, Vec<State>)> {
         let z = 0.05 * (column - 0.5 * (MARBLES[0] - 1) as f64) + 0.01 * row;
         let x = -0.5 + 0.05 * row;
         let above = height(x, z) + 2.0 * RADIUS;
-        states.push(State::at_rest(Isometry3::translation(x, above, z)));
+        states.push(BodyState::at_rest(Isometry3::translation(x, above, z)));
         balls.push(world.add(Body::from_shape(&format!("marble {i}"), &shape, DENSITY)?));
     }
     let mass = DENSITY * 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
@@ -65,24 +65,25 @@ fn marbles() -> anyhow::Result<(World, Vec<State>)> {
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 })?);
     world.add_contacts_between(&balls, &[ground], law.clone(), GapSmoothing::Hard)?;
     world.add_contacts_between(&balls, &balls, law, GapSmoothing::Hard)?;
-    Ok((world, states))
+    Ok((world, State::new(states)))
 }
 
 /// Where all marbles are at equal times, if number `moved` starts `by` \[m\] aside (x, z).
 fn run<S: Scalar>(
-    (world, states): &(World, Vec<State>),
+    (world, states): &(World, State),
     integrator: &Adaptive,
     moved: usize,
     by: [S; 2],
     steps: usize,
 ) -> Result<Vec<Vec<Vector3<S>>>, SimulationError> {
-    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
+    let mut start: State<S> = states.cast();
     let place = &mut start[1 + moved].pose.translation;
     (place.x, place.z) = (place.x + by[0], place.z + by[1]);
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
     let run = world.cast().rollout_with(integrator, &start, time_steps)?.states;
-    let places =
-        |states: &Vec<State<S>>| states[1..].iter().map(|s| s.pose.translation.vector).collect();
+    let places = |states: &State<S>| {
+        states.bodies()[1..].iter().map(|s| s.pose.translation.vector).collect()
+    };
     Ok(run.iter().map(places).collect())
 }
 

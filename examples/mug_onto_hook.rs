@@ -21,7 +21,7 @@ use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, loo
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
     Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape,
-    ShapeOptions, SimulationError, State, TimeSteps, World,
+    ShapeOptions, SimulationError, TimeSteps, World,
 };
 
 /// Radius of the hook's rod, and where along it the mug is to hang \[m\].
@@ -99,13 +99,13 @@ impl Throw {
         time: f64,
         steps: usize,
     ) -> Result<Vec<Isometry3<S>>, SimulationError> {
-        let mut start = self.mug.at_rest(&self.hand).cast::<S>();
+        let world = self.world.cast::<S>();
         let unit = |i: usize| x[i].times(UNITS[i]);
-        start.linear = Vector3::new(unit(0), unit(1), unit(2));
-        start.angular = Vector3::new(unit(3), unit(4), unit(5));
-        let start = [State::at_rest(Isometry3::identity()).cast(), start];
-        let time_steps = TimeSteps { dt: time / steps as f64, steps };
-        let run = self.world.cast().rollout(&start, time_steps)?;
+        let mut start = world.neutral_state();
+        start[1] = self.mug.at_rest(&self.hand).cast();
+        start[1].linear = Vector3::new(unit(0), unit(1), unit(2));
+        start[1].angular = Vector3::new(unit(3), unit(4), unit(5));
+        let run = world.rollout(&start, TimeSteps { dt: time / steps as f64, steps })?;
         let mug = self.mug.cast::<S>();
         Ok(run.iter().map(|states| mug.model_pose(&states[1].pose)).collect())
     }

@@ -58,8 +58,8 @@ impl Pendulum {
         parts: usize,
     ) -> Result<Vec<[S; 2]>, SimulationError> {
         let world = self.world.cast::<S>();
-        let start = world.neutral_states();
-        let control = |step: Step, world: &mut World<S>, _: &mut [State<S>]| {
+        let start = world.neutral_state();
+        let control = |step: Step, world: &mut World<S>, _: &mut State<S>| {
             world.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])
         };
         let time_steps = TimeSteps { dt: HOLD / parts as f64, steps: parts * efforts.len() };

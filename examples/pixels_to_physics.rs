@@ -15,8 +15,8 @@ use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, SceneVars};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError,
-    State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
+    SimulationError, Surface, TimeSteps, World,
 };
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };
@@ -56,9 +56,11 @@ fn slide<S: Scalar>(world: &World, x: &[S]) -> Result<Vec<Isometry3<S>>, Simulat
     let [vx, vy, spin, friction] = std::array::from_fn(|i| x[i].times(UNITS[i]));
     let mut world = world.cast::<S>();
     *world.contacts[0].param_mut("friction")? = friction;
-    let mut start = State::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).cast();
-    (start.linear.x, start.linear.y, start.angular.z) = (vx, vy, spin);
-    let run = world.rollout(&[State::at_rest(Isometry3::identity()).cast(), start], PICTURES)?;
+    let mut start = world.neutral_state();
+    let block = &mut start[1];
+    *block = BodyState::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).cast();
+    (block.linear.x, block.linear.y, block.angular.z) = (vx, vy, spin);
+    let run = world.rollout(&start, PICTURES)?;
     Ok(run[1..].iter().map(|states| states[1].pose).collect())
 }
 

@@ -15,8 +15,9 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
-    Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    Law, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, Trajectory, World,
+    Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, Law, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, Trajectory,
+    World,
 };
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].
@@ -56,14 +57,14 @@ fn spline<S: Scalar>(points: Vec<Vector2<S>>) -> impl Trajectory<S> {
             })
         };
         let height = Vector3::new(0.0, 0.0, HALF[2]).map(S::constant);
-        let mut state = State::at_rest(Isometry3::from(sum(place) + height));
+        let mut state = BodyState::at_rest(Isometry3::from(sum(place) + height));
         state.linear = sum(rate);
         state
     }
 }
 
 /// A box of 500 g on a table, the finger, and where they are at the start.
-fn scene() -> anyhow::Result<(World, [State; 3])> {
+fn scene() -> anyhow::Result<(World, State)> {
     let mass = 0.5;
     let rigid = RigidBody::cuboid(mass, HALF)?;
     // One sample in the middle of each square of 2 cm.
@@ -74,7 +75,7 @@ fn scene() -> anyhow::Result<(World, [State; 3])> {
     let pushed = Body::dynamic("box", rigid).with_field(Arc::new(sides));
     let tip = Surface::ball(FINGER)?;
     let tip_area = tip.area();
-    let still = State::at_rest(Isometry3::identity());
+    let still = BodyState::at_rest(Isometry3::identity());
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
@@ -93,21 +94,22 @@ fn scene() -> anyhow::Result<(World, [State; 3])> {
     let law = Law::new(normal(5e-4, tip_area)?, BristleFriction { friction, deflection: 5e-4 })?;
     let bodies = ContactBodies { samples: finger, field: pushed };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
-    let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH));
-    Ok((world, [still, stands, still]))
+    let mut start = world.neutral_state();
+    start[pushed].pose.translation.z = HALF[2] - DEPTH;
+    Ok((world, start))
 }
 
 /// x, y and yaw of the box at equal times.
 fn push<S: Scalar>(
-    (world, start): &(World, [State; 3]),
+    (world, start): &(World, State),
     parameters: &[S],
     steps: usize,
 ) -> Result<Vec<[S; 3]>, SimulationError> {
     let mut world = world.cast::<S>();
     world.bodies[2].motion = Motion::Kinematic(Arc::new(spline(points(parameters))));
-    let start = start.each_ref().map(State::cast);
+    let start: State<S> = start.cast();
     let run = world.rollout(&start, TimeSteps { dt: TIME / steps as f64, steps })?;
-    let seen = |states: &Vec<State<S>>| {
+    let seen = |states: &State<S>| {
         let pose = &states[1].pose;
         let [_, _, k, w] = pose.rotation.coords.into();
         [pose.translation.x, pose.translation.y, k.atan2(w).times(2.0)]

@@ -13,8 +13,8 @@ use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, BodyId, BristleFriction, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    KelvinVoigt, Law, Shape, SimulationError, State, TimeSteps, World,
+    Body, BodyId, BodyState, BristleFriction, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, KelvinVoigt, Law, Shape, SimulationError, State, TimeSteps, World,
 };
 
 /// Half of a box's edge without, and the radius of, the rounding \[m\].
@@ -27,18 +27,18 @@ const BALLS: usize = 5;
 const SPEED: f64 = 1.0;
 
 /// Three boxes that fall, a little turned, onto each other; z up.
-fn stack() -> anyhow::Result<(World, Vec<State>)> {
+fn stack() -> anyhow::Result<(World, State)> {
     let mut world = World::new(Vector3::z() * -9.81);
     let floor = Shape::from_parry(&HalfSpace::new(Vector::Z))?;
     let floor = world.add(Body::fixed_from_shape("floor", &floor));
     let inner_shape = Cuboid::new(Vector::splat(HALF));
     let shape = Shape::from_parry(&RoundCuboid { inner_shape, border_radius: ROUNDING })?;
-    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let mut boxes: Vec<BodyId> = Vec::new();
     for level in 0..3 {
         let height = (2 * level + 1) as f64 * (HALF + ROUNDING) + 1e-3 * (level + 1) as f64;
         let turn = Vector3::new(0.02, -0.015, 0.15) * level as f64;
-        states.push(State::at_rest(Isometry3::new(Vector3::new(0.0, 0.0, height), turn)));
+        states.push(BodyState::at_rest(Isometry3::new(Vector3::new(0.0, 0.0, height), turn)));
         boxes.push(world.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?));
     }
     // 20 µm deep under a box, and critically damped.
@@ -48,11 +48,11 @@ fn stack() -> anyhow::Result<(World, Vec<State>)> {
     let smoothing = GapSmoothing::Softplus { width: 5e-6 };
     world.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
     world.add_contacts_between(&boxes, &boxes, law, smoothing)?;
-    Ok((world, states))
+    Ok((world, State::new(states)))
 }
 
 /// Steel balls in a row along x, weightless, the first of them a little apart.
-fn cradle() -> anyhow::Result<(World, Vec<State>)> {
+fn cradle() -> anyhow::Result<(World, State)> {
     let mut world = World::new(Vector3::zeros());
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let mut balls: Vec<BodyId> = Vec::new();
@@ -60,7 +60,7 @@ fn cradle() -> anyhow::Result<(World, Vec<State>)> {
     for i in 0..BALLS {
         let apart = if i == 0 { -0.1 } else { 0.0 };
         let x = i as f64 * (2.0 * RADIUS + GAP) + apart;
-        states.push(State::at_rest(Isometry3::translation(x, 0.0, 0.0)));
+        states.push(BodyState::at_rest(Isometry3::translation(x, 0.0, 0.0)));
         balls.push(world.add(Body::from_shape(&format!("ball {i}"), &shape, 7800.0)?));
     }
     let mass = world.bodies[balls[0]].rigid().map_or(0.0, |rigid| rigid.mass());
@@ -70,16 +70,16 @@ fn cradle() -> anyhow::Result<(World, Vec<State>)> {
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.1, slip_scale: 1e-2 })?;
     world.add_contacts_between(&balls, &balls, Arc::new(law), GapSmoothing::Hard)?;
-    Ok((world, states))
+    Ok((world, State::new(states)))
 }
 
 /// The states of the balls at equal times, if the first one comes with `speed` \[m/s\].
 fn strike<S: Scalar>(
-    (world, states): &(World, Vec<State>),
+    (world, states): &(World, State),
     speed: S,
     steps: usize,
-) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
+) -> Result<Vec<State<S>>, SimulationError> {
+    let mut start: State<S> = states.cast();
     start[0].linear.x = speed;
     world.cast().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
 }
@@ -87,13 +87,13 @@ fn strike<S: Scalar>(
 pub(crate) fn main() -> anyhow::Result<()> {
     let (world, start) = stack()?;
     let stack = world.rollout(&start, TimeSteps { dt: 0.4, steps: 5 })?;
-    let fastest = stack[5][1..4].iter().map(|s| s.linear.norm()).fold(0.0, f64::max);
+    let fastest = stack[5].bodies()[1..4].iter().map(|s| s.linear.norm()).fold(0.0, f64::max);
     println!("the stack stands after two seconds: nothing moves faster than {fastest:.0e} m/s");
 
     let scene = cradle()?;
     let run = strike(&scene, SPEED, 100)?;
-    let speeds = |states: &[State]| states.iter().map(|s| s.linear.x).collect::<Vec<f64>>();
-    let [before, after] = [&run[0], &run[100]].map(|states| speeds(states));
+    let speeds = |states: &State| states.bodies().iter().map(|s| s.linear.x).collect::<Vec<f64>>();
+    let [before, after] = [&run[0], &run[100]].map(speeds);
     println!("balls before [m/s]: {before:.3?}\nballs after  [m/s]: {after:.3?}");
     let end = strike(&scene, Fwd::<1>::variable(SPEED, 0), 1)?;
     let slope = end[1][BALLS - 1].linear.x.derivative[0];
@@ -122,7 +122,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
 
 /// The boxes from the side, before and after.
 fn draw_stack<D: DrawingBackend>(
-    moments: [&Vec<State>; 2],
+    moments: [&State; 2],
     area: &DrawingArea<D, Shift>,
 ) -> anyhow::Result<()>
 where
@@ -139,7 +139,7 @@ where
     for (states, color) in
         moments.into_iter().zip([RGBColor(170, 170, 170), RGBColor(31, 119, 180)])
     {
-        for state in &states[1..4] {
+        for state in &states.bodies()[1..4] {
             let corner = |x: f64, y: f64, z: f64| {
                 let p = state.pose * Point3::new(half * x, half * y, half * z);
                 (p.x, p.z)
@@ -155,10 +155,7 @@ where
 }
 
 /// Where the balls are over time.
-fn draw_cradle<D: DrawingBackend>(
-    run: &[Vec<State>],
-    area: &DrawingArea<D, Shift>,
-) -> anyhow::Result<()>
+fn draw_cradle<D: DrawingBackend>(run: &[State], area: &DrawingArea<D, Shift>) -> anyhow::Result<()>
 where
     D::ErrorType: 'static,
 {

@@ -16,13 +16,13 @@ const RED: RGBColor = RGBColor(214, 39, 40);
 const ORANGE: RGBColor = RGBColor(255, 127, 14);
 
 /// Shoulder, elbow and end of the arm.
-fn joints(scene: &Scene, states: &[State]) -> [(f64, f64); 3] {
+fn joints(scene: &Scene, states: &State) -> [(f64, f64); 3] {
     let [upper, fore] = scene.arm.map(|link| states[link].pose);
     let end = fore * Point3::new(LINKS[1], 0.0, 0.0);
     [upper * Point3::origin(), fore * Point3::origin(), end].map(|p| (p.x, p.y))
 }
 
-fn outline(scene: &Scene, states: &[State]) -> [(f64, f64); 5] {
+fn outline(scene: &Scene, states: &State) -> [(f64, f64); 5] {
     let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
     corners.map(|(i, j)| {
         let corner = states[scene.pushed].pose * Point3::new(i * HALF[0], j * HALF[1], 0.0);
@@ -33,7 +33,7 @@ fn outline(scene: &Scene, states: &[State]) -> [(f64, f64); 5] {
 /// The end of the push as guessed; that as found, every `every` states, with the way of the peg.
 pub(crate) fn draw(
     scene: &Scene,
-    [guessed, found]: &[Vec<Vec<State>>; 2],
+    [guessed, found]: &[Vec<State>; 2],
     goal: Vector2<f64>,
     every: usize,
     file: &Path,
@@ -54,7 +54,7 @@ pub(crate) fn draw(
         .x_desc("x [m]")
         .y_desc("y [m]")
         .draw()?;
-    let poses: Vec<&Vec<State>> = found.iter().step_by(every).collect();
+    let poses: Vec<&State> = found.iter().step_by(every).collect();
     for (k, states) in poses.iter().enumerate() {
         // Fainter the earlier.
         let share = 0.25 + 0.75 * k as f64 / (poses.len() - 1) as f64;

@@ -54,17 +54,17 @@ fn push<S: Scalar>(
     integrator: &impl Integrator,
     plan: &[S],
     parts: usize,
-) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-    let start: Vec<State<S>> = scene.start.iter().map(State::cast).collect();
+) -> Result<Vec<State<S>>, SimulationError> {
+    let start: State<S> = scene.start.cast();
     let ticks = (TIME / TICK).round() as usize;
     let mut run = Vec::with_capacity(ticks + 1);
-    let control = |step: Step, world: &mut World<S>, states: &mut [State<S>]| {
+    let control = |step: Step, world: &mut World<S>, states: &mut State<S>| {
         if step.index.is_multiple_of(parts) {
             let targets = planned(scene.first, plan, step.start);
             for (servo, target) in scene.servos.into_iter().zip(targets) {
                 world.joint_force_mut(servo).params_mut()[0] = target;
             }
-            run.push(states.to_vec());
+            run.push(states.clone());
         }
     };
     let time_steps = TimeSteps { dt: TICK / parts as f64, steps: parts * ticks };
@@ -74,7 +74,7 @@ fn push<S: Scalar>(
 }
 
 /// Where the box is in states \[m\].
-fn place<S: Scalar>(scene: &Scene, states: &[State<S>]) -> Vector2<S> {
+fn place<S: Scalar>(scene: &Scene, states: &State<S>) -> Vector2<S> {
     states[scene.pushed].pose.translation.vector.xy()
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct Scene {
     pub(crate) arm: [BodyId; 2],
     pub(crate) servos: [JointForceId; 2],
     pub(crate) pushed: BodyId,
-    pub(crate) start: Vec<State>,
+    pub(crate) start: State,
     /// Angles of shoulder and elbow at the start \[rad\].
     pub(crate) first: [f64; 2],
 }
@@ -80,7 +80,7 @@ impl Scene {
             world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
         }
 
-        let mut start = world.neutral_states();
+        let mut start = world.neutral_state();
         let first = [2.0, -2.2];
         for (link, angle) in arm.into_iter().zip(first) {
             world.set_joint(&mut start, link, &[angle], &[0.0])?;

@@ -14,7 +14,7 @@ pub(crate) fn draw(
     file: &str,
     gripper: &Gripper,
     (lifted, half): (BodyId, [f64; 3]),
-    run: &[Vec<State>],
+    run: &[State],
 ) -> anyhow::Result<()> {
     // Seen across the fingers.
     let [left, right] = gripper.pads.map(|pad| run[0][pad].pose.translation.vector);

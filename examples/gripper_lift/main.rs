@@ -46,11 +46,11 @@ pub(crate) fn main() -> anyhow::Result<()> {
         world.add_contact(bodies, law.clone(), smoothing)?;
     }
 
-    let mut start = world.neutral_states();
+    let mut start = world.neutral_state();
     start[lifted] = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2]));
     let time_steps = TimeSteps { dt: 0.02, steps: (HELD / 0.02) as usize };
     let mut closing: f64 = 0.0;
-    let control = |step: Step, world: &mut World, states: &mut [State]| {
+    let control = |step: Step, world: &mut World, states: &mut State| {
         // Fingers close until they feel the box, and open where they press too much.
         let felt = world.contact_wrench(gripper.pads[0], states)?.fixed_rows::<3>(0).norm();
         let pace = (1.0 - felt / GRIP).clamp(-1.0, 1.0);
@@ -65,11 +65,11 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let run = world.rollout_controlled(&Adaptive::default(), &start, time_steps, control)?;
     println!("{HELD} s simulated in {:.1} s", began.elapsed().as_secs_f64());
 
-    let height = |states: &[State]| states[lifted].pose.translation.z;
+    let height = |states: &State| states[lifted].pose.translation.z;
     let (before, end) = (&run[(CLOSED / 0.02) as usize], &run[run.len() - 1]);
     let rise = height(end) - height(&start);
     // How the box has moved in the hand since it was gripped.
-    let held = |states: &[State]| states[gripper.base].pose.inverse() * states[lifted].pose;
+    let held = |states: &State| states[gripper.base].pose.inverse() * states[lifted].pose;
     let slip = held(before).inverse() * held(end);
     let [force, other] = gripper.pads.map(|pad| world.contact_wrench(pad, end));
     let grip = 0.5 * (force?.fixed_rows::<3>(0).norm() + other?.fixed_rows::<3>(0).norm());

@@ -14,7 +14,7 @@ pub(crate) fn draw(
     robot: &KinematicTree,
     links: &[BodyId],
     (ball, radius): (BodyId, f64),
-    run: &[Vec<State>],
+    run: &[State],
 ) -> anyhow::Result<()> {
     let root = SVGBackend::new(file, (1080, 340)).into_drawing_area();
     root.fill(&WHITE)?;

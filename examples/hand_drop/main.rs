@@ -62,7 +62,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
         }
     }
 
-    let mut start = world.neutral_states();
+    let mut start = world.neutral_state();
     for (link, angle) in &joints {
         world.set_joint(&mut start, *link, &[*angle], &[0.0])?;
     }
@@ -71,7 +71,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
     println!("{TIME} s simulated in {:.1} s", began.elapsed().as_secs_f64());
 
-    let height = |states: &Vec<State>| states[id].pose.translation.z;
+    let height = |states: &State| states[id].pose.translation.z;
     let lowest = run.iter().map(height).fold(f64::INFINITY, f64::min);
     let first = run.iter().position(|states| states[id].linear.z > 0.0).context("it bounces")?;
     let rebound = run[first..].iter().map(height).fold(0.0, f64::max);

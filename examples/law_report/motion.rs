@@ -5,8 +5,8 @@ use std::sync::Arc;
 use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Adaptive, Body, BuildError, ContactBodies, DynContactLaw, GapSmoothing, Integrator, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
+    Adaptive, Body, BodyState, BuildError, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
 };
 
 use super::curves::Curve;
@@ -58,7 +58,7 @@ impl Specimen<'_> {
         let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
         let dt = 2.0 * duration() / 200.0;
         let mut points = Vec::new();
-        let mut add = |time: f64, states: &[State]| {
+        let mut add = |time: f64, states: &State| {
             points.push([time * 1e3, states[BODY].pose.translation.z * 1e3]);
         };
         let time_steps = TimeSteps { dt, steps: 200 };
@@ -74,7 +74,7 @@ impl Specimen<'_> {
         gravity: Vector3<f64>,
         depth: f64,
         velocity: Vector3<f64>,
-    ) -> Result<(World, Vec<State>), SimulationError> {
+    ) -> Result<(World, State), SimulationError> {
         let failed = |error| BuildError::Body { body: "specimen".to_owned(), error };
         // Nothing here turns it.
         let inertia = Matrix3::identity() * self.mass;
@@ -88,7 +88,7 @@ impl Specimen<'_> {
         world.add_contact(bodies, Arc::clone(self.law), GapSmoothing::Hard)?;
         let mut state = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -depth));
         state.linear = velocity;
-        Ok((world, vec![State::at_rest(Isometry3::identity()), state]))
+        Ok((world, State::new([BodyState::at_rest(Isometry3::identity()), state])))
     }
 
     fn rest(&self) -> Result<Finding, SimulationError> {
@@ -171,18 +171,18 @@ impl Specimen<'_> {
 }
 
 /// The states after `time` \[s\].
-fn simulate(world: &World, start: &[State], time: f64) -> Result<Vec<State>, SimulationError> {
+fn simulate(world: &World, start: &State, time: f64) -> Result<State, SimulationError> {
     unaudited(world, start, TimeSteps { dt: time, steps: 1 }, |_, _| ())
 }
 
 /// The states at the end, those at the beginning of each step handed to `visit`: whether energy is made is a finding, not an error.
 fn unaudited(
     world: &World,
-    start: &[State],
+    start: &State,
     time_steps: TimeSteps,
-    mut visit: impl FnMut(Step, &[State]),
-) -> Result<Vec<State>, SimulationError> {
-    let control = |step: Step, _: &mut World, states: &mut [State]| visit(step, states);
+    mut visit: impl FnMut(Step, &State),
+) -> Result<State, SimulationError> {
+    let control = |step: Step, _: &mut World, states: &mut State| visit(step, states);
     world.simulate_controlled(&Adaptive::default(), start, time_steps, control)
 }
 

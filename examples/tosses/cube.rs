@@ -60,17 +60,18 @@ pub(crate) fn path<S: Scalar>(
     let mut pose = start.pose;
     let upright = |v: Vector3<S>| (v - lean * v.z) * size;
     pose.translation.vector = upright(pose.translation.vector);
-    let mut state = rigid.at_rest(&pose);
-    state.angular = pose.rotation * start.spin;
-    state.linear = upright(start.velocity) + state.angular.cross(&(pose.rotation * com.coords));
-    let states = [State::at_rest(Isometry3::identity()), state];
+    let mut initial = world.neutral_state();
+    let cube = &mut initial[1];
+    *cube = rigid.at_rest(&pose);
+    cube.angular = pose.rotation * start.spin;
+    cube.linear = upright(start.velocity) + cube.angular.cross(&(pose.rotation * com.coords));
     let Steps { integrator, per_row, board } = steps;
     if !board {
         world.contacts.clear();
     }
     let time_steps = TimeSteps { dt: 1.0 / (RATE * *per_row as f64), steps: (rows - 1) * per_row };
-    let run = world.rollout_with(integrator, &states, time_steps)?.states;
-    let recorded = |states: &Vec<State<S>>| {
+    let run = world.rollout_with(integrator, &initial, time_steps)?.states;
+    let recorded = |states: &State<S>| {
         let mut pose = rigid.model_pose(&states[1].pose);
         let place = pose.translation.vector / size;
         pose.translation.vector = place + lean * place.z;

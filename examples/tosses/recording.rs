@@ -8,7 +8,7 @@ use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend::autodiff::Scalar;
 use prehend::autodiff::lie::{lift, so3_log};
-use prehend::sim::State;
+use prehend::sim::BodyState;
 use serde::{Deserialize, Serialize};
 
 /// Rows a second.
@@ -52,7 +52,8 @@ pub(crate) struct Start<S: Scalar = f64> {
 impl<S: Scalar> Start<S> {
     /// Values without derivatives.
     pub(crate) fn value(&self) -> Start {
-        let state = State { pose: self.pose, linear: self.velocity, angular: self.spin }.value();
+        let state =
+            BodyState { pose: self.pose, linear: self.velocity, angular: self.spin }.value();
         Start { pose: state.pose, velocity: state.linear, spin: state.angular }
     }
 }

@@ -78,13 +78,13 @@ impl Integrator for AnyIntegrator {
     fn step<S: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<S>],
+        state: &State<S>,
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    ) -> Result<State<S>, SimulationError> {
         if is_interrupted() {
             return Err(SimulationError::Interrupted);
         }
-        each!(self, integrator => integrator.step(world, states, step))
+        each!(self, integrator => integrator.step(world, state, step))
     }
 
     fn stability_limit(&self) -> f64 {

@@ -103,7 +103,7 @@ impl Robot {
         let robot = self.of_mujoco("positions in MuJoCo's order")?;
         let positions =
             positions.map_or_else(|| self.reference.clone(), |p| in_order(&p).into_owned());
-        crate::world::states::change(states, |all| {
+        crate::world::states::change(&world.world, states, |all| {
             robot.set_positions(&world.world, all, &positions).raise()
         })
     }
@@ -123,8 +123,8 @@ impl Robot {
         states: Numbers<'py>,
         name: &str,
     ) -> PyResult<Array<'py>> {
-        let states = crate::world::states::states(&states)?;
-        let reading = self.of_mujoco("sensors")?.sensor(&world.world, &states, name).raise()?;
+        let state = crate::world::states::state(&world.world, &states)?;
+        let reading = self.of_mujoco("sensors")?.sensor(&world.world, &state, name).raise()?;
         let count = reading.len();
         array(py, reading, &[count])
     }
@@ -138,9 +138,12 @@ impl Robot {
         pose: Numbers<'_>,
     ) -> PyResult<()> {
         let (robot, pose) = (self.of_mujoco("mocap bodies")?, pose_of(Some(&pose), "pose")?);
-        crate::world::states::change(states, |all| {
-            robot.set_mocap(&mut world.world, all, name, &pose).raise()
-        })
+        let mut moved = world.world.clone();
+        crate::world::states::change(&world.world, states, |all| {
+            robot.set_mocap(&mut moved, all, name, &pose).raise()
+        })?;
+        world.world = moved;
+        Ok(())
     }
 
     fn __repr__(&self) -> String {

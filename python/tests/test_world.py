@@ -146,7 +146,7 @@ def test_states_that_cannot_be_are_refused():
     world, states, ball, _ = thrown_ball()
     with pytest.raises(prehend.Error, match="state 0: its quaternion has the length 0"):
         world.rollout(1e-3, 1)(np.zeros_like(states))
-    with pytest.raises(prehend.Error, match="2 rows are expected"):
+    with pytest.raises(prehend.Error, match="1 states for 2 bodies"):
         world.longest_step(states[:1])
     with pytest.raises(prehend.Error, match="no memory"):
         world.rollout(1e-3, 2**62)(states)

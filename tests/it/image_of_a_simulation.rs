@@ -10,8 +10,8 @@ use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, SemiImplicitEuler,
-    State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
+    SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
@@ -39,13 +39,13 @@ fn world(mesh: &TriMesh) -> World {
 
 /// Poses of the block at the end, in the world, for a throw of the given tangent.
 fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
-    let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
+    let mut start = BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
-    let still = State::at_rest(Isometry3::identity()).cast();
+    let still = BodyState::at_rest(Isometry3::identity()).cast();
     let thrown = start.retract(&std::array::from_fn(|i| tangent[i]));
     let states =
-        world.cast().simulate_with(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
+        world.cast().simulate_with(&SemiImplicitEuler, &State::new([still, thrown]), TIME_STEPS);
     states.unwrap().states[1].pose
 }
 

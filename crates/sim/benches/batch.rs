@@ -9,8 +9,8 @@ use prehend_autodiff::{Recording, Scalar, Var};
 use prehend_sim::contact::Bounce;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Batch, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law,
-    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Batch, Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    Law, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 
 /// Balls of a world, each with a contact of its own.
@@ -21,10 +21,10 @@ const MASS: f64 = 0.5;
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-3, steps: 100 };
 
 /// Balls that slide and roll on a floor, one beside the other.
-fn balls() -> anyhow::Result<(World, Vec<State>)> {
+fn balls() -> anyhow::Result<(World, State)> {
     let mut world = World::new(Vector3::z() * -9.81);
     let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
-    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let (rigid, surface) = (RigidBody::ball(MASS, RADIUS)?, Arc::new(Surface::ball(RADIUS)?));
     let contact_area = surface.area();
     let target = ContactCalibration { mass: MASS, gravity: 9.81, penetration: 1e-3, contact_area };
@@ -39,28 +39,28 @@ fn balls() -> anyhow::Result<(World, Vec<State>)> {
         let pose = Isometry3::translation(0.0, 0.2 * i as f64, RADIUS - 1e-3);
         states.push(rigid.at_rest(&pose));
     }
-    Ok((world, states))
+    Ok((world, State::new(states)))
 }
 
 /// World `index` of a batch: each ball with a speed of its own, `faster` \[m/s\] than that.
 fn variant<S: Scalar>(
     world: &World,
-    states: &[State],
+    states: &State,
     index: usize,
     faster: &[S; BALLS],
-) -> (World<S>, Vec<State<S>>) {
-    let mut states: Vec<State<S>> = states.iter().map(State::cast).collect();
+) -> (World<S>, State<S>) {
+    let mut states: State<S> = states.cast();
     for (i, faster) in faster.iter().enumerate() {
         states[i + 1].linear.x = faster.plus(0.2 + 1e-4 * (index % 997) as f64 + 0.01 * i as f64);
     }
     (world.cast(), states)
 }
 
-fn far<S: Scalar>(ends: &[Result<Vec<State<S>>, SimulationError>]) -> anyhow::Result<S> {
+fn far<S: Scalar>(ends: &[Result<State<S>, SimulationError>]) -> anyhow::Result<S> {
     let mut sum = S::zero();
     for states in ends {
         let states = states.as_ref().map_err(Clone::clone)?;
-        sum = states.iter().fold(sum, |sum, state| sum + state.pose.translation.x);
+        sum = states.bodies().iter().fold(sum, |sum, state| sum + state.pose.translation.x);
     }
     Ok(sum)
 }

@@ -53,17 +53,14 @@ fn main() -> anyhow::Result<()> {
 }
 
 fn value(world: &World, steps: usize) -> anyhow::Result<f64> {
-    let end = world.simulate_with(&FirstOrder, &start(), time_steps(steps), |_, _| ())?.states;
+    let end = world.simulate_with(&FirstOrder, &State::new(start()), time_steps(steps))?.states;
     Ok(loss(&end[1]))
 }
 
 fn forward_mode(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
-    let states = [hand.cast(), ellipsoid.pose_variables()];
-    let end = world
-        .cast::<Fwd<6>>()
-        .simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ())?
-        .states;
+    let states = State::new([hand.cast(), ellipsoid.pose_variables()]);
+    let end = world.cast::<Fwd<6>>().simulate_with(&FirstOrder, &states, time_steps(steps))?.states;
     let Fwd { value, derivative } = loss(&end[1]);
     Ok((value, derivative))
 }
@@ -75,8 +72,8 @@ fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
         |x| {
             let mut tangent = [Scalar::constant(0.0); 12];
             tangent[..6].copy_from_slice(x);
-            let states: [State<_>; 2] = [hand.cast(), ellipsoid.retract(&tangent)];
-            match world.cast().simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
+            let states = State::new([hand.cast(), ellipsoid.retract(&tangent)]);
+            match world.cast().simulate_with(&FirstOrder, &states, time_steps(steps)) {
                 Ok(run) => loss(&run.states[1]),
                 Err(error) => {
                     failure = Some(error);

@@ -11,8 +11,9 @@ use parry3d_f64::utils::Array2;
 use prehend_autodiff::{Recording, Var};
 use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
-    HuntCrossley, Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State, TimeSteps, World,
+    BackwardEuler, Body, BodyId, BodyState, ContactBodies, ContactCalibration, Coulomb,
+    GapSmoothing, HuntCrossley, Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State,
+    TimeSteps, World,
 };
 
 /// Radius of the balls \[m\].
@@ -42,11 +43,11 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// `count` balls at `height` \[m\] over hills, one beside the other.
-fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
+fn balls(count: usize, height: f64) -> anyhow::Result<(World, State)> {
     let mut world = World::new(Vector3::y() * -9.81);
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let floor = world.add(Body::fixed_from_shape("ground", &ground()?));
-    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let side = (count as f64).sqrt().ceil() as usize;
     let place = |i: usize| APART * (i as f64 - 0.5 * (side - 1) as f64);
     let mut ids: Vec<BodyId> = Vec::new();
@@ -67,16 +68,16 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     if count > 1 {
         world.add_contacts_between(&ids, &ids, law, GapSmoothing::Hard)?;
     }
-    Ok((world, states))
+    Ok((world, State::new(states)))
 }
 
 /// `count` balls in a pile of five by five, each a little in those beside and below it.
-fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
+fn pile(count: usize) -> anyhow::Result<(World, State)> {
     let (mut world, mut states) = balls(count, 0.0)?;
     let flat = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
     world.bodies[0] = Body::fixed_from_shape("ground", &flat);
     let apart = 2.0 * RADIUS - 1e-4;
-    for (i, state) in states[1..].iter_mut().enumerate() {
+    for (i, state) in states.bodies_mut()[1..].iter_mut().enumerate() {
         let [x, y, z] = [i % 5, i / 25, i / 5 % 5].map(|k| apart * k as f64);
         state.pose = Isometry3::translation(x, RADIUS - 1e-4 + y, z);
     }
@@ -104,14 +105,14 @@ fn every_pair(grouped: &World) -> anyhow::Result<World> {
 fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
     integrator: I,
     (what, world): (&str, &World),
-    states: &[State],
+    states: &State,
 ) -> anyhow::Result<()> {
     let steps = TimeSteps { dt: 1e-4, steps: 10 };
-    let forward = median(9, || Ok(world.simulate_with(&integrator, states, steps, |_, _| ())?))?;
+    let forward = median(9, || Ok(world.simulate_with(&integrator, states, steps)?))?;
     let reverse = median(9, || {
         let recording = Recording::start();
         let start = with_velocities(&recording, states);
-        let end = world.cast().simulate_with(&integrator, &start, steps, |_, _| ())?.states;
+        let end = world.cast().simulate_with(&integrator, &start, steps)?.states;
         Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
     })?;
     let [forward, reverse] = [forward, reverse].map(|time| 1e3 * time / steps.steps as f64);
@@ -123,9 +124,9 @@ fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
 }
 
 /// `states` with all velocities of balls as variables.
-fn with_velocities(recording: &Recording, states: &[State]) -> Vec<State<Var>> {
-    let mut start: Vec<State<Var>> = states.iter().map(State::cast).collect();
-    for state in &mut start[1..] {
+fn with_velocities(recording: &Recording, states: &State) -> State<Var> {
+    let mut start: State<Var> = states.cast();
+    for state in &mut start.bodies_mut()[1..] {
         state.linear = state.linear.map(|v| recording.variable(v.value()));
         state.angular = state.angular.map(|v| recording.variable(v.value()));
     }
@@ -133,8 +134,8 @@ fn with_velocities(recording: &Recording, states: &[State]) -> Vec<State<Var>> {
 }
 
 /// The sum of the heights of balls \[m\].
-fn height(states: &[State<Var>]) -> Var {
-    states.iter().fold(Var::from(0.0), |sum, state| sum + state.pose.translation.y)
+fn height(states: &State<Var>) -> Var {
+    states.bodies().iter().fold(Var::from(0.0), |sum, state| sum + state.pose.translation.y)
 }
 
 /// The median time of `runs` runs \[s\].

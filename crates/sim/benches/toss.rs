@@ -10,15 +10,15 @@ use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::contact::Bounce;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
+    Adaptive, Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
 /// Free fall, impact and slide \[s\].
 const TIME: f64 = 0.5;
 
 /// A cube of 10 cm and 0.37 kg, thrown from 20 cm with 1 m/s and 3 rad/s.
-fn cube() -> anyhow::Result<(World, [State; 2])> {
+fn cube() -> anyhow::Result<(World, State)> {
     let (mass, side) = (0.37, 0.1);
     let inertia = Matrix3::identity() * (mass * side * side / 6.0);
     let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
@@ -37,7 +37,7 @@ fn cube() -> anyhow::Result<(World, [State; 2])> {
     let bodies = ContactBodies { samples, field };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let pose = Isometry3::new(Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.3, 0.2, 0.1));
-    let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&pose)];
+    let mut start = State::new([BodyState::at_rest(Isometry3::identity()), rigid.at_rest(&pose)]);
     start[samples].linear.x = 1.0;
     start[samples].angular.y = 3.0;
     Ok((world, start))
@@ -45,25 +45,25 @@ fn cube() -> anyhow::Result<(World, [State; 2])> {
 
 /// Where the cube ends along x \[m\], by its initial velocities if `N` is 3 (linear) or 6 (angular too).
 fn end<const N: usize>(
-    (world, start): &(World, [State; 2]),
+    (world, start): &(World, State),
     integrator: &impl Integrator,
     steps: usize,
 ) -> anyhow::Result<Fwd<N>> {
     let mut tangent = [Fwd::<N>::constant(0.0); 12];
     (0..N).for_each(|i| tangent[6 + i] = Fwd::variable(0.0, i));
-    let states = [start[0].cast(), start[1].retract(&tangent)];
+    let states = State::new([start[0].cast(), start[1].retract(&tangent)]);
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.cast().simulate_with(integrator, &states, time_steps, |_, _| ())?;
+    let run = world.cast().simulate_with(integrator, &states, time_steps)?;
     Ok(run.states[1].pose.translation.x)
 }
 
 fn value(
-    (world, start): &(World, [State; 2]),
+    (world, start): &(World, State),
     integrator: &impl Integrator,
     steps: usize,
 ) -> anyhow::Result<f64> {
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.simulate_with(integrator, start, time_steps, |_, _| ())?;
+    let run = world.simulate_with(integrator, start, time_steps)?;
     Ok(run.states[1].pose.translation.x)
 }
 
@@ -85,7 +85,7 @@ fn main() -> anyhow::Result<()> {
 
 fn row(
     name: &str,
-    scene: &(World, [State; 2]),
+    scene: &(World, State),
     integrator: &impl Integrator,
     steps: usize,
     truth: &Fwd<3>,

@@ -13,8 +13,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing,
+    Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
 
@@ -87,11 +87,11 @@ fn study(
     let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
     let bounce = |phase: usize| {
         let height = 1.0 + SPEED * dt * phase as f64 / PHASES as f64;
-        let mut start = State::at_rest(Isometry3::identity()).cast::<Fwd<1>>();
+        let mut start = BodyState::at_rest(Isometry3::identity()).cast::<Fwd<1>>();
         start.pose.translation.z = Fwd::variable(height, 0);
         start.linear.z = Fwd::constant(-SPEED);
-        let still = State::at_rest(Isometry3::identity()).cast();
-        let end = world.simulate_with(integrator, &[still, start], time_steps, |_, _| ())?.states;
+        let still = BodyState::at_rest(Isometry3::identity()).cast();
+        let end = world.simulate_with(integrator, &State::new([still, start]), time_steps)?.states;
         let slope = end[point].pose.translation.z.derivative[0];
         Ok([(slope + 1.0).abs(), (end[point].linear.z.value - SPEED).abs()])
     };

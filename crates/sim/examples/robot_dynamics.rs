@@ -120,7 +120,7 @@ impl Robot for Mjcf {
         for ((_, id), control) in self.robot.actuators.iter().zip(ctrl) {
             world.joint_force_mut(*id).set_param("control", control)?;
         }
-        let mut states = world.neutral_states();
+        let mut states = world.neutral_state();
         self.robot.set_positions(&world, &mut states, &qpos)?;
         self.robot.set_velocities(&world, &mut states, &qvel)?;
         self.robot.set_activations(&world, &mut states, &act)?;
@@ -168,7 +168,7 @@ impl Robot for Urdf {
     }
 
     fn at(&self, state: &Value) -> anyhow::Result<Value> {
-        let mut states = self.world.neutral_states();
+        let mut states = self.world.neutral_state();
         let own = &self.world.articulations[0];
         let (n, mut order) = (own.tree.nv(), Vec::new());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
@@ -207,7 +207,7 @@ fn body(name: &str, inertial: Option<&Inertial>) -> Value {
 }
 
 fn output(
-    states: &[State],
+    states: &State,
     bodies: &[BodyId],
     mass: &DMatrix<f64>,
     acceleration: &[f64],

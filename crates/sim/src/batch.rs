@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Recompute, Scalar};
 
-use crate::error::SimulationError;
+use crate::body_state::{STATE, coordinates_of};
+use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
 use crate::integrator::step_checkpointed::StepCheckpointed;
 use crate::integrator::world_template::{ParameterDelta, WorldTemplate};
-use crate::state::{STATE, State, coordinates_of, states_of};
+use crate::state::State;
 use crate::time::TimeSteps;
 use crate::world::World;
 
@@ -23,13 +24,12 @@ use crate::world::World;
 /// Whatever [`World::parameters`] lists may differ, and may carry derivatives; so may states.
 ///
 /// ```
-/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use nalgebra::Vector3;
 /// use prehend_autodiff::{Recording, Scalar};
 /// use prehend_sim::{Batch, Body, RigidBody, SimulationError, TimeSteps, World};
 ///
-/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// let id = world.add(Body::dynamic("stone", stone));
+/// let id = world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
 /// let batch = Batch::new(&world)?;
 ///
 /// // By how much does the mean height of 100 throws change with gravity?
@@ -38,13 +38,13 @@ use crate::world::World;
 /// let throws = (0..100).map(|i| {
 ///     let mut lifted = world.cast();
 ///     lifted.gravity.z = gravity;
-///     let mut start = stone.at_rest(&Isometry3::identity()).cast();
-///     start.linear.z = Scalar::constant(0.1 * f64::from(i));
-///     (lifted, vec![start])
+///     let mut start = lifted.neutral_state();
+///     start[id].linear.z = Scalar::constant(0.1 * f64::from(i));
+///     (lifted, start)
 /// });
 /// let ends = batch.simulate(throws, TimeSteps { dt: 0.5, steps: 1 });
 /// let ends = ends.into_iter().collect::<Result<Vec<_>, SimulationError>>()?;
-/// let heights = ends.iter().map(|states| states[id].pose.translation.z);
+/// let heights = ends.iter().map(|end| end[id].pose.translation.z);
 /// let mean = heights.reduce(|sum, height| sum + height).unwrap_or_default().times(0.01);
 /// let slope = recording.gradient(mean).wrt(gravity);
 /// assert!((slope - 0.125).abs() < 1e-9);
@@ -60,7 +60,7 @@ impl Batch {
     ///
     /// # Errors
     /// See [`Batch::with_integrator`].
-    pub fn new<S: Scalar>(world: &World<S>) -> Result<Self, SimulationError> {
+    pub fn new<S: Scalar>(world: &World<S>) -> Result<Self> {
         Self::with_integrator(Adaptive::default(), world)
     }
 }
@@ -70,14 +70,11 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     ///
     /// # Errors
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
-    pub fn with_integrator<S: Scalar>(
-        integrator: I,
-        world: &World<S>,
-    ) -> Result<Self, SimulationError> {
+    pub fn with_integrator<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self> {
         Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
-    /// States of each of `variants`, a world and the states that it starts from, after `time_steps`, as
+    /// State of each of `variants`, a world and the state that it starts from, after `time_steps`, as
     /// [`World::simulate_with`] finds it.
     ///
     /// Variants are taken one after the other, and only what they change is kept.
@@ -87,20 +84,21 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     /// trajectory carries derivatives.
     pub fn simulate<S: Scalar>(
         &self,
-        variants: impl IntoIterator<Item = (World<S>, Vec<State<S>>)>,
+        variants: impl IntoIterator<Item = (World<S>, State<S>)>,
         time_steps: TimeSteps,
-    ) -> Vec<Result<Vec<State<S>>, SimulationError>> {
+    ) -> Vec<Result<State<S>>> {
         let mut refused = Vec::new();
         let mut runs = Vec::new();
-        for (index, (world, states)) in variants.into_iter().enumerate() {
-            match self.run(&world, &states, time_steps) {
+        for (index, (world, state)) in variants.into_iter().enumerate() {
+            match self.run(&world, &state, time_steps) {
                 Ok(run) => runs.push(run),
                 Err(error) => refused.push((index, error)),
             }
         }
-        let ends = S::recompute_each(runs).into_iter();
-        let ends = ends.map(|end| end.map(|coordinates| states_of(&coordinates).collect()));
-        let mut ends: Vec<Result<Vec<State<S>>, SimulationError>> = ends.collect();
+        let times: Vec<f64> = runs.iter().map(|(run, _)| time_steps.end(run.start)).collect();
+        let ends = S::recompute_each(runs).into_iter().zip(times);
+        let ends = ends.map(|(end, time)| Ok(self.template.state(&end?, time)));
+        let mut ends: Vec<Result<State<S>>> = ends.collect();
         for (index, error) in refused {
             ends.insert(index, Err(error));
         }
@@ -111,9 +109,9 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     fn run<S: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<S>],
+        state: &State<S>,
         time_steps: TimeSteps,
-    ) -> Result<(Run<I>, Vec<S>), SimulationError> {
+    ) -> Result<(Run<I>, Vec<S>)> {
         world.check_trajectories()?;
         if !self.template.is_of(world) {
             return Err(SimulationError::AnotherWorld);
@@ -122,9 +120,14 @@ impl<I: Integrator + Send + 'static> Batch<I> {
             self.template.integrator.check_differentiable(world)?;
         }
         let ParameterDelta { places, values } = self.template.changes(world);
-        let numbers = coordinates_of(states).chain(values).collect();
-        let run =
-            Run { template: Arc::clone(&self.template), places, states: states.len(), time_steps };
+        let numbers = coordinates_of(state.rows()).chain(values).collect();
+        let run = Run {
+            template: Arc::clone(&self.template),
+            places,
+            rows: state.rows().len(),
+            start: state.time,
+            time_steps,
+        };
         Ok((run, numbers))
     }
 }
@@ -136,33 +139,34 @@ const FEW: usize = 2000;
 struct Run<I> {
     template: Arc<WorldTemplate<I>>,
     places: Box<[u32]>,
-    /// Number of states that it starts from.
-    states: usize,
+    /// Number of rows that it starts from.
+    rows: usize,
+    /// Time at its start \[s\].
+    start: f64,
     time_steps: TimeSteps,
 }
 
 impl<I: Integrator + Send + 'static> Recompute for Run<I> {
     type Error = SimulationError;
 
-    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
-        let (states, values) = x.split_at(STATE * self.states);
+    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>> {
+        let (states, values) = x.split_at(STATE * self.rows);
         let world = self.template.world(&self.places, values)?;
-        let states: Vec<State<S>> = states_of(states).collect();
+        let state = self.template.state(states, self.start);
         // Few steps are recorded as they are, of many one at a time.
         let TimeSteps { steps, .. } = self.time_steps;
         let few = steps == 1
-            || steps.saturating_mul(states.len()) <= FEW
-                && !self.template.integrator.controls_error();
+            || steps.saturating_mul(self.rows) <= FEW && !self.template.integrator.controls_error();
         let end = match S::RECORDED && !few {
             true => {
                 let steps = StepCheckpointed::of(&self.template);
-                world.simulate_with(&steps, &states, self.time_steps, |_, _| ())
+                world.simulate_with(&steps, &state, self.time_steps)
             }
             false => {
                 let integrator = &self.template.integrator;
-                world.simulate_with(integrator, &states, self.time_steps, |_, _| ())
+                world.simulate_with(integrator, &state, self.time_steps)
             }
         };
-        Ok(coordinates_of(&end?.states).collect())
+        Ok(coordinates_of(end?.states.rows()).collect())
     }
 }

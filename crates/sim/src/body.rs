@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3
 use prehend_autodiff::Scalar;
 use prehend_autodiff::rigid::conjugated;
 
-use crate::state::State;
+use crate::body_state::BodyState;
 use error::{BodyError, check_lengths};
 
 /// Mass, inertia and center of mass of a rigid body.
@@ -166,7 +166,7 @@ impl<S: Scalar> RigidBody<S> {
     #[inline]
     pub(crate) fn apply_impulse(
         &self,
-        state: &State<S>,
+        state: &BodyState<S>,
         wrench: &Vector6<S>,
         gravity: &Vector3<S>,
         dt: S,
@@ -199,8 +199,8 @@ impl<S: Scalar> RigidBody<S> {
     }
 
     /// The body at rest with its model frame at `t_world_model`. Derivatives by the center of mass are in the state, too.
-    pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> State<S> {
-        State::at_rest(self.com_pose(t_world_model))
+    pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> BodyState<S> {
+        BodyState::at_rest(self.com_pose(t_world_model))
     }
 }
 

@@ -8,9 +8,9 @@ use std::fmt;
 
 use prehend_autodiff::Scalar;
 
-use crate::error::SimulationError;
+use crate::body_state::Rows;
+use crate::error::Result;
 use crate::handle::BodyId;
-use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use energy::EnergyBalance;
@@ -77,7 +77,7 @@ pub(crate) struct Diagnostics<'a, S: Scalar> {
 
 impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not.
-    pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
+    pub(crate) fn new(world: &'a World<S>, initial: &Rows<S>, controls_error: bool) -> Self {
         let roughness = (!controls_error).then(|| StepResolution::new(world, initial));
         let tunneling = (!controls_error).then(|| Tunneling::new(world, initial));
         let energy = EnergyBalance::new(world, initial, controls_error);
@@ -88,7 +88,7 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     ///
     /// # Errors
     /// If contacts have made energy.
-    pub(crate) fn step(&mut self, step: Step, states: &[State<S>]) -> Result<(), SimulationError> {
+    pub(crate) fn step(&mut self, step: Step, states: &Rows<S>) -> Result<()> {
         if let Some(roughness) = &mut self.roughness {
             roughness.step(step, states);
         }
@@ -105,8 +105,8 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     pub(crate) fn finish(
         mut self,
         TimeSteps { dt, steps }: TimeSteps,
-        states: &[State<S>],
-    ) -> Result<Resolution, SimulationError> {
+        states: &Rows<S>,
+    ) -> Result<Resolution> {
         let time = dt * steps as f64;
         self.energy.check(self.world, time, states)?;
         let roughness = self.roughness.as_ref().map(StepResolution::mean);

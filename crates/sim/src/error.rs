@@ -8,6 +8,9 @@ use crate::contact::error::LawError;
 use crate::handle::BodyId;
 use crate::shape::error::ShapeError;
 
+/// Result of what simulates.
+pub type Result<T, E = SimulationError> = std::result::Result<T, E>;
+
 /// Error of building or changing a world.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum BuildError {
@@ -49,6 +52,12 @@ pub enum BuildError {
     /// A body that is no link has no joint.
     #[error("body '{body}' is no link of an articulation")]
     NotALink {
+        /// Its name.
+        body: String,
+    },
+    /// A link is where its joints put it.
+    #[error("body '{body}' is a link, which its joints put where it is: use set_joint")]
+    IsALink {
         /// Its name.
         body: String,
     },
@@ -103,7 +112,7 @@ pub enum BuildError {
         /// Cause.
         error: ShapeError,
     },
-    /// A robot, its shape and the trajectory of its joints do not belong together.
+    /// A robot and its shape do not belong together.
     #[error("{found} {what} for a robot that has {expected}")]
     Robot {
         /// Name of what was counted.

@@ -10,7 +10,7 @@
 //!
 //! use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! use prehend_sim::fields::HalfSpace;
-//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World};
+//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, Surface, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // 200 g; inertia in kg m², center of mass in m.
@@ -32,20 +32,20 @@
 //! let bodies = ContactBodies { samples: stool, field: floor };
 //! world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
 //!
-//! let t_world_stool = Isometry3::translation(0.0, 0.0, 0.02);
-//! let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&t_world_stool)];
+//! let mut start = world.neutral_state();
+//! world.set_pose(&mut start, stool, &Isometry3::translation(0.0, 0.0, 0.02))?;
 //! start[stool].linear.x = 0.3;
 //! let end = world.simulate(&start, 0.2)?;
 //! // It slid to a halt: v²/2μg.
-//! let slid = rigid.model_pose(&end[stool].pose).translation.x;
+//! let slid = world.pose(&end, stool).translation.x;
 //! assert!((slid - 0.3 * 0.3 / (2.0 * 0.5 * 9.81)).abs() < 3e-4, "{slid}");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, for renderers. For fixed and kinematic bodies the two are the same; a link's state is
-//! the pose of its frame.
+//! The pose in a state is that of the center of mass: [`World::set_pose`] sets it from the pose of the body's frame, and
+//! [`World::pose`] goes back, for renderers. For fixed and kinematic bodies the two are the same; a link's state is
+//! the pose of its frame. A simulation begins at the [time](crate::State::time) of its state.
 //!
 //! Return `anyhow::Result` from `main`: it prints messages of errors, `Box<dyn Error>` only their fields.
 //!
@@ -69,11 +69,11 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
 //! let table = world.add(Body::kinematic("table", |time: f64| {
-//!     let mut state = State::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
+//!     let mut state = BodyState::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
 //!     state.linear.x = 0.1; // What touches it feels this velocity.
 //!     state
 //! }));
-//! let start = [State::at_rest(Isometry3::identity())];
+//! let start = world.neutral_state();
 //! let end = world.simulate(&start, 0.5)?;
 //! assert!((end[table].pose.translation.x - 0.05).abs() < 1e-12);
 //!
@@ -81,11 +81,11 @@
 //! let speed = Fwd::<1>::variable(0.1, 0);
 //! let mut lifted = world.cast();
 //! lifted.bodies[table].motion = Motion::Kinematic(Arc::new(move |time: f64| {
-//!     let mut state = State::at_rest(Isometry3::identity());
+//!     let mut state = BodyState::at_rest(Isometry3::identity());
 //!     (state.pose.translation.x, state.linear.x) = (speed.times(time), speed);
 //!     state
 //! }));
-//! let end = lifted.simulate(&start.map(|state| state.cast()), 0.5)?;
+//! let end = lifted.simulate(&start.cast(), 0.5)?;
 //! assert!((end[table].pose.translation.x.derivative[0] - 0.5).abs() < 1e-12);
 //! # Ok(())
 //! # }
@@ -126,8 +126,9 @@
 //! world.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
 //! world.add_symmetric_contact(upper, lower, law, smoothing)?;
 //!
-//! let at_height = |z| rigid.at_rest(&Isometry3::translation(0.0, 0.0, z));
-//! let start = [State::at_rest(Isometry3::identity()), at_height(half), at_height(3.0 * half)];
+//! let mut start = world.neutral_state();
+//! start[lower].pose.translation.z = half;
+//! start[upper].pose.translation.z = 3.0 * half;
 //! let run = world.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
 //! let place = |second: usize| run[second][upper].pose.translation.x;
 //! assert!((place(3) - place(1)).abs() < 1e-7);
@@ -161,9 +162,10 @@
 //! let law = Law::new(spring, friction)?;
 //! world.add_symmetric_contact(lower, upper, Arc::new(law), GapSmoothing::Hard)?;
 //! let turned = Isometry3::new(Vector3::new(0.0, 0.0, -1e-3), Vector3::x() * std::f64::consts::PI);
-//! let states = [Isometry3::identity(), turned].map(|pose| rigid.at_rest(&pose));
+//! let mut state = world.neutral_state();
+//! world.set_pose(&mut state, upper, &turned)?;
 //! // 1e7 N/m³ · 1 mm · 1 cm², half of it each way.
-//! assert!((world.wrenches(&states, 0)[upper].z - 1.0).abs() < 1e-9);
+//! assert!((world.wrenches(&state, 0)[upper].z - 1.0).abs() < 1e-9);
 //! # Ok(())
 //! # }
 //! ```
@@ -198,13 +200,13 @@
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! # let bodies = ContactBodies { samples: stool, field: floor };
 //! # world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
-//! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.021));
-//! # let start = [State::at_rest(Isometry3::identity()), above];
+//! # let mut start = world.neutral_state();
+//! # start[stool].pose.translation.z = 0.021;
 //! let right = world.simulate(&start, 0.5)?;
 //! let time_steps = TimeSteps { dt: 1e-2, steps: 50 };
 //! let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: 256 };
-//! let coarse = world.simulate_with(&BackwardEuler, &start, time_steps, |_, _| ())?;
-//! let finer = world.simulate_with(&divided, &start, time_steps, |_, _| ())?;
+//! let coarse = world.simulate_with(&BackwardEuler, &start, time_steps)?;
+//! let finer = world.simulate_with(&divided, &start, time_steps)?;
 //! for end in [&coarse.states, &finer.states] {
 //!     assert!((end[stool].pose.translation.z - right[stool].pose.translation.z).abs() < 1e-4);
 //! }
@@ -244,16 +246,15 @@
 //! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 1e-4)?;
 //! # let puck = world.add(Body::dynamic("puck", rigid).with_surface(surface));
-//! # let below = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
-//! # let mut start = vec![State::at_rest(Isometry3::identity()), below];
+//! # let mut start = world.neutral_state();
+//! # start[puck].pose.translation.z = -1e-3;
 //! # start[puck].linear.x = 0.3;
 //!
 //! let bodies = ContactBodies { samples: puck, field: floor };
 //! world.add_contact(bodies, Arc::new(Wet([1.962e10, 0.5])), GapSmoothing::Hard)?;
 //! let mut lifted = world.cast::<Fwd<1>>();
 //! lifted.contacts[0].params_mut()[1].derivative = [1.0]; // Of the only contact.
-//! let start: Vec<_> = start.iter().map(State::cast).collect();
-//! let end = lifted.simulate(&start, 0.2)?;
+//! let end = lifted.simulate(&start.cast(), 0.2)?;
 //! // v = v₀ exp(−c g t), by c:
 //! let speed = end[puck].linear.x;
 //! assert!((speed.derivative[0] / (-9.81 * 0.2 * speed.value) - 1.0).abs() < 1e-4);
@@ -280,11 +281,11 @@
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let ball = world.add(Body::dynamic("ball", rigid));
 //! # world.bodies[ball].external_wrench.z = 1.0;
-//! # let start = [rigid.at_rest(&Isometry3::identity())];
+//! # let start = world.neutral_state();
 //! // Height after a while, by the speed at the start and the mass.
 //! fn height<S: Scalar>(
 //!     world: &World,
-//!     start: &[State],
+//!     start: &State,
 //!     [speed, mass]: [S; 2],
 //! ) -> Result<S, SimulationError> {
 //!     let mut world = world.cast::<S>();
@@ -292,7 +293,7 @@
 //!         *body = RigidBody::new(mass, *body.inertia(), *body.com())
 //!             .map_err(|error| BuildError::Body { body: "ball".to_owned(), error })?;
 //!     }
-//!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
+//!     let mut start: State<S> = start.cast();
 //!     start[0].linear.z = speed;
 //!     Ok(world.simulate(&start, 0.1)?[0].pose.translation.z)
 //! }
@@ -341,18 +342,18 @@
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
 //! let contact = world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
-//! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
-//! # let start = [State::at_rest(Isometry3::identity()), stands];
+//! # let mut start = world.neutral_state();
+//! # start[block].pose.translation.z = 0.02;
 //! // Where a block is every 20 ms, by its friction and its speed at the start.
 //! fn places<S: Scalar>(
 //!     world: &World,
-//!     start: &[State],
+//!     start: &State,
 //!     (block, contact): (BodyId, ContactId),
 //!     [friction, speed]: [S; 2],
 //! ) -> Result<Vec<S>, SimulationError> {
 //!     let mut world = world.cast::<S>();
 //!     world.set_contact_param(contact, "friction", friction)?;
-//!     let mut start: Vec<State<S>> = start.iter().map(State::cast).collect();
+//!     let mut start: State<S> = start.cast();
 //!     start[block].linear.x = speed;
 //!     let run = world.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
 //!     Ok(run.iter().map(|states| states[block].pose.translation.x).collect())
@@ -388,16 +389,17 @@
 //! # let ball = world.add(Body::dynamic("ball", rigid));
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
-//! let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).cast()];
+//! let mut start = world.neutral_state();
+//! start[ball].pose.translation.x = 1.0;
 //! let mut loss = Var::from(0.0);
-//! let control = |step: Step, world: &mut World<Var>, states: &mut [State<Var>]| {
+//! let control = |step: Step, world: &mut World<Var>, state: &mut State<Var>| {
 //!     if step.start >= 0.1 {
-//!         world.bodies[ball].external_wrench.x = -gain * states[ball].pose.translation.x;
+//!         world.bodies[ball].external_wrench.x = -gain * state[ball].pose.translation.x;
 //!     }
-//!     loss += states[ball].pose.translation.vector.norm_squared();
+//!     loss += state[ball].pose.translation.vector.norm_squared();
 //! };
 //! let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
-//! world.cast().simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+//! world.cast().simulate_controlled(&Adaptive::default(), &start.cast(), time_steps, control)?;
 //! // A stiffer spring brings it back sooner.
 //! assert!(recording.gradient(loss).wrt(gain) < 0.0);
 //! # Ok(())
@@ -425,9 +427,9 @@
 //!
 //! let smoothing = GapSmoothing::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
 //! world.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
-//! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 1e-3));
-//! # let states = [State::at_rest(Isometry3::identity()), above];
-//! let mut lifted: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
+//! # let mut state = world.neutral_state();
+//! # state[stool].pose.translation.z = 1e-3;
+//! let mut lifted: State<Fwd<1>> = state.cast();
 //! lifted[stool].pose.translation.z.derivative = [1.0];
 //! let force = world.cast().wrenches(&lifted, 0)[stool].z;
 //! assert!(force.value == 0.0 && force.derivative[0] < 0.0);

@@ -7,11 +7,11 @@ use std::ops::{Index, IndexMut};
 ///
 /// ```
 /// use nalgebra::{Isometry3, Vector3};
-/// use prehend_sim::{Body, State, World};
+/// use prehend_sim::{Body, BodyState, World};
 ///
 /// let mut world = World::new(Vector3::zeros());
 /// let belt = world.add(Body::fixed("belt"));
-/// let mut states = [State::at_rest(Isometry3::identity())];
+/// let mut states = [BodyState::at_rest(Isometry3::identity())];
 /// states[belt].linear.x = 0.1;
 /// assert_eq!(world.bodies[belt].name, "belt");
 /// ```

@@ -10,7 +10,7 @@ pub(crate) mod world_template;
 
 use prehend_autodiff::Scalar;
 
-use crate::error::SimulationError;
+use crate::error::Result;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
@@ -29,29 +29,24 @@ use crate::world::World;
 ///     fn step<S: Scalar>(
 ///         &self,
 ///         _: &World<S>,
-///         states: &[State<S>],
+///         state: &State<S>,
 ///         step: Step,
-///     ) -> Result<Vec<State<S>>, SimulationError> {
-///         let mut next = states.to_vec();
-///         for state in &mut next {
-///             state.pose.translation.vector += state.linear * S::constant(step.dt);
+///     ) -> Result<State<S>, SimulationError> {
+///         let mut next = state.clone();
+///         for body in next.bodies_mut() {
+///             body.pose.translation.vector += body.linear * S::constant(step.dt);
 ///         }
 ///         Ok(next)
 ///     }
 /// }
 /// ```
 pub trait Integrator: Sync {
-    /// The states of all bodies one time step later. Bodies that forces do not move are left to
+    /// State one time step later. Its time and the bodies that forces do not move are left to
     /// [`World::update_kinematics`], which follows every step.
     ///
     /// # Errors
     /// If the scheme solves equations and they were not solved.
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError>;
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>>;
 
     /// The largest dt·max(ω, c) at which linear contacts of angular frequency ω and damping rate c
     /// ([`World::contact_frequency`]) are stable, whatever the smaller of the two; infinite for a scheme that is stable always.
@@ -76,7 +71,7 @@ pub trait Integrator: Sync {
     ///
     /// # Errors
     /// If they are not.
-    fn check_differentiable<S: Scalar>(&self, _world: &World<S>) -> Result<(), SimulationError> {
+    fn check_differentiable<S: Scalar>(&self, _world: &World<S>) -> Result<()> {
         Ok(())
     }
 
@@ -93,13 +88,8 @@ mod tests {
     struct Still;
 
     impl Integrator for Still {
-        fn step<S: Scalar>(
-            &self,
-            _: &World<S>,
-            states: &[State<S>],
-            _: Step,
-        ) -> Result<Vec<State<S>>, SimulationError> {
-            Ok(states.to_vec())
+        fn step<S: Scalar>(&self, _: &World<S>, state: &State<S>, _: Step) -> Result<State<S>> {
+            Ok(state.clone())
         }
     }
 

@@ -19,6 +19,7 @@
 pub mod articulated;
 mod batch;
 mod body;
+mod body_state;
 pub mod contact;
 mod diagnostics;
 mod error;
@@ -50,12 +51,13 @@ pub use articulated::JointState;
 pub use batch::Batch;
 pub use body::RigidBody;
 pub use body::error::BodyError;
+pub use body_state::BodyState;
 pub use contact::{
     BristleFriction, ContactCalibration, ContactForce, ContactKinematics, ContactLaw, Coulomb,
     DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
 };
 pub use diagnostics::Resolution;
-pub use error::{BuildError, SimulationError};
+pub use error::{BuildError, Result, SimulationError};
 pub use handle::{BodyId, BushingId, ContactId, JointForceId};
 pub use integrator::Integrator;
 pub use integrator::adaptive::Adaptive;

@@ -1,6 +1,7 @@
 //! A step and its Jacobian, in closed form.
 
 mod by_forward_mode;
+mod displacement;
 mod generalized;
 mod joint_advance;
 mod motions;
@@ -10,7 +11,8 @@ use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::articulated::Joint;
-use crate::error::SimulationError;
+use crate::body_state::Rows;
+use crate::error::Result;
 #[cfg(doc)]
 use crate::integrator::semi_implicit::SemiImplicitEuler;
 use crate::integrator::semi_implicit::{advance, moved};
@@ -24,12 +26,13 @@ use joint_advance::JointAdvance;
 /// A step with derivatives by everything that moves: the linear system that trajectory optimization and control want.
 ///
 /// With N degrees of freedom, rows and columns are displacements, then velocities. Of each free body displacements are
-/// six, a twist about its center of mass along the world's axes, as in [`State::tangent`]; of each joint they are as many as it has
-/// velocities, and along these. Free bodies come first, then articulations, both in their order in the world.
+/// six, a twist about its center of mass along the world's axes, as in [`BodyState::tangent`](crate::BodyState::tangent); of each joint they are as many as it has
+/// velocities, and along these. Free bodies come first, then articulations, both in their order in the world. [`World::displaced`] and
+/// [`World::displacement`] apply and find such displacements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearizedStep {
-    /// The states after the step.
-    pub states: Vec<State>,
+    /// State after the step.
+    pub state: State,
     /// Derivatives by the states before it, 2N × 2N.
     pub by_state: DMatrix<f64>,
     /// Derivatives by constant forces during it, 2N × N: wrenches on free bodies \[N, N m\], efforts of joints \[N m or N\].
@@ -44,46 +47,39 @@ impl World {
     ///
     /// # Errors
     /// As [`World::step`].
-    pub fn linearize_step(
-        &self,
-        states: &[State],
-        step: Step,
-    ) -> Result<LinearizedStep, SimulationError> {
-        let mut states = self.with_deflections(states);
+    pub fn linearize_step(&self, state: &State, step: Step) -> Result<LinearizedStep> {
+        let mut states = self.with_deflections(state.rows());
         self.check(&states, step)?;
         if !self.contact_groups.is_empty() {
             self.forward_kinematics(&mut states);
         }
         let near = self.with_candidates(&states, step);
         if !near.has_closed_form() {
-            return near.linearize_step_by_forward_mode(&states, step);
+            return near.linearize_step_by_forward_mode(&state.with(states, step.start), step);
         }
         let forces = Generalized::new(&near, &mut states, step.index);
-        let next = moved(&near, &states, &forces.wrenches, step.dt);
-        let next = near.finish_step(&states, next, step.end())?;
+        let mut next = moved(&near, &states, &forces.wrenches, step.dt);
+        near.finish_step(&states, &mut next, step.end())?;
         let n = forces.count;
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
         near.bodies_after(&states, &forces, step.dt, &mut by_state, &mut by_force);
         near.joints_after(&next, &forces, step.dt, &mut by_state, &mut by_force);
-        near.finite(LinearizedStep { states: next, by_state, by_force }, step)
+        let state = state.with(next, step.end());
+        near.finite(LinearizedStep { state, by_state, by_force }, step)
     }
 
     /// `result`, unless its derivatives overflow.
-    fn finite(
-        &self,
-        result: LinearizedStep,
-        step: Step,
-    ) -> Result<LinearizedStep, SimulationError> {
+    fn finite(&self, result: LinearizedStep, step: Step) -> Result<LinearizedStep> {
         match result.by_state.iter().chain(result.by_force.iter()).all(|x| x.is_finite()) {
             true => Ok(result),
-            false => Err(self.blown_up(&result.states, step.end())),
+            false => Err(self.blown_up(result.state.rows(), step.end())),
         }
     }
 
     /// The rows of free bodies.
     fn bodies_after(
         &self,
-        states: &[State],
+        states: &Rows,
         forces: &Generalized,
         dt: f64,
         by_state: &mut DMatrix<f64>,
@@ -120,7 +116,7 @@ impl World {
     /// The rows of joints, whose states are `next` after the step.
     fn joints_after(
         &self,
-        next: &[State],
+        next: &Rows,
         forces: &Generalized,
         dt: f64,
         by_state: &mut DMatrix<f64>,

@@ -12,8 +12,9 @@ pub use crate::joint_law::{
 };
 pub use crate::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
 pub use crate::{
-    Adaptive, BackwardEuler, Batch, Body, BodyId, BuildError, Bushing, BushingId, BushingStiffness,
-    ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Material, Motion, RigidBody,
-    RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, ShapeOptions,
-    SimulationError, State, Step, StepCheckpointed, SubStepped, Surface, TimeSteps, World,
+    Adaptive, BackwardEuler, Batch, Body, BodyId, BodyState, BuildError, Bushing, BushingId,
+    BushingStiffness, ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Material,
+    Motion, RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape,
+    ShapeOptions, SimulationError, State, Step, StepCheckpointed, SubStepped, Surface, TimeSteps,
+    World,
 };

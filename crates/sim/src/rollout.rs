@@ -5,8 +5,9 @@ use std::ops::ControlFlow;
 use prehend_autodiff::Scalar;
 use thiserror::Error;
 
+use crate::body_state::{BodyState, Rows};
 use crate::diagnostics::{Diagnostics, Resolution};
-use crate::error::SimulationError;
+use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
 use crate::state::State;
@@ -19,7 +20,7 @@ use crate::world::sample_culling::SampleCulling;
 /// Result of a simulation with an integrator of one's own choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation<T> {
-    /// The states: those at the end, or of every step.
+    /// State at the end, or those of every step.
     pub states: T,
     /// Report on whether the steps were short enough.
     pub resolution: Resolution,
@@ -31,23 +32,23 @@ pub trait ControlResult {
     ///
     /// # Errors
     /// If the controller failed.
-    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError>;
+    fn into_flow(self) -> Result<ControlFlow<()>>;
 }
 
 impl ControlResult for () {
-    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+    fn into_flow(self) -> Result<ControlFlow<()>> {
         Ok(ControlFlow::Continue(()))
     }
 }
 
 impl ControlResult for ControlFlow<()> {
-    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+    fn into_flow(self) -> Result<ControlFlow<()>> {
         Ok(self)
     }
 }
 
 impl<C: ControlResult, E: Into<SimulationError>> ControlResult for Result<C, E> {
-    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+    fn into_flow(self) -> Result<ControlFlow<()>> {
         self.map_err(Into::into)?.into_flow()
     }
 }
@@ -63,117 +64,106 @@ pub struct StepError {
 }
 
 impl World {
-    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`: dt·ω ≤
+    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `state`: dt·ω ≤
     /// [`Integrator::stability_limit`] for their [`World::contact_frequency`] ω. Impacts to come are not among them.
     ///
     /// # Errors
     /// With the longest step that passes.
     ///
     /// # Panics
-    /// If there are fewer states than bodies.
+    /// If it is no state of this world.
     pub fn check_time_step(
         &self,
         integrator: &impl Integrator,
-        states: &[State],
+        state: &State,
         dt: f64,
     ) -> Result<(), StepError> {
-        let limit = integrator.stability_limit() / self.contact_frequency(states);
+        let limit = integrator.stability_limit() / self.contact_frequency(state);
         if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
     }
 }
 
 impl<S: Scalar> World<S> {
-    /// The states of all bodies after `time` \[s\], from `initial`; kinematic bodies start where their trajectory does.
-    ///
-    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts with bristles
-    /// ([`Bristles`](crate::contact::Bristles)), if there are such. What goes on
-    /// from there remembers them; with the states of the bodies alone it starts without deflection.
+    /// State `time` \[s\] later. Kinematic bodies start where their trajectory is at the time of `initial`.
     ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
     /// [`Fwd`](prehend_autodiff::Fwd) it carries sensitivities to few inputs, over [`Var`](prehend_autodiff::Var) it records
     /// what the adjoint needs.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time is positive; if the velocity of a trajectory is not the rate of
+    /// Unless the state is one of this world and finite, and the time is positive; if the velocity of a trajectory is not the rate of
     /// its pose; where forces jump or grow so that no step is short enough, a state stops being finite or contacts make energy
     /// (see [`World::simulate_with`]), which body, contact and time.
-    pub fn simulate(
-        &self,
-        initial: &[State<S>],
-        time: f64,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    pub fn simulate(&self, initial: &State<S>, time: f64) -> Result<State<S>> {
         let once = TimeSteps { dt: time, steps: 1 };
-        Ok(self.simulate_with(&Adaptive::default(), initial, once, |_, _| ())?.states)
+        Ok(self.simulate_with(&Adaptive::default(), initial, once)?.states)
     }
 
-    /// The states of all bodies at 0, dt, …, `steps`·dt, as [`World::simulate`] finds them.
+    /// States at the time of `initial` and after each step, as [`World::simulate`] finds them.
     ///
     /// # Errors
     /// See [`World::simulate`].
-    pub fn rollout(
-        &self,
-        initial: &[State<S>],
-        time_steps: TimeSteps,
-    ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+    pub fn rollout(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<Vec<State<S>>> {
         Ok(self.rollout_with(&Adaptive::default(), initial, time_steps)?.states)
     }
 
-    /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
-    /// motion.
+    /// [`World::simulate`] with the steps of `integrator`, and a report on how well they resolve the motion.
     ///
     /// Contacts that make energy are an error unless a body is kinematic, or fixed and moving: such a body may bring energy
     /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time step is positive; if the velocity of a trajectory is not the
+    /// Unless the state is one of this world and finite, and the time step is positive; if the velocity of a trajectory is not the
     /// rate of its pose; where a state stops being finite or contacts make energy, which body, contact and time; if a step's equations were not solved.
     pub fn simulate_with(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        initial: &State<S>,
         time_steps: TimeSteps,
-        visit: impl FnMut(Step, &[State<S>]),
-    ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        self.run_checked(integrator, self.initialize(initial, time_steps)?, time_steps, visit)
+    ) -> Result<Simulation<State<S>>> {
+        self.run(integrator, self.initialize(initial, time_steps)?, time_steps, |_| ())
     }
 
-    /// [`World::simulate_with`] of what has begun.
-    pub(crate) fn run_checked(
+    /// [`World::simulate_with`] of what has begun, each step of which is handed to `visit`.
+    pub(crate) fn run(
         &self,
         integrator: &impl Integrator,
-        initial: Vec<State<S>>,
+        mut state: State<S>,
         time_steps: TimeSteps,
-        mut visit: impl FnMut(Step, &[State<S>]),
-    ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        let mut diagnostics = Diagnostics::new(self, &initial, integrator.controls_error());
-        let states = self.run_steps(integrator, initial, time_steps, |step, states| {
-            visit(step, states);
-            diagnostics.step(step, states)
-        })?;
-        let resolution = diagnostics.finish(time_steps, &states)?;
-        Ok(Simulation { states, resolution })
+        mut visit: impl FnMut(&State<S>),
+    ) -> Result<Simulation<State<S>>> {
+        let mut diagnostics = Diagnostics::new(self, state.rows(), integrator.controls_error());
+        let mut near = SampleCulling::new(self);
+        let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
+        for step in time_steps.after(state.time) {
+            let world = if once { near.world(self, state.rows(), step.dt) } else { self };
+            state = world.advance(integrator, &state, step)?;
+            visit(&state);
+            diagnostics.step(step, state.rows())?;
+        }
+        let resolution = diagnostics.finish(time_steps, state.rows())?;
+        Ok(Simulation { states: state, resolution })
     }
 
-    /// The states of [`World::simulate_with`] at 0, dt, …, `steps`·dt.
+    /// States of [`World::simulate_with`] at the start and after each step.
     ///
     /// # Errors
     /// See [`World::simulate_with`].
     pub fn rollout_with(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        initial: &State<S>,
         time_steps: TimeSteps,
-    ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
+    ) -> Result<Simulation<Vec<State<S>>>> {
         let initial = self.initialize(initial, time_steps)?;
         let mut states = room_for(time_steps.steps)?;
         states.push(initial.clone());
-        let keep = |_, next: &[State<S>]| states.push(next.to_vec());
-        let Simulation { resolution, .. } =
-            self.run_checked(integrator, initial, time_steps, keep)?;
+        let keep = |next: &State<S>| states.push(next.clone());
+        let resolution = self.run(integrator, initial, time_steps, keep)?.resolution;
         Ok(Simulation { states, resolution })
     }
 
-    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
+    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the state and may set external
     /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of fixed bodies, for
     /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
     /// either, whose error ends it, too.
@@ -190,14 +180,15 @@ impl<S: Scalar> World<S> {
     /// # let mut world = World::new(Vector3::zeros());
     /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
     /// # let ball = world.add(Body::dynamic("ball", rigid));
-    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).cast()];
+    /// # let mut start = world.neutral_state();
+    /// # start[ball].pose.translation.x = 1.0;
     /// // A spring of 2 N/m pulls the ball back; how far, by its stiffness?
     /// let stiffness = Fwd::<1>::variable(2.0, 0);
     /// let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
-    /// let control = |_, world: &mut World<_>, states: &mut [State<_>]| {
-    ///     world.bodies[ball].external_wrench.x = -stiffness * states[ball].pose.translation.x;
+    /// let control = |_, world: &mut World<_>, state: &mut State<_>| {
+    ///     world.bodies[ball].external_wrench.x = -stiffness * state[ball].pose.translation.x;
     /// };
-    /// let lifted = world.cast();
+    /// let (lifted, start) = (world.cast(), start.cast());
     /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
     /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
     /// # Ok(())
@@ -209,26 +200,26 @@ impl<S: Scalar> World<S> {
     pub fn simulate_controlled<R: ControlResult>(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        initial: &State<S>,
         time_steps: TimeSteps,
-        control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+        control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
+    ) -> Result<State<S>> {
         self.controlled(integrator, initial, time_steps, control, |_| ())
     }
 
-    /// The states of [`World::simulate_controlled`] at 0, dt, …, `steps`·dt, or until `control` ends it.
+    /// States of [`World::simulate_controlled`] at the start and after each step, or until `control` ends it.
     ///
     /// # Errors
     /// See there.
     pub fn rollout_controlled<R: ControlResult>(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        initial: &State<S>,
         time_steps: TimeSteps,
-        control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
-    ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+        control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
+    ) -> Result<Vec<State<S>>> {
         let mut run = room_for(time_steps.steps)?;
-        let keep = |states: &[State<S>]| run.push(states.to_vec());
+        let keep = |state: &State<S>| run.push(state.clone());
         let end = self.controlled(integrator, initial, time_steps, control, keep)?;
         run.push(end);
         Ok(run)
@@ -237,85 +228,61 @@ impl<S: Scalar> World<S> {
     fn controlled<R: ControlResult>(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        initial: &State<S>,
         time_steps: TimeSteps,
-        mut control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
-        mut visit: impl FnMut(&[State<S>]),
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let (mut states, mut world) = (self.initialize(initial, time_steps)?, self.clone());
-        let TimeSteps { dt, steps } = time_steps;
-        for index in 0..steps {
-            let step = Step::new(index, dt);
-            if control(step, &mut world, &mut states).into_flow()?.is_break() {
+        mut control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
+        mut visit: impl FnMut(&State<S>),
+    ) -> Result<State<S>> {
+        let (mut state, mut world) = (self.initialize(initial, time_steps)?, self.clone());
+        for step in time_steps.after(state.time) {
+            if control(step, &mut world, &mut state).into_flow()?.is_break() {
                 break;
             }
-            visit(&states);
-            world.check(&states, step)?;
-            states = world.advance(integrator, &states, step)?;
+            visit(&state);
+            world.check(state.rows(), step)?;
+            state = world.advance(integrator, &state, step)?;
         }
-        Ok(states)
+        Ok(state)
     }
 
-    /// [`World::simulate_with`] of what has begun, without the report; an error of `visit` ends it.
-    pub(crate) fn run_steps(
-        &self,
-        integrator: &impl Integrator,
-        mut states: Vec<State<S>>,
-        TimeSteps { dt, steps }: TimeSteps,
-        mut visit: impl FnMut(Step, &[State<S>]) -> Result<(), SimulationError>,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut near = SampleCulling::new(self);
-        for index in 0..steps {
-            let step = Step::new(index, dt);
-            let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
-            let world = if once { near.world(self, &states, dt) } else { self };
-            states = world.advance(integrator, &states, step)?;
-            visit(step, &states)?;
-        }
-        Ok(states)
-    }
-
-    /// One step: the integrator's, then that of kinematic bodies.
+    /// State at the end of a step: the integrator's, then that of kinematic bodies.
     ///
     /// # Errors
     /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
     pub fn step(
         &self,
         integrator: &impl Integrator,
-        states: &[State<S>],
+        state: &State<S>,
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut states = self.with_deflections(states);
-        self.check(&states, step)?;
-        self.forward_kinematics(&mut states);
-        self.advance(integrator, &states, step)
+    ) -> Result<State<S>> {
+        let mut rows = self.with_deflections(state.rows());
+        self.check(&rows, step)?;
+        self.forward_kinematics(&mut rows);
+        self.advance(integrator, &state.with(rows, step.start), step)
     }
 
     /// [`World::step`] of what has been checked.
     pub(crate) fn advance(
         &self,
         integrator: &impl Integrator,
-        states: &[State<S>],
+        state: &State<S>,
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let next = self.integrate(integrator, states, step)?;
-        self.finish_step(states, next, step.end())
+    ) -> Result<State<S>> {
+        let mut next = self.integrate(integrator, state, step)?;
+        next.time = step.end();
+        self.finish_step(state.rows(), next.rows_mut(), step.end())?;
+        Ok(next)
     }
 
-    /// `next` at `time` \[s\], with kinematic bodies and links where they are then, after a step from `states`.
+    /// Puts kinematic bodies and links among the rows `next` where they are at `time` \[s\], after a step from `rows`.
     ///
     /// # Errors
     /// If one is not finite.
-    pub(crate) fn finish_step(
-        &self,
-        states: &[State<S>],
-        mut next: Vec<State<S>>,
-        time: f64,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        self.update_kinematics(&mut next, time);
-        match next.iter().all(State::is_finite) {
-            true => Ok(next),
-            false => Err(self.not_finite(states, &next, time)),
+    pub(crate) fn finish_step(&self, rows: &Rows<S>, next: &mut Rows<S>, time: f64) -> Result<()> {
+        self.place_bodies(next, time);
+        match next.iter().all(BodyState::is_finite) {
+            true => Ok(()),
+            false => Err(self.not_finite(rows, next, time)),
         }
     }
 
@@ -323,53 +290,50 @@ impl<S: Scalar> World<S> {
     pub(crate) fn integrate(
         &self,
         integrator: &impl Integrator,
-        states: &[State<S>],
+        state: &State<S>,
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    ) -> Result<State<S>> {
         if self.contact_groups.is_empty() || integrator.finds_contacts() {
-            return integrator.step(self, states, step);
+            return integrator.step(self, state, step);
         }
-        let near = self.with_candidates(states, step);
-        integrator.step(&near, states, step)
+        let near = self.with_candidates(state.rows(), step);
+        integrator.step(&near, state, step)
     }
 
-    /// The states from which a rollout begins: `initial` with kinematic bodies where their trajectories start.
+    /// State from which a rollout begins: `initial` with kinematic bodies where their trajectories are at its time.
     ///
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
-    pub(crate) fn initialize(
-        &self,
-        initial: &[State<S>],
-        TimeSteps { dt, steps }: TimeSteps,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut states = self.with_deflections(initial);
-        self.check(&states, Step::new(0, dt))?;
-        self.check_velocities(dt * steps as f64)?;
-        self.update_kinematics(&mut states, 0.0);
-        Ok(states)
+    pub(crate) fn initialize(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<State<S>> {
+        let mut rows = self.with_deflections(initial.rows());
+        let first = Step { index: 0, start: initial.time, dt: time_steps.dt };
+        self.check(&rows, first)?;
+        self.check_velocities([initial.time, time_steps.end(initial.time)])?;
+        self.place_bodies(&mut rows, initial.time);
+        Ok(initial.with(rows, initial.time))
     }
 
     /// Checks that a rollout may begin.
-    pub(crate) fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
+    pub(crate) fn check(&self, rows: &Rows<S>, step: Step) -> Result<()> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
         }
-        if states.len() != self.state_count() {
-            return Err(self.wrong_count(states.len()));
+        if rows.len() != self.state_count() {
+            return Err(self.wrong_count(rows.len()));
         }
         self.contact_materials().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
         self.bushings.iter().try_for_each(Bushing::check)?;
-        match states.iter().all(State::is_finite) {
+        match rows.iter().all(BodyState::is_finite) {
             true => Ok(()),
-            false => Err(self.not_finite(states, states, start)),
+            false => Err(self.not_finite(rows, rows, start)),
         }
     }
 }
 
 /// An empty list with room for what is at the start and after each of `steps`.
-fn room_for<T>(steps: usize) -> Result<Vec<T>, SimulationError> {
+fn room_for<T>(steps: usize) -> Result<Vec<T>> {
     let mut list = Vec::new();
     match steps.checked_add(1).map(|count| list.try_reserve_exact(count)) {
         Some(Ok(())) => Ok(list),
@@ -392,11 +356,11 @@ mod tests {
     #[test]
     fn parameters_out_of_range_and_missing_states_are_refused() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        let step = |world: &World, states: &[State], dt| {
+        let step = |world: &World, states: &State, dt| {
             world.step(&SemiImplicitEuler, states, Step::new(0, dt)).map(|_| ()).unwrap_err()
         };
         assert_eq!(
-            step(&world, &states[..1], 1e-3),
+            step(&world, &State::new(&states.bodies()[..1]), 1e-3),
             SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 }
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
@@ -434,7 +398,7 @@ mod tests {
                 );
                 let mut lifted = world.cast::<Fwd<1>>();
                 lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);
-                let states: Vec<_> = states.iter().map(State::cast).collect();
+                let states = states.cast();
                 assert_eq!(lifted.step(&SemiImplicitEuler, &states, step).unwrap_err(), refused);
             }
         }
@@ -443,9 +407,9 @@ mod tests {
     #[test]
     fn driven_bodies_start_on_their_trajectory() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        let rising = |time: f64| State {
+        let rising = |time: f64| BodyState {
             linear: Vector3::z(),
-            ..State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
+            ..BodyState::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
         };
         world.bodies[0].motion = Motion::Kinematic(Arc::new(rising));
         let run = world
@@ -460,7 +424,7 @@ mod tests {
     fn a_controller_ends_a_simulation() {
         let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let time_steps = TimeSteps { dt: 1e-3, steps: 100 };
-        let control = |step: Step, _: &mut World, states: &mut [State]| {
+        let control = |step: Step, _: &mut World, states: &mut State| {
             states[1].linear.x = 0.1;
             match step.index {
                 7 => ControlFlow::Break(()),
@@ -472,7 +436,7 @@ mod tests {
         assert_eq!(run.len(), 8);
         let end = world.simulate_controlled(&SemiImplicitEuler, &states, time_steps, control);
         assert_eq!(&end.unwrap(), run.last().unwrap());
-        let fails = |step: Step, _: &mut World, _: &mut [State]| match step.index {
+        let fails = |step: Step, _: &mut World, _: &mut State| match step.index {
             3 => Err(SimulationError::TimeStep(0.0)),
             _ => Ok(ControlFlow::Continue(())),
         };
@@ -483,11 +447,11 @@ mod tests {
     #[test]
     fn bad_starts_and_blow_ups_say_where() {
         let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        let roll = |states: &[State], dt| {
+        let roll = |states: &State, dt| {
             world.rollout_with(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
-        let error = roll(&states[..1], 1e-3).unwrap_err();
+        let error = roll(&State::new(&states.bodies()[..1]), 1e-3).unwrap_err();
         assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 });
         let mut lost = states.clone();
         lost[1].linear = Vector3::repeat(f64::NAN);

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, STATE, coordinates_of, states_of};
+use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
 use crate::integrator::world_template::WorldTemplate;
-use crate::state::{STATE, State, coordinates_of, states_of};
+use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 
@@ -18,7 +19,7 @@ use crate::world::World;
 ///
 /// A state is a row of 13 numbers: position x, y, z \[m\], unit quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
 /// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts with bristles, as in
-/// [`World::neutral_states`]. The rows of links follow from those of joints.
+/// [`World::neutral_state`]. The rows of links follow from those of joints.
 ///
 /// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
 ///
@@ -88,7 +89,7 @@ impl RolloutFunction {
         time_steps: TimeSteps,
         parameters: &[&str],
         controls: &[&str],
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self> {
         Self::with_integrator(Adaptive::default(), world, time_steps, parameters, controls)
     }
 }
@@ -104,7 +105,7 @@ impl<I: Integrator> RolloutFunction<I> {
         time_steps: TimeSteps,
         parameters: &[&str],
         controls: &[&str],
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self> {
         let names = world.parameter_names();
         let mut left: HashMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
         let mut places = Vec::with_capacity(parameters.len() + controls.len());
@@ -147,10 +148,7 @@ impl<I: Integrator> RolloutFunction<I> {
     /// # Errors
     /// As [`World::simulate_with`], with controls as [`World::simulate_controlled`]; if inputs are too few or too many, a quaternion has not the length 1, or there
     /// is no memory for so many steps.
-    pub fn evaluate<S: Scalar>(
-        &self,
-        inputs: RolloutInputs<'_, S>,
-    ) -> Result<Vec<S>, SimulationError> {
+    pub fn evaluate<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>> {
         let mut run = Vec::new();
         let numbers =
             self.time_steps.steps.checked_add(1).and_then(|n| n.checked_mul(self.width()));
@@ -158,7 +156,7 @@ impl<I: Integrator> RolloutFunction<I> {
         if !reserved {
             return Err(SimulationError::Memory { steps: self.time_steps.steps });
         }
-        self.run_steps(inputs, |states| run.extend(coordinates_of(states)))?;
+        self.run_steps(inputs, |state| run.extend(coordinates_of(state.rows())))?;
         Ok(run)
     }
 
@@ -166,39 +164,37 @@ impl<I: Integrator> RolloutFunction<I> {
     ///
     /// # Errors
     /// See [`RolloutFunction::evaluate`].
-    pub fn end<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>, SimulationError> {
-        Ok(coordinates_of(&self.run_steps(inputs, |_| ())?).collect())
+    pub fn end<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>> {
+        Ok(coordinates_of(self.run_steps(inputs, |_| ())?.rows()).collect())
     }
 
     /// The states at the end; those at the start and after each step go to `visit`.
     fn run_steps<S: Scalar>(
         &self,
         inputs: RolloutInputs<'_, S>,
-        mut visit: impl FnMut(&[State<S>]),
-    ) -> Result<Vec<State<S>>, SimulationError> {
+        mut visit: impl FnMut(&State<S>),
+    ) -> Result<State<S>> {
         self.check(&inputs)?;
         let (integrator, time_steps) = (&self.template.integrator, self.time_steps);
-        let initial: Vec<State<S>> = states_of(inputs.states).collect();
+        let initial = self.template.state(inputs.states, 0.0);
         let world = self.template.world(&self.places, &self.values_at(&inputs, 0))?;
-        let mut states = world.initialize(&initial, time_steps)?;
-        visit(&states);
+        let mut state = world.initialize(&initial, time_steps)?;
+        visit(&state);
         let [_, controls] = self.inputs();
         if controls == 0 {
-            let follow = |_, states: &[State<S>]| visit(states);
-            return Ok(world.run_checked(integrator, states, time_steps, follow)?.states);
+            return Ok(world.run(integrator, state, time_steps, visit)?.states);
         }
         for step in self.steps() {
             let world = self.template.world(&self.places, &self.values_at(&inputs, step.index))?;
-            world.check(&states, step)?;
-            states = world.advance(integrator, &states, step)?;
-            visit(&states);
+            world.check(state.rows(), step)?;
+            state = world.advance(integrator, &state, step)?;
+            visit(&state);
         }
-        Ok(states)
+        Ok(state)
     }
 
     fn steps(&self) -> impl DoubleEndedIterator<Item = Step> + use<I> {
-        let TimeSteps { dt, steps } = self.time_steps;
-        (0..steps).map(move |index| Step::new(index, dt))
+        self.time_steps.after(0.0)
     }
 
     /// Parameters and controls of a step.
@@ -209,7 +205,7 @@ impl<I: Integrator> RolloutFunction<I> {
     }
 
     /// Checks that there are as many as it takes.
-    fn check<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>) -> Result<(), SimulationError> {
+    fn check<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>) -> Result<()> {
         let [parameters, controls] = self.inputs();
         let expected = [
             ("parameters", inputs.parameters.len(), parameters),
@@ -247,7 +243,7 @@ impl<I: Integrator> RolloutFunction<I> {
         inputs: RolloutInputs<'_>,
         run: &[f64],
         adjoints: &[f64],
-    ) -> Result<RolloutGradient, SimulationError> {
+    ) -> Result<RolloutGradient> {
         self.check(&inputs)?;
         self.template.integrator.check_differentiable(self.world())?;
         let (width, steps) = (self.width(), self.time_steps.steps);
@@ -269,15 +265,15 @@ impl<I: Integrator> RolloutFunction<I> {
             let before = step.index * width..(step.index + 1) * width;
             let states = &run[before.clone()];
             let [by_before, by_values] =
-                self.pull_back(&inputs, step.index, states, &by_states, |world, states| {
-                    world.advance(&self.template.integrator, states, step)
+                self.pull_back(&inputs, step.index, states, &by_states, |world, state| {
+                    world.advance(&self.template.integrator, state, step)
                 })?;
             add(step.index, &by_values);
             by_states = by_before;
             by_states.iter_mut().zip(&adjoints[before]).for_each(|(by, own)| *by += own);
         }
         let begin =
-            |world: &World<Var>, states: &[State<Var>]| world.initialize(states, self.time_steps);
+            |world: &World<Var>, state: &State<Var>| world.initialize(state, self.time_steps);
         let [states, by_values] = self.pull_back(&inputs, 0, inputs.states, &by_states, begin)?;
         add(0, &by_values);
         Ok(RolloutGradient { states, parameters: by_parameters, controls: by_controls })
@@ -291,8 +287,8 @@ impl<I: Integrator> RolloutFunction<I> {
         step: usize,
         before: &[f64],
         adjoints: &[f64],
-        change: impl FnOnce(&World<Var>, &[State<Var>]) -> Result<Vec<State<Var>>, SimulationError>,
-    ) -> Result<[Vec<f64>; 2], SimulationError> {
+        change: impl FnOnce(&World<Var>, &State<Var>) -> Result<State<Var>>,
+    ) -> Result<[Vec<f64>; 2]> {
         let time = Step::new(step, self.time_steps.dt).start;
         let values = self.values_at(inputs, step);
         if adjoints.iter().all(|adjoint| *adjoint == 0.0) {
@@ -302,19 +298,19 @@ impl<I: Integrator> RolloutFunction<I> {
         let states = recording.variables_of(before);
         let values = recording.variables_of(&values);
         let world = self.template.world(&self.places, &values)?;
-        let after = change(&world, &states_of(&states).collect::<Vec<_>>())?;
-        let seeds = coordinates_of(&after).zip(adjoints.iter().copied());
+        let after = change(&world, &self.template.state(&states, time))?;
+        let seeds = coordinates_of(after.rows()).zip(adjoints.iter().copied());
         let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();
         let adjoints = recording.vjp(&seeds);
         let by = |vars: &[Var]| vars.iter().map(|&var| adjoints.wrt(var)).collect::<Vec<f64>>();
         let (by_states, by_values) = (by(&states), by(&values));
         if let Some(failed) = by_states.iter().position(|slope| !slope.is_finite()) {
-            let states: Vec<State> = states_of(before).collect();
+            let states: Vec<BodyState> = states_of(before).collect();
             return Err(self.world().not_finite_at(failed / STATE, &states, time));
         }
         match by_values.iter().all(|slope| slope.is_finite()) {
             true => Ok([by_states, by_values]),
-            false => Err(world.blown_up(&after, time)),
+            false => Err(world.blown_up(after.rows(), time)),
         }
     }
 
@@ -326,7 +322,7 @@ impl<I: Integrator> RolloutFunction<I> {
         &self,
         inputs: RolloutInputs<'_>,
         tangents: RolloutInputs<'_>,
-    ) -> Result<[Vec<f64>; 2], SimulationError> {
+    ) -> Result<[Vec<f64>; 2]> {
         let lift = |what: &'static str, values: &[f64], along: &[f64]| {
             let (given, expected) = (along.len(), values.len());
             if given != expected {

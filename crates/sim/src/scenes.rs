@@ -7,8 +7,8 @@ use prehend_geometry::DistanceField;
 
 use crate::fields::{HalfSpace, SphereCavity};
 use crate::{
-    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
-    RigidBody, State, Surface, World,
+    Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
+    KelvinVoigt, Law, RigidBody, State, Surface, World,
 };
 
 /// Kelvin and Voigt's normal law with Coulomb friction, the law of most tests.
@@ -69,10 +69,7 @@ pub(crate) fn on_ground(
 }
 
 /// Body 0 is `field`, fixed; body 1 an egg of 0.2 kg that spins and has just touched it.
-pub(crate) fn egg_on(
-    field: Arc<dyn DistanceField>,
-    smoothing: GapSmoothing,
-) -> (World, Vec<State>) {
+pub(crate) fn egg_on(field: Arc<dyn DistanceField>, smoothing: GapSmoothing) -> (World, State) {
     let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
     let rigid = RigidBody::new(0.2, inertia, Point3::new(1e-3, -2e-3, 3e-3)).unwrap();
     let surface = Surface::uniform(&ellipsoid(60, [0.03, 0.025, 0.02]), 6e-3).unwrap();
@@ -83,5 +80,5 @@ pub(crate) fn egg_on(
     let mut state = rigid.at_rest(&pose);
     state.linear = Vector3::new(0.05, 0.02, -0.1);
     state.angular = Vector3::new(1.0, -0.5, 0.7);
-    (world, vec![State::at_rest(Isometry3::identity()), state])
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), state]))
 }

@@ -287,9 +287,10 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
+    use crate::State;
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{
-        Body, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State,
+        Body, BodyState, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
     };
 
     #[test]
@@ -352,7 +353,8 @@ mod tests {
         let world = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
         let sinks = mass * 9.81 / (1e8 * surface.area());
         let pose = Isometry3::translation(0.0, 0.0, radius - sinks);
-        let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&pose)];
+        let mut start =
+            State::new([BodyState::at_rest(Isometry3::identity()), rigid.at_rest(&pose)]);
         start[1].linear.x = speed;
         let end = world.simulate(&start, 0.3).unwrap()[1];
         // It slides until 2v/7μg = 0.097 s and then rolls at 5v/7.
@@ -373,13 +375,13 @@ mod tests {
         let normal = KelvinVoigt::from_target(&target, 0.5).unwrap();
         let law = Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 }).unwrap();
         let ball = Body::dynamic("ball", rigid).with_surface(surface);
-        let start = [
-            State::at_rest(Isometry3::identity()),
+        let start = State::new([
+            BodyState::at_rest(Isometry3::identity()),
             rigid.at_rest(&Isometry3::translation(0.0, 0.0, radius)),
-        ];
+        ]);
         let smoothing = GapSmoothing::Softplus { width: 1e-6 };
         let mut world = on_ground(Vector3::zeros(), floor(), ball, Arc::new(law), smoothing);
-        let mut falling = start;
+        let mut falling = start.clone();
         falling[1].linear.z = -1.0;
         let bounced = world.simulate(&falling, 0.1).unwrap()[1].linear.z;
         assert!((bounced - 0.5).abs() < 2e-3, "{bounced}");

@@ -41,6 +41,17 @@ pub struct TimeSteps {
 }
 
 impl TimeSteps {
+    /// The steps, the first of which starts at `time` \[s\].
+    pub(crate) fn after(self, time: f64) -> impl DoubleEndedIterator<Item = Step> {
+        let Self { dt, steps } = self;
+        (0..steps).map(move |index| Step { index, start: time + index as f64 * dt, dt })
+    }
+
+    /// Time at the end of steps that start at `time` \[s\].
+    pub(crate) fn end(self, time: f64) -> f64 {
+        self.after(time).next_back().map_or(time, |last| last.end())
+    }
+
     /// Time in steps no longer than `limit` \[s\], but no more than `max_steps` of them.
     #[must_use]
     pub fn refined(self, limit: f64, max_steps: usize) -> Self {

@@ -33,6 +33,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use crate::body_state::Rows;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -50,7 +51,7 @@ use transmission::Transmissions;
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
 /// To differentiate by a mass, a friction coefficient or gravity, [`cast`](World::cast) the world to the scalar and put
-/// the variable in its place. States come in the order of the bodies; then those of the joints of [articulations](World::add_articulation).
+/// the variable in its place. Its [`State`] begins as [`World::neutral_state`].
 #[derive(Clone)]
 pub struct World<S: Scalar = f64> {
     /// The bodies.
@@ -275,11 +276,17 @@ impl<S: Scalar> World<S> {
         plain
     }
 
-    /// Moves the bodies that forces do not move to where they are at `time` \[s\], and links to where their joints put them.
+    /// Moves the bodies that forces do not move to where they are at the time of the state, and links to where their joints put them.
     ///
     /// # Panics
-    /// If there are fewer states than bodies and joints, where there are joints.
-    pub fn update_kinematics(&self, states: &mut [State<S>], time: f64) {
+    /// If it is no state of this world, and there are joints.
+    pub fn update_kinematics(&self, state: &mut State<S>) {
+        let time = state.time;
+        self.place_bodies(state.rows_mut(), time);
+    }
+
+    /// [`World::update_kinematics`] of rows at `time` \[s\].
+    pub(crate) fn place_bodies(&self, states: &mut Rows<S>, time: f64) {
         for (body, state) in self.bodies.iter().zip(states.iter_mut()) {
             if let Motion::Kinematic(trajectory) = &body.motion {
                 *state = trajectory.state(time);
@@ -313,10 +320,10 @@ mod tests {
     use super::*;
     use crate::fields::{Sphere, SphereCavity};
     use crate::scenes::{egg_on, ellipsoid, floor, penalty, sticking};
-    use crate::{RigidBody, Surface};
+    use crate::{BodyState, RigidBody, Surface};
 
     /// A pebble in a cup, both free, turned and moving; they touch both ways.
-    fn pebble_in_cup() -> (World, Vec<State>) {
+    fn pebble_in_cup() -> (World, State) {
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
         let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
         let rigid = |com| RigidBody::new(0.2, inertia, com).unwrap();
@@ -349,7 +356,7 @@ mod tests {
             state.angular = Vector3::new(1.0, 2.0, -1.5) * sign;
             state
         };
-        let states = vec![state(cup, &cup_pose, -1.0), state(pebble, &pebble_pose, 1.0)];
+        let states = State::new([state(cup, &cup_pose, -1.0), state(pebble, &pebble_pose, 1.0)]);
         (world, states)
     }
 
@@ -357,7 +364,7 @@ mod tests {
     fn both_bodies_feel_derivatives_of_both() {
         let (world, states) = pebble_in_cup();
         for moving in 0..2 {
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
+            let mut lifted: State<Fwd<12>> = states.cast();
             lifted[moving] = states[moving].variables();
             let exact = world.cast().wrenches(&lifted, 0);
             let differences = finite_difference_jacobian(
@@ -365,7 +372,11 @@ mod tests {
                     let mut states = states.clone();
                     let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
                     states[moving] = states[moving].retract(&tangent);
-                    world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
+                    world
+                        .wrenches_of(states.rows(), 0)
+                        .iter()
+                        .flat_map(|w| w.iter().copied())
+                        .collect()
                 },
                 &[0.0; 12],
                 1e-7,
@@ -410,7 +421,7 @@ mod tests {
         let variables = Fwd::variables(at);
         lifted.contacts[0].set_params(&variables[..3]).unwrap();
         lifted.bodies[1].external_wrench = Vector6::repeat(variables[3]);
-        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::cast).collect();
+        let constants: State<Fwd<4>> = states.cast();
         let exact = lifted.wrenches(&constants, 0)[1];
         // Scaled, so that one step suits all.
         let differences = finite_difference_jacobian(
@@ -427,7 +438,7 @@ mod tests {
     }
 
     /// The wrenches and rates of [`pebble_in_cup`] with the centers of mass moved by `change`.
-    fn with_centers_moved<S: Scalar>(world: &World, states: &[State], change: &[S]) -> Vec<S> {
+    fn with_centers_moved<S: Scalar>(world: &World, states: &State, change: &[S]) -> Vec<S> {
         let mut world = world.cast::<S>();
         for (body, change) in world.bodies.iter_mut().zip(change.as_chunks::<3>().0) {
             let rigid = *body.rigid().unwrap();
@@ -435,8 +446,8 @@ mod tests {
             body.motion =
                 Motion::Dynamic(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
         }
-        let states: Vec<State<S>> = states.iter().map(State::cast).collect();
-        world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
+        let states: State<S> = states.cast();
+        world.wrenches_of(states.rows(), 0).iter().flat_map(|w| w.iter().copied()).collect()
     }
 
     #[test]
@@ -447,8 +458,9 @@ mod tests {
                 let law: Arc<dyn DynContactLaw> = Arc::new(sticking(5e6, 2e4, 0.6, 2e-2));
                 world.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(&law)));
                 let deflection = Vector6::new(1e-4, -2e-4, 3e-4, 5e-3, -2e-3, 1e-2);
-                let state = State::at_rest(Isometry3::identity());
-                states.extend([state.deflected(&deflection), state.deflected(&-deflection)]);
+                let state = BodyState::at_rest(Isometry3::identity());
+                let deflected = [deflection, -deflection].map(|change| state.deflected(&change));
+                states = states.with([states.bodies(), &deflected].concat(), 0.0);
             }
             let exact = with_centers_moved(&world, &states, &Fwd::<6>::variables([0.0; 6]));
             // Springs are solved for, and round.

@@ -3,10 +3,10 @@
 use prehend_sim::Integrator;
 use pyo3::prelude::*;
 
-use super::states::states;
+use super::states::state;
 use super::{BodyKey, World};
 use crate::arrays::{Array, Numbers, array, vector};
-use crate::error::{Raise, wrong};
+use crate::error::Raise;
 use crate::integrator::AnyIntegrator;
 
 #[pymethods]
@@ -18,8 +18,8 @@ impl World {
         states: Numbers<'py>,
         body: BodyKey,
     ) -> PyResult<Array<'py>> {
-        let (id, states) = (self.id(&body)?, self::states(&states)?);
-        let wrench = self.world.contact_wrench(id, &states).raise()?;
+        let (id, state) = (self.id(&body)?, self::state(&self.world, &states)?);
+        let wrench = self.world.contact_wrench(id, &state).raise()?;
         array(py, wrench.as_slice().to_vec(), &[6])
     }
 
@@ -31,21 +31,17 @@ impl World {
         body: BodyKey,
         point: Numbers<'py>,
     ) -> PyResult<Array<'py>> {
-        let (id, states) = (self.id(&body)?, self::states(&states)?);
+        let (id, state) = (self.id(&body)?, self::state(&self.world, &states)?);
         let felt =
-            self.world.accelerometer(id, &vector(&point, "point")?.into(), &states).raise()?;
+            self.world.accelerometer(id, &vector(&point, "point")?.into(), &state).raise()?;
         array(py, felt.as_slice().to_vec(), &[3])
     }
 
     /// The longest step [s] with which an integrator of fixed steps is stable for the contacts at `states`; those to come are not among them.
     #[pyo3(signature = (states, integrator="semi_implicit_euler"))]
     fn longest_step(&self, states: Numbers<'_>, integrator: &str) -> PyResult<f64> {
-        let states = self::states(&states)?;
-        let rows = self.world.neutral_states().len();
-        if states.len() < rows {
-            return Err(wrong(format!("states: {rows} rows are expected, not {}", states.len())));
-        }
+        let state = self::state(&self.world, &states)?;
         let integrator = AnyIntegrator::of(integrator, None)?;
-        Ok(integrator.stability_limit() / self.world.contact_frequency(&states))
+        Ok(integrator.stability_limit() / self.world.contact_frequency(&state))
     }
 }

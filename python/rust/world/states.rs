@@ -2,7 +2,7 @@
 
 use numpy::ndarray::{ArrayView1, IxDyn};
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use prehend_sim::{Motion, State};
+use prehend_sim::{BodyState, Motion, State};
 use pyo3::prelude::*;
 
 use super::{BodyKey, World};
@@ -10,20 +10,23 @@ use crate::arrays::{Numbers, array, in_order, matrix, pose, vector_or};
 use crate::error::{Raise, wrong};
 use crate::rollout::STATE;
 
-/// The states in the rows of an array.
-pub(crate) fn states(rows: &Numbers<'_>) -> PyResult<Vec<State>> {
+/// State of `world` in the rows of an array.
+pub(crate) fn state(world: &prehend_sim::World, rows: &Numbers<'_>) -> PyResult<State> {
     match rows.shape() {
         [_, STATE] => {
-            Ok(in_order(rows).as_chunks().0.iter().map(State::from_coordinates).collect())
+            let numbers = in_order(rows);
+            let rows = numbers.as_chunks().0.iter().map(BodyState::from_coordinates);
+            world.state_of_rows(rows.collect(), 0.0).raise()
         }
         shape => Err(wrong(format!("states: an array of n × 13 is expected, not {shape:?}"))),
     }
 }
 
-/// Lets `edit` change the states in the rows of an array, which stays as it was if that fails.
+/// Lets `edit` change the state of `world` in the rows of an array, which stays as it was if that fails.
 pub(crate) fn change(
+    world: &prehend_sim::World,
     rows: &Bound<'_, PyAny>,
-    edit: impl FnOnce(&mut [State]) -> PyResult<()>,
+    edit: impl FnOnce(&mut State) -> PyResult<()>,
 ) -> PyResult<()> {
     let rows = rows.cast::<PyArray2<f64>>().map_err(|_| {
         wrong("states: an array of n × 13 in double precision is expected, which is written to")
@@ -36,10 +39,12 @@ pub(crate) fn change(
             array.shape()
         )));
     }
-    let row = |row: ArrayView1<'_, f64>| State::from_coordinates(&std::array::from_fn(|k| row[k]));
-    let mut states: Vec<State> = array.rows().into_iter().map(row).collect();
-    edit(&mut states)?;
-    for (mut row, state) in array.rows_mut().into_iter().zip(&states) {
+    let row =
+        |row: ArrayView1<'_, f64>| BodyState::from_coordinates(&std::array::from_fn(|k| row[k]));
+    let states = array.rows().into_iter().map(row).collect();
+    let mut state = world.state_of_rows(states, 0.0).raise()?;
+    edit(&mut state)?;
+    for (mut row, state) in array.rows_mut().into_iter().zip(state.rows()) {
         row.iter_mut().zip(state.coordinates()).for_each(|(to, x)| *to = x);
     }
     Ok(())
@@ -47,15 +52,15 @@ pub(crate) fn change(
 
 #[pymethods]
 impl World {
-    /// States in which everything is at rest, bodies with their center of mass at the origin and joints at their neutral coordinates: a row of 13 for
-    /// each body, then for each joint. Contacts with bristles begin without a deflection, and have rows in what a rollout returns.
+    /// States in which everything is at rest, frames of bodies at the origin and joints at their neutral coordinates: a row of 13 for
+    /// each body, then for each joint, then for each contact with bristles, which is not deflected.
     fn neutral_states<'py>(
         &self,
         py: Python<'py>,
     ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
-        let states = self.world.neutral_states();
-        let rows = states.len();
-        array(py, states.iter().flat_map(State::coordinates).collect(), &[rows, STATE])
+        let state = self.world.neutral_state();
+        let rows = state.rows();
+        array(py, rows.iter().flat_map(BodyState::coordinates).collect(), &[rows.len(), STATE])
     }
 
     /// Writes the row of a body in `states`: the pose of its frame (4 × 4 or a translation), velocity of its center of mass (of a fixed body of its
@@ -79,16 +84,14 @@ impl World {
         let at = self::pose(Some(&pose), "pose")?;
         let mut state = match self.world.bodies[id].rigid() {
             Some(rigid) => rigid.at_rest(&at),
-            None => State::at_rest(at),
+            None => BodyState::at_rest(at),
         };
         state.linear = vector_or(velocity.as_ref(), [0.0; 3], "velocity")?;
         state.angular = vector_or(angular_velocity.as_ref(), [0.0; 3], "angular_velocity")?;
         // They may be views of the states.
         drop((pose, velocity, angular_velocity));
-        let place = id.index();
-        change(states, |all| {
-            *all.get_mut(place)
-                .ok_or_else(|| wrong(format!("states: there is no row {place}")))? = state;
+        change(&self.world, states, |all| {
+            all[id] = state;
             Ok(())
         })
     }
@@ -100,15 +103,8 @@ impl World {
         states: Numbers<'py>,
         body: BodyKey,
     ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
-        let (id, states) = (self.id(&body)?, self::states(&states)?);
-        let place = id.index();
-        let state =
-            states.get(place).ok_or_else(|| wrong(format!("states: there is no row {place}")))?;
-        let pose = match self.world.bodies[id].rigid() {
-            Some(rigid) => rigid.model_pose(&state.pose),
-            None => state.pose,
-        };
-        matrix(py, &pose)
+        let (id, state) = (self.id(&body)?, self::state(&self.world, &states)?);
+        matrix(py, &self.world.pose(&state, id))
     }
 
     /// Writes coordinates [m, rad] and velocities of the joint of a link into `states`, with those of joints that mimic it in URDF, and where the links are then. A spherical joint has a
@@ -127,7 +123,7 @@ impl World {
         let velocity = velocity_like.as_ref().map(|v| in_order(v).into_owned());
         // They may be views of the states.
         drop((position_like, velocity_like));
-        change(states, |all| {
+        change(&self.world, states, |all| {
             let still = vec![0.0; self.world.joint(all, id).raise()?.velocity.len()];
             self.world.set_joint(all, id, &position, &velocity.unwrap_or(still)).raise()
         })
@@ -135,7 +131,8 @@ impl World {
 
     /// Coordinates [m, rad] and velocities of the joint of a link.
     fn joint(&self, states: Numbers<'_>, link: BodyKey) -> PyResult<(Vec<f64>, Vec<f64>)> {
-        let joint = self.world.joint(&self::states(&states)?, self.id(&link)?).raise()?;
+        let joint =
+            self.world.joint(&self::state(&self.world, &states)?, self.id(&link)?).raise()?;
         Ok((joint.position, joint.velocity))
     }
 }

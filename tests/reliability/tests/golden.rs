@@ -19,7 +19,7 @@ use prehend_refine::strategy::Fused;
 use prehend_refine::{PreparedFrame, Strategy, refine};
 use prehend_reliability::scene::body_over_floor;
 use prehend_render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
-use prehend_sim::State;
+use prehend_sim::{BodyState, State};
 
 /// Relative to the largest number of its kind.
 const TOLERANCE: f64 = 1e-9;
@@ -66,19 +66,19 @@ fn pose<S: Scalar>(pose: &Isometry3<S>) -> Vec<S> {
 }
 
 /// A box that is thrown onto the floor, slides and tumbles.
-fn thrown<S: Scalar>(tangent: &[S]) -> State<S> {
+fn thrown<S: Scalar>(tangent: &[S]) -> BodyState<S> {
     let world = body_over_floor(12).unwrap();
-    let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
+    let mut start = BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
-    let still = State::at_rest(Isometry3::identity()).cast();
+    let still = BodyState::at_rest(Isometry3::identity()).cast();
     let start = start.retract(&std::array::from_fn(|i| tangent[i]));
-    world.cast().simulate(&[still, start], 0.2).unwrap()[1]
+    world.cast().simulate(&State::new([still, start]), 0.2).unwrap()[1]
 }
 
 #[test]
 fn a_rollout() {
-    let end: State<f64> = thrown(&[0.0; 12]);
+    let end: BodyState<f64> = thrown(&[0.0; 12]);
     let velocities = end.linear.iter().chain(end.angular.iter()).copied().collect();
     let (_, by) = gradient(
         |x| {

@@ -3,9 +3,8 @@
 use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_autodiff::{Fwd, Quadratic, Scalar};
-use prehend_sim::{
-    BodyId, RigidBody, SemiImplicitEuler, SimulationError, State, Step, StepError, TimeSteps, World,
-};
+use prehend_sim::StepError;
+use prehend_sim::prelude::*;
 use rayon::prelude::*;
 
 /// Scales of displacement \[1/m\], rotation \[1/rad\], linear velocity \[s/m\] and angular velocity \[s/rad\] that make the residuals of
@@ -50,7 +49,7 @@ impl StabilityLoss {
     /// # Errors
     /// Where the simulation blows up (see [`Self::check`]) or cannot begin.
     pub(super) fn value(&self, pose: &Isometry3<f64>) -> Result<f64, SimulationError> {
-        let rollout = |start: &State| Ok(self.residual(&self.world, start)?.norm_squared());
+        let rollout = |start: &BodyState| Ok(self.residual(&self.world, start)?.norm_squared());
         let rollouts: Vec<f64> =
             self.starts(pose).par_iter().map(rollout).collect::<Result<_, SimulationError>>()?;
         Ok(rollouts.iter().sum::<f64>() / STARTS as f64)
@@ -105,15 +104,15 @@ impl StabilityLoss {
     }
 
     /// The object's states from which rollouts begin.
-    fn starts(&self, pose: &Isometry3<f64>) -> [State; STARTS] {
+    fn starts(&self, pose: &Isometry3<f64>) -> [BodyState; STARTS] {
         let start =
-            |speed: f64| State { linear: Vector3::repeat(speed), ..self.rigid.at_rest(pose) };
+            |speed: f64| BodyState { linear: Vector3::repeat(speed), ..self.rigid.at_rest(pose) };
         [0.0, self.perturbation, -self.perturbation].map(start)
     }
 
     /// The states of all bodies, the object in one of its own.
-    fn states<S: Scalar>(&self, world: &World<S>, object: State<S>) -> Vec<State<S>> {
-        let mut states = world.neutral_states();
+    fn states<S: Scalar>(&self, world: &World<S>, object: BodyState<S>) -> State<S> {
+        let mut states = world.neutral_state();
         states[self.object] = object;
         states
     }
@@ -122,9 +121,9 @@ impl StabilityLoss {
     fn residual<S: Scalar>(
         &self,
         world: &World<S>,
-        start: &State<S>,
+        start: &BodyState<S>,
     ) -> Result<SVector<S, 12>, SimulationError> {
-        let go_on = |_: Step, _: &mut World<S>, _: &mut [State<S>]| ();
+        let go_on = |_: Step, _: &mut World<S>, _: &mut State<S>| ();
         let initial = self.states(world, *start);
         let end =
             world.simulate_controlled(&SemiImplicitEuler, &initial, self.time_steps, go_on)?;

@@ -4,8 +4,8 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_sim::contact::regularized_coulomb;
 use prehend_sim::{
-    ContactForce, ContactKinematics, ContactLaw, Integrator, RigidBody, SimulationError, State,
-    Step, World,
+    BodyState, ContactForce, ContactKinematics, ContactLaw, Integrator, RigidBody, SimulationError,
+    State, Step, World,
 };
 
 /// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.
@@ -49,26 +49,26 @@ impl Integrator for FirstOrder {
     fn step<S: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<S>],
+        states: &State<S>,
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    ) -> Result<State<S>, SimulationError> {
         let wrenches = world.wrenches(states, step.index);
-        let bodies = world.bodies.iter().zip(states).zip(&wrenches);
+        let bodies = world.bodies.iter().zip(states.bodies()).zip(&wrenches);
         let next = bodies.map(|((body, state), wrench)| match body.rigid() {
             Some(rigid) => advance(rigid, &world.gravity, state, wrench, step.dt),
             None => *state,
         });
-        Ok(next.collect())
+        Ok(State::new(next.collect::<Vec<_>>()))
     }
 }
 
 fn advance<S: Scalar>(
     body: &RigidBody<S>,
     gravity: &Vector3<S>,
-    state: &State<S>,
+    state: &BodyState<S>,
     wrench: &Vector6<S>,
     dt: f64,
-) -> State<S> {
+) -> BodyState<S> {
     let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3).into_owned());
     let mut next = *state;
     next.linear += (force / body.mass() + gravity).map(|a| a.times(dt));

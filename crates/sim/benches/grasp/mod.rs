@@ -15,7 +15,8 @@ use nalgebra::{
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 use prehend_sim::{
-    Body, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, Surface, TimeSteps,
+    World,
 };
 
 pub(crate) use equations::FirstOrder;
@@ -59,11 +60,11 @@ impl Grasp {
 }
 
 /// Where hand and ellipsoid begin.
-pub(crate) fn start() -> [State; 2] {
+pub(crate) fn start() -> [BodyState; 2] {
     let rotation: UnitQuaternion<f64> = Unit::new_normalize(Quaternion::new(1.0, 0.05, 0.02, 0.03));
     let pose = Isometry3::from_parts(Translation3::new(0.002, -0.001, 0.0295), rotation);
     let (linear, angular) = (Vector3::new(0.02, 0.01, -0.05), Vector3::new(0.3, 0.1, 0.2));
-    [State::at_rest(Isometry3::identity()), State { pose, linear, angular }]
+    [BodyState::at_rest(Isometry3::identity()), BodyState { pose, linear, angular }]
 }
 
 pub(crate) fn time_steps(steps: usize) -> TimeSteps {
@@ -71,7 +72,7 @@ pub(crate) fn time_steps(steps: usize) -> TimeSteps {
 }
 
 /// How far from the target, and how fast, the ellipsoid ends.
-pub(crate) fn loss<S: Scalar>(state: &State<S>) -> S {
+pub(crate) fn loss<S: Scalar>(state: &BodyState<S>) -> S {
     let off = state.pose.translation.vector - TARGET.map(S::constant);
     off.norm_squared().times(100.0) + state.linear.norm_squared() + state.angular.norm_squared()
 }

@@ -17,8 +17,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Coulomb, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler, SimulationError, State, TimeSteps,
-    World,
+    BodyState, Coulomb, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler, SimulationError, State,
+    TimeSteps, World,
 };
 use scene::OBJECT;
 use smoothing::{SmoothedGradient, Smoothing};
@@ -75,12 +75,10 @@ impl Drop {
     }
 
     /// A hundred times the squared distance from a target, and squared velocities.
-    fn loss<S: Scalar>(&self, world: &World<S>, start: State<S>) -> Result<S, SimulationError> {
-        let still = State::at_rest(Isometry3::identity()).cast();
-        let states = [still, start];
-        let end = world
-            .simulate_with(&SemiImplicitEuler, &states, self.time_steps, |_, _| ())?
-            .states[OBJECT];
+    fn loss<S: Scalar>(&self, world: &World<S>, start: BodyState<S>) -> Result<S, SimulationError> {
+        let still = BodyState::at_rest(Isometry3::identity()).cast();
+        let states = State::new([still, start]);
+        let end = world.simulate_with(&SemiImplicitEuler, &states, self.time_steps)?.states[OBJECT];
         let target = Vector3::new(0.0, 0.0, 0.035).map(S::constant);
         let off = (end.pose.translation.vector - target).norm_squared();
         Ok(off.times(100.0) + end.linear.norm_squared() + end.angular.norm_squared())

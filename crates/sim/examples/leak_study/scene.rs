@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    Body, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, State, Surface, World,
+    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, Surface, World,
 };
 
 /// Mass of the object \[kg\].
@@ -118,10 +118,10 @@ pub(crate) fn world(
 }
 
 /// Where the object begins: just in touch with palm and fingers, falling and turning slowly.
-pub(crate) fn start() -> State {
+pub(crate) fn start() -> BodyState {
     let rotation = UnitQuaternion::from_quaternion(Quaternion::new(1.0, 0.05, 0.02, 0.03));
     let translation = Vector3::new(0.002, -0.001, 0.0295);
-    State {
+    BodyState {
         pose: Isometry3::from_parts(translation.into(), rotation),
         linear: Vector3::new(0.02, 0.01, -0.05),
         angular: Vector3::new(0.3, 0.1, 0.2),

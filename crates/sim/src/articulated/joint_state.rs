@@ -1,4 +1,4 @@
-//! The state of a joint in a world: its coordinates are the pose of a [`State`], its velocities the velocities.
+//! The state of a joint in a world: its coordinates are the pose of a [`BodyState`], its velocities the velocities.
 //!
 //! Numbers come first in place and velocity; a rotation and its angular velocity, along the link's axes, are those of the state.
 
@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 
 use super::joint::{Joint, quaternion};
-use crate::state::State;
+use crate::body_state::BodyState;
 
 /// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`](prehend_geometry::robot::KinematicTree::joint_names), or of one joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct JointState<S = f64> {
 
 impl Joint {
     /// Appends the coordinates and velocities that `state` is.
-    pub(crate) fn read<S: Scalar>(&self, state: &State<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
+    pub(crate) fn read<S: Scalar>(&self, state: &BodyState<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
         let (place, turn) = (&state.pose.translation.vector, &state.pose.rotation.coords);
         match self {
             Self::Spherical => {
@@ -39,8 +39,8 @@ impl Joint {
     }
 
     /// The state that coordinates and velocities are.
-    pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> State<S> {
-        let mut state = State::at_rest(Isometry3::identity());
+    pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> BodyState<S> {
+        let mut state = BodyState::at_rest(Isometry3::identity());
         let copy = |to: &mut [S], from: &[S]| to[..from.len()].copy_from_slice(from);
         match self {
             Self::Spherical => {
@@ -80,7 +80,7 @@ impl Joint {
     }
 
     /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.
-    pub(crate) fn rate_of_pose<S: Scalar>(&self, state: &State<S>) -> [Vector3<S>; 2] {
+    pub(crate) fn rate_of_pose<S: Scalar>(&self, state: &BodyState<S>) -> [Vector3<S>; 2] {
         match self {
             Self::Spherical => [state.linear, state.pose.rotation * state.angular],
             Self::Floating => [state.linear, state.angular].map(|v| state.pose.rotation * v),
@@ -91,7 +91,7 @@ impl Joint {
     }
 
     /// Derivatives of the position along an axis by displacements along all.
-    pub(crate) fn position_slopes<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 3] {
+    pub(crate) fn position_slopes<S: Scalar>(&self, state: &BodyState<S>, axis: usize) -> [S; 3] {
         match self {
             Self::Spherical => {
                 let turn = so3_log(&state.pose.rotation);
@@ -102,7 +102,7 @@ impl Joint {
     }
 
     /// Position and velocity along an axis: of a spherical joint, a component of its rotation vector and its rate.
-    pub(crate) fn along<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 2] {
+    pub(crate) fn along<S: Scalar>(&self, state: &BodyState<S>, axis: usize) -> [S; 2] {
         match self {
             Self::Spherical => {
                 let slopes = Vector3::from(self.position_slopes(state, axis));

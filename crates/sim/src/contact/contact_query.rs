@@ -6,7 +6,7 @@ use prehend_geometry::{DistanceField, FieldSample};
 
 use super::gap_smoothing::{GapSmoothing, SmoothedGap};
 use super::point::ContactKinematics;
-use crate::state::State;
+use crate::body_state::BodyState;
 use crate::surface::{Block, Surface, SurfacePoint};
 
 /// Below this length a distance gradient has no direction, and the point no contact.
@@ -33,7 +33,7 @@ pub struct ContactQuery<'a> {
     /// Center of mass of the body that carries them, in its model frame \[m\].
     pub com: Point3<f64>,
     /// The body's state, as the field sees it.
-    pub state: State,
+    pub state: BodyState,
     /// Whose surface is at distance zero.
     pub field: &'a dyn DistanceField,
     /// Smoothing of the gap where contact begins.
@@ -80,7 +80,7 @@ impl ContactQuery<'_> {
     /// Position of a point of the body's model frame.
     #[inline]
     fn place(&self, point: &Point3<f64>) -> Point3<f64> {
-        let State { pose, .. } = &self.state;
+        let BodyState { pose, .. } = &self.state;
         Point3::from(pose.translation.vector + pose.rotation * (point - self.com))
     }
 
@@ -108,7 +108,7 @@ impl ContactQuery<'_> {
 
     /// True if a touching sample has come to another side of the field since its body was in `before`: not out of the solid again
     /// but through the middle of it.
-    pub(crate) fn has_crossed(&self, before: State) -> bool {
+    pub(crate) fn has_crossed(&self, before: BodyState) -> bool {
         let reach = self.surface.rounding();
         let earlier = Self { state: before, ..*self };
         let gradient = |query: &Self, point: &SurfacePoint| {
@@ -122,7 +122,7 @@ impl ContactQuery<'_> {
 
     /// True if a sample has gone straight through the middle of the solid since its body was in `before`, whether it touched then or
     /// touches now.
-    pub(crate) fn has_passed(&self, before: State) -> bool {
+    pub(crate) fn has_passed(&self, before: BodyState) -> bool {
         let earlier = Self { state: before, ..*self };
         self.surface.points().iter().any(|point| {
             let [from, to] = [&earlier, self].map(|query| query.place(&point.position));
@@ -176,7 +176,7 @@ impl ContactQuery<'_> {
         pressing_only: bool,
         mut visit: impl FnMut(&ContactPoint),
     ) -> bool {
-        let State { pose, linear, angular } = &self.state;
+        let BodyState { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
         let reach = self.reach(cutoff);
         let skips = pressing_only && self.smoothing.leaks();

@@ -22,7 +22,7 @@ pub trait QueryWrench {
         by_params: bool,
     ) -> WrenchJacobian;
 
-    /// [`QueryWrench::wrench`] with its derivative along a direction of the state's [`tangent`](crate::State::tangent).
+    /// [`QueryWrench::wrench`] with its derivative along a direction of the state's [`tangent`](crate::BodyState::tangent).
     fn wrench_along(
         &self,
         p: &[f64],

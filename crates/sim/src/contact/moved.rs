@@ -12,7 +12,7 @@ pub(crate) struct LiftedContact<T: Scalar> {
     pub(crate) lever: Vector3<T>,
 }
 
-/// A query whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
+/// A query whose body is a little away from where it is, in a direction of [`BodyState::tangent`](crate::BodyState::tangent).
 pub(crate) struct MovedQuery<T: Scalar> {
     position: Vector3<T>,
     turn: Vector3<T>,

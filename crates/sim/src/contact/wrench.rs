@@ -16,7 +16,7 @@ use crate::spatial::spatial;
 pub struct WrenchJacobian {
     /// Force \[N\], then torque about the center of mass \[N m\].
     pub wrench: Vector6<f64>,
-    /// One row for each component of the wrench: derivatives along the directions of [`State::tangent`](crate::State::tangent).
+    /// One row for each component of the wrench: derivatives along the directions of [`BodyState::tangent`](crate::BodyState::tangent).
     pub by_state: [[f64; 12]; 6],
     /// Derivative of the wrench by each parameter of the law; empty if not asked for.
     pub by_params: Vec<Vector6<f64>>,
@@ -211,7 +211,7 @@ mod tests {
     use crate::contact::dynamic::QueryWrench;
     use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
-    use crate::{ContactLaw, GapSmoothing, State, Surface, World};
+    use crate::{BodyState, ContactLaw, GapSmoothing, State, Surface, World};
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(
@@ -222,7 +222,7 @@ mod tests {
     ) -> R {
         let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
         let (_, states) = egg_on(floor(), smoothing);
-        let state = State { pose: Isometry3::translation(0.0, 0.0, height), ..states[1] };
+        let state = BodyState { pose: Isometry3::translation(0.0, 0.0, height), ..states[1] };
         f(&ContactQuery { surface: &surface, com: Point3::origin(), state, field, smoothing })
     }
 
@@ -231,9 +231,9 @@ mod tests {
     }
 
     /// The wrench on body 1 presses it up, the same with derivatives as without, and those match differences.
-    fn assert_derivatives(world: &World, states: &[State], what: &str) {
-        let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
-        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
+    fn assert_derivatives(world: &World, states: &State, what: &str) {
+        let wrench = |state: BodyState| world.wrenches(&State::new([states[0], state]), 0)[1];
+        let mut lifted: State<Fwd<12>> = states.cast();
         lifted[1] = states[1].variables();
         let exact = world.cast().wrenches(&lifted, 0)[1];
         let value = wrench(states[1]);
@@ -332,7 +332,7 @@ mod tests {
         let row: Vec<Point3<f64>> =
             (0..16).map(|i| Point3::new(0.02 * f64::from(i), 0.0, 0.55)).collect();
         let whole = Surface::uniform(&row, 16e-4).unwrap();
-        let state = State::at_rest(Isometry3::identity());
+        let state = BodyState::at_rest(Isometry3::identity());
         let (com, smoothing) = (Point3::origin(), GapSmoothing::Hard);
         let wrench = |surface: &Surface| {
             let query = ContactQuery { surface, com, state, field: &Slope, smoothing };
@@ -360,7 +360,7 @@ mod tests {
             // ∇φ = 0 gives no contact; φ = 0 without slip, finite ones.
             assert_eq!(sample_at(0.0, &Flat, smoothing, jacobian).wrench, Vector6::zeros());
             let rest = |query: &ContactQuery<'_>| {
-                let state = State::at_rest(Isometry3::identity());
+                let state = BodyState::at_rest(Isometry3::identity());
                 jacobian(&ContactQuery { state, ..*query })
             };
             assert!(is_finite(&sample_at(0.0, floor().as_ref(), smoothing, rest)));

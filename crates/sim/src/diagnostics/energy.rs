@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use crate::articulated::{Articulation, Energy};
+use crate::body_state::{BodyState, Rows};
 use crate::contact::bristles::Bristles;
 use crate::contact::point::ContactKinematics;
-use crate::error::SimulationError;
+use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
 use crate::spatial::spatial;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::{Body, Motion};
@@ -43,7 +43,7 @@ pub(super) struct EnergyBalance {
     /// True if it is such a world, and the work of torques is known: bodies on trajectories bring energy with them, and a body
     /// may have turned any way within steps of any length.
     closed: bool,
-    initial: Vec<State>,
+    initial: Vec<BodyState>,
     /// Articulations as values, and their energy at the start.
     trees: Vec<Articulation>,
     articulated: Energy,
@@ -57,11 +57,11 @@ impl EnergyBalance {
     /// Balance of a simulation from `initial` by an integrator that `controls_error`, with steps of any length, or not.
     pub(super) fn new<S: Scalar>(
         world: &World<S>,
-        initial: &[State<S>],
+        initial: &Rows<S>,
         controls_error: bool,
     ) -> Self {
-        let initial: Vec<State> = initial.iter().map(State::value).collect();
-        let moves = |(motion, state): (&Motion<S>, &State)| match motion {
+        let initial: Vec<BodyState> = initial.iter().map(BodyState::value).collect();
+        let moves = |(motion, state): (&Motion<S>, &BodyState)| match motion {
             Motion::Dynamic(_) | Motion::Link => false,
             Motion::Fixed => state.linear != Vector3::zeros() || state.angular != Vector3::zeros(),
             Motion::Kinematic(_) => true,
@@ -87,8 +87,8 @@ impl EnergyBalance {
         &mut self,
         world: &World<S>,
         step: Step,
-        states: &[State<S>],
-    ) -> Result<(), SimulationError> {
+        states: &Rows<S>,
+    ) -> Result<()> {
         for (body, state) in world.bodies.iter().zip(states) {
             let torque = torque(body);
             if torque != Vector3::zeros() {
@@ -105,7 +105,7 @@ impl EnergyBalance {
     fn articulated_energy<S: Scalar, T: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<T>],
+        states: &Rows<T>,
     ) -> Energy {
         let gravity = world.gravity.map(|x| x.value());
         let mut sum = NOTHING;
@@ -125,8 +125,8 @@ impl EnergyBalance {
         &mut self,
         world: &World<S>,
         time: f64,
-        states: &[State<S>],
-    ) -> Result<(), SimulationError> {
+        states: &Rows<S>,
+    ) -> Result<()> {
         let [mut kinetic, mut gain] = [0.0, -self.work];
         for body in world.free_bodies() {
             let (before, now) = (&self.initial[body], states[body].value());
@@ -150,9 +150,9 @@ impl EnergyBalance {
             return Ok(());
         }
         // What contacts had stored at the start they may give back.
-        let now: Vec<State> = states.iter().map(State::value).collect();
+        let now: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let plain = world.to_f64();
-        let stored = |states: &[State]| stored_energy(&plain.with_touching(states, 0.0), states);
+        let stored = |states: &Rows| stored_energy(&plain.with_touching(states, 0.0), states);
         let before = stored(&self.initial);
         let energy = gain - before + stored(&now);
         if energy <= TOLERANCE * self.kinetic.max(before) {
@@ -174,7 +174,7 @@ fn torque<S: Scalar>(body: &Body<S>) -> Vector3<f64> {
 }
 
 /// Kinetic energy of a free body \[J\].
-fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f64 {
+fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &BodyState) -> f64 {
     let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
     let spin = state.pose.rotation.inverse() * state.angular;
     let inertia = rigid.inertia().map(|x| x.value());
@@ -182,10 +182,10 @@ fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f
 }
 
 /// Work of springs along joints, and of all else that acts there, while nothing moved fast \[J\].
-fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
-    let lifted: Vec<State<S>> = before.iter().map(State::cast).collect();
+fn work_along_joints<S: Scalar>(world: &World<S>, before: &Rows, now: &Rows<S>) -> f64 {
+    let lifted: Vec<BodyState<S>> = before.iter().map(BodyState::cast).collect();
     let work = |force: &JointForce<S>| {
-        let position = |states: &[State<S>]| Some(world.along(force, states)?.position.value());
+        let position = |states: &Rows<S>| Some(world.along(force, states)?.position.value());
         let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
         let p: Vec<f64> = force.params().iter().map(|p| p.value()).collect();
         let effort = |x: f64| force.law().effort(&p, from + x * (to - from), 0.0);
@@ -200,7 +200,12 @@ fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State
 }
 
 /// Work of gravity and the external force on a free body that has moved from `before` to `now` \[J\].
-fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: &State) -> f64 {
+fn work_of_pull<S: Scalar>(
+    world: &World<S>,
+    body: BodyId,
+    before: &BodyState,
+    now: &BodyState,
+) -> f64 {
     let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
     let force =
         world.gravity * rigid.mass() + world.bodies[body].external_wrench.fixed_rows::<3>(0);
@@ -210,7 +215,7 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 
 /// Energy that resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
 /// there is none, and that of bristles and bushings as they return.
-fn stored_energy(world: &World, states: &[State]) -> f64 {
+fn stored_energy(world: &World, states: &Rows) -> f64 {
     let mut energy = energy_of_bristles(world, states) + world.energy_of_bushings(states);
     for pair in &world.contacts {
         let Some(query) = world.contact_query(pair, world.relative_value(pair, states)) else {
@@ -240,14 +245,15 @@ fn stored_energy(world: &World, states: &[State]) -> f64 {
 }
 
 /// The work of the bristles of all contacts with bristles, from their deflections to none, while nothing else moves \[J\].
-fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
-    let resting: Vec<State> = states.iter().map(|state| State::at_rest(state.pose)).collect();
-    let work = |((pair, _), state): ((&ContactPair, Bristles), &State)| {
+fn energy_of_bristles(world: &World, states: &Rows) -> f64 {
+    let resting: Vec<BodyState> =
+        states.iter().map(|state| BodyState::at_rest(state.pose)).collect();
+    let work = |((pair, _), state): ((&ContactPair, Bristles), &BodyState)| {
         let rotation = states[pair.bodies.field].pose.rotation;
         let [linear, angular] = [state.linear, state.angular].map(|x| rotation * x);
         let twist = spatial(&linear, &angular);
         let along = |part: f64| {
-            let deflection = State::at_rest(state.pose).deflected(&(state.deflection() * part));
+            let deflection = BodyState::at_rest(state.pose).deflected(&(state.deflection() * part));
             world.pair_wrench(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
         };
         let undeflected = along(0.0);

@@ -4,9 +4,9 @@ use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use crate::body::RigidBody;
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
 use crate::spatial::spatial;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 
@@ -42,7 +42,7 @@ impl Sums {
 }
 
 /// The velocities of a joint's state.
-fn velocity<S: Scalar>(state: &State<S>) -> Vector6<f64> {
+fn velocity<S: Scalar>(state: &BodyState<S>) -> Vector6<f64> {
     let state = state.value();
     spatial(&state.linear, &state.angular)
 }
@@ -70,7 +70,7 @@ struct FollowedJoint {
 }
 
 impl StepResolution {
-    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
+    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &Rows<S>) -> Self {
         let follow = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?.map(S::value);
             let state = initial[body].value();
@@ -98,7 +98,7 @@ impl StepResolution {
 
     /// After `step` has led to `states`.
     #[inline]
-    pub(super) fn step<S: Scalar>(&mut self, step: Step, states: &[State<S>]) {
+    pub(super) fn step<S: Scalar>(&mut self, step: Step, states: &Rows<S>) {
         for followed in &mut self.bodies {
             let state = states[followed.body].value();
             let momentum = followed.rigid.momentum(&state.pose.rotation, &state.angular);

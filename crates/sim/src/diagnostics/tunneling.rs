@@ -2,7 +2,7 @@
 
 use prehend_autodiff::Scalar;
 
-use crate::state::State;
+use crate::body_state::{BodyState, Rows};
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::Body;
@@ -15,7 +15,7 @@ const SAFE_TRAVEL: f64 = 0.25;
 /// Watch over bodies that move by more than a small part of another one's thickness in a step.
 pub(super) struct Tunneling {
     /// The states before the step; empty where no field is thin.
-    before: Vec<State>,
+    before: Vec<BodyState>,
     /// Distance of each body's samples from its center of mass \[m\].
     radii: Vec<f64>,
     /// Smallest thickness of a field \[m\].
@@ -24,7 +24,7 @@ pub(super) struct Tunneling {
 }
 
 impl Tunneling {
-    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
+    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &Rows<S>) -> Self {
         let fields = world.bodies.iter().filter_map(|body| body.field.as_ref());
         let thinnest = fields.map(|field| field.thickness()).fold(f64::INFINITY, f64::min);
         let watched = if thinnest.is_finite() { initial } else { &[] };
@@ -33,7 +33,7 @@ impl Tunneling {
             body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&com))
         };
         Self {
-            before: watched.iter().map(State::value).collect(),
+            before: watched.iter().map(BodyState::value).collect(),
             radii: world.bodies.iter().map(radius).collect(),
             thinnest,
             first: None,
@@ -42,7 +42,7 @@ impl Tunneling {
 
     /// After `step` has led to `states`.
     #[inline]
-    pub(super) fn step<S: Scalar>(&mut self, world: &World<S>, step: Step, states: &[State<S>]) {
+    pub(super) fn step<S: Scalar>(&mut self, world: &World<S>, step: Step, states: &Rows<S>) {
         if self.before.is_empty() || self.first.is_some() {
             return;
         }
@@ -65,7 +65,7 @@ impl Tunneling {
         &self,
         world: &World<S>,
         step: Step,
-        states: &[State<S>],
+        states: &Rows<S>,
     ) -> Option<ContactBodies> {
         let bodies = || self.before.iter().zip(states).zip(&self.radii);
         let fastest =
@@ -85,7 +85,7 @@ impl Tunneling {
         &self,
         world: &World<S>,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
     ) -> bool {
         let [before, after] =
             [world.relative_value(pair, &self.before), world.relative_value(pair, states)];
@@ -97,7 +97,7 @@ impl Tunneling {
 }
 
 /// Bound of the distance \[m\] that points of a body within `radius` \[m\] of its center of mass move.
-fn travel(before: &State, after: &State, radius: f64) -> f64 {
+fn travel(before: &BodyState, after: &BodyState, radius: f64) -> f64 {
     let moved = after.pose.translation.vector - before.pose.translation.vector;
     moved.norm() + radius * after.pose.rotation.angle_to(&before.pose.rotation)
 }

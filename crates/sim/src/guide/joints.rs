@@ -1,8 +1,8 @@
 //! Joints and robots.
 //!
-//! Links are bodies with samples and fields, connected by joints: [`World::add_articulation`]. Their generalized coordinates are states of
-//! their own, after those of the bodies: begin with [`World::neutral_states`], set joints by [`World::set_joint`], and read them by
-//! [`World::joint_motion`]. States of links follow from these and are overwritten. Add samples and fields afterwards:
+//! Links are bodies with samples and fields, connected by joints: [`World::add_articulation`]. Begin with
+//! [`World::neutral_state`], set their generalized coordinates by [`World::set_joint`], and read them by
+//! [`World::joint_motion`]. Poses of links follow from these and are overwritten. Add samples and fields afterwards:
 //! `world.bodies[finger] = world.bodies[finger].clone().with_cuboid(shape, 0.005)?`.
 //!
 //! Forces along a joint are [`JointLaw`](crate::joint_law::JointLaw)s: springs, dampers, dry friction, limits (no joint has any by itself), motors and
@@ -27,14 +27,14 @@
 //!
 //! // It is pushed the way it moves: how far does it get, and how does that depend on the push?
 //! let push = Fwd::<1>::variable(0.2, 0);
-//! let control = |_: Step, world: &mut World<Fwd<1>>, states: &mut [State<Fwd<1>>]| {
-//!     let [_, velocity] = world.joint_motion(states, rod)?;
+//! let control = |_: Step, world: &mut World<Fwd<1>>, state: &mut State<Fwd<1>>| {
+//!     let [_, velocity] = world.joint_motion(state, rod)?;
 //!     let effort = if velocity.value() < 0.0 { -push } else { push };
 //!     world.joint_force_mut(motor).set_param("effort", effort)?;
 //!     Ok::<_, prehend_sim::SimulationError>(())
 //! };
 //! let lifted = world.cast();
-//! let start = lifted.neutral_states();
+//! let start = lifted.neutral_state();
 //! let time_steps = TimeSteps { dt: 0.02, steps: 20 };
 //! let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
 //! let [angle, _] = lifted.joint_motion(&end, rod)?;
@@ -45,7 +45,7 @@
 //!
 //! [`World::add_bushing`] closes loops by springs. Robots of MJCF: [`World::add_mjcf`], with joints, actuators, tendons and loops; of
 //! URDF ([`KinematicTree::from_urdf_file`](prehend_geometry::robot::KinematicTree::from_urdf_file)): [`World::add_articulated_robot`], which names joints by the
-//! links that they move, or [`World::add_robot`] with driven joints. Sensors: [`World::contact_wrench`], [`World::accelerometer`]. A custom
+//! links that they move; links on a given path are bodies [on a trajectory](super#bodies-on-a-trajectory). Sensors: [`World::contact_wrench`], [`World::accelerometer`]. A custom
 //! joint type is a function from coordinates to a pose ([`JointModel`](crate::articulated::JointModel)). [`World::linearize_step`] gives a
 //! step with its Jacobian in closed form.
 //!

@@ -14,7 +14,7 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
 use super::Integrator;
-use crate::error::SimulationError;
+use crate::error::{Result, SimulationError};
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
@@ -51,13 +51,12 @@ use crate::world::World;
 /// with penetration ([`HuntCrossley`](crate::HuntCrossley)).
 ///
 /// ```
-/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use nalgebra::Vector3;
 /// use prehend_sim::{Adaptive, Body, RigidBody, TimeSteps, World};
 ///
-/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::dynamic("stone", stone));
-/// let start = [stone.at_rest(&Isometry3::identity())];
+/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let start = world.neutral_state();
 /// let tight = Adaptive { tolerance: 1e-10, sensitivity_tolerance: 1e-9, ..Adaptive::default() };
 /// let run = world.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
 /// assert!((run[10][0].linear.z + 9.81).abs() < 1e-12);
@@ -78,7 +77,7 @@ pub struct Adaptive {
 }
 
 impl Adaptive {
-    fn check(&self) -> Result<(), SimulationError> {
+    fn check(&self) -> Result<()> {
         let settings = [
             ("Adaptive::tolerance", self.tolerance),
             ("Adaptive::sensitivity_tolerance", self.sensitivity_tolerance),
@@ -104,24 +103,19 @@ impl Integrator for Adaptive {
     /// # Errors
     /// If a tolerance is not positive; if a contact's force jumps at touch and derivatives are asked for; where a body passes
     /// through another; where steps would have to be too short or too many; where a state stops being finite.
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
         self.check()?;
         if S::ORDER > 0 {
             self.check_differentiable(world)?;
         }
-        windows::step(self, world, states, step)
+        Ok(state.with(windows::step(self, world, state.rows(), step)?, step.end()))
     }
 
     fn finds_contacts(&self) -> bool {
         true
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<()> {
         world.check_onsets()
     }
 

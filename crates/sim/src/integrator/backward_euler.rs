@@ -9,7 +9,8 @@ use prehend_autodiff::implicit::Equations as _;
 use prehend_autodiff::solve::Factored;
 
 use super::Integrator;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::Result;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
@@ -29,36 +30,32 @@ use crate::world::World;
 ///
 /// # Errors
 /// A force that jumps, as that of a damped contact does without smoothing, may leave the equations of an impact without a
-/// solution: [`SimulationError::Unsolved`]. [`SubStepped`](crate::SubStepped) then tries shorter steps; a softplus
+/// solution: [`SimulationError::Unsolved`](crate::SimulationError::Unsolved). [`SubStepped`](crate::SubStepped) then tries shorter steps; a softplus
 /// has no jumps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BackwardEuler;
 
 impl Integrator for BackwardEuler {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
         world.ensure_no_joints("BackwardEuler")?;
         world.ensure_no_bushings("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
-            return Ok(states.to_vec());
+            return Ok(state.clone());
         }
-        let values: Vec<State> = states.iter().map(State::value).collect();
+        let states = state.rows();
+        let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let plain = world.to_f64();
         let lifted = plain.cast();
         let mut at_end = values.clone();
-        plain.update_kinematics(&mut at_end, step.end());
+        plain.place_bodies(&mut at_end, step.end());
         let mut equations =
             ImplicitStep { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
         let solution = equations.solve()?;
         if S::ORDER == 0 {
             let velocity = |slot| velocity_at(&solution, slot).map(S::constant);
             let next = moved(world, states, &equations, velocity);
-            return Ok(deflected(world, next, &equations.step));
+            return Ok(state.with(deflected(world, next, &equations.step), step.end()));
         }
         // Leaks are in derivatives only.
         let mut leaky = lifted.clone();
@@ -69,7 +66,7 @@ impl Integrator for BackwardEuler {
         let (_, jacobian) = equations
             .linearize(&solution)
             .map_err(|_| equations.unsolved(equations.residual(&solution).norm(), 0))?;
-        Ok(carried(world, states, &equations, &solution, &jacobian))
+        Ok(state.with(carried(world, states, &equations, &solution, &jacobian), step.end()))
     }
 
     fn stability_limit(&self) -> f64 {
@@ -80,12 +77,12 @@ impl Integrator for BackwardEuler {
 /// The states at the end of a step that free bodies make with these velocities, before contacts with bristles are deflected.
 fn moved<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     equations: &ImplicitStep<'_>,
     velocity: impl Fn(usize) -> [S; 6],
-) -> Vec<State<S>> {
+) -> Vec<BodyState<S>> {
     let mut next = states.to_vec();
-    world.update_kinematics(&mut next, equations.step.end());
+    world.place_bodies(&mut next, equations.step.end());
     for (slot, &body) in equations.free.iter().enumerate() {
         next[body] = arrived(&states[body], &velocity(slot), equations.step.dt);
     }
@@ -95,14 +92,14 @@ fn moved<S: Scalar>(
 /// The states at the end, with the derivatives of the solution: x − J⁻¹F(x), where F carries those by all else.
 fn carried<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     equations: &ImplicitStep<'_>,
     solution: &DVector<f64>,
     jacobian: &Factored<f64>,
-) -> Vec<State<S>> {
+) -> Vec<BodyState<S>> {
     let velocity = |slot: usize| velocity_at(solution, slot).map(S::constant);
     let next = moved(world, states, equations, velocity);
-    let wrenches = world.wrenches(&next, equations.step.index);
+    let wrenches = world.wrenches_of(&next, equations.step.index);
     let mut excesses = Vec::with_capacity(solution.len());
     for (slot, &body) in equations.free.iter().enumerate() {
         let Some(rigid) = world.bodies[body].rigid() else { continue };
@@ -118,9 +115,13 @@ fn carried<S: Scalar>(
 }
 
 /// Forces are those of the deflections at the start; these follow the motion at the end.
-fn deflected<S: Scalar>(world: &World<S>, mut next: Vec<State<S>>, step: &Step) -> Vec<State<S>> {
+fn deflected<S: Scalar>(
+    world: &World<S>,
+    mut next: Vec<BodyState<S>>,
+    step: &Step,
+) -> Vec<BodyState<S>> {
     if next.len() > world.bodies.len() {
-        let rates = world.wrenches(&next, step.index);
+        let rates = world.wrenches_of(&next, step.index);
         world.integrate_bristles(&mut next, &rates, S::constant(step.dt));
     }
     next
@@ -138,7 +139,7 @@ mod tests {
     use crate::{GapSmoothing, Motion, RigidBody, TimeSteps};
 
     /// The egg in a bowl that flies freely.
-    fn egg_in_free_bowl(smoothing: GapSmoothing) -> (World, Vec<State>) {
+    fn egg_in_free_bowl(smoothing: GapSmoothing) -> (World, State) {
         let (mut world, mut states) = egg_on(bowl(), smoothing);
         let mut rigid = *world.bodies[1].rigid().unwrap();
         rigid = RigidBody::new(0.5, rigid.inertia() * 3.0, *rigid.com()).unwrap();
@@ -154,37 +155,31 @@ mod tests {
         let (world, states) = egg_in_free_bowl(GapSmoothing::Softplus { width: 3e-4 });
         let time_steps = TimeSteps { dt: 2e-3, steps: 3 };
         for moving in 0..2 {
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
+            let mut lifted: State<Fwd<12>> = states.cast();
             lifted[moving] = states[moving].variables();
-            let run = world
-                .cast()
-                .simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ())
-                .unwrap()
-                .states;
+            let run =
+                world.cast().simulate_with(&BackwardEuler, &lifted, time_steps).unwrap().states;
             let differences = finite_difference_jacobian(
                 |x| {
                     let mut moved = states.clone();
                     let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
                     moved[moving] = states[moving].retract(&tangent);
-                    let run = world
-                        .simulate_with(&BackwardEuler, &moved, time_steps, |_, _| ())
-                        .unwrap()
-                        .states;
-                    let velocities = run.iter().flat_map(|s| [s.linear, s.angular]);
+                    let run =
+                        world.simulate_with(&BackwardEuler, &moved, time_steps).unwrap().states;
+                    let velocities = run.bodies().iter().flat_map(|s| [s.linear, s.angular]);
                     velocities.flat_map(|v| [v.x, v.y, v.z]).collect()
                 },
                 &[0.0; 12],
                 1e-6,
             );
-            let exact = run.iter().flat_map(|s| [s.linear, s.angular]);
+            let exact = run.bodies().iter().flat_map(|s| [s.linear, s.angular]);
             for (exact, reference) in exact.flat_map(|v| [v.x, v.y, v.z]).zip(&differences) {
                 let error = compare_gradients(&exact.derivative, reference);
                 assert!(error.relative < 1e-6, "body {moving}: {error:?}");
             }
         }
-        let plain =
-            world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap().states;
-        let momentum = |states: &[State]| states[0].linear * 0.5 + states[1].linear * 0.2;
+        let plain = world.simulate_with(&BackwardEuler, &states, time_steps).unwrap().states;
+        let momentum = |states: &State| states[0].linear * 0.5 + states[1].linear * 0.2;
         let gained = world.gravity * (0.7 * 6e-3);
         assert!((momentum(&plain) - momentum(&states) - gained).norm() < 1e-14);
     }
@@ -197,8 +192,7 @@ mod tests {
         hit[1].pose.translation.z -= 1e-3;
         assert!(0.01 * world.contact_frequency(&hit) > 50.0);
         let time_steps = TimeSteps { dt: 0.01, steps: 300 };
-        let end =
-            world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap().states[1];
+        let end = world.simulate_with(&BackwardEuler, &states, time_steps).unwrap().states[1];
         assert!(end.linear.norm() < 1e-3 && end.angular.norm() < 0.1, "{end:?}");
     }
 
@@ -208,12 +202,12 @@ mod tests {
         let ends = [GapSmoothing::Hard, leaky].map(|smoothing| {
             let (world, mut states) = egg_on(bowl(), smoothing);
             states[1].pose.translation.z += 5e-3;
-            let lifted = [states[0].cast(), states[1].variables()];
+            let lifted = State::new([states[0].cast(), states[1].variables()]);
             let step = Step::new(0, 1e-3);
             BackwardEuler.step(&world.cast(), &lifted, step).unwrap()[1]
         });
         assert_eq!(ends[0].value(), ends[1].value());
-        let slope = |end: &State<Fwd<12>>| end.linear.z.derivative[2];
+        let slope = |end: &BodyState<Fwd<12>>| end.linear.z.derivative[2];
         assert_eq!(slope(&ends[0]), 0.0);
         assert!(slope(&ends[1]) < -1e-2, "{}", slope(&ends[1]));
     }
@@ -223,7 +217,7 @@ mod tests {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
         world.bodies[1].motion = Motion::Fixed;
         let step = Step::new(0, 1e-3);
-        assert_eq!(BackwardEuler.step(&world, &states, step).unwrap(), states);
+        assert_eq!(BackwardEuler.step(&world, &states, step).unwrap().bodies(), states.bodies());
     }
 
     /// Enough bodies for sparse equations, where those are compiled.
@@ -234,7 +228,7 @@ mod tests {
         let mut world = World::new(Vector3::z() * -9.81);
         let ground = crate::Body::fixed("ground").with_field(crate::scenes::floor());
         let ground = world.add(ground);
-        let mut states = vec![State::at_rest(nalgebra::Isometry3::identity())];
+        let mut states = vec![BodyState::at_rest(nalgebra::Isometry3::identity())];
         let rigid = RigidBody::ball(0.5, radius).unwrap();
         let surface = std::sync::Arc::new(crate::Surface::ball(radius).unwrap());
         let field = std::sync::Arc::new(crate::fields::Sphere {
@@ -248,6 +242,7 @@ mod tests {
             let (x, y, z) = (place(i % 3), place(i / 3 % 3), 0.0499 + place(i / 9));
             states.push(rigid.at_rest(&nalgebra::Isometry3::translation(x, y, z)));
         }
+        let states = State::new(states);
         let balls: Vec<_> = world.free_bodies();
         let law = std::sync::Arc::new(crate::scenes::penalty(1e6, 1e4, 0.5, 1e-2));
         let smoothing = GapSmoothing::Softplus { width: 3e-4 };
@@ -257,15 +252,15 @@ mod tests {
         let end = |push: [f64; 2]| {
             let mut states = states.clone();
             (states[1].linear.x, states[BALLS].angular.y) = (0.1 + push[0], push[1]);
-            let run = world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ());
+            let run = world.simulate_with(&BackwardEuler, &states, time_steps);
             let states = run.unwrap().states;
-            states.iter().flat_map(|s| [s.linear.x, s.linear.z, s.angular.y]).collect()
+            states.bodies().iter().flat_map(|s| [s.linear.x, s.linear.z, s.angular.y]).collect()
         };
-        let mut lifted: Vec<State<Fwd<2>>> = states.iter().map(State::cast).collect();
+        let mut lifted: State<Fwd<2>> = states.cast();
         lifted[1].linear.x = Fwd::variable(0.1, 0);
         lifted[BALLS].angular.y = Fwd::variable(0.0, 1);
-        let run = world.cast().simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ());
-        let exact: Vec<Fwd<2>> = (run.unwrap().states.iter())
+        let run = world.cast().simulate_with(&BackwardEuler, &lifted, time_steps);
+        let exact: Vec<Fwd<2>> = (run.unwrap().states.bodies().iter())
             .flat_map(|s| [s.linear.x, s.linear.z, s.angular.y])
             .collect();
         let differences = finite_difference_jacobian(|x| end([x[0], x[1]]), &[0.0; 2], 1e-6);

@@ -10,9 +10,9 @@ use prehend_autodiff::rigid::turned;
 use prehend_autodiff::{LocalFunction, Scalar};
 
 use crate::body::RigidBody;
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
 use crate::spatial::spatial;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body::Body;
@@ -29,7 +29,7 @@ pub(super) type Change<S> = [Vector3<S>; 4];
 /// One step of an explicit method: where it starts, and the slopes of the stages so far.
 pub(super) struct Stages<'a, S: Scalar> {
     world: &'a World<S>,
-    states: &'a [State<S>],
+    states: &'a Rows<S>,
     step: Step,
     free: Vec<Free<'a, S>>,
     /// Free bodies, joints and contacts with bristles.
@@ -52,7 +52,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
     /// The first of `count` stages, of a step that starts with `wrenches` on the bodies.
     pub(super) fn new(
         world: &'a World<S>,
-        states: &'a [State<S>],
+        states: &'a Rows<S>,
         wrenches: &[Vector6<S>],
         step: Step,
         count: usize,
@@ -77,20 +77,20 @@ impl<'a, S: Scalar> Stages<'a, S> {
         &mut self,
         fraction: f64,
         weights: &[f64],
-    ) -> (Vec<State<S>>, Vec<Vector6<S>>) {
+    ) -> (Vec<BodyState<S>>, Vec<Vector6<S>>) {
         let mut change = std::mem::take(&mut self.change);
         change.fill([Vector3::zeros(); 4]);
         self.add_combined(weights, &mut change);
         let mut states = self.moved(&change);
         self.change = change;
-        self.world.update_kinematics(&mut states, self.step.start + fraction * self.step.dt);
-        let wrenches = self.world.wrenches(&states, self.step.index);
+        self.world.place_bodies(&mut states, self.step.start + fraction * self.step.dt);
+        let wrenches = self.world.wrenches_of(&states, self.step.index);
         self.add_slopes(&states, &wrenches);
         (states, wrenches)
     }
 
     /// The states that `weights` of the slopes lead to.
-    pub(super) fn end(&self, weights: &[f64]) -> Vec<State<S>> {
+    pub(super) fn end(&self, weights: &[f64]) -> Vec<BodyState<S>> {
         self.moved(&self.combined(weights))
     }
 
@@ -122,7 +122,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
     }
 
     /// The states after `change`.
-    fn moved(&self, change: &[Change<S>]) -> Vec<State<S>> {
+    fn moved(&self, change: &[Change<S>]) -> Vec<BodyState<S>> {
         let mut moved = self.states.to_vec();
         for (free, [position, velocity, turn, momentum]) in self.free.iter().zip(change) {
             let state = &mut moved[free.id];
@@ -147,7 +147,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
     }
 
     /// The rates of change at `states` under `wrenches`, where the last change has led to.
-    fn add_slopes(&mut self, states: &[State<S>], wrenches: &[Vector6<S>]) {
+    fn add_slopes(&mut self, states: &Rows<S>, wrenches: &[Vector6<S>]) {
         for (free, change) in self.free.iter().zip(&self.change) {
             let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));

@@ -6,7 +6,8 @@ use prehend_autodiff::rigid::turned;
 
 use super::Integrator;
 use crate::body::RigidBody;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::Result;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
@@ -20,16 +21,11 @@ use crate::world::World;
 pub struct SemiImplicitEuler;
 
 impl Integrator for SemiImplicitEuler {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let (wrenches, dt) = (world.wrenches(states, step.index), S::constant(step.dt));
-        let mut next = moved(world, states, &wrenches, dt);
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let (wrenches, dt) = (world.wrenches_of(state.rows(), step.index), S::constant(step.dt));
+        let mut next = moved(world, state.rows(), &wrenches, dt);
         world.integrate_bristles(&mut next, &wrenches, dt);
-        Ok(next)
+        Ok(state.with(next, step.end()))
     }
 
     fn evaluates_forces_once(&self) -> bool {
@@ -47,16 +43,16 @@ impl Integrator for SemiImplicitEuler {
 /// The states after `dt` \[s\] with these wrenches on bodies and accelerations of joints, before contacts with bristles are deflected.
 pub(crate) fn moved<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     wrenches: &[Vector6<S>],
     dt: S,
-) -> Vec<State<S>> {
+) -> Vec<BodyState<S>> {
     let bodies = world.bodies.iter().zip(states).zip(wrenches);
     let next = bodies.map(|((body, state), wrench)| match body.rigid() {
         Some(rigid) => advance(rigid, &world.gravity, state, wrench, dt),
         None => *state,
     });
-    let mut next: Vec<State<S>> = next.collect();
+    let mut next: Vec<BodyState<S>> = next.collect();
     next.extend_from_slice(&states[next.len()..]);
     world.integrate_joints(&mut next, wrenches, dt);
     next
@@ -67,10 +63,10 @@ pub(crate) fn moved<S: Scalar>(
 pub(crate) fn advance<S: Scalar>(
     body: &RigidBody<S>,
     gravity: &Vector3<S>,
-    state: &State<S>,
+    state: &BodyState<S>,
     wrench: &Vector6<S>,
     dt: S,
-) -> State<S> {
+) -> BodyState<S> {
     let mut next = *state;
     let (linear, momentum) = body.apply_impulse(state, wrench, gravity, dt);
     next.linear = linear;

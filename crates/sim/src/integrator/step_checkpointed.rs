@@ -8,8 +8,9 @@ use prehend_autodiff::{Recompute, Scalar};
 
 use super::Integrator;
 use super::world_template::{ParameterDelta, WorldTemplate};
-use crate::error::SimulationError;
-use crate::state::{STATE, State, coordinates_of, states_of};
+use crate::body_state::{BodyState, Rows, STATE, coordinates_of, states_of};
+use crate::error::{Result, SimulationError};
+use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 
@@ -32,9 +33,9 @@ use crate::world::World;
 /// let recording = Recording::start();
 /// let mut lifted = world.cast::<Var>();
 /// lifted.gravity.z = recording.variable(-9.81);
-/// let start = [State::at_rest(Isometry3::identity()).cast()];
+/// let start = world.neutral_state().cast();
 /// let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
-/// let end = lifted.simulate_with(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 }, |_, _| ())?.states;
+/// let end = lifted.simulate_with(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 })?.states;
 /// let by_gravity = recording.gradient(end[ball].linear.z).wrt(lifted.gravity.z);
 /// assert!((by_gravity - 1.0).abs() < 1e-12);
 /// # Ok(())
@@ -50,7 +51,7 @@ impl<I: Integrator> StepCheckpointed<I> {
     ///
     /// # Errors
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
-    pub fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self, SimulationError> {
+    pub fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self> {
         Ok(Self { template: WorldTemplate::new(integrator, world)? })
     }
 
@@ -64,26 +65,21 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
     /// # Errors
     /// As the integrator within; if the world differs from the one of [`StepCheckpointed::new`] in more than parameters, or a
     /// trajectory carries derivatives.
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
         if S::ORDER == 0 {
-            return world.integrate(&self.template.integrator, states, step);
+            return world.integrate(&self.template.integrator, state, step);
         }
         world.check_trajectories()?;
         if !self.template.is_of(world) {
             return Err(SimulationError::AnotherWorld);
         }
         self.check_differentiable(world)?;
-        let (function, x) = OneStep::new(&self.template, world, states, step);
+        let (function, x) = OneStep::new(&self.template, world, state.rows(), step);
         let after = S::recompute(function, &x)?;
-        Ok(with_moved(world, states, &after))
+        Ok(state.with(with_moved(world, state.rows(), &after), step.end()))
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<()> {
         self.template.integrator.check_differentiable(world)
     }
 
@@ -113,7 +109,7 @@ impl<I: Integrator> OneStep<I> {
     pub(crate) fn new<S: Scalar>(
         template: &Arc<WorldTemplate<I>>,
         world: &World<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         step: Step,
     ) -> (Self, Vec<S>) {
         let ParameterDelta { places, values } = template.changes(world);
@@ -125,11 +121,11 @@ impl<I: Integrator> OneStep<I> {
 /// `states` after a step of `world` whose function has the results `moved`.
 pub(crate) fn with_moved<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     moved: &[S],
-) -> Vec<State<S>> {
+) -> Vec<BodyState<S>> {
     let mut moved = states_of(moved);
-    let next = |(index, state): (usize, &State<S>)| match world.moves_by_forces(index) {
+    let next = |(index, state): (usize, &BodyState<S>)| match world.moves_by_forces(index) {
         true => moved.next().unwrap_or(*state),
         false => *state,
     };
@@ -139,12 +135,13 @@ pub(crate) fn with_moved<S: Scalar>(
 impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {
     type Error = SimulationError;
 
-    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
+    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>> {
         let (states, values) = x.split_at(STATE * self.template.world.state_count());
         let world = self.template.world(&self.places, values)?;
-        let states: Vec<State<S>> = states_of(states).collect();
-        let next = world.integrate(&self.template.integrator, &states, self.step)?;
-        let moved = next.into_iter().enumerate().filter(|(index, _)| world.moves_by_forces(*index));
+        let state = self.template.state(states, self.step.start);
+        let next = world.integrate(&self.template.integrator, &state, self.step)?;
+        let moved =
+            next.rows().iter().enumerate().filter(|(index, _)| world.moves_by_forces(*index));
         Ok(moved.flat_map(|(_, state)| state.coordinates()).collect())
     }
 }

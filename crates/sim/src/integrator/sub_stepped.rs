@@ -4,7 +4,8 @@ use nalgebra::Vector6;
 use prehend_autodiff::Scalar;
 
 use super::Integrator;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::{Result, SimulationError};
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
@@ -21,13 +22,12 @@ use crate::world::body::Body;
 /// other steps might be. Contacts that leak in the first step of a rollout leak in the first part of it.
 ///
 /// ```
-/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use nalgebra::Vector3;
 /// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, SubStepped, TimeSteps, World};
 ///
-/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::dynamic("stone", stone));
-/// let start = [stone.at_rest(&Isometry3::identity())];
+/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let start = world.neutral_state();
 /// let integrator = SubStepped { integrator: SemiImplicitEuler, max_substeps: 32 };
 /// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
 /// assert!((run[100][0].linear.z + 9.81).abs() < 1e-12);
@@ -48,27 +48,28 @@ impl<I: Integrator> SubStepped<I> {
     fn divided<S: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<S>],
+        state: &State<S>,
         step: Step,
         parts: usize,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut states = states.to_vec();
+    ) -> Result<State<S>> {
+        let mut state = state.clone();
         for part in step.parts(parts) {
-            states = self.integrator.step(world, &states, part)?;
-            world.update_kinematics(&mut states, part.end());
+            state = self.integrator.step(world, &state, part)?;
+            state.time = part.end();
+            world.update_kinematics(&mut state);
         }
-        Ok(states)
+        Ok(state)
     }
 
     /// Number of substeps that the contacts demand.
-    fn demanded<S: Scalar>(&self, world: &World<S>, states: &[State<S>], dt: f64) -> f64 {
+    fn demanded<S: Scalar>(&self, world: &World<S>, states: &Rows<S>, dt: f64) -> f64 {
         let limit = self.integrator.stability_limit();
         if limit.is_infinite() {
             return 1.0;
         }
         let plain = world.to_f64();
-        let now: Vec<State> = states.iter().map(State::value).collect();
-        let drift = |(body, state): (&Body, &State)| {
+        let now: Vec<BodyState> = states.iter().map(BodyState::value).collect();
+        let drift = |(body, state): (&Body, &BodyState)| {
             let mut falling = *state;
             if let Some(rigid) = body.rigid() {
                 let pull = body.external_wrench.fixed_rows::<3>(0) / rigid.mass();
@@ -76,27 +77,22 @@ impl<I: Integrator> SubStepped<I> {
             }
             falling.drifted(dt)
         };
-        let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
+        let mut then: Vec<BodyState> = plain.bodies.iter().zip(&now).map(drift).collect();
         then.extend_from_slice(&now[then.len()..]);
         plain.integrate_joints(&mut then, &vec![Vector6::zeros(); now.len()], dt);
         plain.forward_kinematics(&mut then);
-        let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
+        let fastest = plain.contact_frequency_of(&now).max(plain.contact_frequency_of(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }
 }
 
 impl<I: Integrator> Integrator for SubStepped<I> {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let needed = self.demanded(world, states, step.dt);
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let needed = self.demanded(world, state.rows(), step.dt);
         let max_substeps = self.max_substeps.max(1);
         if needed.is_nan() || needed > max_substeps as f64 {
             let (step, time) = (step.index, step.start);
-            let (body, contact) = world.most_accelerated(states);
+            let (body, contact) = world.most_accelerated(state.rows());
             return Err(SimulationError::SubSteps {
                 step,
                 time,
@@ -108,7 +104,7 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         }
         let mut parts = needed as usize;
         loop {
-            match self.divided(world, states, step, parts) {
+            match self.divided(world, state, step, parts) {
                 Err(SimulationError::Unsolved { .. }) if 2 * parts <= max_substeps => parts *= 2,
                 // Parts have numbers of their own.
                 Err(mut error) => {
@@ -122,7 +118,7 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         }
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<()> {
         self.integrator.check_differentiable(world)
     }
 
@@ -147,18 +143,17 @@ mod tests {
         states[1].pose.translation.z += 1e-3;
         states[1].linear.z = -0.5;
         let step = Step::new(2, 1e-2);
-        let parts = |states: &[State]| {
+        let parts = |states: &State| {
             let euler = SubStepped { integrator: SemiImplicitEuler, max_substeps: 1000 };
-            euler.demanded(&world, states, step.dt)
+            euler.demanded(&world, states.bodies(), step.dt)
         };
         let impact = parts(&states);
         assert!(impact > 2.0 && world.contact_frequency(&states) == 0.0, "{impact}");
         let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: impact as usize };
         let done = divided.step(&world, &states, step).unwrap();
         let fine = TimeSteps { dt: step.dt / impact, steps: impact as usize };
-        let expected =
-            world.simulate_with(&SemiImplicitEuler, &states, fine, |_, _| ()).unwrap().states;
-        assert_eq!(done, expected);
+        let expected = world.simulate_with(&SemiImplicitEuler, &states, fine).unwrap().states;
+        assert_eq!(done.bodies(), expected.bodies());
         let too_few = SubStepped { max_substeps: impact as usize - 1, ..divided };
         assert_eq!(
             too_few.step(&world, &states, step).unwrap_err(),
@@ -172,7 +167,7 @@ mod tests {
             }
         );
         let wider = SubStepped { integrator: RungeKutta4, max_substeps: 1000 };
-        assert!(wider.demanded(&world, &states, step.dt) < impact);
+        assert!(wider.demanded(&world, states.bodies(), step.dt) < impact);
         states[1].pose.translation.z += 0.1;
         assert_eq!(parts(&states), 1.0);
     }

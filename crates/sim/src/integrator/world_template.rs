@@ -6,7 +6,9 @@ use prehend_autodiff::Scalar;
 
 use super::Integrator;
 use crate::articulated::Link;
+use crate::body_state::states_of;
 use crate::error::BuildError;
+use crate::state::State;
 use crate::world::World;
 use crate::world::articulated_body::ArticulatedBody;
 use crate::world::body::{Body, Motion};
@@ -51,6 +53,11 @@ impl<I: Integrator> WorldTemplate<I> {
     /// True if `world` differs in parameters only.
     pub(crate) fn is_of<S: Scalar>(&self, world: &World<S>) -> bool {
         has_parts_of(world, &self.world)
+    }
+
+    /// State at `time` \[s\] of the numbers of its rows.
+    pub(crate) fn state<S: Scalar>(&self, rows: &[S], time: f64) -> State<S> {
+        State::from_rows(states_of(rows).collect(), self.world.bodies.len(), time)
     }
 
     /// This template's world with `values` at `places`.

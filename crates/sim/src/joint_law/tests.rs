@@ -136,7 +136,7 @@ fn what_cannot_be_is_refused_where_it_is_added() {
     let id = world.add_joint_force(links[0], damper(1.0)).unwrap();
     assert!(world.joint_force_mut(id).set_param("friction", 1.0).is_err());
     world.joint_force_mut(id).set_param("damping", f64::NAN).unwrap();
-    let states = world.neutral_states();
+    let states = world.neutral_state();
     assert!(matches!(
         world.simulate(&states, 0.1),
         Err(SimulationError::Build(BuildError::JointLaw { .. }))

@@ -7,8 +7,8 @@ use super::motions::{Motion, of_free_body, of_link};
 use super::pair::Between;
 use crate::articulated::Kinematics;
 use crate::articulated::tree_factor::TreeFactor;
+use crate::body_state::Rows;
 use crate::spatial::{angular, cross_motion, linear};
-use crate::state::State;
 use crate::world::World;
 use crate::world::articulated_body::ArticulatedBody;
 use crate::world::joint_force::Along;
@@ -29,7 +29,7 @@ pub(super) struct Generalized {
 
 impl Generalized {
     /// At `states`, whose links are moved to where their joints put them.
-    pub(super) fn new(world: &World, states: &mut [State], step: usize) -> Self {
+    pub(super) fn new(world: &World, states: &mut Rows, step: usize) -> Self {
         let trees = trees(world, states);
         for Tree { own, at, .. } in &trees {
             let bodies = own.bodies().iter();
@@ -49,7 +49,7 @@ impl Generalized {
     }
 
     /// Without any but by efforts.
-    pub(super) fn without_forces(world: &World, states: &[State]) -> Self {
+    pub(super) fn without_forces(world: &World, states: &Rows) -> Self {
         let trees = trees(world, states);
         let mut all = Self::empty(world, &trees);
         for Tree { at, first, .. } in &trees {
@@ -70,7 +70,7 @@ impl Generalized {
     }
 
     /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
-    fn add_forces(&mut self, world: &World, states: &[State], trees: &[Tree<'_>], step: usize) {
+    fn add_forces(&mut self, world: &World, states: &Rows, trees: &[Tree<'_>], step: usize) {
         let contacts = world.contacts.iter();
         let contacts = contacts.filter_map(|pair| Between::contact(world, pair, states, step));
         let bushings =
@@ -130,7 +130,7 @@ impl Generalized {
     fn add_joint_forces(
         &mut self,
         world: &World,
-        states: &[State],
+        states: &Rows,
         trees: &[Tree<'_>],
     ) -> Vec<Vec<f64>> {
         let mut efforts: Vec<Vec<f64>> = trees.iter().map(|tree| vec![0.0; tree.dofs]).collect();
@@ -229,7 +229,7 @@ struct Tree<'a> {
     dofs: usize,
 }
 
-fn trees<'a>(world: &'a World, states: &[State]) -> Vec<Tree<'a>> {
+fn trees<'a>(world: &'a World, states: &Rows) -> Vec<Tree<'a>> {
     let mut first = 6 * world.free_bodies().len();
     let mut trees = Vec::with_capacity(world.articulations.len());
     for (index, own) in world.articulations.iter().enumerate() {

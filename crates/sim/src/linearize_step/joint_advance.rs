@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix3};
 use prehend_autodiff::lie::{cross_matrix, so3_exp, so3_right_jacobian};
 
 use crate::articulated::Joint;
-use crate::state::State;
+use crate::body_state::BodyState;
 
 /// Derivatives of a joint's displacement after a step by that before it and by its velocity after it.
 pub(super) struct JointAdvance {
@@ -13,7 +13,7 @@ pub(super) struct JointAdvance {
 }
 
 impl JointAdvance {
-    pub(super) fn new(joint: &Joint, after: &State, dt: f64) -> Self {
+    pub(super) fn new(joint: &Joint, after: &BodyState, dt: f64) -> Self {
         let count = joint.nv();
         let mut advance = Self {
             of_place: DMatrix::identity(count, count),

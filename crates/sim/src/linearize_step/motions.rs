@@ -5,7 +5,7 @@ use nalgebra::{SVector, Vector6};
 use crate::articulated::Kinematics;
 use crate::spatial::{angular, cross_motion, linear, spatial};
 
-/// Changes of a body's state, in the order of [`State::tangent`](crate::State::tangent), by one coordinate.
+/// Changes of a body's state, in the order of [`BodyState::tangent`](crate::BodyState::tangent), by one coordinate.
 pub(super) struct Motion {
     /// Index of the coordinate.
     pub(super) dof: usize,

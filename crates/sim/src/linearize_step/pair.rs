@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, Scalar};
 
+use crate::body_state::Rows;
 use crate::contact::contact_query::ContactQuery;
 use crate::handle::BodyId;
 use crate::spatial::spatial;
-use crate::state::State;
 use crate::world::World;
 use crate::world::bushing::Bushing;
 use crate::world::contact_pair::ContactPair;
@@ -26,7 +26,7 @@ impl Between {
     pub(super) fn contact(
         world: &World,
         pair: &ContactPair,
-        states: &[State],
+        states: &Rows,
         step: usize,
     ) -> Option<Self> {
         let bodies = [pair.bodies.samples, pair.bodies.field];
@@ -68,7 +68,7 @@ impl Between {
     }
 
     /// Linearized force of a bushing.
-    pub(super) fn bushing(world: &World, bushing: &Bushing, states: &[State]) -> Self {
+    pub(super) fn bushing(world: &World, bushing: &Bushing, states: &Rows) -> Self {
         let inputs = Fwd::<24>::variables([0.0; 24]);
         let [a, b] = [0, 1].map(|end| {
             states[bushing.bodies[end]].retract(&std::array::from_fn(|i| inputs[12 * end + i]))

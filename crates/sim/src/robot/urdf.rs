@@ -37,7 +37,7 @@ impl World {
     /// caller's to give.
     ///
     /// Limits of effort and speed are not used, and there are no motors: add them by [`World::add_joint_force`]. Joints that mimic others follow
-    /// them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
+    /// them by springs.
     ///
     /// # Errors
     /// If `shape` is not the robot's, or a link weighs nothing and yet should move. The world is then as it was.

@@ -11,12 +11,13 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::rigid::turned;
 
 use super::World;
-use super::body::Body;
+use super::body::{Body, Motion};
 use super::joint_force::JointAxis;
 use crate::articulated::adjoint::link_states;
 use crate::articulated::joint_state::JointState;
 use crate::articulated::{Articulation, Joint, Link};
-use crate::error::{BuildError, SimulationError};
+use crate::body_state::{BodyState, Rows};
+use crate::error::{BuildError, Result, SimulationError};
 use crate::handle::BodyId;
 use crate::state::State;
 
@@ -45,7 +46,7 @@ impl<S: Scalar> ArticulatedBody<S> {
     }
 
     /// Coordinates and velocities of all joints with these states.
-    pub(crate) fn coordinates<T: Scalar>(&self, joints: &[State<T>]) -> [Vec<T>; 2] {
+    pub(crate) fn coordinates<T: Scalar>(&self, joints: &Rows<T>) -> [Vec<T>; 2] {
         let [mut q, mut v] = [self.tree.nq(), self.tree.nv()].map(Vec::with_capacity);
         for (link, state) in self.tree.links().iter().zip(joints) {
             link.joint.read(state, &mut q, &mut v);
@@ -58,8 +59,8 @@ impl World {
     /// Adds links, each after its parent, as bodies named after them, and returns which, in the same order. Give them samples and fields as
     /// other bodies.
     ///
-    /// The joints are free to move, and their states follow those of the bodies: start from [`World::neutral_states`] and set them by
-    /// [`World::set_joint`]. The state of a link, that of its frame, follows from its joints; what is written there is overwritten.
+    /// The joints are free to move: start from [`World::neutral_state`] and set them by [`World::set_joint`]. The state of a link, that of its
+    /// frame, follows from its joints; what is written there is overwritten.
     ///
     /// ```
     /// use nalgebra::{Isometry3, Point3, Vector3};
@@ -75,7 +76,7 @@ impl World {
     ///     Link::new("upper", hinge.clone(), &rod).at(Isometry3::translation(0.0, 0.0, 2.0)),
     ///     Link::new("lower", hinge, &rod).on(0, Isometry3::translation(0.0, 0.0, -1.0)),
     /// ])?;
-    /// let mut start = world.neutral_states();
+    /// let mut start = world.neutral_state();
     /// world.set_joint(&mut start, links[0], &[0.5], &[0.0])?;
     /// let end = world.simulate(&start, 1.0)?;
     /// let [angle, velocity] = world.joint_motion(&end, links[1])?;
@@ -98,46 +99,85 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// States in which everything is at rest: bodies with their center of mass at the origin, joints at their neutral coordinates, those that mimic
-    /// others where these put them.
-    pub fn neutral_states(&self) -> Vec<State<S>> {
-        let at_rest = State::at_rest(Isometry3::identity());
-        let mut states = vec![at_rest; self.bodies.len() + self.joint_count()];
+    /// State in which everything is at rest at time 0: frames of bodies at the origin, joints at their neutral coordinates, those that mimic
+    /// others where these put them, contacts not deflected.
+    pub fn neutral_state(&self) -> State<S> {
+        let origin = Isometry3::identity();
+        let mut rows = vec![BodyState::at_rest(origin); self.state_count()];
+        for (body, row) in self.bodies.iter().zip(&mut rows) {
+            if let Some(rigid) = body.rigid() {
+                *row = rigid.at_rest(&origin);
+            }
+        }
         for own in &self.transmissions.couplings {
             // Both are joints of this world.
-            drop(self.move_followers(&mut states, own.leader.link));
+            drop(self.move_followers(&mut rows, own.leader.link));
         }
-        self.forward_kinematics(&mut states);
-        states
+        self.forward_kinematics(&mut rows);
+        State::from_rows(rows, self.bodies.len(), 0.0)
+    }
+
+    /// State at `time` \[s\] of [rows](State::rows): bodies, joints, contacts with bristles; the last may be missing.
+    ///
+    /// # Errors
+    /// If they are too few or too many.
+    pub fn state_of_rows(&self, rows: Vec<BodyState<S>>, time: f64) -> Result<State<S>> {
+        let rows = self.with_deflections(rows);
+        match rows.len() == self.state_count() {
+            true => Ok(State::from_rows(rows, self.bodies.len(), time)),
+            false => Err(self.wrong_count(rows.len())),
+        }
+    }
+
+    /// Puts the frame of a body that is no link at `t_world_model`. Its velocities stay.
+    ///
+    /// # Errors
+    /// If there is no such body, or it is a link.
+    pub fn set_pose(
+        &self,
+        state: &mut State<S>,
+        body: BodyId,
+        t_world_model: &Isometry3<S>,
+    ) -> Result<(), BuildError> {
+        let own = self.body(body)?;
+        if let Motion::Link = own.motion {
+            return Err(BuildError::IsALink { body: own.name.clone() });
+        }
+        state[body].pose =
+            own.rigid().map_or(*t_world_model, |rigid| rigid.at_rest(t_world_model).pose);
+        Ok(())
+    }
+
+    /// Pose of a body's frame, `t_world_model`.
+    pub fn pose(&self, state: &State<S>, body: BodyId) -> Isometry3<S> {
+        let pose = state[body].pose;
+        self.bodies[body].rigid().map_or(pose, |rigid| rigid.model_pose(&pose))
     }
 
     /// Sets coordinates and velocities of the joint of a link, as [`Joint`] has them, and of those that mimic it in URDF, and
     /// moves all links to where they are then. Set a follower that is to be elsewhere after its leader.
     ///
     /// # Errors
-    /// If it is no link, the numbers are too few or too many, a quaternion is zero, or the states are not those of this world.
+    /// If it is no link, the numbers are too few or too many, a quaternion is zero, or it is no state of this world.
     pub fn set_joint(
         &self,
-        states: &mut [State<S>],
+        state: &mut State<S>,
         link: BodyId,
         position: &[S],
         velocity: &[S],
-    ) -> Result<(), SimulationError> {
-        self.write_joint(states, link, position, velocity)?;
-        self.move_followers(states, link)?;
-        self.forward_kinematics(states);
+    ) -> Result<()> {
+        let rows = state.rows_mut();
+        self.write_joint(rows, link, position, velocity)?;
+        self.move_followers(rows, link)?;
+        self.forward_kinematics(rows);
         Ok(())
     }
 
     /// Writes the joints that mimic that of `leader`, which mimics none.
-    fn move_followers(
-        &self,
-        states: &mut [State<S>],
-        leader: BodyId,
-    ) -> Result<(), SimulationError> {
+    fn move_followers(&self, states: &mut Rows<S>, leader: BodyId) -> Result<()> {
         let couplings = self.transmissions.couplings.iter();
         for own in couplings.filter(|own| own.leader.link == leader) {
-            let joint = self.joint(states, leader)?;
+            let joint = self.joint_at(states, leader)?;
             let position = joint.position.iter().map(|q| q.times(own.slope).plus(own.offset));
             let velocity = joint.velocity.iter().map(|v| v.times(own.slope));
             let [position, velocity]: [Vec<S>; 2] = [position.collect(), velocity.collect()];
@@ -146,14 +186,14 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// [`World::set_joint`] without moving the links.
+    /// [`World::set_joint`] at rows, without moving the links.
     pub(crate) fn write_joint(
         &self,
-        states: &mut [State<S>],
+        states: &mut Rows<S>,
         link: BodyId,
         position: &[S],
         velocity: &[S],
-    ) -> Result<(), SimulationError> {
+    ) -> Result<()> {
         let (place, joint) = self.joint_place(states, link)?;
         if position.len() != joint.nq() || velocity.len() != joint.nv() {
             return Err(SimulationError::JointNumbers {
@@ -177,12 +217,12 @@ impl<S: Scalar> World<S> {
     /// Coordinates and velocities of the joint of a link, as [`Joint`] has them.
     ///
     /// # Errors
-    /// If it is no link, or the states are not those of this world.
-    pub fn joint(
-        &self,
-        states: &[State<S>],
-        link: BodyId,
-    ) -> Result<JointState<S>, SimulationError> {
+    /// If it is no link, or it is no state of this world.
+    pub fn joint(&self, state: &State<S>, link: BodyId) -> Result<JointState<S>> {
+        self.joint_at(state.rows(), link)
+    }
+
+    pub(crate) fn joint_at(&self, states: &Rows<S>, link: BodyId) -> Result<JointState<S>> {
         let (place, joint) = self.joint_place(states, link)?;
         let (mut position, mut velocity) = (Vec::new(), Vec::new());
         joint.read(&states[place], &mut position, &mut velocity);
@@ -192,13 +232,16 @@ impl<S: Scalar> World<S> {
     /// Position and velocity along an axis of the joint of a link, the first if a link is given \[rad, rad/s or m, m/s\].
     ///
     /// # Errors
-    /// If it is no link, its joint has no such axis, or the states are not those of this world.
-    pub fn joint_motion(
+    /// If it is no link, its joint has no such axis, or it is no state of this world.
+    pub fn joint_motion(&self, state: &State<S>, axis: impl Into<JointAxis>) -> Result<[S; 2]> {
+        self.motion_along(state.rows(), axis.into())
+    }
+
+    pub(crate) fn motion_along(
         &self,
-        states: &[State<S>],
-        axis: impl Into<JointAxis>,
-    ) -> Result<[S; 2], SimulationError> {
-        let JointAxis { link, index } = axis.into();
+        states: &Rows<S>,
+        JointAxis { link, index }: JointAxis,
+    ) -> Result<[S; 2]> {
         self.check_axis(link, index)?;
         let (place, joint) = self.joint_place(states, link)?;
         Ok(joint.along(&states[place], index))
@@ -224,7 +267,7 @@ impl<S: Scalar> World<S> {
 
     /// # Errors
     /// If there are joints, which `integrator` does not move.
-    pub(crate) fn ensure_no_joints(&self, integrator: &'static str) -> Result<(), SimulationError> {
+    pub(crate) fn ensure_no_joints(&self, integrator: &'static str) -> Result<()> {
         match self.articulations.is_empty() {
             true => Ok(()),
             false => Err(SimulationError::Joints { integrator }),
@@ -232,7 +275,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves on the joints among `states`, for `dt` \[s\] by semi-implicit Euler with the accelerations among `wrenches`.
-    pub(crate) fn integrate_joints(&self, states: &mut [State<S>], wrenches: &[Vector6<S>], dt: S) {
+    pub(crate) fn integrate_joints(&self, states: &mut Rows<S>, wrenches: &[Vector6<S>], dt: S) {
         for (place, joint) in self.joint_places().zip(self.joints()) {
             let (state, rate) = (&mut states[place], &wrenches[place]);
             state.linear += rate.fixed_rows::<3>(0) * dt;
@@ -243,11 +286,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    pub(crate) fn joint_place(
-        &self,
-        states: &[State<S>],
-        body: BodyId,
-    ) -> Result<(usize, &Joint), SimulationError> {
+    pub(crate) fn joint_place(&self, states: &Rows<S>, body: BodyId) -> Result<(usize, &Joint)> {
         let (articulation, link) = self.link_of(body)?;
         if states.len() < self.joint_places().end {
             return Err(self.wrong_count(states.len()));
@@ -287,14 +326,14 @@ impl<S: Scalar> World<S> {
     /// Each articulation with the states of its joints.
     pub(crate) fn articulated<'a, T: Scalar>(
         &'a self,
-        states: &'a [State<T>],
-    ) -> impl Iterator<Item = (&'a ArticulatedBody<S>, &'a [State<T>])> {
+        states: &'a Rows<T>,
+    ) -> impl Iterator<Item = (&'a ArticulatedBody<S>, &'a Rows<T>)> {
         let all = self.articulations.iter().enumerate();
         all.map(|(index, own)| (own, &states[self.joint_range(index)]))
     }
 
     /// Moves the links to where their joints put them.
-    pub(crate) fn forward_kinematics(&self, states: &mut [State<S>]) {
+    pub(crate) fn forward_kinematics(&self, states: &mut Rows<S>) {
         if self.articulations.is_empty() {
             return;
         }
@@ -309,7 +348,7 @@ impl<S: Scalar> World<S> {
     /// The accelerations of all joints, each as the rate of its state's velocities, by `wrenches` on the bodies.
     pub(crate) fn joint_accelerations(
         &self,
-        states: &[State<S>],
+        states: &Rows<S>,
         wrenches: &[Vector6<S>],
     ) -> Vec<Vector6<S>> {
         let mut all = Vec::with_capacity(self.joint_count());

@@ -8,12 +8,12 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::contact_pair::ContactPair;
+use crate::body_state::{BodyState, Rows};
 use crate::contact::bristles::Bristles;
 use crate::error::SimulationError;
 use crate::spatial::spatial;
-use crate::state::State;
 
-impl<S: Scalar> State<S> {
+impl<S: Scalar> BodyState<S> {
     /// The deflection that this state is.
     pub(crate) fn deflection(&self) -> Vector6<S> {
         spatial(&self.linear, &self.angular)
@@ -56,21 +56,19 @@ impl<S: Scalar> World<S> {
     }
 
     /// `states` with those of contacts with bristles, not deflected if they are missing.
-    pub(crate) fn with_deflections(&self, states: &[State<S>]) -> Vec<State<S>> {
-        let mut states = states.to_vec();
+    pub(crate) fn with_deflections(
+        &self,
+        states: impl Into<Vec<BodyState<S>>>,
+    ) -> Vec<BodyState<S>> {
+        let mut states = states.into();
         if states.len() == self.bodies.len() + self.joint_count() {
-            states.resize(self.state_count(), State::at_rest(Isometry3::identity()));
+            states.resize(self.state_count(), BodyState::at_rest(Isometry3::identity()));
         }
         states
     }
 
     /// Moves on the deflections among `states`, for `dt` \[s\] at the rates that follow the `wrenches` on the bodies.
-    pub(crate) fn integrate_bristles(
-        &self,
-        states: &mut [State<S>],
-        wrenches: &[Vector6<S>],
-        dt: S,
-    ) {
+    pub(crate) fn integrate_bristles(&self, states: &mut Rows<S>, wrenches: &[Vector6<S>], dt: S) {
         for (state, rate) in states.iter_mut().zip(wrenches).skip(self.joint_places().end) {
             *state = state.deflected(&(rate * dt));
         }

@@ -12,8 +12,8 @@ use super::World;
 use super::body::{Body, Motion};
 use super::contact_group::ContactGroup;
 use super::contact_pair::{ContactBodies, ContactPair};
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
-use crate::state::State;
 use crate::time::Step;
 
 /// Deviation from free motion to which a body may be pushed within a step, in fractions of its size.
@@ -90,12 +90,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     /// The contacts of groups whose samples may touch within `dt` \[s\] from `states` on, if no body's center comes farther than its
     /// one of `deviations` \[m\] from where constant velocity would bring it, others from where they are, in an order that
     /// depends on nothing but the bodies.
-    pub(crate) fn find(
-        &self,
-        states: &[State],
-        deviations: &[f64],
-        dt: f64,
-    ) -> Vec<CandidateContact> {
+    pub(crate) fn find(&self, states: &Rows, deviations: &[f64], dt: f64) -> Vec<CandidateContact> {
         let reach = |(id, deviation): (BodyId, &f64)| {
             let free = self.world.bodies[id].feels_forces();
             Reach {
@@ -160,7 +155,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     fn may_touch(
         &self,
         contact: &CandidateContact,
-        states: &[State],
+        states: &Rows,
         reach: &Reach,
         deviation: f64,
     ) -> bool {
@@ -230,11 +225,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// World with those contacts of its groups one by one that may touch in `step` from `states`.
-    pub(crate) fn with_candidates<T: Scalar>(
-        &self,
-        states: &[State<T>],
-        step: Step,
-    ) -> Cow<'_, Self> {
+    pub(crate) fn with_candidates<T: Scalar>(&self, states: &Rows<T>, step: Step) -> Cow<'_, Self> {
         self.with_contacts(states, step.dt, |search| search.deviations(step, SLACK))
     }
 
@@ -242,14 +233,14 @@ impl<S: Scalar> World<S> {
     /// `deviations` \[m\].
     fn with_contacts<T: Scalar>(
         &self,
-        states: &[State<T>],
+        states: &Rows<T>,
         dt: f64,
         deviations: impl FnOnce(&BroadPhase<'_, S>) -> Vec<f64>,
     ) -> Cow<'_, Self> {
         if self.contact_groups.is_empty() {
             return Cow::Borrowed(self);
         }
-        let values: Vec<State> = states.iter().map(State::value).collect();
+        let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let search = BroadPhase::new(self);
         let candidates = search.find(&values, &deviations(&search), dt);
         let contacts = self.contacts_with(&candidates);
@@ -266,11 +257,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::with_candidates`] of those that touch, or are no farther than `reach` \[m\] from it.
-    pub(crate) fn with_touching<T: Scalar>(
-        &self,
-        states: &[State<T>],
-        reach: f64,
-    ) -> Cow<'_, Self> {
+    pub(crate) fn with_touching<T: Scalar>(&self, states: &Rows<T>, reach: f64) -> Cow<'_, Self> {
         self.with_contacts(states, 0.0, |_| vec![reach; states.len()])
     }
 }

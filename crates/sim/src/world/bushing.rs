@@ -5,12 +5,12 @@ use prehend_autodiff::lie::{lift, so3_log};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::World;
-use crate::error::{BuildError, SimulationError};
+use crate::body_state::STATE;
+use crate::body_state::{BodyState, Rows};
+use crate::error::{BuildError, Result, SimulationError};
 use crate::first_order::{Linearized, first_order, linearized};
 use crate::handle::{BodyId, BushingId};
 use crate::spatial::spatial;
-use crate::state::STATE;
-use crate::state::State;
 
 /// A soft bushing of two bodies, or a soft ball joint: springs and dampers between a frame of one and a frame of the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,10 +102,7 @@ impl World {
 impl<S: Scalar> World<S> {
     /// # Errors
     /// If there are bushings, of which `integrator` knows nothing.
-    pub(crate) fn ensure_no_bushings(
-        &self,
-        integrator: &'static str,
-    ) -> Result<(), SimulationError> {
+    pub(crate) fn ensure_no_bushings(&self, integrator: &'static str) -> Result<()> {
         match self.bushings.is_empty() {
             true => Ok(()),
             false => Err(SimulationError::Bushings { integrator }),
@@ -121,7 +118,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Adds what bushings do to the wrenches on the bodies.
-    pub(super) fn add_bushings(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
+    pub(super) fn add_bushings(&self, states: &Rows<S>, wrenches: &mut [Vector6<S>]) {
         for bushing in &self.bushings {
             // Where a center of mass varies, of the point that has its value for coordinates.
             let shifted = bushing.bodies.map(|body| self.shifted(body, states));
@@ -144,7 +141,7 @@ impl<S: Scalar> World<S> {
     pub(crate) fn pull<T: Scalar>(
         &self,
         bushing: &Bushing<S>,
-        states: [&State<T>; 2],
+        states: [&BodyState<T>; 2],
         stiffness: [T; 4],
     ) -> [Vector6<T>; 2] {
         let pull = Pull { frames: self.frames_from_com(bushing) };
@@ -165,7 +162,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Energy of the springs of bushings at `states` \[J\].
-    pub(crate) fn energy_of_bushings(&self, states: &[State]) -> f64 {
+    pub(crate) fn energy_of_bushings(&self, states: &Rows) -> f64 {
         let energy = |bushing: &Bushing<S>| {
             let [a, b] = bushing.bodies.map(|body| states[body]);
             let Gap { apart, turn, .. } = Gap::new(&self.frames_from_com(bushing), &a, &b);
@@ -190,7 +187,7 @@ struct Gap<S: Scalar> {
 }
 
 impl<S: Scalar> Gap<S> {
-    fn new(frames: &[Isometry3<f64>; 2], a: &State<S>, b: &State<S>) -> Self {
+    fn new(frames: &[Isometry3<f64>; 2], a: &BodyState<S>, b: &BodyState<S>) -> Self {
         let [first, second] = [(a, frames[0]), (b, frames[1])].map(|(s, f)| s.pose * lift(&f));
         let [from, to] = [first, second].map(|frame| frame.translation.vector);
         Self {
@@ -237,8 +234,9 @@ impl Pull {
     }
 
     fn wrenches<S: Scalar>(&self, x: &[S; INPUTS]) -> [S; 12] {
-        let state = |from: usize| State::from_coordinates(&std::array::from_fn(|i| x[from + i]));
-        let (a, b): (State<S>, State<S>) = (state(0), state(STATE));
+        let state =
+            |from: usize| BodyState::from_coordinates(&std::array::from_fn(|i| x[from + i]));
+        let (a, b): (BodyState<S>, BodyState<S>) = (state(0), state(STATE));
         let [linear, linear_damping, angular, angular_damping] =
             std::array::from_fn(|i| x[2 * STATE + i]);
         let Gap { arms, apart, turn } = Gap::new(&self.frames, &a, &b);

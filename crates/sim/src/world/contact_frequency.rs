@@ -5,18 +5,23 @@ use prehend_autodiff::Fwd;
 
 use super::World;
 use super::joint_force::{Along, JointForce};
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
 use crate::state::State;
 
 impl World {
-    /// The largest of natural frequency ω_max and damping rate \[1/s\] of contacts and forces along joints at `states`: of M⁻¹K and
-    /// M⁻¹D, with the symmetric parts of their stiffness K and damping D; NaN for states that are.
+    /// The largest of natural frequency ω_max and damping rate \[1/s\] of contacts and forces along joints at a state: of M⁻¹K and
+    /// M⁻¹D, with the symmetric parts of their stiffness K and damping D; NaN for a state that is.
     ///
     /// # Panics
-    /// If there are fewer states than bodies and joints.
-    pub fn contact_frequency(&self, states: &[State]) -> f64 {
+    /// If it is no state of this world.
+    pub fn contact_frequency(&self, state: &State) -> f64 {
+        self.contact_frequency_of(state.rows())
+    }
+
+    pub(crate) fn contact_frequency_of(&self, states: &Rows) -> f64 {
         let lifted = self.with_touching(states, 0.0).to_f64().cast::<Fwd<12>>();
-        let constants: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
+        let constants: Vec<BodyState<Fwd<12>>> = states.iter().map(BodyState::cast).collect();
         let UnitMotions { motions, roots, size } = self.unit_motions(states);
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         for Motions { body, first, by } in &motions {
@@ -63,7 +68,7 @@ impl World {
     }
 
     /// The motions of all bodies that forces move.
-    fn unit_motions(&self, states: &[State]) -> UnitMotions {
+    fn unit_motions(&self, states: &Rows) -> UnitMotions {
         let (mut motions, mut roots, mut first) = (Vec::new(), Vec::new(), 0);
         for body in self.free_bodies() {
             let root = self.inverse_mass_root(body, &states[body]);
@@ -88,7 +93,7 @@ impl World {
     /// For each force along joints: the first of its articulation's motions of unit energy, what they are along it, and the slopes of its effort.
     fn slopes_along_joints(
         &self,
-        states: &[State],
+        states: &Rows,
         roots: &[(usize, DMatrix<f64>)],
     ) -> Vec<(usize, DVector<f64>, [f64; 2])> {
         let slopes = |force: &JointForce| {
@@ -103,7 +108,7 @@ impl World {
     }
 
     /// The root of the inverse mass matrix of a free body.
-    fn inverse_mass_root(&self, body: BodyId, state: &State) -> Matrix6<f64> {
+    fn inverse_mass_root(&self, body: BodyId, state: &BodyState) -> Matrix6<f64> {
         let Some(rigid) = self.bodies[body].rigid() else { return Matrix6::zeros() };
         let mut root = Matrix6::identity() / rigid.mass().sqrt();
         let eigen = rigid.inverse_world_inertia(&state.pose.rotation).symmetric_eigen();
@@ -150,8 +155,8 @@ mod tests {
         let mass = Body::dynamic("mass", rigid).with_surface(surface);
         let law = Arc::new(penalty(2e8, 1e3, 0.0, 1e-3));
         let world = on_ground(Vector3::zeros(), floor(), mass, law, GapSmoothing::Hard);
-        let at_rest = |z| State::at_rest(Isometry3::translation(0.0, 0.0, z));
-        let states = [at_rest(0.0), at_rest(-1e-3)];
+        let at_rest = |z| BodyState::at_rest(Isometry3::translation(0.0, 0.0, z));
+        let states = State::new([at_rest(0.0), at_rest(-1e-3)]);
         let omega = 200.0;
         assert!((world.contact_frequency(&states) - omega).abs() < 1e-9);
         let check = |dt| world.check_time_step(&SemiImplicitEuler, &states, dt);
@@ -160,6 +165,6 @@ mod tests {
         assert!((error.limit - 6.18e-3).abs() < 1e-12);
         let fine = TimeSteps { dt: 7e-3, steps: 10 }.refined(error.limit, 100);
         assert_eq!((fine.steps, check(fine.dt)), (12, Ok(())));
-        assert_eq!(world.contact_frequency(&[at_rest(0.0), at_rest(1.0)]), 0.0);
+        assert_eq!(world.contact_frequency(&State::new([at_rest(0.0), at_rest(1.0)])), 0.0);
     }
 }

@@ -4,16 +4,16 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::contact_pair::ContactPair;
-use crate::error::SimulationError;
+use crate::body_state::Rows;
+use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
-use crate::state::State;
 
 impl<S: Scalar> World<S> {
     /// The error of `states` that led to `next`, not all finite, by `time` \[s\].
     pub(crate) fn not_finite(
         &self,
-        states: &[State<S>],
-        next: &[State<S>],
+        states: &Rows<S>,
+        next: &Rows<S>,
         time: f64,
     ) -> SimulationError {
         let failed = next.iter().position(|state| !state.is_finite()).unwrap_or_default();
@@ -24,7 +24,7 @@ impl<S: Scalar> World<S> {
     pub(crate) fn not_finite_at(
         &self,
         failed: usize,
-        states: &[State<S>],
+        states: &Rows<S>,
         time: f64,
     ) -> SimulationError {
         let links = self.articulations.iter().flat_map(|own| own.bodies()).copied();
@@ -42,13 +42,13 @@ impl<S: Scalar> World<S> {
     }
 
     /// The error of `states` at `time` \[s\] that are too large to measure, or have derivatives that are.
-    pub(crate) fn blown_up(&self, states: &[State<S>], time: f64) -> SimulationError {
+    pub(crate) fn blown_up(&self, states: &Rows<S>, time: f64) -> SimulationError {
         let (body, contact) = self.most_accelerated(states);
         SimulationError::NotFinite { body, contact, time }
     }
 
     /// The error of steps from `states` at `time` \[s\] that even with `dt` \[s\] are too long.
-    pub(crate) fn stalled(&self, states: &[State<S>], time: f64, dt: f64) -> SimulationError {
+    pub(crate) fn stalled(&self, states: &Rows<S>, time: f64, dt: f64) -> SimulationError {
         let (body, contact) = self.most_accelerated(states);
         SimulationError::Stalled { body, contact, time, dt }
     }
@@ -56,7 +56,7 @@ impl<S: Scalar> World<S> {
     /// The error of more than `max_substeps` parts from `states` at `time` \[s\].
     pub(crate) fn too_many_substeps(
         &self,
-        states: &[State<S>],
+        states: &Rows<S>,
         time: f64,
         max_substeps: usize,
     ) -> SimulationError {
@@ -65,7 +65,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The name of the free body that contacts accelerate most, and of what presses hardest on it.
-    pub(crate) fn most_accelerated(&self, states: &[State<S>]) -> (String, Option<String>) {
+    pub(crate) fn most_accelerated(&self, states: &Rows<S>) -> (String, Option<String>) {
         let acceleration = |body: &BodyId| {
             let mass = self.mass(*body);
             let pairs = self.contacts.iter().filter(|pair| pair.joins(*body));
@@ -89,7 +89,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The name of a body, and that of the one that presses hardest on it of those that may touch it.
-    pub(crate) fn names(&self, states: &[State<S>], body: BodyId) -> (String, Option<String>) {
+    pub(crate) fn names(&self, states: &Rows<S>, body: BodyId) -> (String, Option<String>) {
         let pairs = self.contacts.iter().filter(|pair| pair.joins(body));
         let loads = pairs.map(|pair| (pair, self.load(pair, states)));
         let hardest = loads.max_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -102,13 +102,13 @@ impl<S: Scalar> World<S> {
     }
 
     /// The force of a contact \[N\], infinite if it is no number.
-    fn load(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
+    fn load(&self, pair: &ContactPair<S>, states: &Rows<S>) -> f64 {
         let force = self.force(pair, states);
         if force.is_nan() { f64::INFINITY } else { force }
     }
 
     /// Checks that derivatives through the beginning of every contact are right.
-    pub(crate) fn check_onsets(&self) -> Result<(), SimulationError> {
+    pub(crate) fn check_onsets(&self) -> Result<()> {
         let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
         match self.contact_materials().find(jumps) {
             Some(pair) => {

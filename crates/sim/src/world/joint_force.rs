@@ -8,13 +8,13 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::path::Path;
 use crate::articulated::{Joint, Kinematics};
+use crate::body_state::Rows;
 use crate::contact::error::LawError;
 use crate::contact::range::ParameterRange;
 use crate::error::BuildError;
 use crate::handle::{BodyId, JointForceId};
 use crate::joint_law::JointLaw;
 use crate::joint_law::dynamic::DynJointLaw;
-use crate::state::State;
 
 /// One of the axes of a link's joint: the first of a revolute or prismatic one.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
@@ -210,7 +210,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
-    pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
+    pub(crate) fn joint_efforts(&self, states: &Rows<S>) -> Vec<Vec<S>> {
         let none = || -> Vec<Vec<S>> {
             self.articulations.iter().map(|own| vec![S::zero(); own.tree.nv()]).collect()
         };
@@ -266,8 +266,8 @@ impl<S: Scalar> World<S> {
     }
 
     /// The velocity of an axis some time ahead, by the forces along it alone, which moves a unit of inertia.
-    fn input(&self, (axis, ahead): (JointAxis, f64), states: &[State<S>]) -> Option<S> {
-        let [position, velocity] = self.joint_motion(states, axis).ok()?;
+    fn input(&self, (axis, ahead): (JointAxis, f64), states: &Rows<S>) -> Option<S> {
+        let [position, velocity] = self.motion_along(states, axis).ok()?;
         let own = self.joint_forces.iter().filter(|force| ahead > 0.0 && force.is_along(axis));
         let rate = own.fold(S::zero(), |sum, force| {
             sum + force.law().lifted(force.params(), position, velocity)
@@ -279,7 +279,7 @@ impl<S: Scalar> World<S> {
     fn placed<'a, 'b>(
         &'a self,
         articulation: usize,
-        states: &[State<S>],
+        states: &Rows<S>,
         places: &'b mut [Option<Kinematics<'a, S>>],
     ) -> &'b Kinematics<'a, S> {
         places[articulation].get_or_insert_with(|| {
@@ -290,7 +290,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Degrees of freedom that a force acts along.
-    pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
+    pub(crate) fn along(&self, force: &JointForce<S>, states: &Rows<S>) -> Option<Along<S>> {
         let mut places: Vec<_> = self.articulations.iter().map(|_| None).collect();
         self.along_at(force, states, &mut places)
     }
@@ -298,7 +298,7 @@ impl<S: Scalar> World<S> {
     fn along_at<'a>(
         &'a self,
         force: &JointForce<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         places: &mut [Option<Kinematics<'a, S>>],
     ) -> Option<Along<S>> {
         let (first, _) = force.axes.first()?;

@@ -5,12 +5,12 @@ use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::World;
 use super::contact_pair::ContactPair;
+use crate::body_state::STATE;
+use crate::body_state::{BodyState, Rows};
 use crate::contact::contact_query::ContactQuery;
 use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 use crate::spatial::spatial;
-use crate::state::STATE;
-use crate::state::State;
 
 /// The contacts of a world at one moment as a linear function of its states: one node of the tape, however many they are.
 #[derive(Default)]
@@ -25,7 +25,7 @@ pub(super) struct LinearContacts {
 /// A body that touches.
 struct Touching {
     body: BodyId,
-    state: State,
+    state: BodyState,
     /// The sum of its contacts' wrenches.
     wrench: Vector6<f64>,
 }
@@ -54,7 +54,7 @@ impl LinearContacts {
         &mut self,
         world: &World<S>,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         step: usize,
         wrenches: &mut [Vector6<S>],
     ) {
@@ -98,7 +98,7 @@ impl LinearContacts {
     pub(super) fn record<S: Scalar>(
         self,
         world: &World<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         wrenches: &mut [Vector6<S>],
     ) {
         let mut inputs = Vec::with_capacity(STATE * self.bodies.len());
@@ -137,7 +137,7 @@ impl LinearContacts {
 struct Node {
     contacts: Vec<LinearContact>,
     /// For each body that touches, and where its coordinates begin among the inputs, if they are inputs.
-    states: Vec<(State, Option<usize>)>,
+    states: Vec<(BodyState, Option<usize>)>,
 }
 
 impl CustomVjp for Node {
@@ -176,7 +176,7 @@ impl LinearContact {
     /// [`PairFunction`](super::pair_function::PairFunction) describes, and of the wrench on the body with the field, −f and −(τ + r×f).
     fn vjp(
         &self,
-        [samples, field]: [&State; 2],
+        [samples, field]: [&BodyState; 2],
         [force_s, torque_s]: [Vector3<f64>; 2],
         [force_f, torque_f]: [Vector3<f64>; 2],
     ) -> [StateAdjoint; 2] {
@@ -216,7 +216,7 @@ impl LinearContact {
 impl StateAdjoint {
     /// Adds the adjoints of the coordinates of `state`. Its left turn is θ = 2 (w δv − δw v + v×δv) of a quaternion of vector v and
     /// scalar w.
-    fn add_to(&self, state: &State, coordinates: &mut [f64]) {
+    fn add_to(&self, state: &BodyState, coordinates: &mut [f64]) {
         let q = state.pose.rotation.coords;
         let v = Vector3::new(q.x, q.y, q.z);
         let by_vector = (self.turn * q.w + self.turn.cross(&v)) * 2.0;

@@ -56,7 +56,7 @@ impl World {
     /// world.add(Body::fixed_from_shape("floor", &Shape::half_space(Vector3::z_axis())?));
     /// let cube = world.add(Body::from_shape("cube", &Shape::cuboid([0.03; 3])?, 500.0)?); // half extents [m], density [kg/m³]
     /// world.add_contacts(Material::default())?;
-    /// let mut start = world.cast::<Fwd<1>>().neutral_states();
+    /// let mut start = world.cast::<Fwd<1>>().neutral_state();
     /// start[cube].pose.translation.z = Fwd::constant(0.03);
     /// start[cube].linear.x = Fwd::variable(1.0, 0); // thrown with 1 m/s
     /// let end = world.cast().simulate(&start, 0.5)?[cube].pose.translation.x;

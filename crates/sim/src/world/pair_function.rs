@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use crate::state::STATE;
-use crate::state::State;
+use crate::body_state::BodyState;
+use crate::body_state::STATE;
 
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;
@@ -12,8 +12,8 @@ const TWO: usize = 2 * STATE;
 /// The states of two bodies that touch.
 #[derive(Clone, Copy)]
 pub(super) struct Relation {
-    pub(super) samples: State,
-    pub(super) field: State,
+    pub(super) samples: BodyState,
+    pub(super) field: BodyState,
     /// Factor on their wrench.
     pub(super) weight: f64,
 }
@@ -53,7 +53,7 @@ struct Change<S: Scalar> {
 impl<S: Scalar> Change<S> {
     /// Change of value zero about `state`, with the derivatives of the coordinates `x`.
     #[inline(always)]
-    fn new(x: &[S; STATE], state: &State) -> Self {
+    fn new(x: &[S; STATE], state: &BodyState) -> Self {
         let less = |i: usize| x[i].plus(-x[i].value());
         let vector = |from: usize| Vector3::new(less(from), less(from + 1), less(from + 2));
         // δq q̄ = θ/2, and with q = (u, w): w δu − δw u + u×δu.
@@ -126,7 +126,7 @@ struct Relative {
 impl<W: LocalFunction<12, 6>> PairFunction<W> {
     /// Wrench as a function of the states of both bodies; that of the field may be constant.
     #[inline]
-    pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
+    pub(super) fn of<S: Scalar>(&self, samples: &BodyState<S>, field: &BodyState<S>) -> [S; 6] {
         let (samples, field) = (samples.coordinates(), field.coordinates());
         if field.iter().all(|x| x.is_constant()) {
             return S::local(&OneMoves(self), samples);

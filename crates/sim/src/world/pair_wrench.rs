@@ -10,6 +10,7 @@ use super::contact_pair::ContactPair;
 use super::linear_contacts::LinearContacts;
 use super::pair_function::Relation;
 use super::relative_state::RelativeState;
+use crate::body_state::{BodyState, Rows};
 use crate::contact::bristle_function::BristleFunction;
 use crate::contact::bristles::Bristles;
 use crate::contact::contact_query::ContactQuery;
@@ -37,18 +38,24 @@ impl<S: Scalar> Default for PairWrench<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
-    /// world frame), without gravity; then the accelerations of every joint, in the order of its state's velocities, and the rate of the
-    /// deflection (\[m/s\], \[rad/s\]) of every contact with bristles.
-    /// `step` matters to leaks in the first step only.
+    /// External and contact wrenches on every body (force \[N\], torque about the center of mass \[N m\],
+    /// world frame), without gravity. `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
     ///
     /// # Panics
-    /// If there are fewer states than bodies and joints.
-    pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+    /// If it is no state of this world.
+    pub fn wrenches(&self, state: &State<S>, step: usize) -> Vec<Vector6<S>> {
+        let mut wrenches = self.wrenches_of(state.rows(), step);
+        wrenches.truncate(self.bodies.len());
+        wrenches
+    }
+
+    /// [`World::wrenches`] at the rows of a state; then the accelerations of every joint, in the order of its state's velocities, and the
+    /// rate of the deflection (\[m/s\], \[rad/s\]) of every contact with bristles.
+    pub(crate) fn wrenches_of(&self, states: &Rows<S>, step: usize) -> Vec<Vector6<S>> {
         if !self.contact_groups.is_empty() {
-            return self.with_touching(states, 0.0).wrenches(states, step);
+            return self.with_touching(states, 0.0).wrenches_of(states, step);
         }
         let mut wrenches = self.contact_wrenches(states, step);
         let accelerations = self.joint_accelerations(states, &wrenches);
@@ -57,7 +64,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::wrenches`] without groups of contacts, and without the accelerations of joints.
-    pub(crate) fn contact_wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+    pub(crate) fn contact_wrenches(&self, states: &Rows<S>, step: usize) -> Vec<Vector6<S>> {
         const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
@@ -90,8 +97,8 @@ impl<S: Scalar> World<S> {
     pub(crate) fn pair_wrench(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
-        deflection: Option<&State<S>>,
+        states: &Rows<S>,
+        deflection: Option<&BodyState<S>>,
         step: usize,
     ) -> PairWrench<S> {
         match pair.law().bristles() {
@@ -101,7 +108,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Magnitude of the force of `pair` without a memory \[N\].
-    pub(crate) fn force(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
+    pub(crate) fn force(&self, pair: &ContactPair<S>, states: &Rows<S>) -> f64 {
         let Some(query) = &self.contact_query_at(pair, states, 1) else { return 0.0 };
         let (law, p) = (pair.law().as_ref(), &pair.param_values());
         let wrench = match law.bristles() {
@@ -119,7 +126,7 @@ impl<S: Scalar> World<S> {
     fn contact_query_at<'a>(
         &'a self,
         pair: &'a ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         step: usize,
     ) -> Option<ContactQuery<'a>> {
         let query = self.contact_query(pair, self.relative_value(pair, states))?;
@@ -130,15 +137,15 @@ impl<S: Scalar> World<S> {
     fn bristle_wrench(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         bristles: Bristles,
-        deflection: Option<&State<S>>,
+        deflection: Option<&BodyState<S>>,
         step: usize,
     ) -> PairWrench<S> {
         let Some(query) = self.contact_query_at(pair, states, step) else {
             return PairWrench::default();
         };
-        let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
+        let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
         let seen = self.relative_state(pair, states);
         let (wrench, rate) = local_bristles(pair, &seen, &query, bristles, deflection);
         let mut slopes = [S::zero(); 12];
@@ -155,7 +162,7 @@ impl<S: Scalar> World<S> {
     fn memoryless_wrench(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         step: usize,
     ) -> PairWrench<S> {
         let Some(query) = &self.contact_query_at(pair, states, step) else {
@@ -202,7 +209,7 @@ impl<S: Scalar> World<S> {
     fn pair_wrench_along(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         axes: &UnitQuaternion<S>,
         wrench: [S; 6],
     ) -> PairWrench<S> {
@@ -215,7 +222,7 @@ impl<S: Scalar> World<S> {
     fn on_both(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         force: Vector3<S>,
         torque: Vector3<S>,
     ) -> PairWrench<S> {
@@ -318,7 +325,7 @@ impl<S: Scalar> World<S> {
     pub(crate) fn contact_query<'a>(
         &'a self,
         pair: &'a ContactPair<S>,
-        state: State,
+        state: BodyState,
     ) -> Option<ContactQuery<'a>> {
         let body = &self.bodies[pair.bodies.samples];
         Some(ContactQuery {

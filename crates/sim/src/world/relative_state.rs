@@ -5,8 +5,8 @@ use prehend_autodiff::Scalar;
 
 use super::World;
 use super::contact_pair::ContactPair;
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
-use crate::state::State;
 
 /// The body with the samples of a contact, in the model frame of the body with the field.
 ///
@@ -14,7 +14,7 @@ use crate::state::State;
 /// which has its value for coordinates, as if the body were that: it does not move as the center of mass does.
 pub(super) struct RelativeState<S: Scalar> {
     /// The state of that point.
-    pub(super) state: State<S>,
+    pub(super) state: BodyState<S>,
     /// From the center of mass to that point \[m\], a zero that carries derivatives; none if they are the same.
     pub(super) from_com: Option<Vector3<S>>,
 }
@@ -25,7 +25,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn relative_state(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
     ) -> RelativeState<S> {
         let com = self.bodies[pair.bodies.field].com();
         let frame = states[pair.bodies.field].shifted(&-com.coords);
@@ -46,8 +46,8 @@ impl<S: Scalar> World<S> {
     pub(super) fn shifted(
         &self,
         id: BodyId,
-        states: &[State<S>],
-    ) -> Option<(State<S>, Vector3<S>)> {
+        states: &Rows<S>,
+    ) -> Option<(BodyState<S>, Vector3<S>)> {
         let change = self.bodies[id].rigid()?.com_change()?;
         let state = states[id].shifted(&-change);
         Some((state, -(state.pose.rotation * change)))
@@ -57,8 +57,8 @@ impl<S: Scalar> World<S> {
     pub(crate) fn relative_value<T: Scalar>(
         &self,
         pair: &ContactPair<S>,
-        states: &[State<T>],
-    ) -> State {
+        states: &Rows<T>,
+    ) -> BodyState {
         let com = self.bodies[pair.bodies.field].com().coords.map(S::value);
         let mut frame = states[pair.bodies.field].value();
         if com != Vector3::zeros() {

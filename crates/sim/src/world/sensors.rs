@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::World;
-use crate::error::SimulationError;
+use crate::body_state::Rows;
+use crate::error::Result;
 use crate::handle::BodyId;
 use crate::spatial::{angular, linear};
 use crate::state::State;
@@ -14,33 +15,30 @@ impl<S: Scalar> World<S> {
     /// frame.
     ///
     /// # Errors
-    /// If there is no such body, or states are too few or too many.
-    pub fn contact_wrench(
-        &self,
-        body: BodyId,
-        states: &[State<S>],
-    ) -> Result<Vector6<S>, SimulationError> {
+    /// If there is no such body, or it is no state of this world.
+    pub fn contact_wrench(&self, body: BodyId, state: &State<S>) -> Result<Vector6<S>> {
         let external = self.body(body)?.external_wrench;
-        let states = self.sensed(states)?;
+        let state = self.sensed(state)?;
         // Leaks of the first step are no forces.
-        let world = self.with_touching(&states, 0.0);
-        Ok(world.contact_wrenches(&states, 1)[body] - external)
+        let world = self.with_touching(state.rows(), 0.0);
+        Ok(world.contact_wrenches(state.rows(), 1)[body] - external)
     }
 
     /// Reading of an accelerometer at `point` of a body, given in its model frame \[m\]: acceleration less that of free fall, along the axes of the
     /// body \[m/s²\].
     ///
     /// # Errors
-    /// If there is no such body or no force moves it, or states are too few or too many.
+    /// If there is no such body or no force moves it, or it is no state of this world.
     pub fn accelerometer(
         &self,
         body: BodyId,
         point: &Point3<f64>,
-        states: &[State<S>],
-    ) -> Result<Vector3<S>, SimulationError> {
+        state: &State<S>,
+    ) -> Result<Vector3<S>> {
         let rigid = self.body(body)?.rigid();
-        let states = self.sensed(states)?;
-        let wrenches = self.wrenches(&states, 1);
+        let state = self.sensed(state)?;
+        let states = state.rows();
+        let wrenches = self.wrenches_of(states, 1);
         let state = &states[body];
         let (acceleration, turning, arm) = match rigid {
             Some(rigid) => {
@@ -55,7 +53,7 @@ impl<S: Scalar> World<S> {
             None => {
                 let (articulation, link) = self.link_of(body)?;
                 let (acceleration, turning) =
-                    self.link_acceleration(articulation, link, &states, &wrenches);
+                    self.link_acceleration(articulation, link, states, &wrenches);
                 (acceleration, turning, point.coords.map(S::constant))
             }
         };
@@ -70,7 +68,7 @@ impl<S: Scalar> World<S> {
         &self,
         articulation: usize,
         link: usize,
-        states: &[State<S>],
+        states: &Rows<S>,
         wrenches: &[Vector6<S>],
     ) -> (Vector3<S>, Vector3<S>) {
         let (own, places) = (&self.articulations[articulation], self.joint_range(articulation));
@@ -83,13 +81,10 @@ impl<S: Scalar> World<S> {
         (linear(&of_link), angular(&of_link))
     }
 
-    /// The states, with links where their joints put them.
-    pub(crate) fn sensed(&self, states: &[State<S>]) -> Result<Vec<State<S>>, SimulationError> {
-        let mut states = self.with_deflections(states);
-        if states.len() != self.state_count() {
-            return Err(self.wrong_count(states.len()));
-        }
-        self.forward_kinematics(&mut states);
-        Ok(states)
+    /// A state with links where their joints put them.
+    pub(crate) fn sensed(&self, state: &State<S>) -> Result<State<S>> {
+        let mut state = self.state_of_rows(state.rows().to_vec(), state.time)?;
+        self.forward_kinematics(state.rows_mut());
+        Ok(state)
     }
 }

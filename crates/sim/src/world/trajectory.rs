@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use crate::state::State;
+use crate::body_state::BodyState;
 
-/// State of a model frame in the world as a function of time: a function from seconds to a [`State`], for instance.
+/// State of a model frame in the world as a function of time: a function from seconds to a [`BodyState`], for instance.
 ///
 /// The velocities are the rates at which the pose changes, world frame: what touches the body feels them. A rollout in which they
 /// are far from that is refused ([`SimulationError::TrajectoryVelocity`](crate::SimulationError::TrajectoryVelocity)). Kinks and jumps are allowed, and a pose that stays where it is
@@ -20,11 +20,11 @@ use crate::state::State;
 /// The velocities must have theirs, too.
 pub trait Trajectory<S: Scalar = f64>: Any + Send + Sync {
     /// The state at `time` \[s\].
-    fn state(&self, time: f64) -> State<S>;
+    fn state(&self, time: f64) -> BodyState<S>;
 }
 
-impl<S: Scalar, F: Fn(f64) -> State<S> + Send + Sync + 'static> Trajectory<S> for F {
-    fn state(&self, time: f64) -> State<S> {
+impl<S: Scalar, F: Fn(f64) -> BodyState<S> + Send + Sync + 'static> Trajectory<S> for F {
+    fn state(&self, time: f64) -> BodyState<S> {
         self(time)
     }
 }
@@ -33,7 +33,7 @@ impl<S: Scalar, F: Fn(f64) -> State<S> + Send + Sync + 'static> Trajectory<S> fo
 struct Lifted(Arc<dyn Trajectory>);
 
 impl<S: Scalar> Trajectory<S> for Lifted {
-    fn state(&self, time: f64) -> State<S> {
+    fn state(&self, time: f64) -> BodyState<S> {
         self.0.state(time).cast()
     }
 }
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_lifted_trajectory_is_known_again() {
         let mut world = World::new(Vector3::zeros());
-        world.add(Body::kinematic("table", |_: f64| State::at_rest(Isometry3::identity())));
+        world.add(Body::kinematic("table", |_: f64| BodyState::at_rest(Isometry3::identity())));
         let source = |motion: &Motion| match motion {
             Motion::Kinematic(trajectory) => plain(trajectory).unwrap(),
             _ => panic!("not driven"),
@@ -82,12 +82,14 @@ mod tests {
         let mut world = World::new(Vector3::zeros()).cast::<Fwd<1>>();
         let [speed] = Fwd::<1>::variables([0.2]);
         world.bodies.push(Body::kinematic("table", move |time: f64| {
-            let mut state = State::at_rest(Isometry3::identity()).cast();
+            let mut state = BodyState::at_rest(Isometry3::identity()).cast();
             state.pose.translation.x = speed.times(time);
             state
         }));
-        let mut state = [State::at_rest(Isometry3::identity())];
-        world.to_f64().update_kinematics(&mut state, 0.5);
+        let world = world.to_f64();
+        let mut state = world.neutral_state();
+        state.time = 0.5;
+        world.update_kinematics(&mut state);
         assert_eq!(state[0].pose.translation.x, 0.1);
     }
 }

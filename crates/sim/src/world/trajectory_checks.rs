@@ -6,8 +6,8 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::body::Motion;
 use super::trajectory::plain;
-use crate::error::{BuildError, SimulationError};
-use crate::state::State;
+use crate::body_state::BodyState;
+use crate::error::{BuildError, Result, SimulationError};
 
 impl<S: Scalar> World<S> {
     /// Refuses trajectories that may carry derivatives, for what keeps their values only.
@@ -20,7 +20,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Refuses trajectories whose velocity is not the rate of their pose, at some times of a rollout of `duration` \[s\].
-    pub(crate) fn check_velocities(&self, duration: f64) -> Result<(), SimulationError> {
+    pub(crate) fn check_velocities(&self, [from, to]: [f64; 2]) -> Result<()> {
         for body in &self.bodies {
             let Motion::Kinematic(trajectory) = &body.motion else { continue };
             let plain = plain(trajectory);
@@ -28,8 +28,9 @@ impl<S: Scalar> World<S> {
                 Some(plain) => plain.state(time),
                 None => trajectory.state(time).value(),
             };
+            let duration = to - from;
             let apart = APART.min(duration / 32.0);
-            let times = TRIED.map(|part| part * duration);
+            let times = TRIED.map(|part| from + part * duration);
             if let Some(time) = times.into_iter().find(|time| contradicts(state, *time, apart)) {
                 return Err(SimulationError::TrajectoryVelocity { body: body.name.clone(), time });
             }
@@ -51,8 +52,8 @@ const SLOWEST: f64 = 1e-6;
 
 /// True if the velocity of `state` at `time` \[s\] is far from the rate of its pose, where that is the same over times up to `apart`
 /// \[s\] before and after.
-fn contradicts(state: impl Fn(f64) -> State, time: f64, apart: f64) -> bool {
-    let State { pose, linear, angular } = state(time);
+fn contradicts(state: impl Fn(f64) -> BodyState, time: f64, apart: f64) -> bool {
+    let BodyState { pose, linear, angular } = state(time);
     let rates = |step: f64| {
         let next = state(time + step).pose;
         let shift = next.translation.vector - pose.translation.vector;
@@ -89,13 +90,13 @@ mod tests {
     #[test]
     fn trajectories_that_carry_derivatives_are_refused() {
         let mut world = World::new(Vector3::zeros());
-        let still = |_: f64| State::at_rest(Isometry3::identity());
+        let still = |_: f64| BodyState::at_rest(Isometry3::identity());
         world.add(Body::kinematic("table", still));
         let mut lifted = world.cast::<Fwd<1>>();
         assert_eq!(lifted.check_trajectories(), Ok(()));
         let [speed] = Fwd::<1>::variables([0.2]);
         lifted.bodies[0].motion = Motion::Kinematic(Arc::new(move |time: f64| {
-            let mut state = State::at_rest(Isometry3::identity());
+            let mut state = BodyState::at_rest(Isometry3::identity());
             state.pose.translation.x = speed.times(time);
             state
         }));
@@ -108,7 +109,7 @@ mod tests {
     fn refused(trajectory: impl Trajectory) -> Option<f64> {
         let mut world = World::new(Vector3::zeros());
         world.add(Body::kinematic("table", trajectory));
-        match world.simulate(&[State::at_rest(Isometry3::identity())], 1.0) {
+        match world.simulate(&world.neutral_state(), 1.0) {
             Ok(_) => None,
             Err(SimulationError::TrajectoryVelocity { body, time }) => {
                 assert_eq!(body, "table");
@@ -118,9 +119,9 @@ mod tests {
         }
     }
 
-    fn moving(pose: Vector3<f64>, velocity: Vector3<f64>) -> State {
+    fn moving(pose: Vector3<f64>, velocity: Vector3<f64>) -> BodyState {
         let linear = velocity;
-        State { linear, ..State::at_rest(Isometry3::new(pose, Vector3::zeros())) }
+        BodyState { linear, ..BodyState::at_rest(Isometry3::new(pose, Vector3::zeros())) }
     }
 
     #[test]
@@ -132,9 +133,9 @@ mod tests {
         let late = refused(move |t: f64| moving(x * (t - 0.8).max(0.0), Vector3::zeros()));
         assert!(late.is_some_and(|time| time > 0.8));
         let turning = |angular: Vector3<f64>| {
-            move |t: f64| State {
+            move |t: f64| BodyState {
                 angular,
-                ..State::at_rest(Isometry3::new(Vector3::zeros(), z * 0.3 * t))
+                ..BodyState::at_rest(Isometry3::new(Vector3::zeros(), z * 0.3 * t))
             }
         };
         assert!(refused(turning(Vector3::zeros())).is_some());

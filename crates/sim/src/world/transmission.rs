@@ -11,11 +11,11 @@ use super::joint_force::{JointAxis, JointForce};
 use super::path::Path;
 use crate::articulated::Kinematics;
 use crate::articulated::adjoint::{Acting, accelerations};
+use crate::body_state::Rows;
 use crate::handle::BodyId;
 use crate::handle::JointForceId;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::spatial::spatial;
-use crate::state::State;
 use crate::world::articulated_body::ArticulatedBody;
 
 /// Transmissions of the robots of a world.
@@ -129,7 +129,7 @@ impl<S: Scalar> World<S> {
         &self,
         own: &ArticulatedBody<S>,
         at: &Kinematics<'_, S>,
-        joints: &[State<S>],
+        joints: &Rows<S>,
         q: &[S],
     ) -> Vec<(f64, DVector<S>, S)> {
         let rotors = self.transmissions.rotors.iter();
@@ -157,7 +157,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The mass matrix of an articulation, with what moves with lengths: accelerations of its joints cause efforts by it.
-    pub(crate) fn mass_matrix(&self, articulation: usize, states: &[State<S>]) -> DMatrix<S> {
+    pub(crate) fn mass_matrix(&self, articulation: usize, states: &Rows<S>) -> DMatrix<S> {
         let own = &self.articulations[articulation];
         let joints = &states[self.joint_range(articulation)];
         let [q, v] = own.coordinates(joints);
@@ -173,7 +173,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn accelerated(
         &self,
         own: &ArticulatedBody<S>,
-        joints: &[State<S>],
+        joints: &Rows<S>,
         [coordinates, velocities]: [&[S]; 2],
         efforts: &[S],
         wrenches: &[Vector6<S>],

@@ -14,6 +14,6 @@ mod shapes;
 
 // The scenes name these as `crate::…`.
 use prehend_sim::{
-    Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
-    RigidBody, State, Surface, World, fields,
+    Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
+    KelvinVoigt, Law, RigidBody, State, Surface, World, fields,
 };

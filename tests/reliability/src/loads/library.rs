@@ -9,7 +9,7 @@ use prehend_autodiff::{Scalar, gradient};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::scene::default_sequence;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
-use prehend_sim::{SemiImplicitEuler, State, TimeSteps};
+use prehend_sim::{BodyState, SemiImplicitEuler, State, TimeSteps};
 
 use super::memory::Memory;
 use super::{LoadContext, NOISE, Outcome};
@@ -19,12 +19,13 @@ use crate::scene::body_over_floor;
 fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<S>> {
     // A body of n segments has n²/2 vertices, about.
     let world = body_over_floor((2 * points).isqrt() + 1)?;
-    let mut start: State<S> = State::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).cast();
+    let mut start: BodyState<S> =
+        BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).cast();
     start.linear = Vector3::from(push);
-    let still = State::at_rest(Isometry3::identity()).cast();
+    let still = BodyState::at_rest(Isometry3::identity()).cast();
     let time_steps = TimeSteps { dt: 5e-5, steps };
     let euler = SemiImplicitEuler;
-    let end = world.cast().simulate_with(&euler, &[still, start], time_steps, |_, _| ())?;
+    let end = world.cast().simulate_with(&euler, &State::new([still, start]), time_steps)?;
     Ok(end.states[1].pose.translation.vector)
 }
 

@@ -7,9 +7,9 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
-    GapSmoothing, Integrator, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface,
-    World,
+    BackwardEuler, Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics,
+    DynContactLaw, GapSmoothing, Integrator, SemiImplicitEuler, SimulationError, State, Step,
+    SubStepped, Surface, World,
 };
 
 use super::grasper::Grasper;
@@ -43,7 +43,7 @@ pub(super) struct Simulation<'a> {
     pub(super) grasper: &'a Grasper<'a>,
     world: World,
     /// States of the world's bodies.
-    states: Vec<State>,
+    states: State,
     object: BodyId,
     /// Links with a shape, in the order of their bodies.
     links: Vec<Solid>,
@@ -88,7 +88,7 @@ impl<'a> Simulation<'a> {
             };
             let body = Body::fixed(&robot.tree.links()[link].name).with_field(shape.clone());
             fields.push(world.add(body));
-            states.push(State::at_rest(poses[link]));
+            states.push(BodyState::at_rest(poses[link]));
             let (shape, corners) = (shape.clone(), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
         }
@@ -97,7 +97,7 @@ impl<'a> Simulation<'a> {
         let mut new = Self {
             grasper,
             world,
-            states,
+            states: State::new(states),
             object,
             links,
             joints: joints.to_vec(),
@@ -120,7 +120,7 @@ impl<'a> Simulation<'a> {
 
     /// Speed of the object's center of mass \[m/s\] and its angular speed \[rad/s\].
     pub(super) fn speed(&self) -> (f64, f64) {
-        let State { linear, angular, .. } = &self.states[self.object];
+        let BodyState { linear, angular, .. } = &self.states[self.object];
         (linear.norm(), angular.norm())
     }
 
@@ -137,7 +137,7 @@ impl<'a> Simulation<'a> {
         for (body, solid) in self.links.iter().enumerate() {
             let (from, to) = (&self.poses[solid.link], &poses[solid.link]);
             let turn = so3_log(&(to.rotation * from.rotation.inverse()));
-            self.states[body] = State {
+            self.states[body] = BodyState {
                 pose: *to,
                 linear: (to.translation.vector - from.translation.vector) / dt,
                 angular: turn / dt,
@@ -163,7 +163,7 @@ impl<'a> Simulation<'a> {
 
     /// The states one time step later: by the implicit equations as they are, or else with softer friction, or else by
     /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
-    fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
+    fn stepped(&mut self) -> Result<State, SimulationError> {
         let grasper = self.grasper;
         let step = Step::new(self.steps, grasper.settings.time_step);
         let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };

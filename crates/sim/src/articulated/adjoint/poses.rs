@@ -6,32 +6,36 @@ use prehend_autodiff::{CustomVjp, Scalar};
 use super::inputs::{Inputs, LinkAdjoint, add_varying};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
+use crate::body_state::{BodyState, STATE, coordinates_of, states_of};
 use crate::spatial::{angular, cross_force, spatial};
-use crate::state::{STATE, State, coordinates_of, states_of};
 
 /// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
-pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {
+pub(crate) fn link_states<S: Scalar>(
+    tree: &Articulation<S>,
+    q: &[S],
+    v: &[S],
+) -> Vec<BodyState<S>> {
     if !(S::RECORDED && S::ORDER == 1) {
         return tree.motion(q, v).link_states().collect();
     }
     let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
     let plain = tree.map(S::value);
-    let result: Vec<State> = plain.motion(&plain_q, &plain_v).link_states().collect();
+    let result: Vec<BodyState> = plain.motion(&plain_q, &plain_v).link_states().collect();
     let Inputs { varying, varies, links } = Inputs::new(q.iter().chain(v).copied(), tree);
     let outputs: Vec<f64> = coordinates_of(&result).collect();
     let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
     match S::recorded(&varying, &outputs, node) {
         Some(recorded) => states_of(&recorded).collect(),
-        None => result.iter().map(State::cast).collect(),
+        None => result.iter().map(BodyState::cast).collect(),
     }
 }
 
 impl<S: Scalar> Kinematics<'_, S> {
     /// The states of all links, at the origins of their frames.
-    pub(crate) fn link_states(&self) -> impl Iterator<Item = State<S>> {
+    pub(crate) fn link_states(&self) -> impl Iterator<Item = BodyState<S>> {
         (0..self.tree.links().len()).map(|link| {
             let [linear, angular] = self.velocity(link, &Point3::origin());
-            State { pose: self.pose(link), linear, angular }
+            BodyState { pose: self.pose(link), linear, angular }
         })
     }
 }

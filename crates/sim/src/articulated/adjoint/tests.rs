@@ -6,7 +6,7 @@ use prehend_autodiff::{Fwd, Scalar, gradient};
 use super::*;
 use crate::articulated::link::Articulation;
 use crate::articulated::tests::{random_state, random_tree};
-use crate::state::coordinates_of;
+use crate::body_state::coordinates_of;
 
 /// Number of inputs of [`weighed`].
 fn inputs(tree: &Articulation) -> usize {

@@ -116,12 +116,13 @@ mod tests {
     use nalgebra::{Isometry3, Matrix3, Point3};
 
     use super::*;
+    use crate::State;
     use crate::contact::Stribeck;
     use crate::contact::law_checks::{Claims, check_law};
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{
-        Body, ContactLaw, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State,
-        Surface,
+        Body, BodyState, ContactLaw, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
+        RigidBody, Surface,
     };
 
     const SPRING: KelvinVoigt = KelvinVoigt { stiffness: 1e7, damping: 0.0 };
@@ -194,7 +195,7 @@ mod tests {
             let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());
             let mut sliding = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
             sliding.linear = slip;
-            let wrench = world.wrenches(&[State::at_rest(turn), sliding], 0)[1];
+            let wrench = world.wrenches(&State::new([BodyState::at_rest(turn), sliding]), 0)[1];
             assert!(wrench.z > 0.5);
             wrench.fixed_rows::<3>(0) / wrench.z - Vector3::z()
         };

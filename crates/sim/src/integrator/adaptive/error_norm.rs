@@ -7,10 +7,10 @@ use nalgebra::{Vector3, Vector6};
 use super::Adaptive;
 use super::sensitivity::Tangent;
 use crate::articulated::Joint;
+use crate::body_state::{BodyState, Rows};
 use crate::contact::bristles::Bristles;
 use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
-use crate::state::State;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
 
@@ -68,7 +68,7 @@ impl Scale {
     }
 
     /// The largest components of the sensitivity of `state`.
-    fn sensitivity(&self, state: &State<Tangent>, speed: f64) -> [f64; 2] {
+    fn sensitivity(&self, state: &BodyState<Tangent>, speed: f64) -> [f64; 2] {
         let tangent = state.tangent().map(|x| x.derivative[0]);
         let [position, turn, velocity, spin] =
             std::array::from_fn(|k| Vector3::from_column_slice(&tangent[3 * k..][..3]).norm());
@@ -84,8 +84,8 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
 
 impl ErrorNorm {
     /// Error norm of a step from `states`.
-    pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
-        let wrenches = LazyCell::new(|| world.wrenches(states, 0));
+    pub(super) fn new(settings: &Adaptive, world: &World, states: &Rows) -> Self {
+        let wrenches = LazyCell::new(|| world.wrenches_of(states, 0));
         let scale = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?;
             let length = rigid.gyration_radius();
@@ -138,13 +138,13 @@ impl ErrorNorm {
     /// The errors of `trial`, a step from `states` that is off by `estimate`: no numbers if the step is none.
     pub(super) fn errors(
         &self,
-        states: &[State<Tangent>],
+        states: &Rows<Tangent>,
         trial: &Trial<Tangent>,
         estimate: &Estimate<Tangent>,
     ) -> Errors {
         let (value, derivative) = (|x: Tangent| x.value, |x: Tangent| x.derivative[0]);
         let (mut error, mut slope_error, mut slope) = (0.0, [0.0; 2], [0.0; 2]);
-        let bodies = |states| <[State<Tangent>]>::iter(states).take(self.bodies);
+        let bodies = |states| <[BodyState<Tangent>]>::iter(states).take(self.bodies);
         let speeds = bodies(states).chain(bodies(trial.end()));
         let speeds = speeds.map(|s| s.linear.map(value).norm());
         let fastest = speeds.fold(0.0, f64::max);
@@ -191,7 +191,7 @@ impl ErrorNorm {
 /// the joint itself.
 fn joint_scales<'a>(
     world: &'a World,
-    states: &'a [State],
+    states: &'a Rows,
     wrenches: &'a LazyCell<Vec<Vector6<f64>>, impl FnOnce() -> Vec<Vector6<f64>>>,
 ) -> impl Iterator<Item = Scale> + 'a {
     let all = world.articulated(states).flat_map(|(own, joints)| {

@@ -2,8 +2,8 @@
 
 use prehend_autodiff::Scalar;
 
+use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
-use crate::state::State;
 use crate::world::World;
 use crate::world::broad_phase::CandidateContact;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
@@ -153,7 +153,7 @@ impl Island {
     }
 
     /// Its states out of those of all.
-    pub(super) fn states<S: Scalar>(&self, states: &[State<S>]) -> Vec<State<S>> {
+    pub(super) fn states<S: Scalar>(&self, states: &Rows<S>) -> Vec<BodyState<S>> {
         self.places().map(|place| states[place]).collect()
     }
 }

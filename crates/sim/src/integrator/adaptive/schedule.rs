@@ -7,7 +7,8 @@ use prehend_autodiff::Scalar;
 use super::Adaptive;
 use super::sensitivity::Tangent;
 use super::substep_controller::SubstepController;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::Result;
 use crate::handle::BodyId;
 use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;
@@ -19,7 +20,7 @@ use crate::world::World;
 pub(super) struct Schedule {
     pub(super) substeps: Substeps,
     /// The states at its end, with the sensitivity.
-    pub(super) states: Vec<State<Tangent>>,
+    pub(super) states: Vec<BodyState<Tangent>>,
     /// Length of the substep that would come next \[s\].
     pub(super) next_substep: f64,
     /// For each of the bodies that were watched, how far its center came at most from where it would have been if it had gone on
@@ -32,11 +33,11 @@ impl Schedule {
     pub(super) fn find(
         settings: &Adaptive,
         world: World,
-        states: Vec<State<Tangent>>,
+        states: Vec<BodyState<Tangent>>,
         step: Step,
         next_substep: Option<f64>,
         watched: &[BodyId],
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self> {
         let mut substep_controller =
             SubstepController::new(settings, world, states, step, next_substep);
         let mut substeps = Vec::new();
@@ -68,17 +69,17 @@ impl Substeps {
     pub(super) fn follow<S: Scalar>(
         &self,
         world: &World<S>,
-        states: &[State<S>],
+        states: &Rows<S>,
         step: Step,
-    ) -> Vec<State<S>> {
+    ) -> Vec<BodyState<S>> {
         let mut states = states.to_vec();
-        let mut wrenches = world.wrenches(&states, step.index);
+        let mut wrenches = world.wrenches_of(&states, step.index);
         for &substep in self.0.iter() {
             let mut trial = dormand_prince::step(world, &states, &wrenches, substep);
             states = trial.stages.pop().unwrap_or(states);
             wrenches = match substep.index {
                 // Leaks of the first substep are not of the next one.
-                0 => world.wrenches(&states, 1),
+                0 => world.wrenches_of(&states, 1),
                 _ => trial.wrenches,
             };
         }
@@ -87,20 +88,15 @@ impl Substeps {
 }
 
 impl Integrator for Substeps {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        Ok(self.follow(world, states, step))
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        Ok(state.with(self.follow(world, state.rows(), step), step.end()))
     }
 }
 
 /// A body and its deviation from uniform motion.
 struct Watched {
     id: BodyId,
-    start: State,
+    start: BodyState,
     /// By how much position \[m\] and velocity \[m/s\] deviate now, and how far it has been off at most \[m\].
     off: f64,
     speed: f64,
@@ -108,12 +104,12 @@ struct Watched {
 }
 
 impl Watched {
-    fn new(id: BodyId, start: State) -> Self {
+    fn new(id: BodyId, start: BodyState) -> Self {
         Self { id, start, off: 0.0, speed: 0.0, farthest: 0.0 }
     }
 
     /// After a `substep` of a step that started at `time` \[s\] has led to `state`.
-    fn moved(&mut self, state: State, substep: Step, time: f64) {
+    fn moved(&mut self, state: BodyState, substep: Step, time: f64) {
         let [from, to] = [self.start, state].map(|state| state.pose.translation.vector);
         let uniform = from + self.start.linear * (substep.end() - time);
         let speed = (state.linear - self.start.linear).norm();

@@ -3,7 +3,7 @@
 use prehend_autodiff::Fwd;
 use prehend_geometry::SplitMix64;
 
-use crate::state::State;
+use crate::body_state::{BodyState, Rows};
 
 /// A number with its derivative along the direction of the sensitivity.
 pub(super) type Tangent = Fwd<1>;
@@ -11,11 +11,11 @@ pub(super) type Tangent = Fwd<1>;
 /// The states with derivatives along a direction in which everything that is free moves: each coordinate of the bodies and joints by half to all of its
 /// unit.
 pub(super) fn seeded(
-    states: &[State],
+    states: &Rows,
     units: impl Iterator<Item = (usize, [f64; 12])>,
-) -> Vec<State<Tangent>> {
+) -> Vec<BodyState<Tangent>> {
     let mut random = SplitMix64::new(7);
-    let mut seeded: Vec<State<Tangent>> = states.iter().map(State::cast).collect();
+    let mut seeded: Vec<BodyState<Tangent>> = states.iter().map(BodyState::cast).collect();
     for (place, units) in units {
         let tangent = units.map(|unit| {
             let (size, sign) = (0.5 + 0.5 * random.uniform(), (random.uniform() - 0.5).signum());

@@ -4,8 +4,8 @@ use std::cell::LazyCell;
 
 use super::sensitivity::Tangent;
 use super::touch_time;
+use crate::body_state::{BodyState, Rows};
 use crate::contact::contact_query::ContactQuery;
-use crate::state::State;
 use crate::world::World;
 use crate::world::body::Motion;
 use crate::world::contact_pair::ContactPair;
@@ -81,7 +81,7 @@ impl StepLimiter {
     /// trajectories say, could not pass over a contact: no sample moves by more than its clearance and a small part of its
     /// body's size. Of a trajectory that does not go on as it moves, a yet smaller substep counts, for all that it touches may be
     /// at rest.
-    pub(super) fn longest(&self, world: &World, states: &[State], time: f64, mut dt: f64) -> f64 {
+    pub(super) fn longest(&self, world: &World, states: &Rows, time: f64, mut dt: f64) -> f64 {
         // Both may fall, but not away from each other faster than one does.
         let fall = 0.5 * world.gravity.norm();
         for (pair, limit) in self.limits(world) {
@@ -110,8 +110,8 @@ impl StepLimiter {
     pub(super) fn crossed<'a>(
         &'a self,
         world: &'a World,
-        before: &[State<Tangent>],
-        after: &[State<Tangent>],
+        before: &Rows<Tangent>,
+        after: &Rows<Tangent>,
     ) -> Option<&'a ContactPair> {
         let mut thin = self.limits(world).filter(|(_, limit)| limit.thin).map(|(pair, _)| pair);
         thin.find(|pair| {
@@ -124,16 +124,16 @@ impl StepLimiter {
     pub(super) fn passes_over(
         &self,
         world: &World,
-        states: &[State],
-        stages: &[Vec<State<Tangent>>],
+        states: &Rows,
+        stages: &[Vec<BodyState<Tangent>>],
         dt: f64,
     ) -> bool {
-        let end = LazyCell::new(|| -> Vec<State> {
-            stages.last().into_iter().flatten().map(State::value).collect()
+        let end = LazyCell::new(|| -> Vec<BodyState> {
+            stages.last().into_iter().flatten().map(BodyState::value).collect()
         });
         self.limits(world).any(|(pair, limit)| {
             let state = world.relative_value(pair, states);
-            let speed = |state: State| state.speed_within(limit.radius);
+            let speed = |state: BodyState| state.speed_within(limit.radius);
             let speeds = stages.iter().map(|stage| speed(world.relative_value(pair, stage)));
             let travel = dt * speeds.fold(speed(state), f64::max);
             travel > limit.short
@@ -145,7 +145,7 @@ impl StepLimiter {
 
 impl Limit {
     /// True if samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
-    fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
+    fn is_near(&self, world: &World, pair: &ContactPair, state: BodyState, travel: f64) -> bool {
         let near =
             |query: ContactQuery<'_>| query.each_near(pair.law().cutoff(), travel).next().is_some();
         world.contact_query(pair, state).is_some_and(near)
@@ -157,7 +157,7 @@ impl Limit {
         &self,
         world: &World,
         pair: &ContactPair,
-        states: &[State],
+        states: &Rows,
         time: f64,
         dt: f64,
     ) -> Vec<f64> {

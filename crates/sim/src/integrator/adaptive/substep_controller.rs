@@ -6,10 +6,10 @@ use super::error_norm::ErrorNorm;
 use super::sensitivity::Tangent;
 use super::step_limiter::StepLimiter;
 use super::{Adaptive, touch_time};
-use crate::error::SimulationError;
+use crate::body_state::BodyState;
+use crate::error::Result;
 use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 
@@ -57,7 +57,7 @@ pub(super) struct SubstepController {
     whole: Step,
     norm: ErrorNorm,
     limiter: StepLimiter,
-    states: Vec<State<Tangent>>,
+    states: Vec<BodyState<Tangent>>,
     wrenches: Vec<Vector6<Tangent>>,
     /// Substeps taken, and the time that they have led to \[s\].
     substeps: usize,
@@ -74,14 +74,14 @@ impl SubstepController {
     pub(super) fn new(
         settings: &Adaptive,
         plain: World,
-        states: Vec<State<Tangent>>,
+        states: Vec<BodyState<Tangent>>,
         whole: Step,
         first: Option<f64>,
     ) -> Self {
         let lifted = plain.cast::<Tangent>();
-        let values: Vec<State> = states.iter().map(State::value).collect();
+        let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let norm = ErrorNorm::new(settings, &plain, &values);
-        let wrenches = lifted.wrenches(&states, whole.index);
+        let wrenches = lifted.wrenches_of(&states, whole.index);
         let first = first.unwrap_or_else(|| norm.first_step(&plain, &wrenches));
         let dt = first.min(whole.dt);
         Self {
@@ -102,12 +102,12 @@ impl SubstepController {
     }
 
     /// The states that the substeps have led to, with the sensitivity.
-    pub(super) fn states(self) -> Vec<State<Tangent>> {
+    pub(super) fn states(self) -> Vec<BodyState<Tangent>> {
         self.states
     }
 
     /// The state of a body that the substeps have led to.
-    pub(super) fn state(&self, body: BodyId) -> State {
+    pub(super) fn state(&self, body: BodyId) -> BodyState {
         self.states[body].value()
     }
 
@@ -120,13 +120,13 @@ impl SubstepController {
     ///
     /// # Errors
     /// If it would have to be too short, or one too many.
-    pub(super) fn advance(&mut self) -> Result<Option<Step>, SimulationError> {
+    pub(super) fn advance(&mut self) -> Result<Option<Step>> {
         let left = self.whole.end() - self.time;
         let shortest = SHORTEST * self.whole.dt.max(self.time.abs());
         if left <= shortest {
             return Ok(None);
         }
-        let values: Vec<State> = self.states.iter().map(State::value).collect();
+        let values: Vec<BodyState> = self.states.iter().map(BodyState::value).collect();
         let wanted = self.dt;
         let to_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
         let dt = wanted.min(left).min(to_kink);
@@ -181,9 +181,9 @@ impl SubstepController {
                 self.wrenches = trial.wrenches;
                 return Ok(Some(substep));
             }
-            let end: Vec<State> = trial.end().iter().map(State::value).collect();
+            let end: Vec<BodyState> = trial.end().iter().map(BodyState::value).collect();
             if chosen <= shortest {
-                return Err(match end.iter().all(State::is_finite) {
+                return Err(match end.iter().all(BodyState::is_finite) {
                     true => self.plain.stalled(&values, self.time, dt),
                     false => self.plain.not_finite(&values, &end, self.time),
                 });

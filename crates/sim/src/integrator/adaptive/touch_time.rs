@@ -2,9 +2,9 @@
 
 use prehend_geometry::FieldSample;
 
+use crate::body_state::{BodyState, Rows};
 use crate::contact::contact_query::ContactQuery;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::state::State;
 use crate::surface::SurfacePoint;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
@@ -13,8 +13,8 @@ use crate::world::contact_pair::ContactPair;
 /// contact's law without smoothing, but not before `earliest` \[s\].
 pub(super) fn first(
     world: &World,
-    start: &[State],
-    end: &[State],
+    start: &Rows,
+    end: &Rows,
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
@@ -27,7 +27,7 @@ pub(super) fn first(
 fn first_of(
     world: &World,
     pair: &ContactPair,
-    ends: [&[State]; 2],
+    ends: [&Rows; 2],
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
@@ -44,7 +44,7 @@ fn first_of(
 pub(super) fn dips(
     world: &World,
     pair: &ContactPair,
-    ends: [&[State]; 2],
+    ends: [&Rows; 2],
     dt: f64,
     depth: f64,
 ) -> bool {
@@ -64,14 +64,14 @@ pub(super) fn dips(
 struct Passage<'a> {
     /// At the start.
     query: ContactQuery<'a>,
-    ends: [State; 2],
+    ends: [BodyState; 2],
     /// Largest distance that a sample moves \[m\].
     travel: f64,
 }
 
 impl<'a> Passage<'a> {
     /// Samples of `pair` beside its field at both `ends` of a step of `dt` \[s\].
-    fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
+    fn new(world: &'a World, pair: &'a ContactPair, ends: [&Rows; 2], dt: f64) -> Option<Self> {
         let ends = ends.map(|states| world.relative_value(pair, states));
         let query = world.contact_query(pair, ends[0])?;
         let radius = query.surface.radius_about(&query.com);
@@ -163,9 +163,9 @@ mod tests {
         for (least, expected) in [(5e-5, false), (-5e-5, false), (-2e-4, true)] {
             let height = 0.25 * speed * dt + least;
             let ends = [-speed, speed].map(|speed| {
-                let mut foot = State::at_rest(Isometry3::translation(0.0, 0.0, height));
+                let mut foot = BodyState::at_rest(Isometry3::translation(0.0, 0.0, height));
                 foot.linear.z = speed;
-                [State::at_rest(Isometry3::identity()), foot]
+                [BodyState::at_rest(Isometry3::identity()), foot]
             });
             let [start, end] = &ends;
             let found = dips(&world, &world.contacts[0], [start, end], dt, depth);

@@ -11,11 +11,11 @@ use super::islands::{Island, Links};
 use super::schedule::{Schedule, Substeps};
 use super::sensitivity::{self, Tangent};
 use super::substep_controller::SHORTEST;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::Result;
 use crate::handle::BodyId;
 use crate::integrator::step_checkpointed::{OneStep, with_moved};
 use crate::integrator::world_template::WorldTemplate;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::broad_phase::{BroadPhase, CandidateContact};
@@ -36,14 +36,14 @@ const MARGIN: f64 = 1.25;
 pub(super) fn step<S: Scalar>(
     settings: &Adaptive,
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     whole: Step,
-) -> Result<Vec<State<S>>, SimulationError> {
+) -> Result<Vec<BodyState<S>>> {
     let plain = world.to_f64();
     let driving = plain.cast::<Tangent>();
     let search = BroadPhase::new(&plain);
     let mut states = states.to_vec();
-    let values: Vec<State> = states.iter().map(State::value).collect();
+    let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();
     let mut tangents =
         sensitivity::seeded(&values, ErrorNorm::new(settings, &plain, &values).units());
     driving.forward_kinematics(&mut tangents);
@@ -53,7 +53,7 @@ pub(super) fn step<S: Scalar>(
         let left = whole.end() - window.start;
         let length = length(&search, &tangents);
         window.dt = if length < left { length } else { left };
-        let values = || tangents.iter().map(State::value).collect::<Vec<_>>();
+        let values = || tangents.iter().map(BodyState::value).collect::<Vec<_>>();
         if window.dt <= SHORTEST * whole.dt.max(window.start.abs()) && window.dt < left {
             return Err(plain.stalled(&values(), window.start, window.dt));
         }
@@ -83,8 +83,8 @@ pub(super) fn step<S: Scalar>(
             break;
         }
         let start = window.end();
-        driving.update_kinematics(&mut tangents, start);
-        world.update_kinematics(&mut states, start);
+        driving.place_bodies(&mut tangents, start);
+        world.place_bodies(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
     Ok(states)
@@ -97,15 +97,15 @@ pub(super) fn step<S: Scalar>(
 fn followed<S: Scalar>(
     world: &World<S>,
     contacts: &[ContactPair<S>],
-    states: &[State<S>],
+    states: &Rows<S>,
     islands: &[(Island, Schedule)],
     window: Step,
-) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+) -> Result<Vec<Vec<BodyState<S>>>> {
     let island = |(island, schedule): &(Island, Schedule)| {
         (island.world(world, contacts), island.states(states), schedule.substeps.clone())
     };
     let worlds: Vec<_> = islands.iter().map(island).collect();
-    let follow = |(own, states, substeps): &(World<S>, Vec<State<S>>, Substeps)| {
+    let follow = |(own, states, substeps): &(World<S>, Vec<BodyState<S>>, Substeps)| {
         substeps.follow(own, states, window)
     };
     if !S::RECORDED {
@@ -115,17 +115,17 @@ fn followed<S: Scalar>(
     if world.contact_groups.is_empty() || world.check_trajectories().is_err() {
         return Ok(worlds.iter().map(follow).collect());
     }
-    let node = |(own, states, substeps): &(World<S>, Vec<State<S>>, Substeps)| {
+    let node = |(own, states, substeps): &(World<S>, Vec<BodyState<S>>, Substeps)| {
         let template = WorldTemplate::new(substeps.clone(), own)?;
         Ok(OneStep::new(&template, own, states, window))
     };
-    let nodes = worlds.iter().map(node).collect::<Result<Vec<_>, SimulationError>>()?;
+    let nodes = worlds.iter().map(node).collect::<Result<Vec<_>>>()?;
     let after = worlds.iter().zip(S::recompute_each(nodes));
     after.map(|((own, states, _), moved)| Ok(with_moved(own, states, &moved?))).collect()
 }
 
 /// In what time the fastest body of a group goes as far as in a window \[s\], infinite without any.
-fn length(search: &BroadPhase<'_, f64>, states: &[State<Tangent>]) -> f64 {
+fn length(search: &BroadPhase<'_, f64>, states: &Rows<Tangent>) -> f64 {
     let gravity = search.world().gravity.norm();
     let time = |(id, size): (BodyId, f64)| {
         TRAVEL * size / (states[id].value().linear.norm() + (gravity * size).sqrt())
@@ -146,12 +146,12 @@ impl Window {
     fn find(
         settings: &Adaptive,
         search: &BroadPhase<'_, f64>,
-        tangents: &[State<Tangent>],
+        tangents: &Rows<Tangent>,
         step: Step,
         next_substeps: &[Option<f64>],
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self> {
         let world = search.world();
-        let states: Vec<State> = tangents.iter().map(State::value).collect();
+        let states: Vec<BodyState> = tangents.iter().map(BodyState::value).collect();
         let free: Vec<BodyId> = search.free().map(|(id, _)| id).collect();
         let mut deviations = search.deviations(step, SLACK);
         let mut known: HashMap<Links, Schedule> = HashMap::new();

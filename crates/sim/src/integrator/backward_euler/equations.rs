@@ -9,16 +9,16 @@ use prehend_autodiff::solve::{Factored, SolveError, sparse_lu};
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::body::RigidBody;
-use crate::error::SimulationError;
+use crate::body_state::{BodyState, Rows};
+use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
-use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
-pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -> State<S> {
+pub(super) fn arrived<S: Scalar>(state: &BodyState<S>, velocity: &[S; 6], dt: f64) -> BodyState<S> {
     let [x, y, z, rx, ry, rz] = *velocity;
-    let moving = State { linear: [x, y, z].into(), angular: [rx, ry, rz].into(), ..*state };
+    let moving = BodyState { linear: [x, y, z].into(), angular: [rx, ry, rz].into(), ..*state };
     moving.drifted(dt)
 }
 
@@ -26,7 +26,7 @@ pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -
 pub(super) fn excess<S: Scalar>(
     body: &RigidBody<S>,
     world: &World<S>,
-    state: &State<S>,
+    state: &BodyState<S>,
     velocity: &[S; 6],
     wrench: &Vector6<S>,
     dt: f64,
@@ -44,9 +44,9 @@ pub(super) fn excess<S: Scalar>(
 pub(super) struct ImplicitStep<'a> {
     pub(super) world: &'a World,
     pub(super) lifted: &'a World<Fwd<12>>,
-    pub(super) states: &'a [State],
+    pub(super) states: &'a Rows,
     /// The states at the end, right for the bodies that are not free.
-    pub(super) at_end: Vec<State>,
+    pub(super) at_end: Vec<BodyState>,
     pub(super) free: Vec<BodyId>,
     pub(super) step: Step,
 }
@@ -57,10 +57,10 @@ type Blocks = BTreeMap<(usize, usize), Matrix6<f64>>;
 impl ImplicitStep<'_> {
     /// Newton's method: first from the velocities at the start, then from those of a flight without contacts, in
     /// which what will touch touches already.
-    pub(super) fn solve(&self) -> Result<DVector<f64>, SimulationError> {
+    pub(super) fn solve(&self) -> Result<DVector<f64>> {
         let start = |flight: f64| {
             let velocity = |&body: &BodyId| {
-                let State { linear, angular, .. } = self.states[body];
+                let BodyState { linear, angular, .. } = self.states[body];
                 let linear = linear + self.world.gravity * flight;
                 [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
             };
@@ -86,7 +86,7 @@ impl ImplicitStep<'_> {
         excesses
     }
 
-    fn ends(&self, x: &DVector<f64>) -> Vec<State> {
+    fn ends(&self, x: &DVector<f64>) -> Vec<BodyState> {
         let mut ends = self.at_end.clone();
         for (slot, &body) in self.free.iter().enumerate() {
             ends[body] = arrived(&self.states[body], &velocity_at(x, slot), self.step.dt);
@@ -133,7 +133,7 @@ impl ImplicitStep<'_> {
 
 impl Equations for ImplicitStep<'_> {
     fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
-        let wrenches = self.world.wrenches(&self.ends(x), self.step.index);
+        let wrenches = self.world.wrenches_of(&self.ends(x), self.step.index);
         self.excesses(x, &wrenches)
     }
 
@@ -145,8 +145,8 @@ impl Equations for ImplicitStep<'_> {
         let mut wrenches: Vec<Vector6<f64>> =
             self.world.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
-        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::cast).collect();
-        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::cast);
+        let mut states: Vec<BodyState<Fwd<12>>> = ends.iter().map(BodyState::cast).collect();
+        let mut deflections = ends[self.world.bodies.len()..].iter().map(BodyState::cast);
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
             let bodies = [pair.bodies.samples, pair.bodies.field];

@@ -3,7 +3,7 @@
 use prehend_autodiff::Scalar;
 
 use super::Stages;
-use crate::error::SimulationError;
+use crate::error::Result;
 use crate::integrator::Integrator;
 use crate::state::State;
 use crate::time::Step;
@@ -17,18 +17,14 @@ use crate::world::World;
 pub struct RungeKutta4;
 
 impl Integrator for RungeKutta4 {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
-        step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
-        let wrenches = world.wrenches(states, step.index);
-        let mut stages = Stages::new(world, states, &wrenches, step, 4);
+    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let wrenches = world.wrenches_of(state.rows(), step.index);
+        let mut stages = Stages::new(world, state.rows(), &wrenches, step, 4);
         stages.stage(0.5, &[0.5]);
         stages.stage(0.5, &[0.0, 0.5]);
         stages.stage(1.0, &[0.0, 0.0, 1.0]);
-        Ok(stages.end(&[1.0, 2.0, 2.0, 1.0].map(|weight| weight / 6.0)))
+        let end = stages.end(&[1.0, 2.0, 2.0, 1.0].map(|weight| weight / 6.0));
+        Ok(state.with(end, step.end()))
     }
 
     /// The left half of the disc of radius 2.6 is inside the stability region, which ends at 2.83 on the imaginary axis.

@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 use prehend_autodiff::Scalar;
 
 use super::{Change, Stages};
-use crate::state::State;
+use crate::body_state::{BodyState, Rows};
 use crate::time::Step;
 use crate::world::World;
 
@@ -48,7 +48,7 @@ const LOWER: [[f64; 7]; 2] = [
 /// States that a step leads to.
 pub(in crate::integrator) struct Trial<S: Scalar> {
     /// The states at its stages, the last of which is its end.
-    pub(in crate::integrator) stages: Vec<Vec<State<S>>>,
+    pub(in crate::integrator) stages: Vec<Vec<BodyState<S>>>,
     /// The wrenches there: those that the next step starts with.
     pub(in crate::integrator) wrenches: Vec<Vector6<S>>,
 }
@@ -65,7 +65,7 @@ pub(in crate::integrator) struct Estimate<S: Scalar> {
 /// A step from `states` with `wrenches` on them.
 pub(in crate::integrator) fn step<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> Trial<S> {
@@ -75,7 +75,7 @@ pub(in crate::integrator) fn step<S: Scalar>(
 /// [`step`], and how far off it may be.
 pub(in crate::integrator) fn estimated<S: Scalar>(
     world: &World<S>,
-    states: &[State<S>],
+    states: &Rows<S>,
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> (Trial<S>, Estimate<S>) {
@@ -101,7 +101,7 @@ fn visit<S: Scalar>(stages: &mut Stages<'_, S>) -> Trial<S> {
 
 impl<S: Scalar> Trial<S> {
     /// The states at its end.
-    pub(in crate::integrator) fn end(&self) -> &[State<S>] {
+    pub(in crate::integrator) fn end(&self) -> &Rows<S> {
         self.stages.last().map_or(&[], Vec::as_slice)
     }
 }

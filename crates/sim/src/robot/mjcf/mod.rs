@@ -84,20 +84,20 @@ impl MjcfRobot {
     /// Puts a mocap body at `t_world_body`, as MuJoCo's `mocap_pos` and `mocap_quat` do: between steps, for it has no velocity.
     ///
     /// # Errors
-    /// If the model has no such mocap body, or the states are not those of the world.
+    /// If the model has no such mocap body, or it is no state of the world.
     pub fn set_mocap(
         &self,
         world: &mut World,
-        states: &mut [State],
+        state: &mut State,
         name: &str,
         t_world_body: &Isometry3<f64>,
     ) -> Result<(), MjcfError> {
         let none = || MjcfError::NoMocap { name: name.to_owned() };
         let body = self.body(name).filter(|body| self.mocaps.contains(body)).ok_or_else(none)?;
-        world.joint_place(states, body)?;
+        world.joint_place(state.rows(), body)?;
         let (articulation, link) = world.link_of(body)?;
         world.articulations[articulation].tree.links_mut()[link].t_parent_joint = *t_world_body;
-        world.forward_kinematics(states);
+        world.forward_kinematics(state.rows_mut());
         Ok(())
     }
 

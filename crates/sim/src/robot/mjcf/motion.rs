@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Quaternion, Unit, Vector3};
 use prehend_geometry::mjcf::{JointKind, Model};
 
 use super::{MjcfError, MjcfRobot};
+use crate::body_state::BodyState;
 use crate::state::State;
 use crate::world::World;
 
@@ -17,11 +18,11 @@ impl MjcfRobot {
     /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
     ///
     /// # Errors
-    /// If they are too few or too many, or the states are not those of the world.
+    /// If they are too few or too many, or it is no state of the world.
     pub fn set_positions(
         &self,
         world: &World,
-        states: &mut [State],
+        state: &mut State,
         positions: &[f64],
     ) -> Result<(), MjcfError> {
         let expected = self.moved.iter().map(|(kind, _)| kind.positions()).sum();
@@ -39,9 +40,9 @@ impl MjcfRobot {
                 JointKind::Ball => turned(own).to_vec(),
                 JointKind::Free => own[..3].iter().copied().chain(turned(&own[3..])).collect(),
             };
-            world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
+            world.write_joint(state.rows_mut(), *link, &position, &vec![0.0; kind.velocities()])?;
         }
-        world.forward_kinematics(states);
+        world.forward_kinematics(state.rows_mut());
         Ok(())
     }
 
@@ -49,11 +50,11 @@ impl MjcfRobot {
     /// angular velocity along the body's.
     ///
     /// # Errors
-    /// If they are too few or too many, or the states are not those of the world.
+    /// If they are too few or too many, or it is no state of the world.
     pub fn set_velocities(
         &self,
         world: &World,
-        states: &mut [State],
+        state: &mut State,
         velocities: &[f64],
     ) -> Result<(), MjcfError> {
         let expected = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
@@ -62,32 +63,32 @@ impl MjcfRobot {
         for (kind, link) in &self.moved {
             let (own, after) = rest.split_at(kind.velocities());
             rest = after;
-            let joint = world.joint(states, *link)?;
+            let joint = world.joint(state, *link)?;
             let mut velocity = own.to_vec();
             if *kind == JointKind::Free {
                 let along =
                     axes(&joint.position).transpose() * Vector3::from_column_slice(&own[..3]);
                 velocity[..3].copy_from_slice(along.as_slice());
             }
-            world.write_joint(states, *link, &joint.position, &velocity)?;
+            world.write_joint(state.rows_mut(), *link, &joint.position, &velocity)?;
         }
-        world.forward_kinematics(states);
+        world.forward_kinematics(state.rows_mut());
         Ok(())
     }
 
     /// Sets the states of actuators that have one, MuJoCo's `act`.
     ///
     /// # Errors
-    /// If they are too few or too many, or the states are not those of the world.
+    /// If they are too few or too many, or it is no state of the world.
     pub fn set_activations(
         &self,
         world: &World,
-        states: &mut [State],
+        state: &mut State,
         activations: &[f64],
     ) -> Result<(), MjcfError> {
         check("activations", activations, self.activations.len())?;
         for (link, activation) in self.activations.iter().zip(activations) {
-            world.write_joint(states, *link, &[0.0], &[*activation])?;
+            world.write_joint(state.rows_mut(), *link, &[0.0], &[*activation])?;
         }
         Ok(())
     }
@@ -95,15 +96,16 @@ impl MjcfRobot {
     /// Accelerations of all joints in MuJoCo's order and axes, its `qacc`.
     ///
     /// # Panics
-    /// If there are fewer states than those of the world.
-    pub fn accelerations(&self, world: &World, states: &[State]) -> Vec<f64> {
-        let wrenches = world.wrenches(states, 0);
+    /// If it is no state of the world.
+    pub fn accelerations(&self, world: &World, state: &State) -> Vec<f64> {
+        let states = state.rows();
+        let wrenches = world.wrenches_of(states, 0);
         let mut all = Vec::new();
         for (kind, link) in &self.moved {
             let Ok((place, joint)) = world.joint_place(states, *link) else { continue };
             let mut own = joint.accelerations(&wrenches[place]);
             if *kind == JointKind::Free {
-                let State { pose, linear, angular } = &states[place];
+                let BodyState { pose, linear, angular } = &states[place];
                 let along = Vector3::from_column_slice(&own[..3]) + angular.cross(linear);
                 own[..3].copy_from_slice((pose.rotation * along).as_slice());
             }
@@ -115,13 +117,13 @@ impl MjcfRobot {
     /// The mass matrix in MuJoCo's order and axes, with the armature of joints and tendons.
     ///
     /// # Panics
-    /// If there are fewer states than those of the world.
-    pub fn mass_matrix(&self, world: &World, states: &[State]) -> DMatrix<f64> {
+    /// If it is no state of the world.
+    pub fn mass_matrix(&self, world: &World, state: &State) -> DMatrix<f64> {
         let Some(Ok((articulation, _))) = self.moved.first().map(|(_, link)| world.link_of(*link))
         else {
             return DMatrix::zeros(0, 0);
         };
-        let own = world.mass_matrix(articulation, states);
+        let own = world.mass_matrix(articulation, state.rows());
         let count = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
         // Velocities of the articulation by MuJoCo's.
         let mut turned = DMatrix::zeros(own.nrows(), count);
@@ -131,7 +133,7 @@ impl MjcfRobot {
             let [_, dofs] = world.articulations[articulation].tree.range(link_index);
             let n = kind.velocities();
             turned.view_mut((dofs.start, column), (n, n)).fill_with_identity();
-            if let (JointKind::Free, Ok(joint)) = (kind, world.joint(states, *link)) {
+            if let (JointKind::Free, Ok(joint)) = (kind, world.joint(state, *link)) {
                 let axes = axes(&joint.position).transpose();
                 turned.view_mut((dofs.start, column), (3, 3)).copy_from(&axes);
             }
@@ -158,10 +160,10 @@ impl World {
             at += joint.kind.positions();
         }
         let own = self.articulations.len() - 1;
-        let mut states = self.neutral_states();
+        let mut state = self.neutral_state();
         let mut coordinates = |positions: &[f64]| -> Result<Vec<f64>, MjcfError> {
-            robot.set_positions(self, &mut states, positions)?;
-            let [q, _] = self.articulations[own].coordinates(&states[self.joint_range(own)]);
+            robot.set_positions(self, &mut state, positions)?;
+            let [q, _] = self.articulations[own].coordinates(&state.rows()[self.joint_range(own)]);
             Ok(q)
         };
         Ok([coordinates(&reference)?, coordinates(&slack)?])

@@ -8,6 +8,7 @@ use prehend_geometry::mjcf::{FramePart, JointIndex, PlacedFrame, Quantity, Senso
 
 use super::lengths::{Along, Lengths};
 use super::{MjcfError, MjcfRobot};
+use crate::body_state::BodyState;
 use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
@@ -56,17 +57,12 @@ impl MjcfRobot {
     /// The reading of a sensor, in MuJoCo's order and units, without noise: see [`Quantity`].
     ///
     /// # Errors
-    /// If there is no such sensor, an accelerometer is on what nothing moves, or the states are not those of the world.
-    pub fn sensor(
-        &self,
-        world: &World,
-        states: &[State],
-        name: &str,
-    ) -> Result<Vec<f64>, MjcfError> {
+    /// If there is no such sensor, an accelerometer is on what nothing moves, or it is no state of the world.
+    pub fn sensor(&self, world: &World, state: &State, name: &str) -> Result<Vec<f64>, MjcfError> {
         let sensor = self.sensors.all.iter().find(|own| own.name == name);
         let sensor = sensor.ok_or_else(|| MjcfError::NoSensor { name: name.to_owned() })?;
-        let states = world.sensed(states)?;
-        let mut numbers = self.measured(world, &states, &sensor.quantity)?;
+        let state = world.sensed(state)?;
+        let mut numbers = self.measured(world, &state, &sensor.quantity)?;
         numbers.iter_mut().for_each(|x| *x = x.clamp(-sensor.cutoff, sensor.cutoff));
         Ok(numbers)
     }
@@ -74,44 +70,44 @@ impl MjcfRobot {
     fn measured(
         &self,
         world: &World,
-        states: &[State],
+        state: &State,
         quantity: &Quantity,
     ) -> Result<Vec<f64>, MjcfError> {
         let three = |v: Vector3<f64>| Ok(v.as_slice().to_vec());
         match quantity {
             Quantity::JointPosition(joint) => {
-                let position = world.joint(states, self.sensors.joints[joint])?.position;
+                let position = world.joint(state, self.sensors.joints[joint])?.position;
                 Ok(match position[..] {
                     [i, j, k, w] => vec![w, i, j, k],
                     _ => position,
                 })
             }
             Quantity::JointVelocity(joint) => {
-                Ok(world.joint(states, self.sensors.joints[joint])?.velocity)
+                Ok(world.joint(state, self.sensors.joints[joint])?.velocity)
             }
             Quantity::TendonLength(k) => {
-                Ok(self.along(world, states, &self.sensors.tendons[*k])?[..1].to_vec())
+                Ok(self.along(world, state, &self.sensors.tendons[*k])?[..1].to_vec())
             }
             Quantity::TendonVelocity(k) => {
-                Ok(self.along(world, states, &self.sensors.tendons[*k])?[1..].to_vec())
+                Ok(self.along(world, state, &self.sensors.tendons[*k])?[1..].to_vec())
             }
             Quantity::ActuatorLength(k) => {
-                Ok(self.along(world, states, &self.sensors.actuators[*k])?[..1].to_vec())
+                Ok(self.along(world, state, &self.sensors.actuators[*k])?[..1].to_vec())
             }
             Quantity::ActuatorVelocity(k) => {
-                Ok(self.along(world, states, &self.sensors.actuators[*k])?[1..].to_vec())
+                Ok(self.along(world, state, &self.sensors.actuators[*k])?[1..].to_vec())
             }
             Quantity::Frame { part, frame, reference } => {
-                let own = self.moving(states, frame);
-                let base = reference.as_ref().map(|reference| self.moving(states, reference));
+                let own = self.moving(state, frame);
+                let base = reference.as_ref().map(|reference| self.moving(state, reference));
                 Ok(part_of(*part, &own, base.as_ref()))
             }
             Quantity::Velocimeter(frame) => {
-                let own = self.moving(states, frame);
+                let own = self.moving(state, frame);
                 three(own.pose.rotation.inverse() * own.linear)
             }
             Quantity::Gyro(frame) => {
-                let own = self.moving(states, frame);
+                let own = self.moving(state, frame);
                 three(own.pose.rotation.inverse() * own.angular)
             }
             Quantity::Accelerometer(PlacedFrame { body, t_body_frame }) => {
@@ -121,29 +117,29 @@ impl MjcfRobot {
                     return three(turn.inverse() * -world.gravity);
                 };
                 let point = t_body_frame.translation.vector.into();
-                let felt = world.accelerometer(self.bodies[*body], &point, states)?;
+                let felt = world.accelerometer(self.bodies[*body], &point, state)?;
                 three(t_body_frame.rotation.inverse() * felt)
             }
-            Quantity::SubtreeCenter(body) => three(self.subtree(states, *body)[0]),
-            Quantity::SubtreeVelocity(body) => three(self.subtree(states, *body)[1]),
-            Quantity::SubtreeMomentum(body) => three(self.subtree(states, *body)[2]),
+            Quantity::SubtreeCenter(body) => three(self.subtree(state, *body)[0]),
+            Quantity::SubtreeVelocity(body) => three(self.subtree(state, *body)[1]),
+            Quantity::SubtreeMomentum(body) => three(self.subtree(state, *body)[2]),
         }
     }
 
     /// A length and its rate.
-    fn along(&self, world: &World, states: &[State], along: &Along) -> Result<[f64; 2], MjcfError> {
+    fn along(&self, world: &World, state: &State, along: &Along) -> Result<[f64; 2], MjcfError> {
         let mut sum = [0.0; 2];
         match along {
             Along::Joints(axes) => {
                 for (axis, factor) in axes {
-                    let motion = world.joint_motion(states, *axis)?;
+                    let motion = world.joint_motion(state, *axis)?;
                     sum = [0, 1].map(|k| sum[k] + factor * motion[k]);
                 }
             }
             Along::Path(path) => {
                 let (articulation, _) = world.link_of(self.bodies[0])?;
                 let own = &world.articulations[articulation];
-                let [q, v] = own.coordinates(&states[world.joint_range(articulation)]);
+                let [q, v] = own.coordinates(&state.rows()[world.joint_range(articulation)]);
                 let length = path.length(&own.tree.kinematics(&q, &v), &q, false);
                 let rate = length.slopes.iter().zip(&v).map(|(slope, v)| slope * v).sum();
                 sum = [length.value, rate];
@@ -152,28 +148,26 @@ impl MjcfRobot {
         Ok(sum)
     }
 
-    fn moving(&self, states: &[State], PlacedFrame { body, t_body_frame }: &PlacedFrame) -> Moving {
+    fn moving(&self, state: &State, PlacedFrame { body, t_body_frame }: &PlacedFrame) -> Moving {
         let Some(body) = body else {
             let pose = self.sensors.t_world_model * t_body_frame;
             return Moving { pose, linear: Vector3::zeros(), angular: Vector3::zeros() };
         };
-        let State { pose, linear, angular } = states[self.bodies[*body]];
+        let BodyState { pose, linear, angular } = state[self.bodies[*body]];
         let arm = pose.rotation * t_body_frame.translation.vector;
         Moving { pose: pose * t_body_frame, linear: linear + angular.cross(&arm), angular }
     }
 
     /// Center of mass of a body and all that it carries, its velocity, and the angular momentum about it.
-    fn subtree(&self, states: &[State], body: Option<usize>) -> [Vector3<f64>; 3] {
+    fn subtree(&self, state: &State, body: Option<usize>) -> [Vector3<f64>; 3] {
         let mut is_inside = vec![body.is_none(); self.bodies.len()];
         let mut parts = Vec::new();
         for (k, (parent, inertial)) in self.sensors.inertials.iter().enumerate() {
             is_inside[k] |= body == Some(k) || parent.is_some_and(|parent| is_inside[parent]);
             let Some(inertial) = inertial.as_ref().filter(|_| is_inside[k]) else { continue };
             let t_body_frame = inertial.com.coords.into();
-            parts.push((
-                inertial,
-                self.moving(states, &PlacedFrame { body: Some(k), t_body_frame }),
-            ));
+            parts
+                .push((inertial, self.moving(state, &PlacedFrame { body: Some(k), t_body_frame })));
         }
         let mass: f64 = parts.iter().map(|(own, _)| own.mass).sum();
         let mean = |of: fn(&Moving) -> Vector3<f64>| {

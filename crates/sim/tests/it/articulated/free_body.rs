@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, State, Surface, World,
+    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, State,
+    Surface, World,
 };
 
 /// A brick over a floor, free or as a link.
-fn worlds() -> [(World, Vec<State>); 2] {
+fn worlds() -> [(World, State); 2] {
     let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
     let com = Point3::new(3e-3, -2e-3, 1e-3);
     let rigid = RigidBody::new(0.2, inertia, com).unwrap();
@@ -33,7 +34,7 @@ fn worlds() -> [(World, Vec<State>); 2] {
         let law = Arc::new(Law::new(spring, friction).unwrap());
         let bodies = ContactBodies { samples: brick, field: floor };
         world.add_contact(bodies, law, GapSmoothing::Softplus { width: 1e-4 }).unwrap();
-        let mut states = world.neutral_states();
+        let mut states = world.neutral_state();
         if linked {
             let (place, turn) = (t_world_brick.translation.vector, t_world_brick.rotation.coords);
             let q: Vec<f64> = place.iter().chain(turn.iter()).copied().collect();
@@ -44,7 +45,7 @@ fn worlds() -> [(World, Vec<State>); 2] {
             world.set_joint(&mut states, brick, &q, &v).unwrap();
         } else {
             let at = rigid.at_rest(&t_world_brick);
-            states[brick] = State { linear: velocity, angular: spin, ..at };
+            states[brick] = BodyState { linear: velocity, angular: spin, ..at };
         }
         (world, states)
     })

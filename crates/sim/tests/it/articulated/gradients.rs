@@ -9,7 +9,7 @@ use super::scenes::random_scene;
 const STEPS: TimeSteps = TimeSteps { dt: 2e-4, steps: 6 };
 
 /// Whether contacts push at the start.
-fn touches((world, states): &(World, Vec<State>)) -> bool {
+fn touches((world, states): &(World, State)) -> bool {
     let mut world = world.clone();
     world.bushings.clear();
     world.bodies.iter().zip(world.wrenches(states, 0)).any(|(_, wrench)| wrench.norm() > 0.1)
@@ -17,7 +17,7 @@ fn touches((world, states): &(World, Vec<State>)) -> bool {
 
 /// Every number of a world and of the joints' and the ball's states, moved by `x`, to a weighted sum of the states in the end.
 fn weighed<S: Scalar>(
-    (world, states): &(World, Vec<State>),
+    (world, states): &(World, State),
     integrator: &impl Integrator,
     x: &[S],
 ) -> S {
@@ -26,7 +26,7 @@ fn weighed<S: Scalar>(
     let world = world.with_parameters(&moved).unwrap();
     let mut rest = x[parameters.len()..].iter().copied();
     let mut next = || rest.next().unwrap();
-    let mut start: Vec<State<S>> = states.iter().map(State::cast).collect();
+    let mut start: State<S> = states.cast();
     start[1] = states[1].retract(&std::array::from_fn(|_| next()));
     let links = world.articulations[0].bodies().to_vec();
     for (link, body) in world.articulations[0].tree.links().iter().zip(links) {
@@ -38,8 +38,8 @@ fn weighed<S: Scalar>(
         assert_eq!(velocity.len(), dofs);
         world.set_joint(&mut start, body, &position, &velocity).unwrap();
     }
-    let end = world.simulate_with(integrator, &start, STEPS, |_, _| ()).unwrap().states;
-    let all = end.iter().skip(1).flat_map(|state| {
+    let end = world.simulate_with(integrator, &start, STEPS).unwrap().states;
+    let all = end.rows().iter().skip(1).flat_map(|state| {
         let [a, b, c] =
             [state.pose.translation.vector, state.linear, state.angular].map(<[S; 3]>::from);
         a.into_iter()
@@ -51,14 +51,14 @@ fn weighed<S: Scalar>(
     all.zip(weights).fold(S::zero(), |sum, (x, weight)| sum + x.times(weight))
 }
 
-fn inputs((world, _): &(World, Vec<State>)) -> usize {
+fn inputs((world, _): &(World, State)) -> usize {
     let joints = world.articulations[0].tree.links().iter().map(|link| &link.joint);
     let joints = joints.map(|joint| joint.nq() + joint.nv());
     world.parameters().len() + 12 + joints.sum::<usize>()
 }
 
 /// A direction in which every number moves by a part of its size.
-fn direction(scene: &(World, Vec<State>), random: &mut SplitMix64) -> Vec<f64> {
+fn direction(scene: &(World, State), random: &mut SplitMix64) -> Vec<f64> {
     let mut size = scene.0.parameters();
     size.iter_mut().for_each(|x| *x = 0.1 * x.abs());
     // The center of mass of the free ball, after the floor's wrench and its own mass and inertia.

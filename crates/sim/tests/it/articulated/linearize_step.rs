@@ -2,13 +2,14 @@
 
 use nalgebra::DMatrix;
 use prehend_autodiff::Fwd;
+use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::Joint;
 use prehend_sim::{SemiImplicitEuler, State, Step, World};
 
 use super::scenes::random_scene;
 
 /// Derivatives of the velocities of bodies and joints, and of places, by initial velocities and coordinates, by forward mode.
-fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
+fn by_velocities(world: &World, states: &State, step: Step) -> DMatrix<f64> {
     let free = 1;
     let links = world.articulations[0].bodies();
     let joints: Vec<&Joint> =
@@ -17,7 +18,7 @@ fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(n, n);
     let lifted = world.cast::<Fwd<1>>();
     for column in 0..n {
-        let mut start: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
+        let mut start: State<Fwd<1>> = states.cast();
         if column < 6 {
             let velocity =
                 if column < 3 { &mut start[free].linear } else { &mut start[free].angular };
@@ -64,7 +65,7 @@ fn the_closed_form_is_forward_mode() {
         let found = world.linearize_step(&states, step).unwrap();
         let n = found.by_force.ncols();
         let end = world.step(&SemiImplicitEuler, &states, step).unwrap();
-        for (a, b) in found.states.iter().zip(&end) {
+        for (a, b) in found.state.rows().iter().zip(end.rows()) {
             assert!((a.pose.to_homogeneous() - b.pose.to_homogeneous()).norm() < 1e-12);
             assert!((a.linear - b.linear).norm() + (a.angular - b.angular).norm() < 1e-10);
         }
@@ -86,4 +87,25 @@ fn the_closed_form_is_forward_mode() {
         }
     }
     assert!(closed > 50 && forward > 50, "{closed} {forward}");
+}
+
+#[test]
+fn displacements_lead_from_one_state_to_another() {
+    for seed in 0..40 {
+        let (world, state) = random_scene(seed);
+        let mut random = SplitMix64::new(seed);
+        let by: Vec<f64> =
+            (0..2 * world.degrees_of_freedom()).map(|_| random.uniform() - 0.5).collect();
+        let displaced = world.displaced(&state, &by);
+        let found = world.displacement(&state, &displaced);
+        for (found, by) in found.iter().zip(&by) {
+            assert!((found - by).abs() < 1e-12, "{seed}: {found} {by}");
+        }
+        // Its derivatives at the state itself are the directions.
+        let lifted = world.displaced(&state, &Fwd::<1>::variables([0.0]).repeat(by.len()));
+        let found = world.displacement(&state, &lifted);
+        assert!(
+            found.iter().all(|x| x.value.abs() < 1e-15 && (x.derivative[0] - 1.0).abs() < 1e-12)
+        );
+    }
 }

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::joint_law::{JointLimits, JointSpring};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Bushing, BushingStiffness, Motion, RigidBody, SimulationError,
-    State, Step, TimeSteps, World,
+    BackwardEuler, Body, BodyId, BodyState, Bushing, BushingStiffness, Motion, RigidBody,
+    SimulationError, State, Step, TimeSteps, World,
 };
 
 #[test]
@@ -18,8 +18,8 @@ fn a_sprung_ball_is_an_oscillator() {
     let frames = [Isometry3::identity(); 2];
     world.add_bushing(Bushing { bodies: [ball, post], frames, stiffness }).unwrap();
     let turn = Vector3::new(0.0, 0.0, 0.3);
-    let mut states = world.neutral_states();
-    states[ball] = State::at_rest(Isometry3::new(Vector3::new(0.02, 0.0, 0.0), turn));
+    let mut states = world.neutral_state();
+    states[ball] = BodyState::at_rest(Isometry3::new(Vector3::new(0.02, 0.0, 0.0), turn));
     let end = world.simulate(&states, 0.2).unwrap();
     let expected = 0.02 * (10.0_f64 * 0.2).cos();
     assert!((end[ball].pose.translation.x - expected).abs() < 1e-6);
@@ -62,8 +62,8 @@ fn a_bushing_feels_the_center_of_mass_and_what_knows_no_bushings_refuses() {
         let moved = rigid.moved(&Isometry3::translation(0.0, x, 0.0));
         let mut world = world.clone();
         world.bodies[ball].motion = Motion::Dynamic(moved);
-        let mut states = world.neutral_states();
-        states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) };
+        let mut states = world.neutral_state();
+        states[ball] = BodyState { angular: Vector3::x(), ..BodyState::at_rest(turned) };
         world.wrenches(&states, 0)[ball]
     };
     let difference = (wrench(1e-6) - wrench(-1e-6)) / 2e-6;
@@ -72,11 +72,11 @@ fn a_bushing_feels_the_center_of_mass_and_what_knows_no_bushings_refuses() {
     // Of the free body: mass, inertia, and of its center of mass x, then y.
     parameters[6 + 1 + 6 + 1].derivative[0] = 1.0;
     lifted = world.with_parameters(&parameters).unwrap();
-    let mut states = lifted.neutral_states();
-    states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) }.cast();
+    let mut states = lifted.neutral_state();
+    states[ball] = BodyState { angular: Vector3::x(), ..BodyState::at_rest(turned) }.cast();
     let slopes = lifted.wrenches(&states, 0)[ball].map(|x| x.derivative[0]);
     assert!(difference.norm() > 1.0 && (slopes - difference).norm() < 1e-6, "{slopes}{difference}");
-    let states = world.neutral_states();
+    let states = world.neutral_state();
     let refused = world.step(&BackwardEuler, &states, Step::new(0, 1e-3));
     assert!(matches!(refused, Err(SimulationError::Bushings { .. })));
 }
@@ -90,11 +90,11 @@ fn a_spring_on_one_axis_of_a_ball_joint_keeps_energy() {
         world.add_articulation(vec![Link::new("ball", Joint::Spherical, &rigid)]).unwrap()[0];
     let stiffness = 1.0;
     world.add_joint_force(link, JointSpring { stiffness, rest: 0.0 }).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     let q = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(0.5, 1.5, 0.0));
     let q: Vec<f64> = q.coords.iter().copied().collect();
     world.set_joint(&mut states, link, &q, &[0.0, 0.3, 2.0]).unwrap();
-    let energy = |states: &[State]| {
+    let energy = |states: &State| {
         let at = world.joint(states, link).unwrap();
         let kinetic = world.articulations[0].tree.kinematics(&at.position, &at.velocity);
         let [angle, _] = world.joint_motion(states, link).unwrap();
@@ -112,7 +112,7 @@ fn a_joint_let_go_beyond_its_limit_makes_no_energy() {
     let link = world.add_articulation(vec![Link::new("rod", hinge, &rigid)]).unwrap()[0];
     let limits = JointLimits { lower: -1.0, upper: 1.0, stiffness: 1e3, damping: 0.0 };
     world.add_joint_force(link, limits).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     world.set_joint(&mut states, link, &[1.01], &[0.0]).unwrap();
     let end = world.simulate(&states, 0.4).unwrap();
     assert!(world.joint_motion(&end, link).unwrap()[0] < 0.0);
@@ -121,7 +121,7 @@ fn a_joint_let_go_beyond_its_limit_makes_no_energy() {
 #[test]
 fn a_parallelogram_swings_as_its_equation_says() {
     let (world, [left, right]) = parallelogram();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     let angle = 0.5;
     for (link, angle) in
         [(left, angle), (right, angle), (world.articulations[0].bodies()[2], -angle)]

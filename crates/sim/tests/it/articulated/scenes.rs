@@ -67,7 +67,7 @@ pub(super) fn coulomb_law() -> (Arc<dyn DynContactLaw>, GapSmoothing) {
 }
 
 /// A tree whose links are balls, low over a floor, beside a free ball; everything is pressed together and moves.
-pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
+pub(super) fn random_scene(seed: u64) -> (World, State) {
     let mut random = SplitMix64::new(seed);
     let count = 1 + seed as usize % 6;
     let links = (0..count).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
@@ -132,7 +132,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
         let bodies = [last, others[seed as usize % 5]];
         world.add_bushing(Bushing { bodies, frames, stiffness }).unwrap();
     }
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     states[free].pose.translation.vector = Vector3::new(0.05, 0.02, 0.03);
     states[free].linear = Vector3::new(0.1, -0.3, -0.2);
     for (index, &link) in bodies.iter().enumerate() {

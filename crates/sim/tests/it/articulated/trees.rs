@@ -11,12 +11,12 @@ use prehend_sim::{
 use super::scenes::{coulomb_law, random_link, random_scene};
 
 /// A tree of 12 links in free motion; every third floats.
-fn free_tree(seed: u64) -> (World, Vec<State>) {
+fn free_tree(seed: u64) -> (World, State) {
     let mut random = SplitMix64::new(seed);
     let mut world = World::new(nalgebra::Vector3::new(0.1, -0.2, -9.81));
     let links = (0..12).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
     let bodies = world.add_articulation(links.collect()).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     for link in bodies {
         let mut joint = world.joint(&states, link).unwrap();
         joint.velocity.iter_mut().for_each(|v| *v = random.normal());
@@ -25,7 +25,7 @@ fn free_tree(seed: u64) -> (World, Vec<State>) {
     (world, states)
 }
 
-fn energy(world: &World, states: &[State]) -> f64 {
+fn energy(world: &World, states: &State) -> f64 {
     let [mut q, mut v] = [Vec::new(), Vec::new()];
     for link in world.articulations[0].bodies() {
         let joint = world.joint(states, *link).unwrap();
@@ -40,7 +40,7 @@ fn energy(world: &World, states: &[State]) -> f64 {
 fn lost(seed: u64, integrator: &impl Integrator, steps: usize) -> f64 {
     let (world, start) = free_tree(seed);
     let time_steps = TimeSteps { dt: 0.1 / steps as f64, steps };
-    let end = world.simulate_with(integrator, &start, time_steps, |_, _| ()).unwrap().states;
+    let end = world.simulate_with(integrator, &start, time_steps).unwrap().states;
     (energy(&world, &end) - energy(&world, &start)).abs()
 }
 
@@ -58,12 +58,12 @@ fn large_trees_keep_energy_to_the_order_of_the_integrator() {
 
 /// The place of the last link, by gravity and by the first velocity.
 fn end_by_two<S: Scalar>(
-    (world, states): &(World, Vec<State>),
+    (world, states): &(World, State),
     [gravity, velocity]: [S; 2],
-) -> (World<S>, Vec<State<S>>) {
+) -> (World<S>, State<S>) {
     let mut world = world.cast::<S>();
     world.gravity.z = gravity;
-    let mut states: Vec<State<S>> = states.iter().map(State::cast).collect();
+    let mut states: State<S> = states.cast();
     let link = world.articulations[0].bodies()[0];
     let mut joint = world.joint(&states, link).unwrap();
     if let Some(first) = joint.velocity.first_mut() {
@@ -76,7 +76,7 @@ fn end_by_two<S: Scalar>(
 const X: [f64; 2] = [-9.0, 0.4];
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 2e-3, steps: 5 };
 
-fn height<S: Scalar>(world: &World<S>, end: &[State<S>]) -> S {
+fn height<S: Scalar>(world: &World<S>, end: &State<S>) -> S {
     end[world.bodies.len() - 1].pose.translation.z
 }
 
@@ -86,7 +86,7 @@ fn error_control_records_what_forward_mode_carries() {
         let scene = random_scene(seed);
         let tight = Adaptive { sensitivity_tolerance: 1e-6, ..Adaptive::default() };
         let (world, start) = end_by_two(&scene, Fwd::<2>::variables(X));
-        let end = world.simulate_with(&tight, &start, TIME_STEPS, |_, _| ()).unwrap().states;
+        let end = world.simulate_with(&tight, &start, TIME_STEPS).unwrap().states;
         let forward = height(&world, &end);
         let checkpointed = StepCheckpointed::new(tight, &scene.0).unwrap();
         let reverse = |kept: bool| {
@@ -94,8 +94,8 @@ fn error_control_records_what_forward_mode_carries() {
             let x = recording.variables(X);
             let (world, start) = end_by_two(&scene, x);
             let end = match kept {
-                true => world.simulate_with(&tight, &start, TIME_STEPS, |_, _| ()),
-                false => world.simulate_with(&checkpointed, &start, TIME_STEPS, |_, _| ()),
+                true => world.simulate_with(&tight, &start, TIME_STEPS),
+                false => world.simulate_with(&checkpointed, &start, TIME_STEPS),
             };
             let end = height(&world, &end.unwrap().states);
             let adjoints = recording.gradient(end);
@@ -111,7 +111,7 @@ fn error_control_records_what_forward_mode_carries() {
     }
 }
 
-fn heights_of_five<S: Scalar>(ends: impl Iterator<Item = Vec<State<S>>>, world: &World) -> S {
+fn heights_of_five<S: Scalar>(ends: impl Iterator<Item = State<S>>, world: &World) -> S {
     let lifted = world.cast();
     ends.fold(S::constant(0.0), |sum, end| sum + height(&lifted, &end))
 }
@@ -120,20 +120,20 @@ fn side_by_side<I: Integrator + Copy + Send + 'static>(integrator: I) {
     let scene = random_scene(5);
     let batch = Batch::with_integrator(integrator, &scene.0).unwrap();
     let numbers = |x: [f64; 2]| (0..5).map(move |i| [x[0] + f64::from(i), x[1]]);
-    let alone: Vec<Vec<State>> = numbers(X)
+    let alone: Vec<State> = numbers(X)
         .map(|x| {
             let (world, start) = end_by_two(&scene, x);
-            world.simulate_with(&integrator, &start, TIME_STEPS, |_, _| ()).unwrap().states
+            world.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
         })
         .collect();
     let together = batch.simulate(numbers(X).map(|x| end_by_two(&scene, x)), TIME_STEPS);
-    let together: Vec<Vec<State>> = together.into_iter().map(Result::unwrap).collect();
+    let together: Vec<State> = together.into_iter().map(Result::unwrap).collect();
     assert_eq!(alone, together);
 
     let forward = (0..5).map(|i| {
         let x: [Fwd<2>; 2] = Fwd::variables(X);
         let (world, start) = end_by_two(&scene, [x[0].plus(f64::from(i)), x[1]]);
-        world.simulate_with(&integrator, &start, TIME_STEPS, |_, _| ()).unwrap().states
+        world.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
     });
     let expected = heights_of_five(forward, &scene.0).derivative;
     let recording = Recording::start();
@@ -157,9 +157,9 @@ fn worlds_with_articulations_side_by_side_are_as_each_alone() {
 fn groups_of_links_do_as_contacts_one_by_one() {
     for seed in 0..12 {
         let (mut grouped, start) = random_scene(seed);
-        let deflections = grouped.neutral_states().len();
-        let start = start[..deflections].to_vec();
         grouped.contacts.clear();
+        let count = grouped.neutral_state().rows().len();
+        let start = grouped.state_of_rows(start.rows()[..count].to_vec(), 0.0).unwrap();
         let mut named = grouped.clone();
         let links = grouped.articulations[0].bodies().to_vec();
         let (floor, free) =
@@ -175,10 +175,10 @@ fn groups_of_links_do_as_contacts_one_by_one() {
         }
         let [a, b] = [&grouped, &named].map(|world| {
             let steps = TimeSteps { dt: 2e-4, steps: 20 };
-            world.simulate_with(&SemiImplicitEuler, &start, steps, |_, _| ()).unwrap().states
+            world.simulate_with(&SemiImplicitEuler, &start, steps).unwrap().states
         });
         let mut moved = 0.0_f64;
-        for ((a, b), start) in a.iter().zip(&b).zip(&start) {
+        for ((a, b), start) in a.rows().iter().zip(b.rows()).zip(start.rows()) {
             let off = a.pose.translation.vector - b.pose.translation.vector;
             assert!(off.norm() < 1e-10, "{seed}: {off}");
             moved = moved.max((a.linear - start.linear).norm());

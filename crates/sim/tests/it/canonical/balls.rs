@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::fields::Sphere;
-use prehend_sim::{Body, DynContactLaw, GapSmoothing, State, Surface, TimeSteps, World};
+use prehend_sim::{Body, BodyState, DynContactLaw, GapSmoothing, State, Surface, TimeSteps, World};
 
 use super::integrators::{INPUTS, Scheme};
 use super::laws::{G, Law, Spec};
@@ -45,8 +45,8 @@ fn two_balls(
     world
 }
 
-fn ball_at(position: Vector3<f64>, linear: Vector3<f64>) -> State {
-    State { linear, ..State::at_rest(Isometry3::from(position)) }
+fn ball_at(position: Vector3<f64>, linear: Vector3<f64>) -> BodyState {
+    BodyState { linear, ..BodyState::at_rest(Isometry3::from(position)) }
 }
 
 /// A grazing collision with friction and spin keeps momentum, linear and angular.
@@ -59,13 +59,15 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let points: Vec<Point3<f64>> = (0..150).map(point).collect();
     let spec = Spec { damping: 0.3, ..elastic(5e-3, 4, 0.5) };
     let world = two_balls(law, &spec, GapSmoothing::Hard, [&points, &points]);
-    let mut start = [
+    let mut start = State::new([
         ball_at(Vector3::new(-0.021, 0.0, 0.005), Vector3::new(0.5, 0.1, 0.0)),
         ball_at(Vector3::new(0.021, 0.01, 0.0), Vector3::new(-0.3, 0.0, 0.2)),
-    ];
+    ]);
     start[0].angular = Vector3::new(3.0, -8.0, 5.0);
-    let momenta = |states: &[State]| {
-        let sum = |f: &dyn Fn(&State) -> Vector3<f64>| states.iter().map(f).sum::<Vector3<f64>>();
+    let momenta = |states: &State| {
+        let sum = |f: &dyn Fn(&BodyState) -> Vector3<f64>| {
+            states.bodies().iter().map(f).sum::<Vector3<f64>>()
+        };
         let inertia = 0.4 * MASS * RADIUS * RADIUS;
         [
             sum(&|s| s.linear * MASS),
@@ -85,7 +87,7 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
 }
 
 /// `state` with its coordinates in `directions` (places in its tangent) as the inputs given beside them.
-fn varied(state: &State, directions: &[(usize, usize)]) -> State<Fwd<INPUTS>> {
+fn varied(state: &BodyState, directions: &[(usize, usize)]) -> BodyState<Fwd<INPUTS>> {
     let mut tangent: [Fwd<INPUTS>; 12] = array::from_fn(|_| Fwd::constant(0.0));
     for &(direction, input) in directions {
         tangent[direction] = Fwd::variable(0.0, input);
@@ -106,7 +108,7 @@ pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
     let bounces = (0..20).map(|phase| {
         let start = above_floor(1.0 + dt * f64::from(phase) / 20.0, -Vector3::z());
-        let start = [start[0].cast(), varied(&start[BODY], &[(2, 0), (8, 1)])];
+        let start = State::new([start[0].cast(), varied(&start[BODY], &[(2, 0), (8, 1)])]);
         let end = scheme.method.differentiate(&world, &start, time_steps).unwrap()[BODY];
         let [by_height, by_speed, ..] = end.pose.translation.z.derivative;
         let speed = if scheme.keeps_energy { 1.0 } else { end.linear.z.value };
@@ -141,7 +143,8 @@ pub(crate) fn exchange(scheme: &Scheme, law: &Law) -> Vec<Row> {
         ball_at(Vector3::new(-0.5, 0.0, 0.0), Vector3::x()),
         ball_at(Vector3::zeros(), Vector3::zeros()),
     ];
-    let varied = [varied(&start[0], &[(0, 0), (6, 2)]), varied(&start[1], &[(0, 1), (6, 3)])];
+    let varied =
+        State::new([varied(&start[0], &[(0, 0), (6, 2)]), varied(&start[1], &[(0, 1), (6, 3)])]);
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
     let end = scheme.method.differentiate(&world, &varied, time_steps).unwrap();
     let second = end[1].pose.translation.x.derivative;

@@ -1,7 +1,7 @@
 //! Bodies that touch nothing.
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use prehend_sim::{Body, RigidBody, State, TimeSteps, World};
+use prehend_sim::{Body, BodyState, RigidBody, State, TimeSteps, World};
 
 use super::integrators::Scheme;
 use super::laws::G;
@@ -13,7 +13,8 @@ pub(crate) fn free_fall(scheme: &Scheme) -> Vec<Row> {
     let mut world = World::new(down());
     world.add(Body::dynamic("body", rigid(0.3, 1e-3)));
     let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
-    let end = scheme.end(&world, &[State::at_rest(Isometry3::identity())], time_steps)[0];
+    let end =
+        scheme.end(&world, &State::new([BodyState::at_rest(Isometry3::identity())]), time_steps)[0];
     let (dt, n) = (time_steps.dt, time_steps.steps as f64);
     let height = -G * dt * dt * n * (n + scheme.fall_lead) / 2.0;
     vec![
@@ -26,15 +27,15 @@ fn spinning(
     inertia: Vector3<f64>,
     tilt: UnitQuaternion<f64>,
     spin: Vector3<f64>,
-) -> (World, State) {
+) -> (World, BodyState) {
     let mut world = World::new(Vector3::zeros());
     let inertia = Matrix3::from_diagonal(&inertia);
     world.add(Body::dynamic("top", RigidBody::new(0.3, inertia, Point3::origin()).unwrap()));
     let pose = Isometry3::from_parts(nalgebra::Translation3::identity(), tilt);
-    (world, State { angular: tilt * spin, ..State::at_rest(pose) })
+    (world, BodyState { angular: tilt * spin, ..BodyState::at_rest(pose) })
 }
 
-fn angular_momentum(world: &World, state: &State) -> Vector3<f64> {
+fn angular_momentum(world: &World, state: &BodyState) -> Vector3<f64> {
     world.bodies[0].rigid().unwrap().world_inertia(&state.pose.rotation) * state.angular
 }
 
@@ -45,8 +46,8 @@ pub(crate) fn precession(scheme: &Scheme) -> Vec<Row> {
     let (world, start) = spinning(Vector3::new(2e-3, 2e-3, 1e-3), tilt, spin);
     let momentum = angular_momentum(&world, &start);
     let time_steps = TimeSteps { dt: 1e-4, steps: 8000 };
-    let end = scheme.end(&world, &[start], time_steps)[0];
-    let across = |state: &State| {
+    let end = scheme.end(&world, &State::new([start]), time_steps)[0];
+    let across = |state: &BodyState| {
         let axis = state.pose.rotation * Vector3::z();
         axis - momentum * (axis.dot(&momentum) / momentum.norm_squared())
     };
@@ -79,8 +80,8 @@ pub(crate) fn flip(scheme: &Scheme) -> Vec<Row> {
         (i2 - i1) * (energy2 * i3 - momentum2) / ((i3 - i2) * (momentum2 - energy2 * i1));
     let expected = 2.0 * complete_elliptic(modulus2) / rate;
     let time_steps = TimeSteps { dt: 1e-5, steps: 140_000 };
-    let course = scheme.course(&world, &[start], time_steps, 0);
-    let middle = |s: &State| s.pose.rotation.inverse_transform_vector(&s.angular).y;
+    let course = scheme.course(&world, &State::new([start]), time_steps, 0);
+    let middle = |s: &BodyState| s.pose.rotation.inverse_transform_vector(&s.angular).y;
     // Moments at which the spin about the middle axis passes zero.
     let mut turns = course.windows(2).enumerate().filter_map(|(i, pair)| {
         let (a, b) = (middle(&pair[0]), middle(&pair[1]));

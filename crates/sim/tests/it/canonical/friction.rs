@@ -1,7 +1,7 @@
 //! Sliding.
 
 use nalgebra::Vector3;
-use prehend_sim::{State, TimeSteps};
+use prehend_sim::{BodyState, TimeSteps};
 
 use super::integrators::Scheme;
 use super::laws::{G, Law, Spec};
@@ -16,7 +16,7 @@ fn slide(
     theta: f64,
     speed: f64,
     time_steps: TimeSteps,
-) -> Vec<State> {
+) -> Vec<BodyState> {
     let gravity = Vector3::new(G * theta.sin(), 0.0, -G * theta.cos());
     let world = slab(law, &spec, gravity);
     let height = carrying_height(&world, spec.mass * G * theta.cos(), -spec.depth * 1.01, 0.0);

@@ -4,7 +4,7 @@ use std::f64::consts::SQRT_2;
 
 use prehend_autodiff::Fwd;
 use prehend_sim::{
-    BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
+    BackwardEuler, BodyState, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State,
     TimeSteps, World,
 };
 
@@ -55,63 +55,56 @@ pub(crate) const INPUTS: usize = 4;
 
 /// [`Integrator`] over the scalars of this suite, as an object.
 pub(crate) trait Method: Sync {
-    fn simulate(
+    fn rollout(
         &self,
         world: &World,
-        start: &[State],
+        start: &State,
         time_steps: TimeSteps,
-        visit: &mut dyn FnMut(&[State]),
     ) -> Result<Vec<State>, SimulationError>;
 
     fn differentiate(
         &self,
         world: &World,
-        start: &[State<Fwd<INPUTS>>],
+        start: &State<Fwd<INPUTS>>,
         time_steps: TimeSteps,
-    ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError>;
+    ) -> Result<State<Fwd<INPUTS>>, SimulationError>;
 }
 
 impl<I: Integrator> Method for I {
-    fn simulate(
+    fn rollout(
         &self,
         world: &World,
-        start: &[State],
+        start: &State,
         time_steps: TimeSteps,
-        visit: &mut dyn FnMut(&[State]),
     ) -> Result<Vec<State>, SimulationError> {
-        world
-            .simulate_with(self, start, time_steps, |_: Step, states| visit(states))
-            .map(|run| run.states)
+        world.rollout_with(self, start, time_steps).map(|run| run.states)
     }
 
     fn differentiate(
         &self,
         world: &World,
-        start: &[State<Fwd<INPUTS>>],
+        start: &State<Fwd<INPUTS>>,
         time_steps: TimeSteps,
-    ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
-        world.cast().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
+    ) -> Result<State<Fwd<INPUTS>>, SimulationError> {
+        world.cast().simulate_with(self, start, time_steps).map(|run| run.states)
     }
 }
 
 impl Scheme {
     /// The states after `time_steps`.
-    pub(crate) fn end(&self, world: &World, start: &[State], time_steps: TimeSteps) -> Vec<State> {
-        self.method.simulate(world, start, time_steps, &mut |_| ()).unwrap()
+    pub(crate) fn end(&self, world: &World, start: &State, time_steps: TimeSteps) -> State {
+        self.method.rollout(world, start, time_steps).unwrap().pop().unwrap()
     }
 
     /// The states of body `body` at 0, dt, ….
     pub(crate) fn course(
         &self,
         world: &World,
-        start: &[State],
+        start: &State,
         time_steps: TimeSteps,
         body: usize,
-    ) -> Vec<State> {
-        let mut course = vec![start[body]];
-        self.method
-            .simulate(world, start, time_steps, &mut |states| course.push(states[body]))
-            .unwrap();
-        course
+    ) -> Vec<BodyState> {
+        let run = self.method.rollout(world, start, time_steps).unwrap();
+        run.iter().map(|state| state[body]).collect()
     }
 }

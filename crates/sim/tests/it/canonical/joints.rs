@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::joint_law::{JointDamper, JointSpring};
-use prehend_sim::{BodyId, RigidBody, SimulationError, State, Step, TimeSteps, World};
+use prehend_sim::{BodyId, RigidBody, SimulationError, State, TimeSteps, World};
 
 use super::integrators::Scheme;
 use super::laws::G;
@@ -22,11 +22,11 @@ fn pendulum(gravity: Vector3<f64>) -> (World, BodyId, f64) {
 
 /// Angle and velocity after the steps; none for integrators that move no joints.
 fn end(scheme: &Scheme, (world, rod): (&World, BodyId), steps: TimeSteps) -> Option<[f64; 2]> {
-    let mut start: Vec<State> = world.neutral_states();
+    let mut start: State = world.neutral_state();
     world.set_joint(&mut start, rod, &[1.0], &[0.0]).unwrap();
-    match scheme.method.simulate(world, &start, steps, &mut |_| ()) {
+    match scheme.method.rollout(world, &start, steps) {
         Err(SimulationError::Joints { .. }) => None,
-        states => Some(world.joint_motion(&states.unwrap(), rod).unwrap()),
+        run => Some(world.joint_motion(&run.unwrap()[steps.steps], rod).unwrap()),
     }
 }
 
@@ -63,10 +63,10 @@ pub(crate) fn torsion_spring(scheme: &Scheme) -> Vec<Row> {
 /// An accelerometer on a pendulum at rest at an angle shows gravity along the rod, and nothing along its free direction.
 pub(crate) fn accelerometer(scheme: &Scheme) -> Vec<Row> {
     let (world, rod, inertia) = pendulum(down());
-    let mut start: Vec<State> = world.neutral_states();
+    let mut start: State = world.neutral_state();
     world.set_joint(&mut start, rod, &[1.0], &[0.0]).unwrap();
-    let step = TimeSteps { dt: Step::new(0, 1e-6).dt, steps: 1 };
-    if scheme.method.simulate(&world, &start, step, &mut |_| ()).is_err() {
+    let step = TimeSteps { dt: 1e-6, steps: 1 };
+    if scheme.method.rollout(&world, &start, step).is_err() {
         return Vec::new();
     }
     let tip = nalgebra::Point3::new(0.0, 0.0, -1.0);

@@ -10,7 +10,7 @@
 //! whatever the elastic law.
 
 use nalgebra::{Point3, Vector3};
-use prehend_sim::{GapSmoothing, State, TimeSteps, World};
+use prehend_sim::{BodyState, GapSmoothing, State, TimeSteps, World};
 
 use super::integrators::Scheme;
 use super::laws::{G, Law, Spec};
@@ -51,12 +51,12 @@ fn rod(law: &Law, friction: f64) -> World {
 }
 
 /// States with the tip at `height`, sliding.
-fn sliding(height: f64) -> [State; 2] {
+fn sliding(height: f64) -> State {
     above_floor(height - tip().z, Vector3::new(SPEED, 0.0, 0.0))
 }
 
 /// Position and velocity of the tip.
-fn tip_motion(state: &State) -> (Vector3<f64>, Vector3<f64>) {
+fn tip_motion(state: &BodyState) -> (Vector3<f64>, Vector3<f64>) {
     let arm = state.pose.rotation * tip();
     (state.pose.translation.vector + arm, state.linear + state.angular.cross(&arm))
 }

@@ -46,14 +46,11 @@ pub(crate) fn stability_limit(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let growth = |product: f64| {
         let start = above_floor(-SLAB.depth + nudge, Vector3::zeros());
         let time_steps = TimeSteps { dt: product / omega, steps: 1000 };
-        let mut largest = 0.0;
-        let mut visit = |states: &[State]| {
-            largest = f64::max(largest, (states[BODY].pose.translation.z + SLAB.depth).abs());
-        };
-        match scheme.method.simulate(&world, &start, time_steps, &mut visit) {
+        let off = |state: &State| (state[BODY].pose.translation.z + SLAB.depth).abs();
+        match scheme.method.rollout(&world, &start, time_steps) {
             // What makes energy grows.
             Err(SimulationError::Energy { .. }) => f64::INFINITY,
-            run => run.map(|_| largest / nudge).unwrap(),
+            run => run.unwrap()[1..].iter().map(off).fold(0.0, f64::max) / nudge,
         }
     };
     let Some(limit) = scheme.stable_below else {

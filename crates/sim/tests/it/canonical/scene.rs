@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::fields::HalfSpace;
-use prehend_sim::{Body, ContactBodies, GapSmoothing, RigidBody, State, Surface, World};
+use prehend_sim::{Body, BodyState, ContactBodies, GapSmoothing, RigidBody, State, Surface, World};
 
 use super::laws::{G, Law, Spec};
 
@@ -59,9 +59,9 @@ pub(crate) fn down() -> Vector3<f64> {
 }
 
 /// States of the floor and of a body at `height` that moves with `linear`.
-pub(crate) fn above_floor(height: f64, linear: Vector3<f64>) -> [State; 2] {
-    let body = State { linear, ..State::at_rest(Isometry3::translation(0.0, 0.0, height)) };
-    [State::at_rest(Isometry3::identity()), body]
+pub(crate) fn above_floor(height: f64, linear: Vector3<f64>) -> State {
+    let body = BodyState { linear, ..BodyState::at_rest(Isometry3::translation(0.0, 0.0, height)) };
+    State::new([BodyState::at_rest(Isometry3::identity()), body])
 }
 
 /// Height at which a body from [`on_floor`] at rest carries `load` \[N\], between `lowest`, where it

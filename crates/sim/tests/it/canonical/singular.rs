@@ -8,7 +8,8 @@ use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, ContactBodies, ContactKinematics, GapSmoothing, RigidBody, State, Surface, World,
+    Body, BodyState, ContactBodies, ContactKinematics, GapSmoothing, RigidBody, State, Surface,
+    World,
 };
 
 use super::laws::{Law, Spec};
@@ -39,15 +40,16 @@ pub(crate) fn finite(law: &Law) -> Vec<Row> {
             let samples = world.add(Body::dynamic("sample", rigid).with_surface(surface));
             let bodies = ContactBodies { samples, field };
             world.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
-            let rest = State::at_rest(Isometry3::translation(0.0, 0.0, height));
-            let state = State { linear, ..rest };
-            let fixed = State::at_rest(Isometry3::identity()).cast();
-            let by_state = world.cast().wrenches(&[fixed, state.variables()], 1)[samples];
+            let rest = BodyState::at_rest(Isometry3::translation(0.0, 0.0, height));
+            let state = BodyState { linear, ..rest };
+            let fixed = BodyState::at_rest(Isometry3::identity()).cast();
+            let by_state =
+                world.cast().wrenches(&State::new([fixed, state.variables()]), 1)[samples];
             let mut varied = world.cast::<Fwd<12>>();
             for (k, p) in varied.contacts[0].params_mut().iter_mut().enumerate() {
                 p.derivative[k] = 1.0;
             }
-            let by_params = varied.wrenches(&[fixed, state.cast()], 1)[samples];
+            let by_params = varied.wrenches(&State::new([fixed, state.cast()]), 1)[samples];
             let all = by_state.iter().chain(&by_params);
             let numbers = all.flat_map(|x| x.derivative.into_iter().chain([x.value]));
             numbers.filter(|x| !x.is_finite()).count()

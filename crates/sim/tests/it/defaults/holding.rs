@@ -7,7 +7,7 @@ use prehend_autodiff::Fwd;
 use prehend_sim::contact::Bounce;
 use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Adaptive, Body, BodyId, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
+    Adaptive, Body, BodyId, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
     DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State, TimeSteps,
     World,
 };
@@ -40,18 +40,18 @@ fn free_cube(name: &str) -> Body {
     cube(Body::dynamic(name, RigidBody::cuboid(MASS, [HALF; 3]).unwrap()), HALF)
 }
 
-fn at(x: f64, y: f64, z: f64) -> State {
-    State::at_rest(Isometry3::translation(x, y, z))
+fn at(x: f64, y: f64, z: f64) -> BodyState {
+    BodyState::at_rest(Isometry3::translation(x, y, z))
 }
 
 /// How far the corners of `bodies` move in ten seconds after one \[m\].
-fn creep(world: &World, start: &[State], bodies: &[BodyId]) -> f64 {
+fn creep(world: &World, start: &State, bodies: &[BodyId]) -> f64 {
     let run = world.rollout(start, TimeSteps { dt: 0.5, steps: 22 }).unwrap();
-    let moved = |body: BodyId, now: &[State]| {
+    let moved = |body: BodyId, now: &State| {
         let [from, to] = [&run[2], now].map(|states| states[body].pose);
         corners([HALF; 3]).iter().map(|p| (to * p - from * p).norm()).fold(0.0, f64::max)
     };
-    let moved = |now: &Vec<State>| bodies.iter().map(|b| moved(*b, now)).fold(0.0, f64::max);
+    let moved = |now: &State| bodies.iter().map(|b| moved(*b, now)).fold(0.0, f64::max);
     run[2..].iter().map(moved).fold(0.0, f64::max)
 }
 
@@ -67,18 +67,18 @@ fn a_stack_of_three_boxes_stays() {
         let body = world.add(free_cube(name));
         let offset = Vector3::new(-1e-3, 0.0, 2.02 * HALF) * f64::from(level);
         let turn = Vector3::z() * 0.05 * f64::from(level);
-        start.push(State::at_rest(Isometry3::new(offset + Vector3::z() * 1.01 * HALF, turn)));
+        start.push(BodyState::at_rest(Isometry3::new(offset + Vector3::z() * 1.01 * HALF, turn)));
         let below = stack[stack.len() - 1];
         world.add_symmetric_contact(body, below, sticking(), SMOOTH).unwrap();
         stack.push(body);
     }
-    let moved = creep(&world, &start, &stack[1..]);
+    let moved = creep(&world, &State::new(start), &stack[1..]);
     println!("a stack of three boxes creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);
 }
 
 /// A point of 0.2 kg just above the floor, moving along it and down, on which `BristleFriction` has a deflection of 0.1 mm.
-fn skipping(smoothing: GapSmoothing) -> (World, Vec<State>) {
+fn skipping(smoothing: GapSmoothing) -> (World, State) {
     let target =
         ContactCalibration { mass: 0.2, gravity: 9.81, penetration: 1e-5, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.8, impact_speed: 0.05 };
@@ -100,14 +100,16 @@ fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
             let slides = |speed: f64, integrator: &Adaptive| {
                 let mut start = start.clone();
                 start[1].linear.z = speed;
-                let run = world.simulate_with(integrator, &start, once, |_, _| ()).unwrap();
-                [run.states[1].linear.x, run.states[2].linear.x]
+                let run = world.simulate_with(integrator, &start, once).unwrap();
+                [1, 2].map(|row: usize| run.states.rows()[row].linear.x)
             };
-            let mut lifted: Vec<State<Fwd<1>>> = start.iter().map(State::cast).collect();
+            let mut lifted: State<Fwd<1>> = start.cast();
             lifted[1].linear.z = Fwd::variable(-0.05, 0);
             let end = world.cast().simulate(&lifted, time).unwrap();
             let [low, high] = [-1e-6, 1e-6].map(|h| slides(-0.05 + h, &CONVERGED));
-            for (k, found) in [end[1].linear.x, end[2].linear.x].into_iter().enumerate() {
+            for (k, found) in
+                [1, 2].map(|row: usize| end.rows()[row].linear.x).into_iter().enumerate()
+            {
                 let (found, expected) = (found.derivative[0], (high[k] - low[k]) / 2e-6);
                 // Of velocities, and of a deflection after 1 ms of contact.
                 let unit = [1.0, 1e-3][k];
@@ -140,8 +142,8 @@ fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
     // With samples where the flat part of the other box ends it is more than ten times as many.
     let few = Adaptive { max_substeps: 10_000, ..Adaptive::default() };
     let second = TimeSteps { dt: 1.0, steps: 1 };
-    let end = world.simulate_with(&few, &start, second, |_, _| ()).unwrap().states;
-    assert!(end[1..4].iter().all(|state| state.linear.norm() < 1e-4), "{end:?}");
+    let end = world.simulate_with(&few, &State::new(start), second).unwrap().states;
+    assert!(end.bodies()[1..4].iter().all(|state| state.linear.norm() < 1e-4), "{end:?}");
 }
 
 /// Position and velocity of what goes from 0 to 1 between two times, without jerk at either.
@@ -171,8 +173,8 @@ fn a_gripper_holds() {
     for other in fingers.into_iter().chain([table]) {
         world.add_symmetric_contact(object, other, sticking(), SMOOTH).unwrap();
     }
-    let start =
-        [at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.0), at(0.0, 0.0, -HALF - LARGE), at(0.0, 0.0, 0.0)];
+    let origin = at(0.0, 0.0, 0.0);
+    let start = State::new([origin, origin, at(0.0, 0.0, -HALF - LARGE), origin]);
     let moved = creep(&world, &start, &[object]);
     println!("an object in a gripper creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);

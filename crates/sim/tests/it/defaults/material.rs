@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 use prehend_sim::{Body, Material, Shape, State, World};
 
 /// A floor across z, and a body of `shape` at `height` above it \[m\].
-fn above_floor(gravity: Vector3<f64>, shape: &Shape, height: f64) -> (World, Vec<State>) {
+fn above_floor(gravity: Vector3<f64>, shape: &Shape, height: f64) -> (World, State) {
     let mut world = World::new(gravity);
     let floor = Shape::half_space(Vector3::z_axis()).unwrap();
     world.add(Body::fixed_from_shape("floor", &floor));
     let body = world.add(Body::from_shape("body", shape, 500.0).unwrap());
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     states[body].pose.translation.z = height;
     (world, states)
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law,
-    RigidBody, State, Surface, World,
+    Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
+    KelvinVoigt, Law, RigidBody, State, Surface, World,
 };
 
 use super::scenes::{HARD, down};
@@ -19,17 +19,17 @@ const DEPTH: f64 = 1e-4;
 const TIP: f64 = 0.015;
 
 /// The plunger's path: 6 cm along x and back, off the middle.
-fn plunger(time: f64) -> State {
+fn plunger(time: f64) -> BodyState {
     let (stroke, duration) = (0.06, 0.2);
     let phase = PI * time.min(duration) / duration;
     let x = stroke * phase.sin().powi(2) - HALF[0] - TIP - 1e-3;
-    let mut state = State::at_rest(Isometry3::translation(x, 2e-3, HALF[2]));
+    let mut state = BodyState::at_rest(Isometry3::translation(x, 2e-3, HALF[2]));
     state.linear.x = stroke * PI / duration * (2.0 * phase).sin();
     state
 }
 
 /// Table, parcel and plunger; the parcel is number 1, its friction parameter 2 of contact 0.
-pub(crate) fn tipped() -> (World, Vec<State>) {
+pub(crate) fn tipped() -> (World, State) {
     let mass = 0.65;
     let [a, b, c] = HALF.map(|half| mass * half * half / 3.0);
     let inertia = Vector3::new(b + c, a + c, mass * 0.0259 * 0.0259);
@@ -63,7 +63,7 @@ pub(crate) fn tipped() -> (World, Vec<State>) {
     let bodies = ContactBodies { samples: plunger, field: parcel };
     world.add_contact(bodies, Arc::new(law), HARD).unwrap();
 
-    let still = State::at_rest(Isometry3::identity());
+    let still = BodyState::at_rest(Isometry3::identity());
     let start = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH));
-    (world, vec![still, start, still])
+    (world, State::new([still, start, still]))
 }

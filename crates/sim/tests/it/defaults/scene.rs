@@ -6,7 +6,7 @@ use prehend_sim::{Integrator, Simulation, SimulationError, State, TimeSteps, Wor
 /// A number of the scene.
 #[derive(Clone, Copy)]
 pub(crate) enum Input {
-    /// A coordinate of a body's initial state, in the order of [`State::tangent`].
+    /// A coordinate of a body's initial state, in the order of [`BodyState::tangent`].
     Start(usize, usize),
     /// A parameter of a contact's law.
     Law(usize, usize),
@@ -26,7 +26,7 @@ pub(crate) enum Output {
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
     pub(crate) world: World,
-    pub(crate) start: Vec<State>,
+    pub(crate) start: State,
     /// How long it takes \[s\].
     pub(crate) time: f64,
     pub(crate) input: Input,
@@ -46,7 +46,7 @@ impl Scene {
         change: S,
     ) -> Result<Simulation<S>, SimulationError> {
         let mut world = self.world.cast::<S>();
-        let mut start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
+        let mut start: State<S> = self.start.cast();
         match self.input {
             Input::Start(body, coordinate) => {
                 let mut tangent = [S::zero(); 12];
@@ -59,7 +59,7 @@ impl Scene {
         }
         let time_steps = TimeSteps { dt: self.time / steps as f64, steps };
         let Simulation { states, resolution } =
-            world.simulate_with(integrator, &start, time_steps, |_, _| ())?;
+            world.simulate_with(integrator, &start, time_steps)?;
         let states = match self.output {
             Output::Position(body, axis) => states[body].pose.translation.vector[axis],
             Output::Velocity(body, axis) => states[body].linear[axis],

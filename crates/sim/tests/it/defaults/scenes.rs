@@ -8,9 +8,9 @@ use prehend_geometry::DistanceField;
 use prehend_sim::contact::{Bounce, Hertz, Stribeck, regularized_coulomb};
 use prehend_sim::fields::{HalfSpace, Sphere, SphereCavity};
 use prehend_sim::{
-    Body, BristleFriction, ContactBodies, ContactCalibration, ContactForce, ContactKinematics,
-    ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody,
-    State, Surface, World,
+    Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, ContactForce,
+    ContactKinematics, ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
+    Law, RigidBody, State, Surface, World,
 };
 
 use super::parcel;
@@ -89,8 +89,8 @@ pub(crate) fn cube() -> Body {
 }
 
 /// Where a body is, and how it moves.
-pub(crate) fn state(pose: Isometry3<f64>, linear: [f64; 3], angular: [f64; 3]) -> State {
-    State { linear: linear.into(), angular: angular.into(), ..State::at_rest(pose) }
+pub(crate) fn state(pose: Isometry3<f64>, linear: [f64; 3], angular: [f64; 3]) -> BodyState {
+    BodyState { linear: linear.into(), angular: angular.into(), ..BodyState::at_rest(pose) }
 }
 
 /// `body` on a fixed `field` under `gravity`; the body is number 1.
@@ -99,14 +99,14 @@ pub(crate) fn on(
     gravity: Vector3<f64>,
     body: Body,
     (law, smoothing): (Arc<dyn DynContactLaw>, GapSmoothing),
-    start: State,
-) -> (World, Vec<State>) {
+    start: BodyState,
+) -> (World, State) {
     let mut world = World::new(gravity);
     let ground = world.add(Body::fixed("ground").with_field(Arc::new(field)));
     let samples = world.add(body);
     let bodies = ContactBodies { samples, field: ground };
     world.add_contact(bodies, law, smoothing).unwrap();
-    (world, vec![State::at_rest(Isometry3::identity()), start])
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), start]))
 }
 
 pub(crate) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
@@ -116,7 +116,7 @@ pub(crate) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 /// A scene that goes on for `time` \[s\], differentiated by `input`; nudges of 1e-5 suit most.
 fn scene(
     name: &'static str,
-    (world, start): (World, Vec<State>),
+    (world, start): (World, State),
     time: f64,
     (output, input): (Output, Input),
     bad_step: f64,
@@ -369,10 +369,10 @@ fn several() -> Vec<Scene> {
         let mut world = World::new(Vector3::zeros());
         let (a, b) = (world.add(ball("red")), world.add(ball("white")));
         world.add_symmetric_contact(a, b, kelvin_voigt(0.3, 1e-2), SMOOTH).unwrap();
-        let start = vec![
+        let start = State::new([
             state(at(-0.1, 0.005, 0.0), [1.0, 0.0, 0.0], [0.0; 3]),
-            State::at_rest(Isometry3::identity()),
-        ];
+            BodyState::at_rest(Isometry3::identity()),
+        ]);
         (world, start)
     };
     let pushed = || {
@@ -381,7 +381,7 @@ fn several() -> Vec<Scene> {
         let block = world.add(cube());
         let pusher = Sphere { center: Point3::new(-0.08, 0.01, 0.05), radius: 0.02 };
         let arm = |time: f64| {
-            let mut state = State::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
+            let mut state = BodyState::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
             state.linear.x = 0.1;
             state
         };
@@ -397,8 +397,8 @@ fn several() -> Vec<Scene> {
             let bodies = ContactBodies { samples: block, field };
             world.add_contact(bodies, kelvin_voigt(0.4, 1e-2), SMOOTH).unwrap();
         }
-        let still = State::at_rest(Isometry3::identity());
-        (world, vec![still, state(at(0.0, 0.0, 0.05), [0.0; 3], [0.0; 3]), still])
+        let still = BodyState::at_rest(Isometry3::identity());
+        (world, State::new([still, state(at(0.0, 0.0, 0.05), [0.0; 3], [0.0; 3]), still]))
     };
     vec![
         scene("two balls collide", collision(), 0.3, (Position(1, 1), Start(0, 1)), 4e-3),

@@ -9,9 +9,9 @@ use parry3d_f64::shape::{Compound, SharedShape};
 use prehend_autodiff::{Recording, Scalar};
 use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, DynContactLaw,
-    GapSmoothing, RigidBody, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
-    StepCheckpointed, Surface, TimeSteps, World,
+    Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
+    DynContactLaw, GapSmoothing, RigidBody, RungeKutta4, SemiImplicitEuler, Shape, SimulationError,
+    State, StepCheckpointed, Surface, TimeSteps, World,
 };
 
 use super::scenes::{
@@ -30,7 +30,7 @@ fn a_finger_that_starts_from_rest_does_not_pass_through() {
             let t = (time / duration).min(1.0);
             let (place, rate) =
                 (t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 30.0 * t * t * (1.0 - t) * (1.0 - t));
-            let mut state = State::at_rest(Isometry3::translation(0.6 * place - 0.3, 0.0, 0.0));
+            let mut state = BodyState::at_rest(Isometry3::translation(0.6 * place - 0.3, 0.0, 0.0));
             state.linear.x = 0.6 * rate / duration;
             state
         }
@@ -42,17 +42,17 @@ fn a_finger_that_starts_from_rest_does_not_pass_through() {
         let samples = world.add(pebble());
         let bodies = ContactBodies { samples, field };
         world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
-        let start = [State::at_rest(Isometry3::identity()); 2];
+        let start = State::new([BodyState::at_rest(Isometry3::identity()); 2]);
         let end = world.simulate(&start, duration).unwrap();
         assert!(end[samples].linear.x > 1.0 / duration, "{duration}: {}", end[samples].linear.x);
     }
 }
 
 /// A state that rests at `z` \[m\] but for a stroke up and back by `stroke` \[m\] within `duration` \[s\] from 0.5 s on.
-fn tapping(stroke: f64, duration: f64) -> impl Fn(f64) -> State {
+fn tapping(stroke: f64, duration: f64) -> impl Fn(f64) -> BodyState {
     move |time: f64| {
         let phase = (time - 0.5) / duration;
-        let mut state = State::at_rest(Isometry3::identity());
+        let mut state = BodyState::at_rest(Isometry3::identity());
         if (0.0..1.0).contains(&phase) {
             state.pose.translation.z = stroke * (PI * phase).sin().powi(2);
             state.linear.z = stroke * PI / duration * (2.0 * PI * phase).sin();
@@ -77,8 +77,8 @@ fn a_paddle_that_waits_is_not_passed_over() {
             let samples = world.add(ball());
             let bodies = ContactBodies { samples, field };
             world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), SMOOTH).unwrap();
-            let above = State::at_rest(at(0.0, 0.0, radius + height));
-            let start = [State::at_rest(Isometry3::identity()), above];
+            let above = BodyState::at_rest(at(0.0, 0.0, radius + height));
+            let start = State::new([BodyState::at_rest(Isometry3::identity()), above]);
             let end = world.simulate(&start, 1.0).unwrap()[samples];
             let run = world.rollout(&start, TimeSteps { dt: 1e-3, steps: 1000 }).unwrap();
             let fine = run[1000][samples];
@@ -121,7 +121,7 @@ fn thin_bodies_are_not_passed_over() {
     let plate = body("plate", 1.0, 0.1, &plate, 4e-4);
     let pin = Sphere { center: Point3::origin(), radius: 4e-3 };
     for place in (0..20).map(|i| 1e-3 * f64::from(i)) {
-        let fallen = |(mut world, mut start): (World, Vec<State>)| {
+        let fallen = |(mut world, mut start): (World, State)| {
             world.gravity = Vector3::zeros();
             start[1].linear.z = -1.0;
             world.simulate(&start, 0.5).unwrap()[1].linear.z
@@ -171,7 +171,7 @@ fn fixed_steps_tell_what_passed_through() {
             world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
         }
         let time_steps = TimeSteps { dt, steps: (0.15 / (speed * dt)).round() as usize };
-        let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
+        let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
         run.map(|run| run.resolution)
     };
     for grouped in [false, true] {
@@ -190,16 +190,16 @@ fn a_plate_that_is_driven_through_a_body_is_told() {
     let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 1e-3), rounding: 1e-4 };
     let mut world = World::new(Vector3::zeros());
     let fly = |time: f64| {
-        let mut state = State::at_rest(at(0.0, 0.0, -0.11 + 20.0 * time));
+        let mut state = BodyState::at_rest(at(0.0, 0.0, -0.11 + 20.0 * time));
         state.linear.z = 20.0;
         state
     };
     let plate = world.add(Body::kinematic("plate", fly).with_field(Arc::new(plate)));
     let pebble = world.add(pebble());
     world.add_contacts_between(&[plate], &[pebble], hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
-    let start = [State::at_rest(at(0.0, 0.0, -0.11)), State::at_rest(Isometry3::identity())];
+    let start = world.neutral_state();
     let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert_eq!(run.resolution.passed.unwrap().0, "pebble");
 }
 
@@ -213,12 +213,12 @@ fn what_leaves_a_wall_for_the_next_has_not_passed_through() {
     let pebble = world.add(pebble());
     let all: Vec<_> = world.body_ids().collect();
     world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
-    let start = [
-        State::at_rest(Isometry3::identity()),
+    let start = State::new([
+        BodyState::at_rest(Isometry3::identity()),
         state(at(-0.0201, 0.0, 0.0), [30.0, 0.0, 0.0], [0.0; 3]),
-    ];
+    ]);
     let once = TimeSteps { dt: 1e-3, steps: 1 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, once, |_, _| ()).unwrap();
+    let run = world.simulate_with(&SemiImplicitEuler, &start, once).unwrap();
     assert!(run.states[pebble].pose.translation.x > 0.0);
     assert_eq!(run.resolution.passed, None);
 }
@@ -254,10 +254,10 @@ fn energy_of_a_free_rotation_is_no_fault_of_contacts() {
     let mut world = World::new(Vector3::zeros());
     let rigid = RigidBody::cuboid(1.0, [0.1, 0.05, 0.02]).unwrap();
     let brick = world.add(Body::dynamic("brick", rigid));
-    let mut start = [rigid.at_rest(&Isometry3::identity())];
+    let mut start = State::new([rigid.at_rest(&Isometry3::identity())]);
     start[brick].angular = Vector3::new(0.1, 20.0, 0.1);
     let time_steps = TimeSteps { dt: 1e-2, steps: 400 };
-    let made = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
+    let made = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
     let made = made.unwrap_err().to_string();
     assert!(made.starts_with("the motion has made"), "{made}");
 }
@@ -270,7 +270,7 @@ fn bad_settings_and_bad_states_are_told_as_such() {
     let once = TimeSteps { dt: 0.1, steps: 1 };
     for value in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
         let loose = Adaptive { sensitivity_tolerance: value, ..Adaptive::default() };
-        let refused = world.simulate_with(&loose, &start, once, |_, _| ()).unwrap_err();
+        let refused = world.simulate_with(&loose, &start, once).unwrap_err();
         let refused = refused.to_string();
         assert!(
             refused.starts_with("Adaptive::sensitivity_tolerance must be positive"),
@@ -291,14 +291,14 @@ fn forces_that_jump_are_refused_before_anything_is_recorded() {
         on(HalfSpace::floor(), down(), pebble(), (kelvin_voigt(0.3, 1e-2), HARD), start);
     assert!(world.simulate(&start, 0.2).is_ok());
     let recording = Recording::start();
-    let mut lifted: Vec<_> = start.iter().map(State::cast).collect();
+    let mut lifted = start.cast();
     lifted[1].linear.x = recording.variable(0.0);
     let world = world.cast();
     let (adaptive, once) = (Adaptive::default(), TimeSteps { dt: 0.2, steps: 1 });
     let compact = StepCheckpointed::new(adaptive, &world).unwrap();
     let refused = [
         world.simulate(&lifted, 0.2).unwrap_err(),
-        world.simulate_with(&compact, &lifted, once, |_, _| ()).unwrap_err(),
+        world.simulate_with(&compact, &lifted, once).unwrap_err(),
     ];
     assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
 }
@@ -311,7 +311,7 @@ fn smooth_contacts_may_give_back_what_they_stored() {
             let start = state(at(0.0, 0.0, height), [0.0; 3], [0.0; 3]);
             let (world, start) = on(HalfSpace::floor(), gravity, pebble(), law, start);
             let time_steps = TimeSteps { dt: 1e-5, steps: 3000 };
-            world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+            world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
         }
     }
 }
@@ -322,12 +322,12 @@ fn without_contacts_nothing_is_rough() {
     let falling = state(at(0.0, 0.0, 100.0), [0.0; 3], [0.0; 3]);
     let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), falling);
     let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert_eq!((run.resolution.roughness, run.resolution.roughest), (Some(0.0), None));
     let tumbling = state(at(0.0, 0.0, 100.0), [0.0; 3], [5.0, 1.0, 0.0]);
     let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), tumbling);
     let time_steps = TimeSteps { dt: 1e-2, steps: 100 };
-    let run = world.simulate_with(&RungeKutta4, &start, time_steps, |_, _| ()).unwrap();
+    let run = world.simulate_with(&RungeKutta4, &start, time_steps).unwrap();
     assert_eq!(run.resolution.roughness, Some(0.0));
 }
 
@@ -341,7 +341,7 @@ fn a_short_run_that_begins_in_contact_may_be_fine() {
     let (world, start) =
         on(HalfSpace::floor(), down(), block, (kelvin_voigt(0.3, 1e-2), HARD), resting);
     let time_steps = TimeSteps { dt: 1e-5, steps: 50 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert!(run.resolution.is_fine(), "{}", run.resolution);
 }
 
@@ -351,6 +351,6 @@ fn too_many_parts_are_told_as_such() {
     let (world, start) =
         on(HalfSpace::floor(), down(), cube(), (kelvin_voigt(0.3, 1e-5), SMOOTH), start);
     let few = Adaptive { max_substeps: 50, ..Adaptive::default() };
-    let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 }, |_, _| ());
+    let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 });
     assert!(matches!(run, Err(SimulationError::TooManySubsteps { max_substeps: 50, .. })));
 }

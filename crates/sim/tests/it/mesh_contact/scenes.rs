@@ -9,7 +9,7 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::{Mug, cuboid};
 use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    Body, BodyId, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
+    Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
     ShapeOptions, State, World,
 };
 
@@ -19,7 +19,7 @@ use super::meshes::{ROD, Thread, bolt, hook, nut};
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
     pub(crate) world: World,
-    pub(crate) start: Vec<State>,
+    pub(crate) start: State,
     /// Meshes of the bodies.
     #[allow(dead_code)] // the example mesh_contacts draws them
     pub(crate) meshes: [TriMesh; 2],
@@ -84,12 +84,12 @@ impl Pair {
         let mut world = World::new(Vector3::z() * -9.81);
         let (mesh, lengths, pose) = self.fixed;
         let other = world.add(Body::fixed_from_shape("fixed", &shape(&mesh, lengths)?));
-        let mut start = vec![State::at_rest(pose)];
+        let fixed = BodyState::at_rest(pose);
         let (moving_mesh, shape, pose) = self.moving;
         let meshes = [mesh, moving_mesh];
         let body = Body::from_shape("moving", &shape, self.density)?;
         let rigid = *body.rigid().ok_or_else(|| anyhow::anyhow!("no mass"))?;
-        start.push(rigid.at_rest(&pose));
+        let start = State::new([fixed, rigid.at_rest(&pose)]);
         let moving = world.add(body);
         let [area, depth, friction] = self.contact;
         let law = Arc::new(law(rigid.mass(), area, depth, friction)?);

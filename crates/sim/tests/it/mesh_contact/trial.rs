@@ -14,7 +14,7 @@ const CONVERGED: Adaptive =
     Adaptive { tolerance: 1e-11, sensitivity_tolerance: 1e-8, max_substeps: 10_000_000 };
 
 /// Inputs by which a scene is differentiated, in this order: pose and velocity of the moving body along the directions of
-/// [`State::tangent`], the logarithms of [`LAW`], and a dimension \[m\].
+/// [`BodyState::tangent`], the logarithms of [`LAW`], and a dimension \[m\].
 const INPUTS: usize = 16;
 const LAW: [&str; 3] = ["stiffness", "damping", "friction"];
 /// Groups of inputs: their names and ranges, and a change along which the end is nearly linear.
@@ -37,7 +37,7 @@ impl Scene {
         changes: &[S; INPUTS],
     ) -> Result<Vector3<S>, SimulationError> {
         let mut world = self.world.cast::<S>();
-        let mut start: Vec<State<S>> = self.start.iter().map(State::cast).collect();
+        let mut start: State<S> = self.start.cast();
         let tangent = std::array::from_fn(|i| changes[i]);
         start[self.moving] = self.start[self.moving].retract(&tangent);
         for (name, change) in LAW.into_iter().zip(&changes[12..15]) {
@@ -52,7 +52,7 @@ impl Scene {
             body.set_dimension(name, value + changes[15]).unwrap();
         }
         let once = TimeSteps { dt: self.time, steps: 1 };
-        let end = world.simulate_with(integrator, &start, once, |_, _| ())?.states;
+        let end = world.simulate_with(integrator, &start, once)?.states;
         let pose = end[self.moving].pose;
         Ok(pose.translation.vector + pose.rotation * self.mark.map(S::constant))
     }

@@ -7,14 +7,14 @@ use prehend_autodiff::Fwd;
 use prehend_geometry::shapes::cuboid;
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Integrator, Law,
+    Adaptive, Body, BodyState, ContactBodies, Coulomb, GapSmoothing, HuntCrossley, Integrator, Law,
     SemiImplicitEuler, State, TimeSteps, World,
 };
 
 use super::scenes::{Lengths, shape};
 
 /// A box that lies on one of its size, all edges above edges.
-fn stacked(smoothing: GapSmoothing) -> (World, Vec<State>) {
+fn stacked(smoothing: GapSmoothing) -> (World, State) {
     let mesh = cuboid(Vector3::repeat(0.1));
     let lengths = Lengths { spacing: 0.02, cell: 0.005 };
     let shape = shape(&mesh, lengths).unwrap();
@@ -28,7 +28,7 @@ fn stacked(smoothing: GapSmoothing) -> (World, Vec<State>) {
     world
         .add_contact(ContactBodies { samples: moving, field: fixed }, Arc::new(law), smoothing)
         .unwrap();
-    (world, vec![State::at_rest(Isometry3::identity()), start])
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), start]))
 }
 
 /// Largest difference of positions \[m\].
@@ -37,7 +37,7 @@ fn difference(integrator: &impl Integrator, smoothing: GapSmoothing) -> f64 {
     let time = TimeSteps { dt: 1e-3, steps: 12 };
     let plain = world.rollout_with(integrator, &start, time).unwrap().states;
     let lifted = world.cast::<Fwd<1>>();
-    let mut moved: Vec<State<Fwd<1>>> = start.iter().map(State::cast).collect();
+    let mut moved: State<Fwd<1>> = start.cast();
     moved[1].pose.translation.vector.z += Fwd::variable(0.0, 0);
     let with = lifted.rollout_with(integrator, &moved, time).unwrap().states;
     let off = plain.iter().zip(&with).map(|(a, b)| {

@@ -66,7 +66,7 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
     let model = Model::from_str(MODEL, None).unwrap();
     let mut world = World::new(model.gravity);
     let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     robot.set_positions(&world, &mut states, &POSITIONS).unwrap();
     for (name, place, [w, i, j, k]) in POSES {
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
@@ -99,7 +99,7 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
     };
     let mut moved = World::new(model.gravity);
     let robot_there = moved.add_mjcf(&model, &options).unwrap();
-    let mut there = moved.neutral_states();
+    let mut there = moved.neutral_state();
     robot_there.set_positions(&moved, &mut there, &POSITIONS).unwrap();
     for (here, other) in robot.bodies.iter().zip(&robot_there.bodies) {
         let by = there[*other].pose.translation.vector - states[*here].pose.translation.vector;
@@ -144,7 +144,7 @@ fn a_model_hangs_on_the_joint_that_is_asked_for_and_has_shapes_if_wanted() {
     let robot = world.add_mjcf(&model, &options).unwrap();
     assert!(world.body_named("ground").is_none());
     assert!(world.bodies.iter().all(|body| body.surface.is_none() && body.field.is_none()));
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     let base = robot.body("base").unwrap();
     let before = states[base].pose;
     world.set_joint(&mut states, base, &[0.25], &[0.0]).unwrap();

@@ -65,7 +65,7 @@ fn velocity_places(world: &World, joints: &[BodyId]) -> Vec<usize> {
 
 fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) {
     let [q, v, a] = ["q", "v", "a"].map(|key| numbers(&golden[key]));
-    let mut states: Vec<State> = world.neutral_states();
+    let mut states: State = world.neutral_state();
     for ((link, q), v) in joints.iter().zip(&q).zip(&v) {
         world.set_joint(&mut states, *link, &[*q], &[*v]).unwrap();
     }

@@ -27,13 +27,13 @@ fn data_loops_of_a_gripper_move_as_in_mujoco() {
     let controls = numbers(&golden["controls"]);
     let time_steps = TimeSteps { dt: golden["every"].as_f64().unwrap(), steps: run.len() - 1 };
     let mut found: Vec<Vec<f64>> = Vec::new();
-    let control = |step: prehend_sim::Step, world: &mut World, states: &mut [State]| {
+    let control = |step: prehend_sim::Step, world: &mut World, states: &mut State| {
         let half = usize::from(2 * step.index >= time_steps.steps);
         world.joint_force_mut(actuator).set_param("control", controls[half]).unwrap();
         let position = |link| world.joint(states, link).unwrap().position[0];
         found.push(links.iter().map(|link| position(*link)).collect());
     };
-    let start = world.neutral_states();
+    let start = world.neutral_state();
     world.simulate_controlled(&Adaptive::default(), &start, time_steps, control).unwrap();
     let travel = run.iter().map(|at| numbers(at)[0]).fold(0.0, f64::max);
     let mut worst = 0.0_f64;

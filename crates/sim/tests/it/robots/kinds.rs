@@ -34,20 +34,20 @@ fn near(what: &str, found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-fn start(world: &mut World, robot: &MjcfRobot, state: &Value) -> Vec<State> {
+fn start(world: &mut World, robot: &MjcfRobot, state: &Value) -> State {
     let [qpos, qvel, ctrl, act] = ["qpos", "qvel", "ctrl", "act"].map(|key| numbers(&state[key]));
     for ((_, id), control) in robot.actuators.iter().zip(&ctrl) {
         world.joint_force_mut(*id).set_param("control", *control).unwrap();
     }
     assert_eq!(robot.actuators.len(), ctrl.len());
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     robot.set_positions(world, &mut states, &qpos).unwrap();
     robot.set_velocities(world, &mut states, &qvel).unwrap();
     robot.set_activations(world, &mut states, &act).unwrap();
     states
 }
 
-fn places(robot: &MjcfRobot, states: &[State]) -> Vec<f64> {
+fn places(robot: &MjcfRobot, states: &State) -> Vec<f64> {
     let place = |t: Vector3<f64>| [t.x, t.y, t.z];
     robot.bodies.iter().flat_map(|id| place(states[*id].pose.translation.vector)).collect()
 }
@@ -159,7 +159,7 @@ fn joints_follow_polynomials_of_others() {
 
 /// Positions of the joints a and b after a while.
 fn ends(world: &World, robot: &MjcfRobot) -> [f64; 2] {
-    let end = world.simulate(&world.neutral_states(), 0.2).unwrap();
+    let end = world.simulate(&world.neutral_state(), 0.2).unwrap();
     ["a", "b"].map(|joint| world.joint_motion(&end, robot.joint(joint).unwrap()).unwrap()[0])
 }
 
@@ -204,11 +204,11 @@ fn mocap_bodies_lead() {
     let model = Model::from_str(xml, None).unwrap();
     let mut world = World::new(Vector3::zeros());
     let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     robot.set_positions(&world, &mut states, &model.reference_positions()).unwrap();
     let pose = Isometry3::new(Vector3::new(0.05, -0.02, 1.1), Vector3::new(0.1, 0.0, 0.2));
     robot.set_mocap(&mut world, &mut states, "hand", &pose).unwrap();
-    let apart = |states: &[State], name: &str| {
+    let apart = |states: &State, name: &str| {
         let found = states[robot.body(name).unwrap()].pose;
         (found.to_homogeneous() - pose.to_homogeneous()).amax()
     };

@@ -17,7 +17,7 @@ fn data_folder() -> PathBuf {
 }
 
 /// Positions and velocities of the first articulation's joints, in the order of its links.
-fn coordinates(world: &World, states: &[State]) -> [Vec<f64>; 2] {
+fn coordinates(world: &World, states: &State) -> [Vec<f64>; 2] {
     let joints =
         world.articulations[0].bodies().iter().map(|link| world.joint(states, *link).unwrap());
     let (q, v): (Vec<_>, Vec<_>) = joints.map(|joint| (joint.position, joint.velocity)).unzip();

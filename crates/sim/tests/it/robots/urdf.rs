@@ -40,7 +40,7 @@ fn body(tree: &KinematicTree, bodies: &[BodyId], name: &str) -> BodyId {
 fn moved(gravity: f64, from: [f64; 2], time: f64) -> [[f64; 2]; 2] {
     let (tree, world, bodies) = arm(gravity);
     let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
-    let mut states: Vec<State> = world.neutral_states();
+    let mut states: State = world.neutral_state();
     world.set_joint(&mut states, upper, &[from[0]], &[from[1]]).unwrap();
     let follow = [0.1 * from[0] + 0.02, 0.1 * from[1]];
     world.set_joint(&mut states, finger, &[follow[0]], &[follow[1]]).unwrap();
@@ -55,7 +55,7 @@ fn moved(gravity: f64, from: [f64; 2], time: f64) -> [[f64; 2]; 2] {
 fn what_mimics_is_set_with_its_leader() {
     let (tree, world, bodies) = arm(9.81);
     let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
-    let mut states: Vec<State> = world.neutral_states();
+    let mut states: State = world.neutral_state();
     assert_eq!(world.joint(&states, finger).unwrap().position, [0.02]);
     world.set_joint(&mut states, upper, &[0.4], &[0.7]).unwrap();
     let slide = world.joint(&states, finger).unwrap();
@@ -70,7 +70,7 @@ fn what_mimics_is_set_with_its_leader() {
 fn links_are_where_kinematics_has_them() {
     let (tree, world, bodies) = arm(9.81);
     assert_eq!(bodies.len(), 4);
-    let mut states: Vec<State> = world.neutral_states();
+    let mut states: State = world.neutral_state();
     world.set_joint(&mut states, body(&tree, &bodies, "upper"), &[0.4], &[0.0]).unwrap();
     world.set_joint(&mut states, body(&tree, &bodies, "finger"), &[0.06], &[0.0]).unwrap();
     assert_eq!(tree.joint_names(), ["shoulder"]);

@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Batch, Body, ContactBodies, GapSmoothing, Integrator, RigidBody, SemiImplicitEuler,
-    SimulationError, State, Surface, TimeSteps, World,
+    Adaptive, Batch, Body, BodyState, ContactBodies, GapSmoothing, Integrator, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 
 use crate::scenes::penalty;
@@ -17,7 +17,7 @@ const WORLDS: usize = 13;
 const BROKEN: usize = 4;
 
 /// A ball thrown at a floor.
-fn throw() -> (World, [State; 2]) {
+fn throw() -> (World, State) {
     let mut world = World::new(Vector3::z() * -9.81);
     let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.1, 0.03).unwrap();
@@ -28,23 +28,23 @@ fn throw() -> (World, [State; 2]) {
     world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
     let mut ball = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.04));
     ball.linear = Vector3::new(0.5, 0.1, -0.3);
-    (world, [State::at_rest(Isometry3::identity()), ball])
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), ball]))
 }
 
 /// Variant `index` of a throw, with friction and speed that follow from two numbers.
 fn variant<S: Scalar>(
-    (world, states): &(World, [State; 2]),
+    (world, states): &(World, State),
     index: usize,
     x: [S; 2],
-) -> (World<S>, Vec<State<S>>) {
-    let (mut world, mut states) = (world.cast::<S>(), states.map(|state| state.cast()).to_vec());
+) -> (World<S>, State<S>) {
+    let (mut world, mut states) = (world.cast::<S>(), states.cast());
     let share = index as f64 / WORLDS as f64;
     world.contacts[0].params_mut()[2] = if index == BROKEN { -x[0] } else { x[0].plus(share) };
     states[1].linear.x = x[1].times(1.0 + share);
     (world, states)
 }
 
-type Ends<S> = Vec<Result<Vec<State<S>>, SimulationError>>;
+type Ends<S> = Vec<Result<State<S>, SimulationError>>;
 
 fn batch<S: Scalar, I: Integrator + Send + 'static>(
     integrator: I,
@@ -69,7 +69,7 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
     let alone: Ends<Fwd<2>> = (0..WORLDS)
         .map(|index| {
             let (world, states) = variant(&throw, index, Fwd::variables(X));
-            Ok(world.simulate_with(&integrator, &states, time_steps, |_, _| ())?.states)
+            Ok(world.simulate_with(&integrator, &states, time_steps)?.states)
         })
         .collect();
     let expected = loss(&alone);
@@ -90,7 +90,7 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
         assert_eq!(refused, [BROKEN]);
         assert!(forward == alone, "{threads} threads");
         for (plain, lifted) in values.iter().flatten().zip(alone.iter().flatten()) {
-            plain.iter().zip(lifted).for_each(|(plain, lifted)| assert_eq!(*plain, lifted.value()));
+            assert_eq!(*plain, lifted.value());
         }
         for (exact, reference) in reverse.iter().zip(expected.derivative) {
             assert!((exact - reference).abs() < 1e-9 * reference.abs(), "{exact} {reference}");
@@ -117,8 +117,7 @@ fn what_is_not_of_the_batch_is_refused_alone() {
     let mut other = world.clone();
     other.add(Body::fixed("wall"));
     let time_steps = TimeSteps { dt: 0.01, steps: 1 };
-    let variants =
-        [(other, states.to_vec()), (world.clone(), states.to_vec()), (world, Vec::new())];
+    let variants = [(other, states.clone()), (world.clone(), states), (world, State::new([]))];
     let ends = batch.simulate(variants, time_steps);
     assert_eq!(ends[0], Err(SimulationError::AnotherWorld));
     assert!(ends[1].is_ok());

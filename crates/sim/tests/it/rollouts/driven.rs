@@ -8,9 +8,9 @@ use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion,
-    RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed, Surface,
-    TimeSteps, Trajectory, World,
+    Adaptive, BackwardEuler, Body, BodyState, BuildError, ContactBodies, GapSmoothing, Integrator,
+    Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
+    Surface, TimeSteps, Trajectory, World,
 };
 
 use super::gradients::coordinates;
@@ -36,12 +36,12 @@ fn course<S: Scalar>([speed, x, y, turn]: [S; 4]) -> impl Trajectory<S> {
             so3_exp(&Vector3::new(S::zero(), S::zero(), turn.times(share))),
         );
         let linear = aside.map(|a| a.times(rate)) + Vector3::new(speed, S::zero(), S::zero());
-        State { pose, linear, angular: Vector3::new(S::zero(), S::zero(), turn.times(rate)) }
+        BodyState { pose, linear, angular: Vector3::new(S::zero(), S::zero(), turn.times(rate)) }
     }
 }
 
 /// A block on the floor and a ball that will push it off its center, and where they are at the start.
-fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, [State<S>; 3]) {
+fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, State<S>) {
     let inertia = Matrix3::from_diagonal(&Vector3::new(5e-5, 6e-5, 7e-5));
     let rigid = RigidBody::new(0.2, inertia, Point3::new(1e-3, 0.0, -2e-3)).unwrap();
     let surface = Surface::cuboid([0.02; 3], 5e-3).unwrap();
@@ -55,11 +55,11 @@ fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, [State<S>; 3]) {
         let smoothing = GapSmoothing::Softplus { width: 2e-4 };
         world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
     }
-    let still = State::at_rest(Isometry3::identity());
+    let still = BodyState::at_rest(Isometry3::identity());
     let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.0194));
     let mut lifted = world.cast();
     lifted.bodies[pusher].motion = Motion::Kinematic(Arc::new(course(inputs)));
-    (lifted, [still, stands, still].map(|state| state.cast()))
+    (lifted, State::new([still, stands, still]).cast())
 }
 
 /// Where the block ends, by changes of the inputs.
@@ -67,7 +67,7 @@ fn pushed<S: Scalar>(integrator: &impl Integrator, dt: f64, change: &[S]) -> Vec
     let input = |i: usize| change[i].times(UNITS[i]).plus(INPUTS[i]);
     let (world, start) = scene(std::array::from_fn(input));
     let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
-    let end = world.simulate_with(integrator, &start, time_steps, |_, _| ()).unwrap().states;
+    let end = world.simulate_with(integrator, &start, time_steps).unwrap().states;
     coordinates(&end[1])
 }
 
@@ -114,12 +114,12 @@ fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
     let error: SimulationError =
         BuildError::TrajectoryDerivatives { body: "pusher".to_owned() }.into();
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
-    let run = carrying.simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
+    let run = carrying.simulate_with(&compact, &lifted_start, time_steps);
     assert_eq!(run.unwrap_err(), error);
     assert_eq!(StepCheckpointed::new(SemiImplicitEuler, &carrying).unwrap_err(), error);
     // A plain one, lifted, is known again.
-    let run = world.cast().simulate_with(&compact, &lifted_start, time_steps, |_, _| ());
-    let expected = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ());
-    let values = run.unwrap().states.iter().map(State::value).collect::<Vec<_>>();
+    let run = world.cast().simulate_with(&compact, &lifted_start, time_steps);
+    let expected = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
+    let values = run.unwrap().states.value();
     assert_eq!(values, expected.unwrap().states);
 }

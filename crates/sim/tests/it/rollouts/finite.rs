@@ -11,8 +11,8 @@ use prehend_sim::contact::Stribeck;
 use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::joint_law::{JointFriction, JointLimits, JointSpring};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
-    DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, RigidBody,
+    Adaptive, BackwardEuler, Body, BodyState, BristleFriction, ContactBodies, ContactCalibration,
+    Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, RigidBody,
     RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
     Step, SubStepped, Surface, TimeSteps, World,
 };
@@ -25,15 +25,16 @@ use super::gradients::coordinates;
 type Lanes = Fwd<8>;
 
 /// States with their pose and two directions of their velocity as variables.
-fn variables(states: &[State]) -> Vec<State<Lanes>> {
+fn variables(world: &World, states: &State) -> State<Lanes> {
     let mut tangent = [Lanes::constant(0.0); 12];
     tangent[..8].copy_from_slice(&Lanes::variables([0.0; 8]));
-    states.iter().map(|state| state.retract(&tangent)).collect()
+    let rows = states.rows().iter().map(|state| state.retract(&tangent)).collect();
+    world.cast().state_of_rows(rows, states.time).unwrap()
 }
 
 /// The numbers of `states` with their derivatives.
-fn numbers(states: &[State<Lanes>]) -> Vec<f64> {
-    let all = states.iter().flat_map(coordinates);
+fn numbers(states: &State<Lanes>) -> Vec<f64> {
+    let all = states.rows().iter().flat_map(coordinates);
     all.flat_map(|x| std::iter::once(x.value).chain(x.derivative)).collect()
 }
 
@@ -50,21 +51,21 @@ fn assert_told(what: &str, world: &World, result: Result<Vec<f64>, SimulationErr
 }
 
 /// A few steps of `integrator` in both modes.
-fn assert_steps(what: &str, integrator: &impl Integrator, world: &World, states: &[State], t: f64) {
+fn assert_steps(what: &str, integrator: &impl Integrator, world: &World, states: &State, t: f64) {
     let time_steps = TimeSteps { dt: t / 4.0, steps: 4 };
-    let forward = world.cast().simulate_with(integrator, &variables(states), time_steps, |_, _| ());
+    let forward = world.cast().simulate_with(integrator, &variables(world, states), time_steps);
     assert_told(what, world, forward.map(|run| numbers(&run.states)));
-    let run = world.simulate_with(integrator, states, time_steps, |_, _| ());
-    let of_run = |run: prehend_sim::Simulation<Vec<State>>| {
-        run.states.iter().flat_map(coordinates).chain(run.resolution.roughness).collect()
+    let run = world.simulate_with(integrator, states, time_steps);
+    let of_run = |run: prehend_sim::Simulation<State>| {
+        run.states.rows().iter().flat_map(coordinates).chain(run.resolution.roughness).collect()
     };
     assert_told(what, world, run.map(of_run));
 }
 
 /// Everything that is asked of a world.
-fn assert_all(what: &str, world: &World, states: &[State], time: f64) {
+fn assert_all(what: &str, world: &World, states: &State, time: f64) {
     let adaptive = Adaptive { max_substeps: 60, ..Adaptive::default() };
-    let wrenches = world.cast().wrenches(&variables(states), 0);
+    let wrenches = world.cast().wrenches(&variables(world, states), 0);
     let of_wrench =
         |w: &Vector6<Lanes>| w.iter().flat_map(|x| [x.value, x.derivative[0]]).collect();
     let wrenches: Vec<Vec<f64>> = wrenches.iter().map(of_wrench).collect();
@@ -85,13 +86,13 @@ fn assert_all(what: &str, world: &World, states: &[State], time: f64) {
 }
 
 /// Derivatives by all states and parameters in reverse mode.
-fn backward(world: &World, states: &[State], time: f64) -> Result<Vec<f64>, SimulationError> {
+fn backward(world: &World, states: &State, time: f64) -> Result<Vec<f64>, SimulationError> {
     let names = world.parameter_names();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let steps = TimeSteps { dt: time / 2.0, steps: 2 };
     let function = RolloutFunction::with_integrator(SemiImplicitEuler, world, steps, &names, &[])?;
     let (states, parameters) =
-        (states.iter().flat_map(coordinates).collect::<Vec<f64>>(), world.parameters());
+        (states.rows().iter().flat_map(coordinates).collect::<Vec<f64>>(), world.parameters());
     let inputs = RolloutInputs { states: &states, parameters: &parameters, controls: &[] };
     let mut run = function.evaluate(inputs)?;
     let gradient = function.vjp(inputs, &run, &vec![1.0; run.len()])?;
@@ -128,7 +129,7 @@ fn pair(
     mass: f64,
     gravity: f64,
     apart: f64,
-) -> (World, Vec<State>) {
+) -> (World, State) {
     let mut world = World::new(Vector3::new(0.0, 0.0, -gravity));
     let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::cuboid(mass, [0.02; 3]).unwrap();
@@ -152,7 +153,8 @@ fn pair(
         world.add_contact(ContactBodies { samples, field: floor }, law.clone(), SOFT).unwrap();
     }
     let at = |z| rigid.at_rest(&Isometry3::translation(0.0, 0.0, z));
-    let states = vec![State::at_rest(Isometry3::identity()), at(0.02), at(0.02 + apart)];
+    let states =
+        State::new([BodyState::at_rest(Isometry3::identity()), at(0.02), at(0.02 + apart)]);
     (world, states)
 }
 
@@ -164,7 +166,7 @@ fn bodies_in_and_on_each_other_at_rest() {
             assert_all(&format!("law {kind}, shape {shape}, {apart} m"), &world, &states, 1e-3);
             // None of this is beyond a short step.
             let time_steps = TimeSteps { dt: 1e-5, steps: 4 };
-            let run = world.simulate_with(&SemiImplicitEuler, &states, time_steps, |_, _| ());
+            let run = world.simulate_with(&SemiImplicitEuler, &states, time_steps);
             assert!(run.is_ok(), "law {kind}, shape {shape}, {apart} m: {:?}", run.err());
         }
     }
@@ -197,14 +199,14 @@ fn extremes_of_every_number() {
 #[test]
 fn worlds_of_nothing_and_times_of_nothing() {
     let empty = World::new(Vector3::zeros());
-    assert_all("empty", &empty, &[], 1e4);
+    assert_all("empty", &empty, &State::new([]), 1e4);
     let mut still = empty.clone();
     let stone = RigidBody::ball(1e-12, 1e-9).unwrap();
     still.add(Body::dynamic("stone", stone));
-    let rest = [stone.at_rest(&Isometry3::translation(1e6, 0.0, -1e6))];
+    let rest = State::new([stone.at_rest(&Isometry3::translation(1e6, 0.0, -1e6))]);
     for time in [1e-300, 1e-12, 1e4] {
         assert_all("still", &still, &rest, time);
-        assert_all("empty", &empty, &[], time);
+        assert_all("empty", &empty, &State::new([]), time);
     }
     assert_eq!(still.simulate(&rest, 0.0), Err(SimulationError::TimeStep(0.0)));
     for steps in [usize::MAX, usize::MAX / 8] {
@@ -231,7 +233,7 @@ fn chains_at_their_singular_places() {
         let below = Isometry3::translation(0.0, 0.0, -1.0);
         let links = vec![link("first", joint.clone()), link("second", joint.clone()).on(0, below)];
         let first = world.add_articulation(links).unwrap()[0];
-        let mut states = world.neutral_states();
+        let mut states = world.neutral_state();
         assert_all(&format!("{joint:?}"), &world, &states, 1e-2);
         if matches!(joint, Joint::Revolute(_) | Joint::Prismatic(_)) {
             let limits = JointLimits { lower: 0.0, upper: 0.0, stiffness: 1e3, damping: 1.0 };
@@ -247,7 +249,7 @@ fn chains_at_their_singular_places() {
     }
     let mut world = World::new(Vector3::zeros());
     let links = world.add_articulation(vec![Link::new("ball", Joint::Spherical, &rod)]).unwrap();
-    let mut states = world.neutral_states();
+    let mut states = world.neutral_state();
     let error = world.set_joint(&mut states, links[0], &[0.0; 4], &[0.0; 3]).unwrap_err();
     assert_eq!(error, SimulationError::JointRotation { link: "ball".to_owned(), norm: 0.0 });
     let pin = Link { mass: 1.0, ..Link::massless("pin", Joint::Revolute(axis)) };

@@ -8,8 +8,8 @@ use prehend_sim::{
 
 use crate::scenes::{bowl, egg_on};
 
-fn numbers<S: Scalar>(states: &[State<S>]) -> Vec<S> {
-    let rows = states.iter().flat_map(|state| {
+fn numbers<S: Scalar>(states: &State<S>) -> Vec<S> {
+    let rows = states.bodies().iter().flat_map(|state| {
         let turn: [S; 4] = state.pose.rotation.coords.into();
         let [place, linear, angular]: [[S; 3]; 3] =
             [state.pose.translation.vector, state.linear, state.angular].map(Into::into);
@@ -18,7 +18,7 @@ fn numbers<S: Scalar>(states: &[State<S>]) -> Vec<S> {
     rows.collect()
 }
 
-fn scene() -> (World, Vec<State>) {
+fn scene() -> (World, State) {
     let (world, mut states) = egg_on(bowl(), GapSmoothing::Softplus { width: 1e-4 });
     states[1].linear.x = 0.3;
     states[1].pose.translation.z -= 5e-4;
@@ -53,7 +53,7 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
     );
     lifted.bodies[1].motion = prehend_sim::Motion::Dynamic(rigid.unwrap());
     let variables = recording.variables_of(&start);
-    let initial = [0, 1].map(|body| {
+    let initial = State::new([0, 1].map(|body| {
         let row = &variables[13 * body..];
         let mut state = states[body].cast();
         state.pose.translation.vector = nalgebra::Vector3::from_column_slice(&row[..3]);
@@ -61,15 +61,14 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
         state.linear.copy_from_slice(&row[7..10]);
         state.angular.copy_from_slice(&row[10..13]);
         state
-    });
+    }));
     let pushes = recording.variables_of(&controls);
-    let control = |step: prehend_sim::Step, world: &mut World<_>, _: &mut [State<_>]| {
+    let control = |step: prehend_sim::Step, world: &mut World<_>, _: &mut State<_>| {
         world.bodies[1].external_wrench.y = pushes[step.index];
     };
     let checkpointed = StepCheckpointed::new(integrator, &world).unwrap();
     let by_hand = lifted.rollout_controlled(&checkpointed, &initial, time_steps, control).unwrap();
-    let seeds: Vec<_> =
-        by_hand.iter().flat_map(|states| numbers(states)).zip(adjoints.iter().copied()).collect();
+    let seeds: Vec<_> = by_hand.iter().flat_map(numbers).zip(adjoints.iter().copied()).collect();
     assert!(seeds.iter().zip(&run).all(|((own, _), run)| own.value() == *run));
     let expected = recording.vjp(&seeds);
     let same = |found: &[f64], vars: &[prehend_autodiff::Var], what: &str| {
@@ -122,12 +121,8 @@ fn without_controls_it_is_a_rollout() {
     let function = RolloutFunction::new(&world, time_steps, &[], &[]).unwrap();
     let start = numbers(&states);
     let inputs = RolloutInputs { states: &start, parameters: &[], controls: &[] };
-    let expected: Vec<f64> = world
-        .rollout(&states, time_steps)
-        .unwrap()
-        .iter()
-        .flat_map(|states| numbers(states))
-        .collect();
+    let expected: Vec<f64> =
+        world.rollout(&states, time_steps).unwrap().iter().flat_map(numbers).collect();
     assert_eq!(function.evaluate(inputs).unwrap(), expected);
     let lifted: Vec<Fwd<1>> = start.iter().map(|x| Fwd::constant(*x)).collect();
     let inputs = RolloutInputs { states: &lifted, parameters: &[], controls: &[] };

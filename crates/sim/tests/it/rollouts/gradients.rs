@@ -12,9 +12,9 @@ use prehend_geometry::DistanceField;
 use prehend_sim::contact::{LeakSteps, regularized_coulomb};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, ContactPair,
-    DynContactLaw, GapSmoothing, Integrator, Motion, RigidBody, SemiImplicitEuler, SimulationError,
-    State, Step, StepCheckpointed, Surface, TimeSteps, World,
+    Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
+    ContactPair, DynContactLaw, GapSmoothing, Integrator, Motion, RigidBody, SemiImplicitEuler,
+    SimulationError, State, Step, StepCheckpointed, Surface, TimeSteps, World,
 };
 use proptest::prelude::*;
 
@@ -49,13 +49,13 @@ const TIME_STEPS: TimeSteps = TimeSteps { dt: 5e-4, steps: 20 };
 /// A world in which nothing moves but free bodies, and what is measured at its end.
 struct Scene {
     world: World,
-    states: Vec<State>,
+    states: State,
     weights: Vec<f64>,
 }
 
 /// Translation, rotation as a quaternion, linear and angular velocity.
-pub(super) fn coordinates<S: Scalar>(state: &State<S>) -> Vec<S> {
-    let State { pose, linear, angular } = state;
+pub(super) fn coordinates<S: Scalar>(state: &BodyState<S>) -> Vec<S> {
+    let BodyState { pose, linear, angular } = state;
     let (translation, rotation) = (pose.translation.vector, pose.rotation.coords);
     let moving = linear.iter().chain(angular.iter());
     translation.iter().chain(rotation.iter()).chain(moving).copied().collect()
@@ -97,7 +97,7 @@ impl Scene {
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81) + dice.vector());
         let ground = [floor(), bowl(), sphere(Point3::new(0.0, 0.0, -0.05), 0.05)][kind[0]].clone();
         let field = world.add(Body::fixed("ground").with_field(Arc::clone(&ground)));
-        let mut states = vec![State::at_rest(Isometry3::identity())];
+        let mut states = vec![BodyState::at_rest(Isometry3::identity())];
         let law: Arc<dyn DynContactLaw> = if kind[2] == 1 {
             let stiffness = dice.between(2e6, 6e6);
             let [power, damping] = [dice.between(0.02, 0.1), dice.between(0.1, 0.5)];
@@ -159,12 +159,12 @@ impl Scene {
             world.add_symmetric_contact(a, b, law, smoothing).unwrap();
         }
         let weights = (0..26).map(|_| dice.roll()).collect();
-        Self { world, states, weights }
+        Self { world, states: State::new(states), weights }
     }
 
     /// How many inputs are of one kind: twists, velocities, a mass, an inertia, a center of mass, loads, gravity, parameters, the swing.
     fn groups(&self) -> Vec<usize> {
-        let mut groups = vec![3; 4 * (self.states.len() - 1)];
+        let mut groups = vec![3; 4 * (self.states.bodies().len() - 1)];
         for body in &self.world.bodies {
             groups.extend(body.rigid().map_or(vec![], |_| vec![1, 6, 3]));
             groups.extend([3, 3]);
@@ -181,13 +181,13 @@ impl Scene {
 
     /// World and states moved by `x`: tangents of the free bodies' states, then the world's numbers, each in units of
     /// its own size.
-    fn set_up<S: Scalar>(&self, x: &[S]) -> (World<S>, Vec<State<S>>) {
+    fn set_up<S: Scalar>(&self, x: &[S]) -> (World<S>, State<S>) {
         let units = [[1e-3; 3], [1e-2; 3], [2e-2; 3], [1.0; 3]];
-        let (tangents, rest) = x.split_at(12 * (self.states.len() - 1));
-        let mut states = vec![self.states[0].cast()];
-        for (state, tangent) in self.states[1..].iter().zip(tangents.as_chunks::<12>().0) {
+        let (tangents, rest) = x.split_at(12 * (self.states.bodies().len() - 1));
+        let mut states: State<S> = self.states.cast();
+        for (body, tangent) in (1..).zip(tangents.as_chunks::<12>().0) {
             let tangent = std::array::from_fn(|i| tangent[i].times(units[i / 3][i % 3]));
-            states.push(state.retract(&tangent));
+            states[body] = self.states[body].retract(&tangent);
         }
         let mut sizes = Vec::new();
         for body in &self.world.bodies {
@@ -210,10 +210,11 @@ impl Scene {
         (self.world.with_parameters(&numbers).unwrap(), states)
     }
 
-    fn measure<S: Scalar>(&self, states: &[State<S>]) -> S {
+    fn measure<S: Scalar>(&self, states: &State<S>) -> S {
         let units = [1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2, 1e-2, 2e-2, 2e-2, 2e-2, 1.0, 1.0, 1.0];
-        let start: Vec<f64> = self.states[1..].iter().flat_map(coordinates).collect();
-        let terms = states[1..self.states.len()].iter().flat_map(coordinates).enumerate();
+        let start: Vec<f64> = self.states.bodies()[1..].iter().flat_map(coordinates).collect();
+        let terms =
+            states.bodies()[1..self.states.bodies().len()].iter().flat_map(coordinates).enumerate();
         terms.fold(S::zero(), |sum, (i, x)| {
             let off = x.plus(-start[i]).times(1.0 / units[i % 13]);
             sum + off.times(self.weights[i]) + (off * off).times(0.1)
@@ -223,9 +224,7 @@ impl Scene {
     /// Scalar function of the last states.
     fn last<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
         let (world, states) = self.set_up(x);
-        self.measure(
-            &world.simulate_with(integrator, &states, TIME_STEPS, |_, _| ()).unwrap().states,
-        )
+        self.measure(&world.simulate_with(integrator, &states, TIME_STEPS).unwrap().states)
     }
 
     /// Mean measure over all steps, while a load swings whose six amplitudes are the last of `x`.
@@ -347,9 +346,9 @@ fn bounced<S: Scalar>(law: Arc<dyn DynContactLaw>, change: &[S]) -> Vec<S> {
     world.bodies[1].motion = Motion::Dynamic(rigid);
     let mut egg = rigid.at_rest(&lift(&t_world_model));
     egg.linear.z = S::constant(-0.5);
-    let end = world.simulate(&[states[0].cast(), egg], 0.03).unwrap()[1];
+    let end = world.simulate(&State::new([states[0].cast(), egg]), 0.03).unwrap()[1];
     assert!(end.linear.z.value() > 0.1);
-    coordinates(&State { pose: rigid.model_pose(&end.pose), ..end })
+    coordinates(&BodyState { pose: rigid.model_pose(&end.pose), ..end })
 }
 
 #[test]
@@ -372,7 +371,7 @@ fn a_bounce_by_the_center_of_mass_of_a_model_at_one_pose() {
 }
 
 /// The egg at rest on the floor, with one sample at gap zero and without slip.
-fn at_rest_on(field: Arc<dyn DistanceField>, smoothing: GapSmoothing) -> (World, Vec<State>) {
+fn at_rest_on(field: Arc<dyn DistanceField>, smoothing: GapSmoothing) -> (World, State) {
     let (world, mut states) = egg_on(field, smoothing);
     let rigid = world.bodies[1].rigid().unwrap();
     let lowest = world.bodies[1].surface.as_ref().unwrap().points().iter();
@@ -416,7 +415,7 @@ fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, world
     // Past the chunk in which a tape grows.
     let time_steps = TimeSteps { dt: 1e-5, steps: 4000 };
     let before = recording.statistics().bytes;
-    lifted.simulate_with(integrator, &states, time_steps, |_, _| ()).unwrap();
+    lifted.simulate_with(integrator, &states, time_steps).unwrap();
     (recording.statistics().bytes - before) / time_steps.steps + saved
 }
 
@@ -440,8 +439,8 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let (world, states) = egg_on(floor(), GapSmoothing::Hard);
     let (other, _) = egg_on(floor(), GapSmoothing::Hard);
     let compact = StepCheckpointed::new(SemiImplicitEuler, &other).unwrap();
-    let lifted: Vec<State<Var>> = states.iter().map(State::cast).collect();
-    let error = world.cast().simulate_with(&compact, &lifted, TIME_STEPS, |_, _| ()).unwrap_err();
+    let lifted: State<Var> = states.cast();
+    let error = world.cast().simulate_with(&compact, &lifted, TIME_STEPS).unwrap_err();
     assert_eq!(error, SimulationError::AnotherWorld);
 
     let recording = Recording::start();
@@ -450,16 +449,16 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let long = TimeSteps { dt: 1.0, steps: 10 };
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
     let world = world.cast::<Var>();
-    let blown_up = world.simulate_with(&compact, &wild, long, |_, _| ()).unwrap_err();
+    let blown_up = world.simulate_with(&compact, &wild, long).unwrap_err();
     assert!(matches!(blown_up, SimulationError::NotFinite { .. }));
 }
 
 #[test]
 fn driven_bodies_keep_to_their_trajectory_in_every_mode() {
     let (mut world, states) = egg_on(floor(), GapSmoothing::Softplus { width: 3e-4 });
-    let lift = |time: f64| State {
+    let lift = |time: f64| BodyState {
         linear: Vector3::z() * 0.2,
-        ..State::at_rest(Isometry3::translation(0.0, 0.0, 0.2 * time))
+        ..BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.2 * time))
     };
     world.bodies[0].motion = Motion::Kinematic(Arc::new(lift));
     let scene = Scene { world, states, weights: vec![1.0; 26] };

@@ -8,9 +8,9 @@ use prehend_autodiff::{Fwd, Recording, Var};
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyId, BuildError, ContactBodies, GapSmoothing, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, SubStepped, Surface,
-    TimeSteps, World,
+    Adaptive, BackwardEuler, Body, BodyId, BodyState, BuildError, ContactBodies, GapSmoothing,
+    Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, SubStepped,
+    Surface, TimeSteps, World,
 };
 
 use crate::scenes::{penalty, sticking};
@@ -22,13 +22,13 @@ fn balls(
     centers: &[[f64; 3]],
     velocities: &[[f64; 3]],
     link: impl Fn(&mut World, BodyId, &[BodyId]),
-) -> (World, Vec<State>) {
+) -> (World, State) {
     let mut world = World::new(Vector3::z() * -9.81);
     let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.1, RADIUS).unwrap();
     let surface = Arc::new(Surface::ball(RADIUS).unwrap());
     let field = Arc::new(Sphere { center: Point3::origin(), radius: RADIUS });
-    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let mut ids = Vec::new();
     for (i, (center, velocity)) in centers.iter().zip(velocities).enumerate() {
         let ball = Body::dynamic(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
@@ -38,7 +38,7 @@ fn balls(
         states.push(state);
     }
     link(&mut world, floor, &ids);
-    (world, states)
+    (world, State::new(states))
 }
 
 const SMOOTHING: GapSmoothing = GapSmoothing::Softplus { width: 1e-5 };
@@ -79,15 +79,16 @@ fn groups_do_as_contacts_one_by_one() {
     let tight = Adaptive { tolerance: 1e-9, sensitivity_tolerance: 1e-8, ..Adaptive::default() };
     let once = TimeSteps { dt: 0.25, steps: 1 };
     let by_speed = |world: &World| {
-        let mut states: Vec<State<Fwd<1>>> = start.iter().map(State::cast).collect();
+        let mut states: State<Fwd<1>> = start.cast();
         states[1].linear.x.derivative = [1.0];
-        world.cast().simulate_with(&tight, &states, once, |_, _| ()).unwrap().states
+        world.cast().simulate_with(&tight, &states, once).unwrap().states
     };
     let (a, b) = (by_speed(&grouped), by_speed(&named));
-    for (a, b) in a.iter().zip(&b) {
+    for (a, b) in a.bodies().iter().zip(b.bodies()) {
         let off = a.value().pose.translation.vector - b.value().pose.translation.vector;
         assert!(off.norm() < 1e-7, "{off}");
-        let slope = |state: &State<Fwd<1>>| state.pose.translation.vector.map(|x| x.derivative[0]);
+        let slope =
+            |state: &BodyState<Fwd<1>>| state.pose.translation.vector.map(|x| x.derivative[0]);
         let off = (slope(a) - slope(b)).norm();
         assert!(off < 1e-4 * (1e-3 + slope(b).norm()), "{off} of {}", slope(b));
     }
@@ -104,7 +105,7 @@ fn same_steps(integrator: &impl Integrator, dt: f64) {
     let [a, b] = [&grouped, &named]
         .map(|world| world.rollout_with(integrator, &start, steps).unwrap().states);
     for (a, b) in a.iter().zip(&b) {
-        for (a, b) in a.iter().zip(b) {
+        for (a, b) in a.bodies().iter().zip(b.bodies()) {
             assert!((a.pose.translation.vector - b.pose.translation.vector).norm() < 1e-10);
         }
     }
@@ -140,7 +141,7 @@ fn reverse_mode_goes_through_groups() {
     let forward = {
         let mut world = world.cast::<Fwd<2>>();
         *world.contact_groups[0].contact.param_mut("stiffness").unwrap() = Fwd::variable(2e6, 1);
-        let mut states: Vec<State<Fwd<2>>> = start.iter().map(State::cast).collect();
+        let mut states: State<Fwd<2>> = start.cast();
         states[1].linear.x.derivative = [1.0, 0.0];
         world.simulate(&states, 0.2).unwrap()[3].pose.translation.y
     };
@@ -148,13 +149,13 @@ fn reverse_mode_goes_through_groups() {
     let mut lifted = world.cast::<Var>();
     let stiffness = recording.variable(2e6);
     *lifted.contact_groups[0].contact.param_mut("stiffness").unwrap() = stiffness;
-    let mut states: Vec<State<Var>> = start.iter().map(State::cast).collect();
+    let mut states: State<Var> = start.cast();
     states[1].linear.x = recording.variable(start[1].linear.x);
     let speed = states[1].linear.x;
     let plain = lifted.simulate(&states, 0.2).unwrap()[3].pose.translation.y;
     let checkpointed = StepCheckpointed::new(Adaptive::default(), &world).unwrap();
     let steps = TimeSteps { dt: 0.2, steps: 1 };
-    let again = lifted.simulate_with(&checkpointed, &states, steps, |_, _| ()).unwrap().states;
+    let again = lifted.simulate_with(&checkpointed, &states, steps).unwrap().states;
     for end in [plain, again[3].pose.translation.y] {
         let adjoints = recording.gradient(end);
         assert!((end.value() - forward.value).abs() < 1e-12);

@@ -7,7 +7,7 @@ use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 use prehend_autodiff::lie::so3_log;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_sim::{
-    BackwardEuler, Body, GapSmoothing, Integrator, Motion, RigidBody, RungeKutta4,
+    BackwardEuler, Body, BodyState, GapSmoothing, Integrator, Motion, RigidBody, RungeKutta4,
     SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, TimeSteps, World,
 };
 
@@ -32,7 +32,7 @@ fn sliding_and_sticking(world: World) -> [World; 2] {
 }
 
 /// An asymmetric body that tumbles freely.
-fn top(gravity: Vector3<f64>) -> (World, Vec<State>) {
+fn top(gravity: Vector3<f64>) -> (World, State) {
     let turned = nalgebra::Rotation3::new(Vector3::new(0.3, -0.5, 0.2));
     let principal = Matrix3::from_diagonal(&Vector3::new(1e-3, 2e-3, 2.5e-3));
     let inertia = turned.matrix() * principal * turned.matrix().transpose();
@@ -43,11 +43,11 @@ fn top(gravity: Vector3<f64>) -> (World, Vec<State>) {
     let mut state = rigid.at_rest(&pose);
     state.linear = Vector3::new(0.3, -0.2, 0.1);
     state.angular = Vector3::new(4.0, 3.0, -2.0);
-    (world, vec![state])
+    (world, State::new([state]))
 }
 
 /// A table on four legs that always touch the floor: its springs, dampers and friction are smooth.
-fn table(damping: f64) -> (World, Vec<State>) {
+fn table(damping: f64) -> (World, State) {
     let inertia = Matrix3::from_diagonal(&Vector3::new(4e-4, 6e-4, 8e-4));
     let rigid = RigidBody::new(0.3, inertia, Point3::new(0.0, 0.005, 0.03)).unwrap();
     let legs = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
@@ -64,28 +64,22 @@ fn table(damping: f64) -> (World, Vec<State>) {
     if damping > 0.0 {
         state.linear.x = 0.2;
     }
-    (world, vec![State::at_rest(Isometry3::identity()), state])
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), state]))
 }
 
-fn end(
-    world: &World,
-    states: &[State],
-    integrator: &impl Integrator,
-    dt: f64,
-    time: f64,
-) -> Vec<State> {
+fn end(world: &World, states: &State, integrator: &impl Integrator, dt: f64, time: f64) -> State {
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
-    world.simulate_with(integrator, states, time_steps, |_, _| ()).unwrap().states
+    world.simulate_with(integrator, states, time_steps).unwrap().states
 }
 
 /// Position, rotation vector from `base`, and velocities.
-fn coordinates(state: &State, base: &State) -> Vec<f64> {
+fn coordinates(state: &BodyState, base: &BodyState) -> Vec<f64> {
     let turn = so3_log(&(state.pose.rotation * base.pose.rotation.inverse()));
     let parts = [state.pose.translation.vector, turn, state.linear, state.angular];
     parts.iter().flat_map(|v| v.iter().copied()).collect()
 }
 
-fn distance(a: &State, b: &State) -> f64 {
+fn distance(a: &BodyState, b: &BodyState) -> f64 {
     coordinates(a, b)
         .iter()
         .zip(coordinates(b, b))
@@ -110,7 +104,8 @@ fn momentum_is_conserved_without_forces() {
     fn check(integrator: &impl Integrator) {
         let (world, states) = top(Vector3::zeros());
         let rigid = world.bodies[0].rigid().unwrap();
-        let momentum = |state: &State| rigid.world_inertia(&state.pose.rotation) * state.angular;
+        let momentum =
+            |state: &BodyState| rigid.world_inertia(&state.pose.rotation) * state.angular;
         let later = end(&world, &states, integrator, 1e-3, 1.0)[0];
         let (before, after) = (momentum(&states[0]), momentum(&later));
         assert!((after - before).norm() < 1e-10 * before.norm(), "{}", (after - before).norm());
@@ -122,12 +117,12 @@ fn momentum_is_conserved_without_forces() {
 /// Orders measured from two halvings of the step.
 fn orders(
     world: &World,
-    states: &[State],
+    states: &State,
     integrator: &impl Integrator,
     dt: f64,
     time: f64,
 ) -> [f64; 2] {
-    let body = states.len() - 1;
+    let body = states.bodies().len() - 1;
     let exact = end(world, states, &RungeKutta4, dt / 64.0, time)[body];
     let error = |dt: f64| distance(&end(world, states, integrator, dt, time)[body], &exact);
     let [a, b, c] = [1.0, 2.0, 4.0].map(|halving| error(dt / halving));
@@ -153,7 +148,7 @@ fn orders_are_as_documented() {
 }
 
 /// Kinetic, elastic and gravitational energy of the undamped table \[J\].
-fn energy(world: &World, state: &State) -> f64 {
+fn energy(world: &World, state: &BodyState) -> f64 {
     let rigid = world.bodies[1].rigid().unwrap();
     let model = rigid.model_pose(&state.pose);
     let surface = world.bodies[1].surface.as_ref().unwrap();
@@ -173,17 +168,12 @@ fn energy_behaves() {
         let start = energy(&world, &states[1]);
         let rest = energy(
             &world,
-            &State { linear: Vector3::zeros(), angular: Vector3::zeros(), ..states[1] },
+            &BodyState { linear: Vector3::zeros(), angular: Vector3::zeros(), ..states[1] },
         );
-        let (mut largest, mut last) = (0.0, 0.0);
         let time_steps = TimeSteps { dt: 1e-3, steps: 10_000 };
-        world
-            .simulate_with(integrator, &states, time_steps, |_, states| {
-                last = (energy(&world, &states[1]) - start) / (start - rest);
-                largest = f64::max(largest, f64::abs(last));
-            })
-            .unwrap();
-        (largest, last)
+        let run = world.rollout_with(integrator, &states, time_steps).unwrap().states;
+        let drift = |state: &State| (energy(&world, &state[1]) - start) / (start - rest);
+        (run.iter().map(|state| drift(state).abs()).fold(0.0, f64::max), drift(&run[10_000]))
     }
     assert!(drift(&SemiImplicitEuler).0 < 0.1);
     assert!(drift(&RungeKutta4).0 < 1e-5);
@@ -200,13 +190,10 @@ fn derivatives_match_differences() {
         let worlds = sliding_and_sticking(world);
         for (world, steps) in worlds.iter().flat_map(|world| [(world, 1), (world, 30)]) {
             let time_steps = TimeSteps { dt: 1e-3, steps };
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::cast).collect();
+            let mut lifted: State<Fwd<12>> = states.cast();
             lifted[1] = states[1].variables();
-            let end = world
-                .cast()
-                .simulate_with(integrator, &lifted, time_steps, |_, _| ())
-                .unwrap()
-                .states[1];
+            let end =
+                world.cast().simulate_with(integrator, &lifted, time_steps).unwrap().states[1];
             let fallen = states[1].linear + world.gravity * (1e-3 * steps as f64);
             assert!(steps == 1 || (end.value().linear - fallen).norm() > 0.05, "no contact");
             let exact = end.sensitivity();
@@ -214,10 +201,7 @@ fn derivatives_match_differences() {
                 |x| {
                     let mut moved = states.clone();
                     moved[1] = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
-                    let run = world
-                        .simulate_with(integrator, &moved, time_steps, |_, _| ())
-                        .unwrap()
-                        .states;
+                    let run = world.simulate_with(integrator, &moved, time_steps).unwrap().states;
                     coordinates(&run[1], &end.value())
                 },
                 &[0.0; 12],
@@ -259,19 +243,15 @@ fn derivatives_by_parameters_match_differences() {
         world.contacts[0].params_mut()[1] = 2e3;
         let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
         for world in sliding_and_sticking(world) {
-            let lifted: Vec<State<Fwd<8>>> = states.iter().map(State::cast).collect();
+            let lifted: State<Fwd<8>> = states.cast();
             let changed = with_parameters(&world, &Fwd::<8>::variables([1.0; 8]));
-            let end =
-                changed.simulate_with(integrator, &lifted, time_steps, |_, _| ()).unwrap().states
-                    [1];
+            let end = changed.simulate_with(integrator, &lifted, time_steps).unwrap().states[1];
             let exact = end.sensitivity();
             let differences = finite_difference_jacobian(
                 |x| {
                     let changed = with_parameters(&world, x);
-                    let run = changed
-                        .simulate_with(integrator, &states, time_steps, |_, _| ())
-                        .unwrap()
-                        .states;
+                    let run =
+                        changed.simulate_with(integrator, &states, time_steps).unwrap().states;
                     coordinates(&run[1], &end.value())
                 },
                 &[1.0; 8],
@@ -290,7 +270,7 @@ fn derivatives_by_parameters_match_differences() {
 
 #[test]
 fn adjoints_agree_with_forward_mode() {
-    fn weighted<S: Scalar>(states: &[State<S>]) -> S {
+    fn weighted<S: Scalar>(states: &State<S>) -> S {
         let tangent = states[1].tangent();
         (1..).zip(tangent).fold(S::zero(), |sum, (i, x)| sum + x.times(f64::from(i).sin()))
     }
@@ -303,27 +283,22 @@ fn adjoints_agree_with_forward_mode() {
             let variables = Fwd::<13>::variables([0.0; 13]);
             forward_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
             let start = |tangent: &[Fwd<13>]| {
-                vec![
-                    states[0].cast(),
-                    states[1].retract(&std::array::from_fn::<_, 12, _>(|i| tangent[i])),
-                ]
+                let mut start: State<Fwd<13>> = states.cast();
+                start[1] = states[1].retract(&std::array::from_fn::<_, 12, _>(|i| tangent[i]));
+                start
             };
-            let run =
-                forward_world.simulate_with(integrator, &start(&variables), time_steps, |_, _| ());
+            let run = forward_world.simulate_with(integrator, &start(&variables), time_steps);
             let forward = weighted(&run.unwrap().states).derivative;
 
             let recording = Recording::start();
             let variables: [Var; 13] = recording.variables([0.0; 13]);
             let mut reverse_world = world.cast::<Var>();
             reverse_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
-            let start = [
+            let start = State::new([
                 states[0].cast(),
                 states[1].retract(&std::array::from_fn::<_, 12, _>(|i| variables[i])),
-            ];
-            let run = reverse_world
-                .simulate_with(integrator, &start, time_steps, |_, _| ())
-                .unwrap()
-                .states;
+            ]);
+            let run = reverse_world.simulate_with(integrator, &start, time_steps).unwrap().states;
             let adjoints = recording.gradient(weighted(&run));
             let reverse: Vec<f64> = variables.iter().map(|x| adjoints.wrt(*x)).collect();
             let error = compare_gradients(&reverse, &forward);
@@ -334,19 +309,19 @@ fn adjoints_agree_with_forward_mode() {
 }
 
 /// A point mass on a spring and damper, along z: its angular frequency is `omega`, its damping rate `rate` \[1/s\].
-fn oscillator(omega: f64, rate: f64) -> (World, Vec<State>) {
+fn oscillator(omega: f64, rate: f64) -> (World, State) {
     let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
     let surface = Surface::new(&[Point3::origin()], &[1e-2]).unwrap();
     let law = Arc::new(penalty(omega * omega * 1e2, rate * 1e2, 0.0, 1.0));
     let mass = Body::dynamic("mass", rigid).with_surface(surface);
     let world = on_ground(Vector3::z() * -9.81, floor(), mass, law, GapSmoothing::Hard);
-    let rest = State::at_rest(Isometry3::translation(0.0, 0.0, -9.81 / (omega * omega)));
-    (world, vec![State::at_rest(Isometry3::identity()), rest])
+    let rest = BodyState::at_rest(Isometry3::translation(0.0, 0.0, -9.81 / (omega * omega)));
+    (world, State::new([BodyState::at_rest(Isometry3::identity()), rest]))
 }
 
 /// An impact on a damped contact without smoothing: without touching the mass ends the step below the floor, and with the
 /// damper's jump of force above it.
-fn jump() -> (World, Vec<State>, Step) {
+fn jump() -> (World, State, Step) {
     let (world, mut states) = oscillator(10.0, 200.0);
     states[1].linear.z = -1.0;
     states[1].pose.translation.z = 0.8 * 0.01;
@@ -429,14 +404,15 @@ fn external_wrenches_and_driven_bodies_are_felt_at_their_time() {
         let follow = |dt: f64| {
             let (mut world, states) = oscillator(100.0, 100.0);
             let heave = |t: f64| {
-                let mut state = State::at_rest(Isometry3::translation(0.0, 0.0, 0.02 * t.sin()));
+                let mut state =
+                    BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.02 * t.sin()));
                 state.linear.z = 0.02 * t.cos();
                 state
             };
             world.bodies[0].motion = Motion::Kinematic(Arc::new(heave));
             world.bodies[1].external_wrench = Vector6::new(0.0, 0.0, -1.0, 0.0, 0.0, 0.0);
             let mut states = states;
-            world.update_kinematics(&mut states, 0.0);
+            world.update_kinematics(&mut states);
             states[1].linear.z = 0.02;
             end(&world, &states, integrator, dt, 0.3)[1]
         };

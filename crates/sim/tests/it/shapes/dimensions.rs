@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::shape::{
     Ball, Capsule, Compound, Cuboid, HalfSpace, RoundCuboid, Shape as ParryShape, SharedShape,
@@ -11,8 +11,9 @@ use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_geometry::SplitMix64;
 use prehend_sim::contact::{GraspD, GraspDParameters};
 use prehend_sim::{
-    Adaptive, Body, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
-    HuntCrossley, KelvinVoigt, Law, Shape, ShapeOptions, State, StepCheckpointed, TimeSteps, World,
+    Adaptive, Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw,
+    GapSmoothing, HuntCrossley, KelvinVoigt, Law, SemiImplicitEuler, Shape, ShapeOptions, State,
+    Step, StepCheckpointed, TimeSteps, World,
 };
 
 use super::catalog::{ROUND, SHARP, vector};
@@ -33,17 +34,28 @@ fn laws() -> [Arc<dyn DynContactLaw>; 3] {
     ]
 }
 
+/// Wrenches, then rates of deflections.
+fn numbers<S: Scalar>(world: &World<S>, state: &State<S>) -> impl Iterator<Item = S> {
+    let step = Step::new(0, 1e-3);
+    let next = world.step(&SemiImplicitEuler, state, step).unwrap();
+    let after = next.rows().to_vec().into_iter().skip(world.bodies.len());
+    let before = state.rows().to_vec().into_iter().skip(world.bodies.len());
+    let rates = after.zip(before).flat_map(move |(after, before)| {
+        let halves = [after.linear - before.linear, after.angular - before.angular];
+        halves.map(|half| half.map(|x| x.times(1.0 / step.dt)))
+    });
+    let wrenches = world.wrenches(state, 0).into_iter().flat_map(<[S; 6]>::from);
+    wrenches.chain(rates.flat_map(<[S; 3]>::from))
+}
+
 /// Wrenches, and rates of deflections, as functions of a dimension of the second body: the value, the derivative and differences.
-fn by_dimension(world: &World, states: &[State], name: &str) -> [Vec<f64>; 2] {
-    let numbers = |all: Vec<Vector6<f64>>| -> Vec<f64> {
-        all.iter().flat_map(|w| w.iter().copied()).collect()
-    };
+fn by_dimension(world: &World, states: &State, name: &str) -> [Vec<f64>; 2] {
     let dimensions = world.bodies[1].shape().unwrap().dimensions();
     let (_, value) = dimensions.into_iter().find(|(own, _)| own == name).unwrap();
     let at = |value: f64| {
         let mut world = world.clone();
         world.bodies[1].set_dimension(name, value).unwrap();
-        numbers(world.wrenches(states, 0))
+        numbers(&world, states).collect::<Vec<f64>>()
     };
     // Of fourth order: rates of deflections are solutions of equations of a high condition, and tell small changes badly.
     let step = 1e-6;
@@ -55,18 +67,17 @@ fn by_dimension(world: &World, states: &[State], name: &str) -> [Vec<f64>; 2] {
     let differences = differences.map(|(one, two)| (8.0 * one - two) / (12.0 * step)).collect();
     let mut lifted = world.cast::<Fwd<1>>();
     lifted.bodies[1].set_dimension(name, Fwd::variable(value, 0)).unwrap();
-    let constants: Vec<State<Fwd<1>>> = states.iter().map(State::cast).collect();
-    let exact = lifted.wrenches(&constants, 0);
-    let exact = numbers(exact.iter().map(|w| w.map(|x| x.derivative[0])).collect());
+    let constants: State<Fwd<1>> = states.cast();
+    let exact = numbers(&lifted, &constants).map(|x| x.derivative[0]).collect();
     [exact, differences]
 }
 
-fn random_state(random: &mut SplitMix64, pose: Isometry3<f64>) -> State {
+fn random_state(random: &mut SplitMix64, pose: Isometry3<f64>) -> BodyState {
     let mut draw = |size: f64| {
         let v = vector(random);
         Vector3::new(v.x, v.y, v.z) * size
     };
-    State { pose, linear: draw(0.05), angular: draw(1.0) }
+    BodyState { pose, linear: draw(0.05), angular: draw(1.0) }
 }
 
 /// The largest errors of wrenches and of rates of deflections over all dimensions of `shape`, relative to the largest derivative, as
@@ -95,18 +106,19 @@ fn worst(shape: &Shape, random: &mut SplitMix64, law: &Arc<dyn DynContactLaw>) -
     let sample = shape.field().sample(&from, f64::INFINITY).unwrap();
     let center = from - sample.gradient * (sample.distance - 5e-3 + DEPTH);
     let ball_pose = Isometry3::from((pose * center).coords);
-    let mut states = vec![
-        State::at_rest(Isometry3::identity()),
+    let mut states = State::new([
+        BodyState::at_rest(Isometry3::identity()),
         random_state(random, rigid.com_pose(&pose)),
         random_state(random, ball_pose),
-    ];
+    ]);
     if law.bristles().is_some() {
         let deflection = |_| {
             let mut state = random_state(random, Isometry3::identity());
             (state.linear, state.angular) = (state.linear * 1e-3, state.angular * 1e-3);
             state
         };
-        states.extend((0..2).map(deflection));
+        let rows = states.rows().iter().copied().chain((0..2).map(deflection));
+        states = world.state_of_rows(rows.collect(), 0.0).unwrap();
     }
     let names: Vec<String> = shape.dimensions().into_iter().map(|(name, _)| name).collect();
     let mut worst = [0.0_f64; 2];
@@ -173,11 +185,11 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     world.bodies[body].set_dimension(name, value + change).unwrap();
     let turn = UnitQuaternion::from_euler_angles(0.3, 0.2, 0.4);
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.07, 0.0), turn);
-    let start = [State::at_rest(Isometry3::identity()), State::at_rest(pose)];
-    let start = start.map(|state| state.cast::<S>());
+    let start = State::new([BodyState::at_rest(Isometry3::identity()), BodyState::at_rest(pose)]);
+    let start = start.cast::<S>();
     let tight = Adaptive { tolerance: 1e-9, sensitivity_tolerance: 1e-8, ..Adaptive::default() };
     let once = TimeSteps { dt: 0.15, steps: 1 };
-    let end = world.simulate_with(&tight, &start, once, |_, _| ()).unwrap().states;
+    let end = world.simulate_with(&tight, &start, once).unwrap().states;
     end[1].pose.translation.vector.into()
 }
 
@@ -225,7 +237,7 @@ fn reverse_mode_and_checkpoints_know_dimensions() {
         .add_contact(ContactBodies { samples, field }, law, GapSmoothing::Softplus { width: 1e-5 })
         .unwrap();
     let start = [Isometry3::identity(), Isometry3::translation(0.0, 0.031, 0.0)];
-    let start = start.map(|pose| State::at_rest(pose).cast::<Var>());
+    let start = State::new(start.map(BodyState::at_rest)).cast::<Var>();
     let radius = recording.variable(0.03);
     let mut lifted = world.cast::<Var>();
     lifted.bodies[samples.index()].set_dimension("radius", radius).unwrap();

@@ -8,12 +8,12 @@ use parry3d_f64::shape::{
     Ball, Cone, Cuboid, Cylinder, HalfSpace, RoundCuboid, RoundCylinder, Shape as ParryShape,
 };
 use prehend_sim::{
-    Body, BodyId, BristleFriction, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Shape,
-    State, World,
+    Body, BodyId, BodyState, BristleFriction, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt,
+    Law, Shape, State, World,
 };
 
 /// A body of `shape` with its model frame at `height` above `ground`, gravity along −y.
-pub(crate) fn on(ground: &Shape, shape: &Shape, height: f64) -> (World, Vec<State>) {
+pub(crate) fn on(ground: &Shape, shape: &Shape, height: f64) -> (World, State) {
     let mut world = World::new(Vector3::y() * -9.81);
     let floor = world.add(Body::fixed_from_shape("ground", ground));
     let body = Body::from_shape("body", shape, 1e3).unwrap();
@@ -24,8 +24,8 @@ pub(crate) fn on(ground: &Shape, shape: &Shape, height: f64) -> (World, Vec<Stat
     let law = Law::new(KelvinVoigt { stiffness: 1e8, damping: 1e5 }, held).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 1e-6 };
     world.add_contact(ContactBodies { samples, field: floor }, Arc::new(law), smoothing).unwrap();
-    let identity = State::at_rest(Isometry3::identity());
-    (world, vec![identity, start, identity])
+    let identity = BodyState::at_rest(Isometry3::identity());
+    (world, State::new([identity, start, identity]))
 }
 
 fn ground() -> Shape {
