@@ -167,15 +167,29 @@ pub enum SimulationError {
         /// Number that it has.
         expected: [usize; 2],
     },
-    /// A rotation of a joint that is none.
+    /// A rotation of a body, or of a link's joint, that is none.
     #[error(
-        "the rotation of the joint of link '{link}' is a quaternion of the length {norm}, which has no direction"
+        "the rotation of '{body}' is a quaternion of the length {norm}, which has no direction"
     )]
-    JointRotation {
+    Rotation {
         /// Its name.
-        link: String,
+        body: String,
         /// The length of the quaternion.
         norm: f64,
+    },
+    /// Too few or too many generalized coordinates.
+    #[error(
+        "{} positions and {} velocities were given: the world has {} and {}",
+        .given[0],
+        .given[1],
+        .expected[0],
+        .expected[1]
+    )]
+    GeneralizedCoordinates {
+        /// Numbers of positions and velocities given.
+        given: [usize; 2],
+        /// Numbers that the world has.
+        expected: [usize; 2],
     },
     /// An integrator that knows no joints.
     #[error("{integrator} does not move articulations")]

@@ -135,4 +135,35 @@ impl World {
             self.world.joint(&self::state(&self.world, &states)?, self.id(&link)?).raise()?;
         Ok((joint.position, joint.velocity))
     }
+
+    /// Generalized positions [m, rad] and velocities of free bodies (center of mass, quaternion x, y, z, w), then of joints: MuJoCo's `qpos` and `qvel`.
+    fn generalized_coordinates<'py>(
+        &self,
+        py: Python<'py>,
+        states: Numbers<'py>,
+    ) -> PyResult<(Bound<'py, numpy::PyArray<f64, IxDyn>>, Bound<'py, numpy::PyArray<f64, IxDyn>>)>
+    {
+        let all = self.world.generalized_coordinates(&self::state(&self.world, &states)?);
+        let (nq, nv) = (all.position.len(), all.velocity.len());
+        Ok((array(py, all.position, &[nq])?, array(py, all.velocity, &[nv])?))
+    }
+
+    /// Writes generalized coordinates into `states`, and where the links are then. Velocities are zero by default.
+    #[pyo3(signature = (states, position, velocity=None))]
+    fn set_generalized_coordinates(
+        &self,
+        states: &Bound<'_, PyAny>,
+        position: Numbers<'_>,
+        velocity: Option<Numbers<'_>>,
+    ) -> PyResult<()> {
+        let (position_like, velocity_like) = (position, velocity);
+        let position = in_order(&position_like).into_owned();
+        let velocity = velocity_like.as_ref().map(|v| in_order(v).into_owned());
+        // They may be views of the states.
+        drop((position_like, velocity_like));
+        let velocity = velocity.unwrap_or_else(|| vec![0.0; self.world.degrees_of_freedom()]);
+        change(&self.world, states, |all| {
+            self.world.set_generalized_coordinates(all, &position, &velocity).raise()
+        })
+    }
 }

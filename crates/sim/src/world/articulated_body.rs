@@ -202,15 +202,21 @@ impl<S: Scalar> World<S> {
                 expected: [joint.nq(), joint.nv()],
             });
         }
+        self.check_rotation(link, joint, position)?;
+        states[place] = joint.write(position, velocity);
+        Ok(())
+    }
+
+    /// An error unless the rotation among these coordinates, if there is one, has a direction.
+    pub(crate) fn check_rotation(&self, body: BodyId, joint: &Joint, position: &[S]) -> Result<()> {
         if joint.turns() {
             let quaternion = &position[position.len() - 4..];
             let norm = quaternion.iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt();
             if norm < f64::MIN_POSITIVE || !norm.is_finite() {
-                let link = self.bodies[link].name.clone();
-                return Err(SimulationError::JointRotation { link, norm });
+                let body = self.bodies[body].name.clone();
+                return Err(SimulationError::Rotation { body, norm });
             }
         }
-        states[place] = joint.write(position, velocity);
         Ok(())
     }
 

@@ -101,6 +101,24 @@ fn displacements_lead_from_one_state_to_another() {
         for (found, by) in found.iter().zip(&by) {
             assert!((found - by).abs() < 1e-12, "{seed}: {found} {by}");
         }
+        let all = world.generalized_coordinates(&displaced);
+        assert_eq!(all.velocity.len(), world.degrees_of_freedom());
+        let mut set = state.clone();
+        world.set_generalized_coordinates(&mut set, &all.position, &all.velocity).unwrap();
+        let off =
+            world.displacement(&displaced, &set).into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        assert!(off < 1e-12, "{seed}: {off}");
+        for (a, b) in set.bodies().iter().zip(displaced.bodies()) {
+            assert!((a.pose.to_homogeneous() - b.pose.to_homogeneous()).amax() < 1e-12);
+        }
+        let before = set.clone();
+        let short = world.set_generalized_coordinates(&mut set, &all.position[1..], &all.velocity);
+        assert!(short.unwrap_err().to_string().contains("the world has"));
+        let zeros = vec![0.0; all.position.len()];
+        let none = world.set_generalized_coordinates(&mut set, &zeros, &all.velocity);
+        let turns = all.position.len() > all.velocity.len();
+        assert_eq!(none.is_err(), turns);
+        assert!(!turns || set == before);
         // Its derivatives at the state itself are the directions.
         let lifted = world.displaced(&state, &Fwd::<1>::variables([0.0]).repeat(by.len()));
         let found = world.displacement(&state, &lifted);

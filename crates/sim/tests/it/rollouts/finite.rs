@@ -251,7 +251,7 @@ fn chains_at_their_singular_places() {
     let links = world.add_articulation(vec![Link::new("ball", Joint::Spherical, &rod)]).unwrap();
     let mut states = world.neutral_state();
     let error = world.set_joint(&mut states, links[0], &[0.0; 4], &[0.0; 3]).unwrap_err();
-    assert_eq!(error, SimulationError::JointRotation { link: "ball".to_owned(), norm: 0.0 });
+    assert_eq!(error, SimulationError::Rotation { body: "ball".to_owned(), norm: 0.0 });
     let pin = Link { mass: 1.0, ..Link::massless("pin", Joint::Revolute(axis)) };
     let inverse = Link { inertia: -Matrix3::identity(), ..pin.clone() };
     for link in [pin, inverse] {
