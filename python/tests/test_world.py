@@ -155,6 +155,25 @@ def test_states_that_cannot_be_are_refused():
         world.set_pose(world.neutral_states(), rod, [0, 0, 1])
 
 
+def test_generalized_coordinates_are_those_of_free_bodies_and_joints():
+    world = prehend.World()
+    ball = world.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
+    rod = world.add_articulation([prehend.Link("rod", axis=[0, 1, 0], mass=1.0, com=[0, 0, -1])])[0]
+    states = world.neutral_states()
+    world.set_pose(states, ball, [1, 2, 3], velocity=[4, 5, 6], angular_velocity=[7, 8, 9])
+    world.set_joint(states, rod, [0.5], [0.25])
+    q, v = world.generalized_coordinates(states)
+    np.testing.assert_allclose(q, [1, 2, 3, 0, 0, 0, 1, 0.5])
+    np.testing.assert_allclose(v, [4, 5, 6, 7, 8, 9, 0.25])
+    other = world.neutral_states()
+    world.set_generalized_coordinates(other, q, v)
+    np.testing.assert_allclose(other, states, atol=1e-15)
+    world.set_generalized_coordinates(other, q)
+    assert not other[ball, 7:].any()
+    with pytest.raises(prehend.Error, match="7 positions and 7 velocities were given: the world has 8 and 7"):
+        world.set_generalized_coordinates(other, q[1:])
+
+
 def test_poses_may_be_views_of_the_states():
     world, states, ball, _ = thrown_ball()
     expected = states.copy()

@@ -11,7 +11,7 @@ use prehend_autodiff::Scalar;
 use crate::body_state::Rows;
 use crate::error::Result;
 use crate::handle::BodyId;
-use crate::time::{Step, TimeSteps};
+use crate::time::Step;
 use crate::world::World;
 use energy::EnergyBalance;
 use step_resolution::StepResolution;
@@ -98,16 +98,16 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
         self.energy.step(self.world, step, states)
     }
 
-    /// Report on `time_steps` that have led to `states`.
+    /// Report on so many `steps` that have led to `states` at `time` \[s\].
     ///
     /// # Errors
     /// If contacts have made energy, or velocities are too large to be squared.
     pub(crate) fn finish(
         mut self,
-        TimeSteps { dt, steps }: TimeSteps,
+        steps: usize,
+        time: f64,
         states: &Rows<S>,
     ) -> Result<Resolution> {
-        let time = dt * steps as f64;
         self.energy.check(self.world, time, states)?;
         let roughness = self.roughness.as_ref().map(StepResolution::mean);
         if roughness.is_some_and(|roughness| !roughness.is_finite()) {

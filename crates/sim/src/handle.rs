@@ -3,16 +3,16 @@
 use std::fmt;
 use std::ops::{Index, IndexMut};
 
-/// Handle of a body of a world: given by [`World::add`](crate::World::add), and the index of its body and state in slices.
+/// Handle of a body of a world: given by [`World::add`](crate::World::add), and the index of its body and of its part of a [`State`](crate::State).
 ///
 /// ```
-/// use nalgebra::{Isometry3, Vector3};
-/// use prehend_sim::{Body, BodyState, World};
+/// use nalgebra::Vector3;
+/// use prehend_sim::{Body, World};
 ///
 /// let mut world = World::new(Vector3::zeros());
 /// let belt = world.add(Body::fixed("belt"));
-/// let mut states = [BodyState::at_rest(Isometry3::identity())];
-/// states[belt].linear.x = 0.1;
+/// let mut state = world.neutral_state();
+/// state[belt].linear.x = 0.1;
 /// assert_eq!(world.bodies[belt].name, "belt");
 /// ```
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]

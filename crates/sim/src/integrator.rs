@@ -41,8 +41,7 @@ use crate::world::World;
 /// }
 /// ```
 pub trait Integrator: Sync {
-    /// State one time step later. Its time and the bodies that forces do not move are left to
-    /// [`World::update_kinematics`], which follows every step.
+    /// State one time step later. Its time is set, and bodies that forces do not move are moved, after every step.
     ///
     /// # Errors
     /// If the scheme solves equations and they were not solved.

@@ -40,7 +40,7 @@ pub struct LinearizedStep {
 }
 
 impl World {
-    /// A step of [`SemiImplicitEuler`] with its Jacobian.
+    /// A step of [`SemiImplicitEuler`] with its Jacobian. The step says when it begins, whatever `state.time` is.
     ///
     /// Contacts with bristles are as they are given, their deflections are no rows. Where there are such contacts, laws along spherical joints or joint
     /// types of one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
@@ -48,7 +48,7 @@ impl World {
     /// # Errors
     /// As [`World::step`].
     pub fn linearize_step(&self, state: &State, step: Step) -> Result<LinearizedStep> {
-        let mut states = self.with_deflections(state.rows());
+        let mut states = self.rows_of(state)?;
         self.check(&states, step)?;
         if !self.contact_groups.is_empty() {
             self.forward_kinematics(&mut states);

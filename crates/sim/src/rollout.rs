@@ -141,7 +141,7 @@ impl<S: Scalar> World<S> {
             visit(&state);
             diagnostics.step(step, state.rows())?;
         }
-        let resolution = diagnostics.finish(time_steps, state.rows())?;
+        let resolution = diagnostics.finish(time_steps.steps, state.time, state.rows())?;
         Ok(Simulation { states: state, resolution })
     }
 
@@ -238,6 +238,7 @@ impl<S: Scalar> World<S> {
             if control(step, &mut world, &mut state).into_flow()?.is_break() {
                 break;
             }
+            state.time = step.start;
             visit(&state);
             world.check(state.rows(), step)?;
             state = world.advance(integrator, &state, step)?;
@@ -245,7 +246,7 @@ impl<S: Scalar> World<S> {
         Ok(state)
     }
 
-    /// State at the end of a step: the integrator's, then that of kinematic bodies.
+    /// State at the end of a step: the integrator's, then that of kinematic bodies. The step says when it begins, whatever `state.time` is.
     ///
     /// # Errors
     /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
@@ -255,7 +256,7 @@ impl<S: Scalar> World<S> {
         state: &State<S>,
         step: Step,
     ) -> Result<State<S>> {
-        let mut rows = self.with_deflections(state.rows());
+        let mut rows = self.rows_of(state)?;
         self.check(&rows, step)?;
         self.forward_kinematics(&mut rows);
         self.advance(integrator, &state.with(rows, step.start), step)
@@ -305,7 +306,7 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
     pub(crate) fn initialize(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<State<S>> {
-        let mut rows = self.with_deflections(initial.rows());
+        let mut rows = self.rows_of(initial)?;
         let first = Step { index: 0, start: initial.time, dt: time_steps.dt };
         self.check(&rows, first)?;
         self.check_velocities([initial.time, time_steps.end(initial.time)])?;
@@ -318,6 +319,9 @@ impl<S: Scalar> World<S> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
+        }
+        if !start.is_finite() {
+            return Err(SimulationError::TimeStep(start));
         }
         if rows.len() != self.state_count() {
             return Err(self.wrong_count(rows.len()));

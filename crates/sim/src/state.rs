@@ -61,7 +61,7 @@ impl<S: Scalar> State<S> {
         &mut self.rows[..self.bodies]
     }
 
-    /// Rows of a [`RolloutFunction`](crate::RolloutFunction): bodies, joints, contacts with bristles.
+    /// Rows of a [`RolloutFunction`](crate::RolloutFunction), which starts at time 0: bodies, joints, contacts with bristles.
     pub fn rows(&self) -> &[BodyState<S>] {
         &self.rows
     }

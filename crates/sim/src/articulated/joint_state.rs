@@ -9,7 +9,7 @@ use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 use super::joint::{Joint, quaternion};
 use crate::body_state::BodyState;
 
-/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`](prehend_geometry::robot::KinematicTree::joint_names), or of one joint.
+/// Positions and velocities: of one joint, or of all that moves in a world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState<S = f64> {
     /// Positions \[rad or m\].

@@ -41,7 +41,7 @@ impl Integrator for BackwardEuler {
         world.ensure_no_bushings("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
-            return Ok(state.clone());
+            return Ok(state.with(state.rows().to_vec(), step.end()));
         }
         let states = state.rows();
         let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();

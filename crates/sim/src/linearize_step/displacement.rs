@@ -21,9 +21,10 @@ impl World {
     /// State displaced \[m, rad\] and sped up \[m/s, rad/s\] by 2N numbers, as a [`LinearizedStep`] orders them. Deflections of contacts stay.
     ///
     /// # Panics
-    /// If they are fewer, or it is no state of this world.
+    /// Unless they are 2N, and it is a state of this world.
     pub fn displaced<S: Scalar>(&self, state: &State, by: &[S]) -> State<S> {
-        let (moves, speeds) = by.split_at(self.degrees_of_freedom());
+        assert_eq!(by.len(), 2 * self.degrees_of_freedom(), "numbers of a displacement");
+        let (moves, speeds) = by.split_at(by.len() / 2);
         let mut displaced: State<S> = state.cast();
         let mut first = 0;
         for body in self.free_bodies() {
@@ -45,7 +46,7 @@ impl World {
         displaced
     }
 
-    /// The 2N numbers by which `to` is [displaced](World::displaced) from `from`. Turns are less than half of one.
+    /// The 2N numbers by which `to` is [displaced](World::displaced) from `from`. Rotations by π or more come back the shorter way.
     ///
     /// # Panics
     /// If they are no states of this world.

@@ -133,6 +133,9 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// If there is no such body, or it is a link.
+    ///
+    /// # Panics
+    /// If it is no state of this world.
     pub fn set_pose(
         &self,
         state: &mut State<S>,
@@ -149,6 +152,9 @@ impl<S: Scalar> World<S> {
     }
 
     /// Pose of a body's frame, `t_world_model`.
+    ///
+    /// # Panics
+    /// If it is no state of this world, or no body of it.
     pub fn pose(&self, state: &State<S>, body: BodyId) -> Isometry3<S> {
         let pose = state[body].pose;
         self.bodies[body].rigid().map_or(pose, |rigid| rigid.model_pose(&pose))

@@ -38,8 +38,7 @@ pub enum Motion<S: Scalar = f64> {
     Dynamic(RigidBody<S>),
     /// Nothing but whoever sets its state. A body that touches it feels the state's velocity, a conveyor's for instance.
     Fixed,
-    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a world of numbers with derivatives one that carries them
-    /// may take its place.
+    /// A trajectory, whatever the forces. In a world of numbers with derivatives one that carries them may take its place.
     Kinematic(Arc<dyn Trajectory<S>>),
     /// The joint that it hangs on, as a link of one of the world's [articulations](crate::World::add_articulation). Its model frame is the link's.
     Link,

@@ -10,8 +10,9 @@ use super::World;
 use super::contact_pair::ContactPair;
 use crate::body_state::{BodyState, Rows};
 use crate::contact::bristles::Bristles;
-use crate::error::SimulationError;
+use crate::error::{Result, SimulationError};
 use crate::spatial::spatial;
+use crate::state::State;
 
 impl<S: Scalar> BodyState<S> {
     /// The deflection that this state is.
@@ -65,6 +66,15 @@ impl<S: Scalar> World<S> {
             states.resize(self.state_count(), BodyState::at_rest(Isometry3::identity()));
         }
         states
+    }
+
+    /// Rows of a state of this world, with deflections where it has none.
+    pub(crate) fn rows_of(&self, state: &State<S>) -> Result<Vec<BodyState<S>>> {
+        let rows = self.with_deflections(state.rows());
+        match state.bodies().len() == self.bodies.len() && rows.len() == self.state_count() {
+            true => Ok(rows),
+            false => Err(self.wrong_count(state.rows().len())),
+        }
     }
 
     /// Moves on the deflections among `states`, for `dt` \[s\] at the rates that follow the `wrenches` on the bodies.

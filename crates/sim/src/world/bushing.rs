@@ -5,8 +5,7 @@ use prehend_autodiff::lie::{lift, so3_log};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::World;
-use crate::body_state::STATE;
-use crate::body_state::{BodyState, Rows};
+use crate::body_state::{BodyState, Rows, STATE};
 use crate::error::{BuildError, Result, SimulationError};
 use crate::first_order::{Linearized, first_order, linearized};
 use crate::handle::{BodyId, BushingId};

@@ -5,8 +5,7 @@ use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::World;
 use super::contact_pair::ContactPair;
-use crate::body_state::STATE;
-use crate::body_state::{BodyState, Rows};
+use crate::body_state::{BodyState, Rows, STATE};
 use crate::contact::contact_query::ContactQuery;
 use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;

@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use crate::body_state::BodyState;
-use crate::body_state::STATE;
+use crate::body_state::{BodyState, STATE};
 
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;

@@ -83,7 +83,7 @@ impl<S: Scalar> World<S> {
 
     /// A state with links where their joints put them.
     pub(crate) fn sensed(&self, state: &State<S>) -> Result<State<S>> {
-        let mut state = self.state_of_rows(state.rows().to_vec(), state.time)?;
+        let mut state = state.with(self.rows_of(state)?, state.time);
         self.forward_kinematics(state.rows_mut());
         Ok(state)
     }

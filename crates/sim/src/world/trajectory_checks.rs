@@ -19,7 +19,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Refuses trajectories whose velocity is not the rate of their pose, at some times of a rollout of `duration` \[s\].
+    /// Refuses trajectories whose velocity is not the rate of their pose, at some times between two \[s\].
     pub(crate) fn check_velocities(&self, [from, to]: [f64; 2]) -> Result<()> {
         for body in &self.bodies {
             let Motion::Kinematic(trajectory) = &body.motion else { continue };

@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
+use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyState, BuildError, ContactBodies, GapSmoothing, Integrator,
-    Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
-    Surface, TimeSteps, Trajectory, World,
+    Adaptive, BackwardEuler, Batch, Body, BodyState, BuildError, ContactBodies, GapSmoothing,
+    Integrator, Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
+    StepCheckpointed, SubStepped, Surface, TimeSteps, Trajectory, World,
 };
 
 use super::gradients::coordinates;
@@ -122,4 +123,66 @@ fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
     let expected = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
     let values = run.unwrap().states.value();
     assert_eq!(values, expected.unwrap().states);
+}
+
+#[test]
+fn runs_go_on_from_the_time_of_their_state() {
+    fn check(integrator: &(impl Integrator + Clone + Send + 'static), tolerance: f64) {
+        let (world, start) = scene(INPUTS);
+        let time_steps = |steps| TimeSteps { dt: 2e-4, steps };
+        let run = |from: &State, steps| {
+            world.simulate_with(integrator, from, time_steps(steps)).unwrap().states
+        };
+        let (whole, half) = (run(&start, 300), run(&start, 150));
+        assert!((half.time - 0.5 * TIME).abs() < 1e-12, "{}", half.time);
+        let mut seen = Vec::new();
+        let look = |_, _: &mut World, state: &mut State| seen.push(state.time);
+        let controlled = world.simulate_controlled(integrator, &half, time_steps(150), look);
+        let batch = Batch::with_integrator(integrator.clone(), &world).unwrap();
+        let mut of_batch = batch.simulate([(world.clone(), half.clone())], time_steps(150));
+        let ends = [run(&half, 150), controlled.unwrap(), of_batch.remove(0).unwrap()];
+        for end in ends {
+            assert!((end.time - TIME).abs() < 1e-12, "{}", end.time);
+            for (a, b) in end.bodies().iter().zip(whole.bodies()) {
+                let off =
+                    coordinates(a).into_iter().zip(coordinates(b)).map(|(a, b)| (a - b).abs());
+                let off = off.fold(0.0, f64::max);
+                assert!(off < tolerance, "{off}");
+            }
+        }
+        assert!((seen[0] - half.time).abs() < 1e-15 && (seen[149] - TIME + 2e-4).abs() < 1e-12);
+    }
+    check(&SemiImplicitEuler, 1e-11);
+    check(&RungeKutta4, 1e-11);
+    check(&SubStepped { integrator: SemiImplicitEuler, max_substeps: 2 }, 1e-11);
+    check(&Adaptive::default(), 1e-4);
+}
+
+#[test]
+fn errors_tell_the_time_of_a_late_start() {
+    let (world, mut state) = scene(INPUTS);
+    state.time = 5.0;
+    state[1].linear.z = -1e160;
+    let late = world.simulate_with(&SemiImplicitEuler, &state, TimeSteps { dt: 1e-3, steps: 1 });
+    let late = late.unwrap_err().to_string();
+    assert!(late.contains("at 5.00"), "{late}");
+    state.time = f64::NAN;
+    let never = world.simulate(&state, 1e-3).unwrap_err().to_string();
+    assert!(never.contains("time of a state"), "{never}");
+}
+
+#[test]
+fn states_of_other_worlds_are_refused() {
+    let mut world = World::new(Vector3::zeros());
+    let rod =
+        Link::new("rod", Joint::Revolute(Vector3::y_axis()), &RigidBody::ball(1.0, 0.1).unwrap());
+    world.add_articulation(vec![rod]).unwrap();
+    assert!(world.simulate(&world.neutral_state(), 1e-3).is_ok());
+    // As many rows as a link and its joint.
+    let bodies = State::new([BodyState::at_rest(Isometry3::identity()); 2]);
+    let refused = world.simulate(&bodies, 1e-3).unwrap_err();
+    assert!(matches!(refused, SimulationError::States { .. }), "{refused}");
+    let step = Step::new(0, 1e-3);
+    assert!(world.step(&SemiImplicitEuler, &bodies, step).is_err());
+    assert!(world.linearize_step(&bodies, step).is_err());
 }

@@ -25,7 +25,7 @@ pub(crate) fn on(ground: &Shape, shape: &Shape, height: f64) -> (World, State) {
     let smoothing = GapSmoothing::Softplus { width: 1e-6 };
     world.add_contact(ContactBodies { samples, field: floor }, Arc::new(law), smoothing).unwrap();
     let identity = BodyState::at_rest(Isometry3::identity());
-    (world, State::new([identity, start, identity]))
+    (world, State::new([identity, start]))
 }
 
 fn ground() -> Shape {
