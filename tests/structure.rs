@@ -8,7 +8,7 @@ use std::{fs, io};
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_070),
     ("geometry", 15_789),
-    ("sim", 16_455),
+    ("sim", 16_443),
     ("render", 10_630),
     ("refine", 30_630),
 ];

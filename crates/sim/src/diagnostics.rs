@@ -11,6 +11,7 @@ use prehend_autodiff::Scalar;
 use crate::body_state::Rows;
 use crate::error::Result;
 use crate::handle::BodyId;
+use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use energy::EnergyBalance;
@@ -98,16 +99,12 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
         self.energy.step(self.world, step, states)
     }
 
-    /// Report on so many `steps` that have led to `states` at `time` \[s\].
+    /// Report on a number of steps that have led to `state`.
     ///
     /// # Errors
     /// If contacts have made energy, or velocities are too large to be squared.
-    pub(crate) fn finish(
-        mut self,
-        steps: usize,
-        time: f64,
-        states: &Rows<S>,
-    ) -> Result<Resolution> {
+    pub(crate) fn finish(mut self, steps: usize, state: &State<S>) -> Result<Resolution> {
+        let (time, states) = (state.time, state.rows());
         self.energy.check(self.world, time, states)?;
         let roughness = self.roughness.as_ref().map(StepResolution::mean);
         if roughness.is_some_and(|roughness| !roughness.is_finite()) {

@@ -271,11 +271,12 @@ pub enum SimulationError {
         /// Time \[s\].
         time: f64,
     },
-    /// The time step is not a positive number, or the time of a state is not finite.
-    #[error(
-        "a duration or a time step must be positive and finite, the time of a state finite, is {0} s"
-    )]
+    /// The time step is not a positive number.
+    #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),
+    /// A state at no time.
+    #[error("the time of a state must be finite, is {0} s")]
+    Time(f64),
     /// A body's state, its square or a derivative of it, is not finite: given so, or blown up.
     #[error(
         "the state of body '{body}', its square or a derivative of it, is not finite at {time} s{}: bad input, or a time step too long for the \

@@ -48,21 +48,21 @@ impl World {
     /// # Errors
     /// As [`World::step`].
     pub fn linearize_step(&self, state: &State, step: Step) -> Result<LinearizedStep> {
-        let mut states = self.rows_of(state)?;
-        self.check(&states, step)?;
+        let mut state = self.with_deflections(state.clone());
+        self.check(&state, step)?;
         if !self.contact_groups.is_empty() {
-            self.forward_kinematics(&mut states);
+            self.forward_kinematics(state.rows_mut());
         }
-        let near = self.with_candidates(&states, step);
+        let near = self.with_candidates(state.rows(), step);
         if !near.has_closed_form() {
-            return near.linearize_step_by_forward_mode(&state.with(states, step.start), step);
+            return near.linearize_step_by_forward_mode(&state, step);
         }
-        let forces = Generalized::new(&near, &mut states, step.index);
-        let mut next = moved(&near, &states, &forces.wrenches, step.dt);
-        near.finish_step(&states, &mut next, step.end())?;
+        let forces = Generalized::new(&near, state.rows_mut(), step.index);
+        let mut next = moved(&near, state.rows(), &forces.wrenches, step.dt);
+        near.finish_step(state.rows(), &mut next, step.end())?;
         let n = forces.count;
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
-        near.bodies_after(&states, &forces, step.dt, &mut by_state, &mut by_force);
+        near.bodies_after(state.rows(), &forces, step.dt, &mut by_state, &mut by_force);
         near.joints_after(&next, &forces, step.dt, &mut by_state, &mut by_force);
         let state = state.with(next, step.end());
         near.finite(LinearizedStep { state, by_state, by_force }, step)

@@ -141,7 +141,7 @@ impl<S: Scalar> World<S> {
             visit(&state);
             diagnostics.step(step, state.rows())?;
         }
-        let resolution = diagnostics.finish(time_steps.steps, state.time, state.rows())?;
+        let resolution = diagnostics.finish(time_steps.steps, &state)?;
         Ok(Simulation { states: state, resolution })
     }
 
@@ -240,7 +240,7 @@ impl<S: Scalar> World<S> {
             }
             state.time = step.start;
             visit(&state);
-            world.check(state.rows(), step)?;
+            world.check(&state, step)?;
             state = world.advance(integrator, &state, step)?;
         }
         Ok(state)
@@ -256,10 +256,11 @@ impl<S: Scalar> World<S> {
         state: &State<S>,
         step: Step,
     ) -> Result<State<S>> {
-        let mut rows = self.rows_of(state)?;
-        self.check(&rows, step)?;
-        self.forward_kinematics(&mut rows);
-        self.advance(integrator, &state.with(rows, step.start), step)
+        let mut state = self.with_deflections(state.clone());
+        state.time = step.start;
+        self.check(&state, step)?;
+        self.forward_kinematics(state.rows_mut());
+        self.advance(integrator, &state, step)
     }
 
     /// [`World::step`] of what has been checked.
@@ -306,32 +307,30 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// See [`World::check`] and [`World::check_velocities`].
     pub(crate) fn initialize(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<State<S>> {
-        let mut rows = self.rows_of(initial)?;
+        let mut state = self.with_deflections(initial.clone());
         let first = Step { index: 0, start: initial.time, dt: time_steps.dt };
-        self.check(&rows, first)?;
+        self.check(&state, first)?;
         self.check_velocities([initial.time, time_steps.end(initial.time)])?;
-        self.place_bodies(&mut rows, initial.time);
-        Ok(initial.with(rows, initial.time))
+        self.place_bodies(state.rows_mut(), initial.time);
+        Ok(state)
     }
 
     /// Checks that a rollout may begin.
-    pub(crate) fn check(&self, rows: &Rows<S>, step: Step) -> Result<()> {
+    pub(crate) fn check(&self, state: &State<S>, step: Step) -> Result<()> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
         }
         if !start.is_finite() {
-            return Err(SimulationError::TimeStep(start));
+            return Err(SimulationError::Time(start));
         }
-        if rows.len() != self.state_count() {
-            return Err(self.wrong_count(rows.len()));
-        }
+        self.check_count(state)?;
         self.contact_materials().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
         self.bushings.iter().try_for_each(Bushing::check)?;
-        match rows.iter().all(BodyState::is_finite) {
+        match state.rows().iter().all(BodyState::is_finite) {
             true => Ok(()),
-            false => Err(self.not_finite(rows, rows, start)),
+            false => Err(self.not_finite(state.rows(), state.rows(), start)),
         }
     }
 }

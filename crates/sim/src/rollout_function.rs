@@ -186,7 +186,7 @@ impl<I: Integrator> RolloutFunction<I> {
         }
         for step in self.steps() {
             let world = self.template.world(&self.places, &self.values_at(&inputs, step.index))?;
-            world.check(state.rows(), step)?;
+            world.check(&state, step)?;
             state = world.advance(integrator, &state, step)?;
             visit(&state);
         }

@@ -2,6 +2,7 @@
 
 use std::ops::{Index, IndexMut};
 
+use nalgebra::Isometry3;
 use prehend_autodiff::Scalar;
 
 use crate::body_state::BodyState;
@@ -68,6 +69,11 @@ impl<S: Scalar> State<S> {
 
     pub(crate) fn rows_mut(&mut self) -> &mut [BodyState<S>] {
         &mut self.rows
+    }
+
+    /// Adds rows at rest, or leaves the last ones out.
+    pub(crate) fn resize_rows(&mut self, count: usize) {
+        self.rows.resize(count, BodyState::at_rest(Isometry3::identity()));
     }
 
     /// State of the same world with other rows at another time \[s\].

@@ -50,6 +50,12 @@ pub(crate) fn change(
     Ok(())
 }
 
+/// Positions and velocities apart from arrays that may be views of the states.
+fn owned(position: Numbers<'_>, velocity: Option<Numbers<'_>>) -> (Vec<f64>, Option<Vec<f64>>) {
+    let copy = |numbers: Numbers<'_>| in_order(&numbers).into_owned();
+    (copy(position), velocity.map(copy))
+}
+
 #[pymethods]
 impl World {
     /// States in which everything is at rest, frames of bodies at the origin and joints at their neutral coordinates: a row of 13 for
@@ -117,12 +123,8 @@ impl World {
         position: Numbers<'_>,
         velocity: Option<Numbers<'_>>,
     ) -> PyResult<()> {
-        let (position_like, velocity_like) = (position, velocity);
         let id = self.id(&link)?;
-        let position = in_order(&position_like).into_owned();
-        let velocity = velocity_like.as_ref().map(|v| in_order(v).into_owned());
-        // They may be views of the states.
-        drop((position_like, velocity_like));
+        let (position, velocity) = owned(position, velocity);
         change(&self.world, states, |all| {
             let still = vec![0.0; self.world.joint(all, id).raise()?.velocity.len()];
             self.world.set_joint(all, id, &position, &velocity.unwrap_or(still)).raise()
@@ -156,11 +158,7 @@ impl World {
         position: Numbers<'_>,
         velocity: Option<Numbers<'_>>,
     ) -> PyResult<()> {
-        let (position_like, velocity_like) = (position, velocity);
-        let position = in_order(&position_like).into_owned();
-        let velocity = velocity_like.as_ref().map(|v| in_order(v).into_owned());
-        // They may be views of the states.
-        drop((position_like, velocity_like));
+        let (position, velocity) = owned(position, velocity);
         let velocity = velocity.unwrap_or_else(|| vec![0.0; self.world.degrees_of_freedom()]);
         change(&self.world, states, |all| {
             self.world.set_generalized_coordinates(all, &position, &velocity).raise()

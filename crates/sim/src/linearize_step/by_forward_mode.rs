@@ -24,7 +24,7 @@ impl World {
     ) -> Result<LinearizedStep> {
         let n = self.degrees_of_freedom();
         let next = self.step(&SemiImplicitEuler, state, step)?;
-        let start = state.with(self.with_deflections(state.rows()), state.time);
+        let start = self.with_deflections(state.clone());
         let slopes = |after: &State<Fwd<1>>| {
             let displacement = self.displacement(&next, after).into_iter();
             DVector::from_iterator(2 * n, displacement.map(|x| x.derivative[0]))

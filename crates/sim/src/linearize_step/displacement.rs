@@ -13,11 +13,6 @@ use crate::state::State;
 use crate::world::World;
 
 impl World {
-    /// Number N of degrees of freedom: six for each free body and as many as each joint has velocities.
-    pub fn degrees_of_freedom(&self) -> usize {
-        6 * self.free_bodies().len() + self.joints().map(Joint::nv).sum::<usize>()
-    }
-
     /// State displaced \[m, rad\] and sped up \[m/s, rad/s\] by 2N numbers, as a [`LinearizedStep`] orders them. Deflections of contacts stay.
     ///
     /// # Panics

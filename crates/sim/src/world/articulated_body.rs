@@ -122,11 +122,8 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// If they are too few or too many.
     pub fn state_of_rows(&self, rows: Vec<BodyState<S>>, time: f64) -> Result<State<S>> {
-        let rows = self.with_deflections(rows);
-        match rows.len() == self.state_count() {
-            true => Ok(State::from_rows(rows, self.bodies.len(), time)),
-            false => Err(self.wrong_count(rows.len())),
-        }
+        let state = self.with_deflections(State::from_rows(rows, self.bodies.len(), time));
+        self.check_count(&state).map(|()| state)
     }
 
     /// Puts the frame of a body that is no link at `t_world_model`. Its velocities stay.

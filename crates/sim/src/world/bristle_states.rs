@@ -3,7 +3,7 @@
 //! They follow the states of the bodies and joints, in the order of the contacts. Each is a state at the origin, whose velocities are the
 //! deflection of the contact's [`Bristles`]: a twist along the axes of the field, \[m\] and \[rad\].
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Vector6;
 use prehend_autodiff::Scalar;
 
 use super::World;
@@ -56,24 +56,20 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// `states` with those of contacts with bristles, not deflected if they are missing.
-    pub(crate) fn with_deflections(
-        &self,
-        states: impl Into<Vec<BodyState<S>>>,
-    ) -> Vec<BodyState<S>> {
-        let mut states = states.into();
-        if states.len() == self.bodies.len() + self.joint_count() {
-            states.resize(self.state_count(), BodyState::at_rest(Isometry3::identity()));
+    /// `state` with the deflections of contacts with bristles, zero if they are missing.
+    pub(crate) fn with_deflections(&self, mut state: State<S>) -> State<S> {
+        if state.rows().len() == self.bodies.len() + self.joint_count() {
+            state.resize_rows(self.state_count());
         }
-        states
+        state
     }
 
-    /// Rows of a state of this world, with deflections where it has none.
-    pub(crate) fn rows_of(&self, state: &State<S>) -> Result<Vec<BodyState<S>>> {
-        let rows = self.with_deflections(state.rows());
-        match state.bodies().len() == self.bodies.len() && rows.len() == self.state_count() {
-            true => Ok(rows),
-            false => Err(self.wrong_count(state.rows().len())),
+    /// An error unless a state has the bodies, joints and contacts with bristles of this world.
+    pub(crate) fn check_count(&self, state: &State<S>) -> Result<()> {
+        let rows = state.rows().len();
+        match state.bodies().len() == self.bodies.len() && rows == self.state_count() {
+            true => Ok(()),
+            false => Err(self.wrong_count(rows)),
         }
     }
 

@@ -4,10 +4,25 @@ use prehend_autodiff::Scalar;
 
 use crate::articulated::{Joint, JointState};
 use crate::error::{Result, SimulationError};
+use crate::handle::BodyId;
 use crate::state::State;
 use crate::world::World;
 
 impl<S: Scalar> World<S> {
+    /// Number N of degrees of freedom: six for each free body and as many as each joint has velocities.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.coordinates().map(|(.., joint)| joint.nv()).sum()
+    }
+
+    /// Row, body and joint of free bodies, which float, then of links.
+    fn coordinates(&self) -> impl Iterator<Item = (usize, BodyId, &Joint)> {
+        let free = self.free_bodies().into_iter();
+        let free = free.map(|body| (body.index(), body, &Joint::Floating));
+        let links = self.articulations.iter().flat_map(|own| own.bodies());
+        let joints = self.joint_places().zip(links).zip(self.joints());
+        free.chain(joints.map(|((row, link), joint)| (row, *link, joint)))
+    }
+
     /// Generalized positions and velocities, `qpos` and `qvel` of MuJoCo: of free bodies, then of joints, in the order in which they were added.
     ///
     /// | | position | velocity |
@@ -21,11 +36,8 @@ impl<S: Scalar> World<S> {
     /// If it is no state of this world.
     pub fn generalized_coordinates(&self, state: &State<S>) -> JointState<S> {
         let (mut position, mut velocity) = (Vec::new(), Vec::new());
-        for body in self.free_bodies() {
-            Joint::Floating.read(&state[body], &mut position, &mut velocity);
-        }
-        for (place, joint) in self.joint_places().zip(self.joints()) {
-            joint.read(&state.rows()[place], &mut position, &mut velocity);
+        for (row, _, joint) in self.coordinates() {
+            joint.read(&state.rows()[row], &mut position, &mut velocity);
         }
         JointState { position, velocity }
     }
@@ -43,31 +55,20 @@ impl<S: Scalar> World<S> {
         position: &[S],
         velocity: &[S],
     ) -> Result<()> {
-        let free = self.free_bodies();
-        let [nq, nv] = self.joints().fold([7 * free.len(), 6 * free.len()], |[nq, nv], joint| {
-            [nq + joint.nq(), nv + joint.nv()]
-        });
-        let (given, expected) = ([position.len(), velocity.len()], [nq, nv]);
+        let nq = self.coordinates().map(|(.., joint)| joint.nq()).sum();
+        let given = [position.len(), velocity.len()];
+        let expected = [nq, self.degrees_of_freedom()];
         if given != expected {
             return Err(SimulationError::GeneralizedCoordinates { given, expected });
         }
         let mut changed = state.clone();
         let (mut position, mut velocity) = (position, velocity);
-        let mut next = |nq, nv| {
+        for (row, body, joint) in self.coordinates() {
             let (q, v);
-            (q, position) = position.split_at(nq);
-            (v, velocity) = velocity.split_at(nv);
-            (q, v)
-        };
-        for body in free {
-            let (q, v) = next(7, 6);
-            self.check_rotation(body, &Joint::Floating, q)?;
-            changed[body] = Joint::Floating.write(q, v);
-        }
-        let links = self.articulations.iter().flat_map(|own| own.bodies());
-        for (link, joint) in links.zip(self.joints()) {
-            let (q, v) = next(joint.nq(), joint.nv());
-            self.write_joint(changed.rows_mut(), *link, q, v)?;
+            (q, position) = position.split_at(joint.nq());
+            (v, velocity) = velocity.split_at(joint.nv());
+            self.check_rotation(body, joint, q)?;
+            changed.rows_mut()[row] = joint.write(q, v);
         }
         self.forward_kinematics(changed.rows_mut());
         *state = changed;

@@ -46,7 +46,7 @@ impl<S: Scalar> World<S> {
     /// # Panics
     /// If it is no state of this world.
     pub fn wrenches(&self, state: &State<S>, step: usize) -> Vec<Vector6<S>> {
-        let mut wrenches = self.wrenches_of(&self.with_deflections(state.rows()), step);
+        let mut wrenches = self.wrenches_of(self.with_deflections(state.clone()).rows(), step);
         wrenches.truncate(self.bodies.len());
         wrenches
     }

@@ -83,7 +83,8 @@ impl<S: Scalar> World<S> {
 
     /// A state with links where their joints put them.
     pub(crate) fn sensed(&self, state: &State<S>) -> Result<State<S>> {
-        let mut state = state.with(self.rows_of(state)?, state.time);
+        let mut state = self.with_deflections(state.clone());
+        self.check_count(&state)?;
         self.forward_kinematics(state.rows_mut());
         Ok(state)
     }

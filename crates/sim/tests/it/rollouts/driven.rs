@@ -144,10 +144,9 @@ fn runs_go_on_from_the_time_of_their_state() {
         for end in ends {
             assert!((end.time - TIME).abs() < 1e-12, "{}", end.time);
             for (a, b) in end.bodies().iter().zip(whole.bodies()) {
-                let off =
-                    coordinates(a).into_iter().zip(coordinates(b)).map(|(a, b)| (a - b).abs());
-                let off = off.fold(0.0, f64::max);
-                assert!(off < tolerance, "{off}");
+                let pairs = coordinates(a).into_iter().zip(coordinates(b));
+                let difference = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(difference < tolerance, "{difference}");
             }
         }
         assert!((seen[0] - half.time).abs() < 1e-15 && (seen[149] - TIME + 2e-4).abs() < 1e-12);
