@@ -1,12 +1,12 @@
 //! Rows of states.
 
-use numpy::ndarray::{ArrayView1, IxDyn};
+use numpy::ndarray::ArrayView1;
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use prehend_sim::{BodyState, Motion, State};
 use pyo3::prelude::*;
 
 use super::{BodyKey, World};
-use crate::arrays::{Numbers, array, in_order, matrix, pose, vector_or};
+use crate::arrays::{Array, Numbers, array, in_order, matrix, pose, vector_or};
 use crate::error::{Raise, wrong};
 use crate::rollout::STATE;
 
@@ -60,10 +60,7 @@ fn owned(position: Numbers<'_>, velocity: Option<Numbers<'_>>) -> (Vec<f64>, Opt
 impl World {
     /// States in which everything is at rest, frames of bodies at the origin and joints at their neutral coordinates: a row of 13 for
     /// each body, then for each joint, then for each contact with bristles, which is not deflected.
-    fn neutral_states<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
+    fn neutral_states<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let state = self.world.neutral_state();
         let rows = state.rows();
         array(py, rows.iter().flat_map(BodyState::coordinates).collect(), &[rows.len(), STATE])
@@ -108,7 +105,7 @@ impl World {
         py: Python<'py>,
         states: Numbers<'py>,
         body: BodyKey,
-    ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
+    ) -> PyResult<Array<'py>> {
         let (id, state) = (self.id(&body)?, self::state(&self.world, &states)?);
         matrix(py, &self.world.pose(&state, id))
     }
@@ -143,8 +140,7 @@ impl World {
         &self,
         py: Python<'py>,
         states: Numbers<'py>,
-    ) -> PyResult<(Bound<'py, numpy::PyArray<f64, IxDyn>>, Bound<'py, numpy::PyArray<f64, IxDyn>>)>
-    {
+    ) -> PyResult<(Array<'py>, Array<'py>)> {
         let all = self.world.generalized_coordinates(&self::state(&self.world, &states)?);
         let (nq, nv) = (all.position.len(), all.velocity.len());
         Ok((array(py, all.position, &[nq])?, array(py, all.velocity, &[nv])?))
