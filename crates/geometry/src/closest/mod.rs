@@ -7,14 +7,12 @@ mod pack;
 mod search;
 mod topology;
 pub(crate) mod triangle;
-mod walk;
 mod winding;
 
 use nalgebra::{Point3, Vector3};
 
 pub use self::derivative::ClosestDerivative;
 pub use self::triangle::Feature;
-pub(crate) use self::walk::Walk;
 
 use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
@@ -214,15 +212,20 @@ impl ClosestPoints {
         Some(self.signed(point, Some(closest)))
     }
 
-    /// As [`Self::signed_distance`] from a hint, with the face of the answer only.
-    #[inline]
-    pub(crate) fn signed_distance_hinted(
-        &self,
-        point: &Point3<f64>,
-        hint: Option<u32>,
-    ) -> (f64, u32) {
-        let (signed, closest) = self.signed(point, self.search(point, f64::INFINITY, hint));
-        (signed, closest.face)
+    /// Whether the sign of a distance is that of the angle between two vectors, as it is for closed meshes.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.sign_method() == SignMethod::PseudoNormal
+    }
+
+    /// Whether `point` is inside by its winding number, and, where `wants_radius`, the radius of a ball around it \[m\] within which that changes
+    /// across the surface alone.
+    pub(crate) fn side_around(&self, point: &Point3<f64>, wants_radius: bool) -> (bool, f64) {
+        let (Sign::Winding(winding) | Sign::PseudoNormal(_, _, winding)) = &self.sign;
+        if wants_radius {
+            winding.around(&self.bvh, &point.coords)
+        } else {
+            (winding.is_inside(&self.bvh, &point.coords), 0.0)
+        }
     }
 
     /// Adds the sign to the answer for `point`; no answer, for a point that is not finite, becomes NaN.
@@ -284,6 +287,11 @@ impl ClosestPoints {
             }
         }
     }
+}
+
+/// Distance from a point to a box, zero inside \[m\].
+pub(crate) fn box_distance(bounds: &(Point3<f64>, Point3<f64>), point: &Point3<f64>) -> f64 {
+    (bounds.0 - point).sup(&(point - bounds.1)).sup(&Vector3::zeros()).norm()
 }
 
 /// The edge opposite the corner of smallest weight.

@@ -62,7 +62,7 @@ impl Bvh {
 
 /// The numbers of the bits that are set, ascending.
 #[inline(always)]
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = (bits != 0).then_some(bits.trailing_zeros() as usize);
         bits &= bits.wrapping_sub(1);

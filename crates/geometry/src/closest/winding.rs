@@ -3,20 +3,54 @@
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
-use wide::f64x4;
+use wide::{f32x8, f64x4};
 
 use super::bvh::{Bvh, Child, child};
-use super::pack::LANES;
+use super::pack::{LANES, Point8, dot3};
+use super::search::lanes;
 use super::triangle::Triangle;
 use crate::mesh::TriMesh;
 use crate::topology::edges;
 
-/// A group of triangles seen from afar: its area vector at its center of area.
-#[derive(Clone, Copy, Debug)]
-struct Dipole {
-    center: Vector3<f64>,
-    area_vector: Vector3<f64>,
-    radius: f64,
+/// Eight groups of triangles seen from afar: their area vectors \[m²\] at their centers of area \[m\], from the center of the mesh.
+#[derive(Clone, Debug)]
+struct Dipoles {
+    center: [f32x8; 3],
+    area_vector: [f32x8; 3],
+    radius: f32x8,
+    /// Lanes in use, one bit each.
+    used: u32,
+}
+
+impl Dipoles {
+    /// Of center, area vector and radius of each group.
+    fn new(groups: &[(Vector3<f64>, Vector3<f64>, f64)]) -> Self {
+        let column = |number: &dyn Fn(&(Vector3<f64>, Vector3<f64>, f64)) -> f64| {
+            let mut column = [0.0; LANES];
+            for (x, group) in column.iter_mut().zip(groups) {
+                *x = number(group) as f32;
+            }
+            f32x8::from(column)
+        };
+        Self {
+            center: [0, 1, 2].map(|i| column(&|group| group.0[i])),
+            area_vector: [0, 1, 2].map(|i| column(&|group| group.1[i])),
+            radius: column(&|group| group.2),
+            used: (1 << groups.len()) - 1,
+        }
+    }
+
+    /// Sum of the solid angles of the groups that are farther than `far` radii from `p` \[sr\], and a bit for each of the others.
+    #[inline]
+    fn seen_from(&self, p: &Point8, far: f32) -> (f32, u32) {
+        let r = [self.center[0] - p[0], self.center[1] - p[1], self.center[2] - p[2]];
+        let squared = dot3(&r, &r);
+        let limit = self.radius * f32x8::splat(far);
+        let is_far = squared.simd_gt(limit * limit);
+        let solid_angle = dot3(&self.area_vector, &r) / (squared * squared.sqrt());
+        let sum = is_far.select(solid_angle, f32x8::ZERO).reduce_add();
+        (sum, !is_far.to_bitmask() & self.used)
+    }
 }
 
 /// Dipoles of every child of every node of a tree.
@@ -26,7 +60,7 @@ struct Dipole {
 /// the first-order term only, in two steps of [`Accuracy`].
 #[derive(Clone, Debug)]
 pub(super) struct Winding {
-    dipoles: Vec<[Dipole; LANES]>,
+    dipoles: Vec<Dipoles>,
     /// Edges at which the surface ends; none where they are more than [`MOST_ENDS`].
     ends: Option<Vec<End>>,
 }
@@ -40,22 +74,16 @@ struct End {
 }
 
 impl End {
-    /// Distance r from `p` \[m\], and ∫ dl/|x − p|² along the edge, times the surplus \[1/m\].
+    /// Distance r from `p` \[m\], and a bound of ∫ dl/|x − p|² along the edge, times the surplus \[1/m\].
     fn seen_from(&self, p: &Vector3<f64>) -> [f64; 2] {
         let [a, b] = self.vertices.map(|v| v - p);
         let along = b - a;
-        let length = along.norm();
-        let nearest = a + along * (-a.dot(&along) / length.powi(2)).clamp(0.0, 1.0);
+        let squared_length = along.norm_squared();
+        let nearest = a + along * (-a.dot(&along) / squared_length).clamp(0.0, 1.0);
         let distance = nearest.norm();
-        let cross = a.cross(&b).norm();
-        let height = cross / length;
-        // The angle of sight over the distance of the line; beside that line rounding would decide.
-        let integral = if height > 1e-3 * distance {
-            cross.atan2(a.dot(&b)) / height
-        } else {
-            length / distance.powi(2)
-        };
-        [distance, integral * self.surplus]
+        // An endless line has π/r.
+        let bound = (squared_length.sqrt() / distance).min(PI) / distance;
+        [distance, bound * self.surplus]
     }
 }
 
@@ -63,7 +91,7 @@ impl End {
 #[derive(Clone, Copy)]
 pub(super) struct Accuracy {
     /// Distance in radii from which a group is a dipole.
-    far: f64,
+    far: f32,
     /// Error of the winding number with a margin, for surfaces of some layers.
     certain: f64,
 }
@@ -78,13 +106,13 @@ const MOST_ENDS: usize = 1000;
 
 impl Winding {
     pub(super) fn new(mesh: &TriMesh, bvh: &Bvh) -> Self {
-        let none = Dipole { center: Vector3::zeros(), area_vector: Vector3::zeros(), radius: 0.0 };
-        let mut dipoles = vec![[none; LANES]; bvh.nodes.len()];
+        let mut dipoles = vec![Dipoles::new(&[]); bvh.nodes.len()];
         // (area, area-weighted center, area vector) of each node; children come after their parents.
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {
             let node = &bvh.nodes[n];
-            for (lane, dipole) in dipoles[n].iter_mut().enumerate().take(node.used) {
+            let mut groups = Vec::with_capacity(LANES);
+            for lane in 0..node.used {
                 let (area, weighted, area_vector) = match child(node.child[lane]) {
                     Child::Node(index) => sums[index],
                     Child::Pack(pack) => bvh.triangles_of(pack).iter().fold(
@@ -92,7 +120,7 @@ impl Winding {
                         |(area, weighted, sum), t| {
                             let vector = t.ab.cross(&t.ac) * 0.5;
                             let own = vector.norm();
-                            let centroid = t.a + (t.ab + t.ac) / 3.0;
+                            let centroid = t.a - bvh.center + (t.ab + t.ac) / 3.0;
                             (area + own, weighted + centroid * own, sum + vector)
                         },
                     ),
@@ -101,30 +129,24 @@ impl Winding {
                 sums[n].1 += weighted;
                 sums[n].2 += area_vector;
                 let (middle, reach) = node.ball(lane);
-                let middle = middle + bvh.center;
                 let center = if area > 0.0 { weighted / area } else { middle };
-                let radius = (center - middle).norm() + reach;
-                *dipole = Dipole { center, area_vector, radius };
+                groups.push((center, area_vector, (center - middle).norm() + reach));
             }
+            dipoles[n] = Dipoles::new(&groups);
         }
         Self { dipoles, ends: ends(mesh) }
     }
 
     /// Winding number of the mesh about `p`: 1 inside and 0 outside of a closed mesh, between for an open one.
     pub(super) fn at(&self, bvh: &Bvh, p: &Vector3<f64>, accuracy: Accuracy) -> f64 {
+        let local = (p - bvh.center).map(|x| f32x8::splat(x as f32)).into();
         let mut solid_angle = 0.0;
         let mut open = vec![0usize];
         while let Some(n) = open.pop() {
-            let node = &bvh.nodes[n];
-            for lane in 0..node.used {
-                let dipole = &self.dipoles[n][lane];
-                let r = dipole.center - p;
-                let distance = r.norm();
-                if distance > accuracy.far * dipole.radius {
-                    solid_angle += dipole.area_vector.dot(&r) / distance.powi(3);
-                    continue;
-                }
-                match child(node.child[lane]) {
+            let (far, near) = self.dipoles[n].seen_from(&local, accuracy.far);
+            solid_angle += f64::from(far);
+            for lane in lanes(near) {
+                match child(bvh.nodes[n].child[lane]) {
                     Child::Node(index) => open.push(index),
                     Child::Pack(pack) => solid_angle += solid_angle_of(bvh.triangles_of(pack), p),
                 }
@@ -148,22 +170,26 @@ impl Winding {
         if coarse.1 > 0.0 { coarse } else { with(FINE) }
     }
 
-    /// Whether `p`, at this distance from the surface, is inside, and the radius of a ball around it of which the same is true.
+    /// Whether `p` is inside, and the radius of a ball around it \[m\] within which that changes across the surface alone.
     ///
     /// Off the surface the number changes as the potential of currents along the ends does (Biot and Savart's law): by less than the sum of
-    /// ∫ dl/(4π|x − p|²) along them, which grows by less than (1 − ρ/r)⁻² within a radius ρ below their distances r.
-    pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>, distance: f64) -> (bool, f64) {
-        let (inside, spare) = self.side(bvh, p);
+    /// ∫ dl/(4π|x − p|²) along them, which grows by less than (1 − ρ/r)⁻² within a radius ρ below their distances r. A ball without ends has
+    /// no currents, so that the change between two points is that along the line, whatever the path.
+    pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>) -> (bool, f64) {
+        let number = self.at(bvh, p, FINE).abs();
+        let (inside, spare) = (number > 0.5, (number - 0.5).abs() - FINE.certain);
         let ends = self.ends.as_ref().filter(|_| spare > 0.0);
         let Some(ends) = ends else { return (inside, 0.0) };
         let seen: Vec<[f64; 2]> = ends.iter().map(|end| end.seen_from(p)).collect();
+        let nearest = seen.iter().fold(f64::INFINITY, |nearest, [r, _]| r.min(nearest));
         let changes_less = |radius: &f64| {
-            let rate = |[distance, integral]: &[f64; 2]| {
-                integral / (1.0 - radius / distance).max(0.0).powi(2)
-            };
+            let rate = |[distance, bound]: &[f64; 2]| bound / (1.0 - radius / distance).powi(2);
             seen.iter().map(rate).sum::<f64>() * radius < spare * 4.0 * PI
         };
-        let radii = [distance, 0.5 * distance, 0.25 * distance];
+        if seen.is_empty() {
+            return (inside, f64::INFINITY);
+        }
+        let radii = [0.8, 0.4, 0.2, 0.1, 0.05].map(|part| part * nearest);
         (inside, radii.into_iter().find(changes_less).unwrap_or(0.0))
     }
 }

@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 
 use super::PosedRobot;
-use super::shape::box_distance;
 use crate::closest::Closest;
+use crate::closest::box_distance;
 
 /// A closest point of a robot's bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::shape::box_distance;
 use super::{RobotError, RobotShape};
+use crate::closest::box_distance;
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
 use crate::sdf::SdfGrid;

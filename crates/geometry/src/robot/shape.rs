@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::{KinematicTree, RobotError};
-use crate::closest::{ClosestPoints, Walk};
+use crate::closest::{ClosestPoints, box_distance};
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
-use crate::sdf::{GridCache, SdfGrid};
+use crate::sdf::{GridCache, Lattice, SdfGrid};
 
 /// The collision shape of one link, in the link frame.
 #[derive(Clone, Debug)]
@@ -38,15 +38,8 @@ impl LinkShape {
             .map(|bounds| {
                 let spacing = spacing.max((bounds.1 - bounds.0).max() / MOST_CELLS);
                 let build = || {
-                    let closest = &closest;
-                    SdfGrid::from_fn(bounds, spacing, margin, || {
-                        let mut walks: Vec<Walk<'_>> = closest.iter().map(Walk::new).collect();
-                        move |p: &Point3<f64>, bound: f64| {
-                            union_distance(closest, p, bound, |k, most| {
-                                walks[k].signed_distance_within(p, most)
-                            })
-                        }
-                    })
+                    Lattice::around(bounds, spacing, margin)
+                        .map(|lattice| SdfGrid::of_union(&closest, bounds, lattice))
                 };
                 match cache {
                     Some(cache) => cache.grid(parts, bounds, [spacing, margin], build),
@@ -78,8 +71,13 @@ impl LinkShape {
     /// The smallest of the bodies' own distances: exact outside; inside where bodies overlap it
     /// understates the depth, which never exceeds the depth in the union.
     pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
-        union_distance(&self.closest, point, f64::INFINITY, |k, most| {
-            self.closest[k].signed_distance_within(point, most).map(|(distance, _)| distance)
+        self.closest.iter().fold(f64::INFINITY, |best, body| {
+            let gap = box_distance(&body.bounds(), point);
+            // Outside its box a body matters only if nearer than the best; inside it may also be deeper.
+            let limit = if gap > 0.0 { best.max(0.0) } else { f64::INFINITY };
+            let within = || body.signed_distance_within(point, limit);
+            let distance = if gap > limit { None } else { within() };
+            distance.map_or(best, |(distance, _)| best.min(distance))
         })
     }
 }
@@ -101,29 +99,6 @@ impl DistanceField for LinkShape {
     fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
         self.grid()?.bounding_ball()
     }
-}
-
-/// Smallest signed distance to any of the bodies, where it is at most `bound` from zero; `within` gives that to a body.
-fn union_distance(
-    bodies: &[ClosestPoints],
-    point: &Point3<f64>,
-    bound: f64,
-    mut within: impl FnMut(usize, f64) -> Option<f64>,
-) -> f64 {
-    bodies.iter().enumerate().fold(f64::INFINITY, |best, (k, body)| {
-        let gap = box_distance(&body.bounds(), point);
-        if gap > best.max(0.0) {
-            return best;
-        }
-        // Outside its box a body matters only if nearer than the best; inside it may also be deeper.
-        let limit = if gap > 0.0 { best.max(0.0).min(bound) } else { bound };
-        within(k, limit).map_or(best, |distance| best.min(distance))
-    })
-}
-
-/// Distance from a point to a box, zero inside \[m\].
-pub(super) fn box_distance(bounds: &(Point3<f64>, Point3<f64>), point: &Point3<f64>) -> f64 {
-    (bounds.0 - point).sup(&(point - bounds.1)).sup(&Vector3::zeros()).norm()
 }
 
 /// The collision shape of a robot in no particular pose. Links of equal geometry share theirs.

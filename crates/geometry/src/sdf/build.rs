@@ -3,8 +3,12 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use super::sides::{Block, add_insides};
 use super::{Lattice, SdfError, SdfGrid};
-use crate::closest::ClosestPoints;
+use crate::closest::{ClosestPoints, box_distance};
+
+/// Planes of samples along x that one task measures.
+const PLANES: usize = 16;
 
 impl SdfGrid {
     /// Samples the signed distance to a mesh every `spacing` \[m\], up to at least `margin` \[m\] around
@@ -18,59 +22,87 @@ impl SdfGrid {
 
     /// As [`Self::build`], with the samples of a given lattice.
     pub fn build_on(mesh: &ClosestPoints, lattice: Lattice) -> Self {
-        let [_, ny, nz] = lattice.dims();
-        let mut values = vec![0.0; lattice.dims().iter().product()];
-        values.par_chunks_mut(ny * nz).enumerate().for_each(|(i, slab)| {
-            sample_slab(mesh, &lattice, i, slab);
-        });
-        Self::from_samples(lattice, &values, mesh.bounds())
+        Self::of_union(std::slice::from_ref(mesh), mesh.bounds(), lattice)
     }
 
-    /// Samples any signed distance of a shape within `bounds` \[m\].
-    ///
-    /// `start` begins a walk from sample to sample, of which there are several at once. It gets a point and an upper bound of the unsigned
-    /// distance there (infinite where none is known): that of the sample before plus the step between them.
+    /// Samples the smallest signed distance to any of several meshes within `bounds` \[m\].
+    pub(crate) fn of_union(
+        meshes: &[ClosestPoints],
+        bounds: (Point3<f64>, Point3<f64>),
+        lattice: Lattice,
+    ) -> Self {
+        let [_, ny, nz] = lattice.dims();
+        let mut values = vec![0.0; lattice.dims().iter().product()];
+        values.par_chunks_mut(PLANES * ny * nz).enumerate().for_each(|(block, values)| {
+            sample(meshes, &Block::new(&lattice, block * PLANES, values.len()), values);
+        });
+        Self::from_samples(lattice, &values, bounds)
+    }
+
+    /// Samples any signed distance \[m\] of a shape within `bounds` \[m\].
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn from_fn<D: FnMut(&Point3<f64>, f64) -> f64>(
+    pub fn from_fn(
         bounds: (Point3<f64>, Point3<f64>),
         spacing: f64,
         margin: f64,
-        start: impl Fn() -> D + Sync,
+        distance: impl Fn(&Point3<f64>) -> f64 + Sync,
     ) -> Result<Self, SdfError> {
         let lattice = Lattice::around(bounds, spacing, margin)?;
         let [_, ny, nz] = lattice.dims();
         let mut values = vec![0.0; lattice.dims().iter().product()];
-        values.par_chunks_mut(ny * nz).enumerate().for_each(|(i, slab)| {
-            let (mut distance, mut bound) = (start(), f64::INFINITY);
-            for (j, line) in slab.chunks_mut(nz).enumerate() {
-                for step in 0..nz {
-                    // To and fro, so that each sample is next to the one before.
-                    let k = if j % 2 == 0 { step } else { nz - 1 - step };
-                    line[k] = distance(&lattice.position([i, j, k]), bound);
-                    // A distance changes by at most the length of the step; the rest is rounding.
-                    bound = (line[k].abs() + spacing) * (1.0 + 1e-9);
-                }
-            }
+        values.par_iter_mut().enumerate().for_each(|(n, value)| {
+            *value = distance(&lattice.position([n / (ny * nz), n / nz % ny, n % nz]));
         });
         Ok(Self::from_samples(lattice, &values, bounds))
     }
 }
 
-/// Samples `i` along x; each search starts from the answer of a neighbor.
-fn sample_slab(mesh: &ClosestPoints, lattice: &Lattice, i: usize, slab: &mut [f64]) {
-    let nz = lattice.dims()[2];
-    let mut row_hint = None;
-    for (j, line) in slab.chunks_mut(nz).enumerate() {
-        let mut hint = row_hint;
-        for (k, value) in line.iter_mut().enumerate() {
-            let (signed, face) = mesh.signed_distance_hinted(&lattice.position([i, j, k]), hint);
-            *value = signed;
-            hint = Some(face);
-            if k == 0 {
-                row_hint = hint;
+/// A mesh of a union, and what was found at the last samples.
+struct Part<'a> {
+    mesh: &'a ClosestPoints,
+    /// Face of the last answer.
+    face: Option<u32>,
+    /// Distances \[m\], without signs, of a mesh whose insides are to be found from all of them; NaN where others are nearer.
+    unsigned: Vec<f64>,
+}
+
+/// The smallest signed distance to any of the meshes at the samples of a block.
+fn sample(meshes: &[ClosestPoints], block: &Block, values: &mut [f64]) {
+    let mut parts = Vec::with_capacity(meshes.len());
+    for mesh in meshes {
+        let count = if mesh.is_closed() { 0 } else { values.len() };
+        parts.push(Part { mesh, face: None, unsigned: vec![f64::NAN; count] });
+    }
+    // What is nearest may be outside of one and inside of another, unknown yet.
+    let is_bounded = meshes.len() == 1 || meshes.iter().all(ClosestPoints::is_closed);
+    let mut bound = f64::INFINITY;
+    block.for_each(|n, point| {
+        let value = parts.iter_mut().fold(f64::INFINITY, |best: f64, part| {
+            let gap = box_distance(&part.mesh.bounds(), point);
+            // Outside its box a mesh matters only if nearer than the best; inside it may also be deeper.
+            let limit = if gap > 0.0 { best.max(0.0).min(bound) } else { bound };
+            if gap > limit {
+                return best;
             }
+            let Some(closest) = part.mesh.search(point, limit, part.face) else { return best };
+            part.face = Some(closest.face);
+            match part.unsigned.get_mut(n) {
+                Some(unsigned) => {
+                    *unsigned = closest.distance;
+                    best.min(closest.distance)
+                }
+                None => best.min(part.mesh.signed(point, Some(closest)).0),
+            }
+        });
+        values[n] = value;
+        if is_bounded {
+            // A distance changes by at most the length of the step; the rest is rounding.
+            bound = (value.abs() + block.spacing()) * (1.0 + 1e-9);
         }
+    });
+    for part in parts.iter().filter(|part| !part.unsigned.is_empty()) {
+        add_insides(part.mesh, block, &part.unsigned, values);
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::Lattice;
 use super::spline::{Basis, prefilter};
+use crate::closest::box_distance;
 use crate::field::{DistanceField, FieldSample};
 
 /// A signed distance on a uniform grid, interpolated by a tricubic B-spline (twice continuously
@@ -73,8 +74,7 @@ impl SdfGrid {
     /// Distance from `point` to the box around the shape: never above the exact distance outside \[m\].
     #[inline]
     pub fn lower_bound(&self, point: &Point3<f64>) -> f64 {
-        let (lo, hi) = &self.bounds;
-        (lo - point).sup(&(point - hi)).sup(&Vector3::zeros()).norm()
+        box_distance(&self.bounds, point)
     }
 
     /// True unless the spline is above `reach` at `point`: outside of the box, too, it may be less than the distance by a fraction of the spacing. Written

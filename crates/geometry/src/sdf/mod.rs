@@ -6,6 +6,7 @@ mod file;
 mod grid;
 mod heights;
 mod lattice;
+mod sides;
 mod spline;
 
 pub use cache::GridCache;

@@ -5,8 +5,8 @@ use crate::shapes::cuboid;
 
 fn sphere(radius: f64, spacing: f64, margin: f64) -> SdfGrid {
     let corner = Point3::new(radius, radius, radius);
-    let distance = |p: &Point3<f64>, _: f64| p.coords.norm() - radius;
-    SdfGrid::from_fn((-corner, corner), spacing, margin, || distance).unwrap()
+    let distance = |p: &Point3<f64>| p.coords.norm() - radius;
+    SdfGrid::from_fn((-corner, corner), spacing, margin, distance).unwrap()
 }
 
 #[test]
@@ -120,6 +120,29 @@ fn ball(closed: bool) -> ClosestPoints {
     ClosestPoints::new(&mesh).unwrap()
 }
 
+/// Each sample is the exact distance, also where the surface is open, has two walls or is one of several, and where blocks of samples meet.
+#[test]
+fn insides_of_open_meshes_spread_from_sample_to_sample() {
+    let open = ball(false);
+    let mut cup = crate::volume::tests::icosphere(0.03, 3);
+    cup.faces.truncate(cup.faces.len() * 2 / 3);
+    let offset = cup.vertices.len() as u32;
+    cup.vertices.extend(cup.vertices.clone().iter().map(|v| v * 0.9));
+    cup.faces.extend(cup.faces.clone().iter().map(|[a, b, c]| [*a, *c, *b].map(|v| v + offset)));
+    let cup = ClosestPoints::new(&cup).unwrap();
+    let beside = ClosestPoints::new(&cuboid(Vector3::new(0.05, 0.07, 0.02))).unwrap();
+    for meshes in [vec![open.clone()], vec![cup.clone()], vec![beside, cup, open]] {
+        let bounds = (Point3::new(-0.03, -0.035, -0.03), Point3::new(0.03, 0.035, 0.03));
+        let lattice = Lattice::around(bounds, 0.0017, 0.008).unwrap();
+        let grid = SdfGrid::of_union(&meshes, bounds, lattice);
+        let distance = |p: &Point3<f64>| {
+            meshes.iter().fold(f64::INFINITY, |best, mesh| best.min(mesh.signed_distance(p).0))
+        };
+        let exact = SdfGrid::from_fn(bounds, 0.0017, 0.008, distance).unwrap();
+        assert!(grid.coefficients == exact.coefficients);
+    }
+}
+
 #[test]
 fn grids_are_the_same_for_any_number_of_threads() {
     let mesh = ball(true);
@@ -169,7 +192,7 @@ fn senseless_grids_are_refused() {
     assert_eq!(lattice(0.0, [2, 1, 2]), SdfError::Dims { axis: 1, count: 1 });
     assert!(matches!(lattice(0.0, [1 << 20; 3]), SdfError::TooLarge { .. }));
     assert_eq!(
-        SdfGrid::from_fn(wrong, 0.1, 0.1, || |_: &Point3<f64>, _| 0.0).unwrap_err(),
+        SdfGrid::from_fn(wrong, 0.1, 0.1, |_: &Point3<f64>| 0.0).unwrap_err(),
         SdfError::Bounds
     );
 }
