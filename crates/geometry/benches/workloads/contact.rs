@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 use prehend_geometry::{ClosestPoints, TriMesh};
+use rayon::prelude::*;
 
 use super::oracle;
 use super::table::Comparison;
@@ -16,8 +17,10 @@ pub(crate) fn area<'a>(hand: &TriMesh, samples: &'a [Point3<f64>]) -> Comparison
     let mut job = Comparison::new("contact area, 100k samples", "m", 1e-7, truth);
     job.add(
         "ours",
-        move || tree.closest_many(samples, REACH),
-        |found| found.iter().map(|f| f.map_or(REACH, |f| f.distance)).collect(),
+        move || samples.par_iter().map(|p| tree.closest(p, REACH)).collect(),
+        |found: Vec<Option<prehend_geometry::closest::Closest>>| {
+            found.iter().map(|f| f.map_or(REACH, |f| f.distance)).collect()
+        },
     );
     job
 }

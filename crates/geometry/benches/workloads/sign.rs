@@ -4,6 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::{ClosestPoints, SplitMix64, TriMesh};
+use rayon::prelude::*;
 
 use super::table::Comparison;
 
@@ -36,6 +37,6 @@ pub(crate) fn of_tetrahedron(tetrahedron: &Tetrahedron) -> Comparison<'_> {
     let mut job = Comparison::new("sign, tetrahedron, 200k", "", 0.0, truth);
     let tree = ClosestPoints::new(mesh).expect("a sound mesh");
     let signs = |found: Vec<(f64, _)>| found.iter().map(|(d, _)| d.signum()).collect();
-    job.add("ours", move || tree.signed_distance_many(points), signs);
+    job.add("ours", move || points.par_iter().map(|p| tree.signed_distance(p)).collect(), signs);
     job
 }

@@ -1,6 +1,5 @@
 //! Closest points of a mesh and signed distance to it.
 
-mod batch;
 mod bvh;
 mod derivative;
 mod pack;
@@ -83,15 +82,6 @@ impl Closest {
     };
 }
 
-/// How inside is told from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SignMethod {
-    /// Angle-weighted pseudo-normals: exact on a closed two-manifold that does not cross itself.
-    PseudoNormal,
-    /// Generalized winding number above one half: for open, non-manifold or self-overlapping meshes.
-    WindingNumber,
-}
-
 /// Closest points of, and signed distances to, one triangle mesh.
 ///
 /// An eight-wide tree of oriented boxes over packs of eight triangles, searched in single precision up to the last
@@ -119,7 +109,7 @@ enum Sign {
 
 impl ClosestPoints {
     /// Prepares queries, telling inside from outside by pseudo-normals where the mesh, welded by
-    /// position, is a closed two-manifold, and by winding number otherwise ([`Self::sign_method`] says which).
+    /// position, is a closed two-manifold, and by winding number otherwise.
     ///
     /// A closed mesh that is turned inside out still has its enclosed side inside. Pseudo-normals
     /// presume that the surface does not cross itself: for overlapping bodies in one mesh, use
@@ -159,22 +149,9 @@ impl ClosestPoints {
         Self { bvh, sign, bounds: (lo.into(), hi.into()) }
     }
 
-    /// How this mesh's inside is told from its outside.
-    pub fn sign_method(&self) -> SignMethod {
-        match self.sign {
-            Sign::PseudoNormal(..) => SignMethod::PseudoNormal,
-            Sign::Winding(_) => SignMethod::WindingNumber,
-        }
-    }
-
     /// Smallest and largest corner of the box around the faces \[m\].
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         self.bounds
-    }
-
-    /// Number of faces.
-    pub fn face_count(&self) -> usize {
-        self.bvh.triangles.len()
     }
 
     /// The point of the mesh closest to `point`, or `None` beyond `max_distance` \[m\] (which may be
@@ -214,7 +191,7 @@ impl ClosestPoints {
 
     /// Whether the sign of a distance is that of the angle between two vectors, as it is for closed meshes.
     pub(crate) fn is_closed(&self) -> bool {
-        self.sign_method() == SignMethod::PseudoNormal
+        matches!(self.sign, Sign::PseudoNormal(..))
     }
 
     /// Whether `point` is inside by its winding number, and, where `wants_radius`, the radius of a ball around it \[m\] within which that changes

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::mesh::TriMesh;
-use crate::topology::{edges, is_collapsed};
+use crate::topology::{Edge, edges, non_manifold_vertices};
 
 /// Cosine between the normals of two faces below which they are back to back: 150 degrees.
 const FOLD: f64 = -0.866;
@@ -30,8 +30,9 @@ impl PseudoNormals {
         // Exactly: a face collapsed by a tolerance would still have an area, and count in its corners' normals.
         let weld = mesh.weld_within(0.0);
         let (corners, vertex_count) = (weld.faces(mesh), weld.positions.len());
-        let partners = partners(&corners)?;
-        if !fans_are_single(&corners, &partners, vertex_count) {
+        let edges = edges(&corners);
+        let partners = partners(&edges, corners.len())?;
+        if !non_manifold_vertices(&corners, &edges).is_empty() {
             return None;
         }
         let unit: Vec<Vector3<f64>> = (0..corners.len())
@@ -92,10 +93,9 @@ impl PseudoNormals {
 
 /// For each half-edge `3 f + i` its opposite one (`None` on collapsed faces); `None` altogether if an
 /// edge is open, shared by more than two faces, or run through twice in one direction.
-fn partners(corners: &[[u32; 3]]) -> Option<Vec<Option<usize>>> {
-    let edges = edges(corners);
-    let mut partners = vec![None; 3 * corners.len()];
-    for edge in edges.iter() {
+fn partners(edges: &[Edge], faces: usize) -> Option<Vec<Option<usize>>> {
+    let mut partners = vec![None; 3 * faces];
+    for edge in edges {
         if !edge.is_manifold() {
             return None;
         }
@@ -103,32 +103,4 @@ fn partners(corners: &[[u32; 3]]) -> Option<Vec<Option<usize>>> {
         (partners[a], partners[b]) = (Some(b), Some(a));
     }
     (!edges.is_empty()).then_some(partners)
-}
-
-/// Whether the faces around every vertex form one fan: a vertex where two bodies touch has two.
-fn fans_are_single(corners: &[[u32; 3]], partners: &[Option<usize>], vertex_count: usize) -> bool {
-    let mut degree = vec![0usize; vertex_count];
-    let mut start = vec![None; vertex_count];
-    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !is_collapsed(c)) {
-        for i in 0..3 {
-            degree[c[i] as usize] += 1;
-            start[c[i] as usize] = Some(3 * f + i);
-        }
-    }
-    (0..vertex_count).all(|v| {
-        let Some(first) = start[v] else { return true };
-        let mut half_edge = first;
-        for turned in 1..=degree[v] {
-            // The half-edge that enters the vertex, seen from the neighboring face, leaves it.
-            let entering = half_edge - half_edge % 3 + (half_edge % 3 + 2) % 3;
-            match partners[entering] {
-                Some(next) => half_edge = next,
-                None => return false,
-            }
-            if half_edge == first {
-                return turned == degree[v];
-            }
-        }
-        false
-    })
 }

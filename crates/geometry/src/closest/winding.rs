@@ -12,6 +12,9 @@ use super::triangle::Triangle;
 use crate::mesh::TriMesh;
 use crate::topology::edges;
 
+/// Center of area, area vector and radius of some triangles.
+type Group = (Vector3<f64>, Vector3<f64>, f64);
+
 /// Eight groups of triangles seen from afar: their area vectors \[m²\] at their centers of area \[m\], from the center of the mesh.
 #[derive(Clone, Debug)]
 struct Dipoles {
@@ -23,9 +26,8 @@ struct Dipoles {
 }
 
 impl Dipoles {
-    /// Of center, area vector and radius of each group.
-    fn new(groups: &[(Vector3<f64>, Vector3<f64>, f64)]) -> Self {
-        let column = |number: &dyn Fn(&(Vector3<f64>, Vector3<f64>, f64)) -> f64| {
+    fn new(groups: &[Group]) -> Self {
+        let column = |number: &dyn Fn(&Group) -> f64| {
             let mut column = [0.0; LANES];
             for (x, group) in column.iter_mut().zip(groups) {
                 *x = number(group) as f32;

@@ -8,7 +8,7 @@ use super::class::{Classes, MAIN};
 use super::compiler::Compilers;
 use super::drive::{Drive, DriveKind, Drives};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::names::{Names, Taken};
 use super::value::Limited;
 use super::{JointIndex, Model};
@@ -156,13 +156,13 @@ impl Default for Spec {
 
 impl Spec {
     /// Reads an element of a default class, if it is an actuator that is read.
-    pub(super) fn read_default(&mut self, e: &Element) -> Result<bool, MjcfError> {
+    pub(super) fn read_default(&mut self, e: &Element) -> Result<bool> {
         let Some(kind) = DriveKind::of(&e.tag) else { return Ok(false) };
         self.read(e, kind)?;
         Ok(true)
     }
 
-    fn read(&mut self, e: &Element, kind: DriveKind) -> Result<Drive, MjcfError> {
+    fn read(&mut self, e: &Element, kind: DriveKind) -> Result<Drive> {
         e.leading("gear", &mut self.gear)?;
         self.is_early = e.switch("actearly")?.unwrap_or(self.is_early);
         self.rod = e.number("cranklength")?.unwrap_or(self.rod);
@@ -192,7 +192,7 @@ pub(super) fn read(
     classes: &Classes,
     model: &Model,
     names: &Names,
-) -> Result<(Vec<Actuator>, Vec<Option<usize>>), MjcfError> {
+) -> Result<(Vec<Actuator>, Vec<Option<usize>>)> {
     let (mut all, mut taken) = (Vec::new(), Taken::default());
     let mut written = Vec::new();
     let mut disabled = BTreeSet::new();
@@ -216,7 +216,7 @@ fn build(
     classes: &Classes,
     (model, names): (&Model, &Names),
     disabled: &BTreeSet<i32>,
-) -> Result<Option<Actuator>, MjcfError> {
+) -> Result<Option<Actuator>> {
     let Some(kind) = DriveKind::of(&e.tag) else {
         e.refuse("left out: actuators of this kind are not read");
         return Ok(None);
@@ -294,8 +294,8 @@ fn transmission(
     spec: &Spec,
     model: &Model,
     names: &Names,
-) -> Result<Option<Transmission>, MjcfError> {
-    let frame = |field| -> Result<PlacedFrame, MjcfError> {
+) -> Result<Option<Transmission>> {
+    let frame = |field| -> Result<PlacedFrame> {
         let (body, t_body_frame) = names.site(e, field)?;
         Ok(PlacedFrame { body, t_body_frame })
     };

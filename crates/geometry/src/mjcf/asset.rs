@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::compiler::Compilers;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::submodel;
 use crate::io::folder::Folder;
 
@@ -19,7 +19,7 @@ pub(super) struct Files<'a> {
 
 impl Files<'_> {
     /// The file `name` of an asset.
-    pub(super) fn path(&self, e: &Element, name: &str) -> Result<PathBuf, MjcfError> {
+    pub(super) fn path(&self, e: &Element, name: &str) -> Result<PathBuf> {
         let Some(folder) = self.folder else {
             return Err(e.unusable(name, "files of assets need a folder to be looked for in"));
         };
@@ -43,11 +43,7 @@ pub(super) struct Assets<'a, T> {
 
 impl<'a, T: Clone> Assets<'a, T> {
     /// Those of `root` with the tag `kind`, named after their files where they have no name. `fields` are read later on.
-    pub(super) fn new(
-        root: &'a Element,
-        kind: &'static str,
-        fields: &[&str],
-    ) -> Result<Self, MjcfError> {
+    pub(super) fn new(root: &'a Element, kind: &'static str, fields: &[&str]) -> Result<Self> {
         let mut elements = BTreeMap::new();
         for e in root.in_sections("asset").filter(|e| e.tag == kind) {
             e.take();
@@ -72,8 +68,8 @@ impl<'a, T: Clone> Assets<'a, T> {
         &self,
         geom: &Element,
         name: &str,
-        read: impl FnOnce(&'a Element) -> Result<T, MjcfError>,
-    ) -> Result<T, MjcfError> {
+        read: impl FnOnce(&'a Element) -> Result<T>,
+    ) -> Result<T> {
         if let Some(known) = self.read.borrow().get(name) {
             return Ok(known.clone());
         }

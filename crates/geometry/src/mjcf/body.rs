@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::class::{Classes, MAIN};
 use super::compiler::{Compilers, InertiaFrom};
 use super::element::{Element, Use};
-use super::error::MjcfError;
+use super::error::{MjcfError, Result};
 use super::geom::{Assets, Geom};
 use super::inertial;
 use super::joint::{self, Joint, JointKind};
@@ -64,7 +64,7 @@ pub(super) fn read(
     compilers: &Compilers,
     classes: &Classes,
     assets: &Assets<'_>,
-) -> Result<Tree, MjcfError> {
+) -> Result<Tree> {
     let mut reader = Reader {
         compilers,
         classes,
@@ -116,7 +116,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Reads the children of a body, of a frame or of the world.
-    fn content(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
+    fn content(&mut self, e: &Element, spot: Spot) -> Result<()> {
         for child in &e.children {
             match child.tag.as_str() {
                 "body" => self.body(child, spot)?,
@@ -140,7 +140,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn body(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
+    fn body(&mut self, e: &Element, spot: Spot) -> Result<()> {
         let compiler = self.compilers.of(e);
         let t_parent_body = spot.t_body_frame * orientation::pose(e, compiler)?;
         self.body_names.add(e, "body")?;
@@ -187,7 +187,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn joint(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
+    fn joint(&mut self, e: &Element, spot: Spot) -> Result<()> {
         let Some(index) = spot.body else {
             return Err(e.misplaced("the world has no joints"));
         };
@@ -214,7 +214,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn geom(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
+    fn geom(&mut self, e: &Element, spot: Spot) -> Result<()> {
         let mut spec = self.classes.of(e, spot.class)?.geom.clone();
         spec.read(e, self.compilers.of(e))?;
         let weighs = spot.body.is_some_and(|b| self.weights[b].is_some());
@@ -231,7 +231,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn site(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
+    fn site(&mut self, e: &Element, spot: Spot) -> Result<()> {
         let mut spec = self.classes.of(e, spot.class)?.site.clone();
         spec.read(e, self.compilers.of(e))?;
         self.site_names.add(e, "site")?;

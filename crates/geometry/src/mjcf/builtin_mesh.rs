@@ -6,14 +6,14 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Point3, Vector3};
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use crate::mesh::TriMesh;
 
 /// Finest division that is made.
 const FINEST: f64 = 512.0;
 
 /// The mesh of `kind` with the attribute `params` of `e`; without faces where it is a convex hull.
-pub(super) fn made(e: &Element, kind: &str) -> Result<TriMesh, MjcfError> {
+pub(super) fn made(e: &Element, kind: &str) -> Result<TriMesh> {
     let numbers = e.list("params", 8)?.unwrap_or_default();
     let wrong = |what: &str| e.invalid("params", format!("of a {kind} are {what}"));
     let count = |x: f64, least: f64, most: f64| {

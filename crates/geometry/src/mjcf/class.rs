@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::compiler::Compilers;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::{MjcfError, Result};
 use super::{actuator, equality, geom, joint, material, mesh, site, tendon};
 use crate::limits::MAX_MJCF_CLASSES;
 
@@ -31,7 +31,7 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    pub(super) fn read(root: &Element, compilers: &Compilers) -> Result<Self, MjcfError> {
+    pub(super) fn read(root: &Element, compilers: &Compilers) -> Result<Self> {
         let names = BTreeMap::from([("main".to_owned(), MAIN)]);
         let mut all = Self { all: vec![Class::default()], names };
         for e in root.sections("default") {
@@ -50,7 +50,7 @@ impl Classes {
     }
 
     /// Reads what is in `e` into the class `index`, then the classes within, which begin as it ended.
-    fn fill(&mut self, index: usize, e: &Element, compilers: &Compilers) -> Result<(), MjcfError> {
+    fn fill(&mut self, index: usize, e: &Element, compilers: &Compilers) -> Result<()> {
         let class = &mut self.all[index];
         for child in e.children.iter().filter(|c| c.tag != "default") {
             let is_known = match child.tag.as_str() {
@@ -89,13 +89,13 @@ impl Classes {
         e: &Element,
         field: &'static str,
         inherited: usize,
-    ) -> Result<usize, MjcfError> {
+    ) -> Result<usize> {
         let Some(name) = e.text(field) else { return Ok(inherited) };
         self.names.get(name).copied().ok_or_else(|| e.unknown(field, name))
     }
 
     /// The class of `e`: its own, or `inherited`.
-    pub(super) fn of(&self, e: &Element, inherited: usize) -> Result<&Class, MjcfError> {
+    pub(super) fn of(&self, e: &Element, inherited: usize) -> Result<&Class> {
         Ok(&self.all[self.index(e, "class", inherited)?])
     }
 }

@@ -1,7 +1,7 @@
 //! The `compiler` element: how the rest of a model is to be understood.
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::value::Limited;
 
 /// Whose inertia a body has.
@@ -49,7 +49,7 @@ impl Compilers {
 
 impl Compiler {
     /// Settings of the `compiler` elements in `root`.
-    pub(super) fn read(root: &Element) -> Result<Self, MjcfError> {
+    pub(super) fn read(root: &Element) -> Result<Self> {
         let mut all = Self {
             degrees: true,
             auto_limits: true,
@@ -67,7 +67,7 @@ impl Compiler {
         Ok(all)
     }
 
-    fn add(&mut self, e: &Element) -> Result<(), MjcfError> {
+    fn add(&mut self, e: &Element) -> Result<()> {
         if let Some(degrees) = e.keyword("angle", &[("degree", true), ("radian", false)])? {
             self.degrees = degrees;
         }
@@ -118,7 +118,7 @@ impl Compiler {
         [limited_field, field]: [&'static str; 2],
         limited: Limited,
         [low, high]: [f64; 2],
-    ) -> Result<Option<(f64, f64)>, MjcfError> {
+    ) -> Result<Option<(f64, f64)>> {
         let given = low != 0.0 || high != 0.0;
         let is_limited = match limited {
             Limited::Yes => true,
@@ -148,9 +148,10 @@ fn euler(text: &str) -> Option<[(usize, bool); 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MjcfError, Model};
+    use super::super::Model;
+    use super::Result;
 
-    fn range(compiler: &str, joint: &str) -> Result<Option<(f64, f64)>, MjcfError> {
+    fn range(compiler: &str, joint: &str) -> Result<Option<(f64, f64)>> {
         let xml = format!(
             "<mujoco><compiler angle=\"radian\" {compiler}/><worldbody><body><joint name=\"q\" {joint}/>\
             <geom size=\"1\"/></body></worldbody></mujoco>"

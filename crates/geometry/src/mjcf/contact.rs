@@ -1,14 +1,11 @@
 //! Pairs of bodies that do not collide.
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::names::Names;
 
 /// The pairs of the `exclude` elements in `root`; `None` is the world.
-pub(super) fn exclusions(
-    root: &Element,
-    names: &Names,
-) -> Result<Vec<[Option<usize>; 2]>, MjcfError> {
+pub(super) fn exclusions(root: &Element, names: &Names) -> Result<Vec<[Option<usize>; 2]>> {
     let mut all = Vec::new();
     for e in root.in_sections("contact").filter(|e| e.tag == "exclude") {
         e.take();

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::compiler::Compilers;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::{MjcfError, Result};
 use super::orientation;
 use super::reference::{self, Names};
 use super::submodel::Submodels;
@@ -21,7 +21,7 @@ pub(super) fn unfold(
     root: &mut Element,
     compilers: &Compilers,
     submodels: &Submodels,
-) -> Result<(), MjcfError> {
+) -> Result<()> {
     let mut copier = Copier { compilers, submodels, elements: root.count() };
     let worlds = root.children.iter().enumerate().filter(|(_, e)| e.tag == "worldbody");
     for place in worlds.map(|(place, _)| place).collect::<Vec<_>>() {
@@ -38,7 +38,7 @@ struct Copier<'a> {
 }
 
 impl Copier<'_> {
-    fn grow(&mut self, by: usize) -> Result<(), MjcfError> {
+    fn grow(&mut self, by: usize) -> Result<()> {
         self.elements += by;
         let (what, limit) = ("elements", MAX_MJCF_ELEMENTS);
         if self.elements > limit {
@@ -53,7 +53,7 @@ impl Copier<'_> {
         content: Vec<Element>,
         root: &mut Element,
         depth: usize,
-    ) -> Result<Vec<Element>, MjcfError> {
+    ) -> Result<Vec<Element>> {
         if depth > MAX_MJCF_DEPTH {
             let (what, limit) = ("levels of tags", MAX_MJCF_DEPTH);
             return Err(MjcfError::TooLarge { what, count: depth, limit });
@@ -80,7 +80,7 @@ impl Copier<'_> {
         e: &Element,
         root: &mut Element,
         unfolded: &mut Vec<Element>,
-    ) -> Result<(), MjcfError> {
+    ) -> Result<()> {
         let count: usize = e.integer("count")?.ok_or_else(|| e.missing("count"))?;
         if count == 0 {
             return Err(e.invalid("count", "must be positive"));
@@ -120,7 +120,7 @@ impl Copier<'_> {
         root: &mut Element,
         mut names: Names,
         suffixes: &[String],
-    ) -> Result<(), MjcfError> {
+    ) -> Result<()> {
         for section in REFERRING {
             let mut referring = Vec::new();
             for own in root.children.iter_mut().filter(|own| own.tag == section) {
@@ -147,7 +147,7 @@ impl Copier<'_> {
     }
 
     /// Puts copies of the model's own bodies and frames where `attach` elements name them, in their order.
-    fn attach_own(&mut self, root: &mut Element) -> Result<(), MjcfError> {
+    fn attach_own(&mut self, root: &mut Element) -> Result<()> {
         while let Some(path) = find(root, &|e| e.tag == "attach") {
             let e = root.at(&path).clone();
             let prefix = e.text("prefix").unwrap_or_default().to_owned();
@@ -192,7 +192,7 @@ fn find(root: &Element, wanted: &dyn Fn(&Element) -> bool) -> Option<Vec<usize>>
 }
 
 /// A frame with what `attach` names in `root`: a body, the content of a frame, or all that is in the world.
-pub(super) fn submodel_part(root: &Element, attach: &Element) -> Result<Element, MjcfError> {
+pub(super) fn submodel_part(root: &Element, attach: &Element) -> Result<Element> {
     let mut frame = attach.empty("frame");
     let wanted = ["body", "frame"].into_iter().find_map(|tag| Some((tag, attach.text(tag)?)));
     let worlds = || root.children.iter().filter(|e| e.tag == "worldbody");

@@ -2,7 +2,7 @@
 
 use super::actuator::{Dynamics, Muscle};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// The elements for actuators that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +144,7 @@ impl Drive {
         is_servo && self.bias[2] > 0.0 && self.gain[0] >= 0.0 && self.gain[0] == -self.bias[1]
     }
 
-    fn read_general(&mut self, e: &Element) -> Result<(), MjcfError> {
+    fn read_general(&mut self, e: &Element) -> Result<()> {
         let gains = [
             ("fixed", Form::Fixed),
             ("affine", Form::Affine),
@@ -185,7 +185,7 @@ impl Drive {
         Ok(())
     }
 
-    fn read_muscle(&mut self, e: &Element) -> Result<(), MjcfError> {
+    fn read_muscle(&mut self, e: &Element) -> Result<()> {
         (self.gain_form, self.bias_form) = (Form::Muscle, Form::Muscle);
         self.activation = Activation::Muscle;
         let (times, gain) = &mut self.muscle;
@@ -200,7 +200,7 @@ impl Drive {
     }
 
     /// Reads a position servo: force kp (u − l) − kv v at the input u, the length l and its rate v.
-    fn read_position(&mut self, e: &Element) -> Result<(), MjcfError> {
+    fn read_position(&mut self, e: &Element) -> Result<()> {
         let stiffness = e.number("kp")?.unwrap_or(self.gain[0]);
         let damping = e.magnitude("kv")?.map(|kv| -kv);
         let ratio = e.magnitude("dampratio")?;
@@ -233,7 +233,7 @@ impl Default for Drives {
 
 impl Drives {
     /// Reads `e` and returns what it has become.
-    pub(super) fn read(&mut self, e: &Element, kind: DriveKind) -> Result<Drive, MjcfError> {
+    pub(super) fn read(&mut self, e: &Element, kind: DriveKind) -> Result<Drive> {
         let drive = &mut self.0[kind as usize];
         match kind {
             DriveKind::General => drive.read_general(e)?,

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::class::{Classes, MAIN};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::names::Names;
 use super::orientation::quaternion_wxyz;
 use super::solver::SolverParameters;
@@ -75,7 +75,7 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.active = e.switch("active")?.unwrap_or(self.active);
         self.solver.read(e, ["solref", "solimp"])
     }
@@ -87,7 +87,7 @@ pub(super) fn read(
     classes: &Classes,
     model: &Model,
     names: &Names,
-) -> Result<Vec<Equality>, MjcfError> {
+) -> Result<Vec<Equality>> {
     let reader = Reader { names, model, t_world_bodies: model.reference_poses() };
     let mut all = Vec::new();
     for e in root.in_sections("equality") {
@@ -125,7 +125,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn bodies(&self, e: &Element) -> Result<[Option<usize>; 2], MjcfError> {
+    fn bodies(&self, e: &Element) -> Result<[Option<usize>; 2]> {
         let first = self.names.body(e, "body1")?;
         let second = if e.has("body2") { self.names.body(e, "body2")? } else { None };
         Ok([first, second])
@@ -139,7 +139,7 @@ impl Reader<'_> {
     }
 
     /// The bodies of the two sites, and their poses there.
-    fn sites(&self, e: &Element) -> Result<Sites, MjcfError> {
+    fn sites(&self, e: &Element) -> Result<Sites> {
         if let Some(field) = ["body1", "body2", "anchor", "relpose"].iter().find(|f| e.has(f)) {
             return Err(e.invalid(field, "is given beside site1 and site2"));
         }
@@ -147,7 +147,7 @@ impl Reader<'_> {
         Ok(([first.0, second.0], [first.1, second.1]))
     }
 
-    fn connect(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+    fn connect(&self, e: &Element) -> Result<EqualityKind> {
         if e.has("site1") || e.has("site2") {
             let (bodies, poses) = self.sites(e)?;
             let anchors = poses.map(|t| t.translation.vector.into());
@@ -160,7 +160,7 @@ impl Reader<'_> {
         Ok(EqualityKind::Connect { bodies, anchors })
     }
 
-    fn weld(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+    fn weld(&self, e: &Element) -> Result<EqualityKind> {
         let torque_scale = e.number("torquescale")?.unwrap_or(1.0);
         if e.has("site1") || e.has("site2") {
             let (bodies, poses) = self.sites(e)?;
@@ -185,7 +185,7 @@ impl Reader<'_> {
         Ok(EqualityKind::Weld { bodies, anchors: [first, second], rotation, torque_scale })
     }
 
-    fn joint(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+    fn joint(&self, e: &Element) -> Result<EqualityKind> {
         let first = self.names.single_joint(e, "joint1", self.model)?;
         let second = match e.has("joint2") {
             true => Some(self.names.single_joint(e, "joint2", self.model)?),

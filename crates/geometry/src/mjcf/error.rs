@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use super::warning::Warning;
 
+/// Result of reading a part of a model.
+pub(super) type Result<T, E = MjcfError> = std::result::Result<T, E>;
+
 /// An element of a model's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// Flags of the `flag` elements that turn off parts of the smooth dynamics.
 #[derive(Default)]
@@ -14,7 +14,7 @@ pub(super) struct Flags {
 }
 
 impl Flags {
-    pub(super) fn read(root: &Element) -> Result<Self, MjcfError> {
+    pub(super) fn read(root: &Element) -> Result<Self> {
         let mut flags = Self::default();
         for e in root.sections("option").flat_map(|option| option.sections("flag")) {
             let words = [("enable", false), ("disable", true)];

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::compiler::Compiler;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::height_field::HeightFields;
 use super::mesh::Meshes;
 use super::shape::{Kind, Shape};
@@ -105,7 +105,7 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<()> {
         self.kind = e.keyword("type", &Kind::WORDS)?.unwrap_or(self.kind);
         e.leading("size", &mut self.size)?;
         self.position = e.numbers("pos")?.map(Vector3::from).or(self.position);
@@ -142,7 +142,7 @@ impl Spec {
         assets: &Assets<'_>,
         t_body_frame: &Isometry3<f64>,
         weighs: bool,
-    ) -> Result<(Geom, Option<Inertial>), MjcfError> {
+    ) -> Result<(Geom, Option<Inertial>)> {
         let (t_frame_geom, size) = self.placed(e)?;
         let mut t_body_geom = t_body_frame * t_frame_geom;
         let shape = if self.kind == Kind::HeightField {
@@ -205,7 +205,7 @@ impl Spec {
         e: &Element,
         assets: &Assets<'_>,
         shape: &Shape,
-    ) -> Result<Option<Inertial>, MjcfError> {
+    ) -> Result<Option<Inertial>> {
         let unit = match (&self.mesh, self.kind) {
             (Some(name), Kind::Mesh) => {
                 if self.is_shell {
@@ -228,7 +228,7 @@ impl Spec {
     }
 
     /// Where the geom is in its frame, and its size.
-    fn placed(&self, e: &Element) -> Result<(Isometry3<f64>, [f64; 3]), MjcfError> {
+    fn placed(&self, e: &Element) -> Result<(Isometry3<f64>, [f64; 3])> {
         let Some(ends) = self.ends else {
             let position = self.position.unwrap_or_default();
             return Ok((Isometry3::from_parts(position.into(), self.rotation), self.size));

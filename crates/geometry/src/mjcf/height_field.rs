@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::asset::{Assets, Files};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::{MjcfError, Result};
 use crate::io::read_plain;
 use crate::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use crate::mesh::Texture;
@@ -31,13 +31,13 @@ pub(super) struct HeightFields<'a> {
 }
 
 impl<'a> HeightFields<'a> {
-    pub(super) fn new(root: &'a Element, files: Files<'a>) -> Result<Self, MjcfError> {
+    pub(super) fn new(root: &'a Element, files: Files<'a>) -> Result<Self> {
         let fields = ["nrow", "ncol", "elevation", "size", "content_type"];
         Ok(Self { assets: Assets::new(root, "hfield", &fields)?, files })
     }
 
     /// The height field that the attribute `hfield` of `geom` names.
-    pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Arc<HeightField>, MjcfError> {
+    pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Arc<HeightField>> {
         self.assets.get(geom, name, |e| {
             let [x, y, height, base] = e.numbers::<4>("size")?.ok_or_else(|| e.missing("size"))?;
             if [x, y, height, base].iter().any(|s| *s <= 0.0) {
@@ -56,7 +56,7 @@ impl<'a> HeightFields<'a> {
         })
     }
 
-    fn load(&self, e: &Element, name: &str) -> Result<([usize; 2], Vec<f64>), MjcfError> {
+    fn load(&self, e: &Element, name: &str) -> Result<([usize; 2], Vec<f64>)> {
         let path = self.files.path(e, name)?;
         let is_png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         let wrong = |reason: String| e.unusable(name, reason);
@@ -86,8 +86,8 @@ impl<'a> HeightFields<'a> {
 }
 
 /// The heights in the attributes of `e`; those that are not told are zero.
-fn written(e: &Element) -> Result<([usize; 2], Vec<f64>), MjcfError> {
-    let count = |field| -> Result<usize, MjcfError> {
+fn written(e: &Element) -> Result<([usize; 2], Vec<f64>)> {
+    let count = |field| -> Result<usize> {
         let count: usize = e.integer(field)?.ok_or_else(|| e.missing(field))?;
         match (2..=MAX_ELEMENTS).contains(&count) {
             true => Ok(count),

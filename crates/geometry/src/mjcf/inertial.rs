@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::compiler::Compiler;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::orientation;
 use crate::inertial::Inertial;
 
 /// Mass and inertia of the `inertial` element of `body`, in its frame; `None` without one, or where both are zero.
-pub(super) fn written(body: &Element, compiler: &Compiler) -> Result<Option<Inertial>, MjcfError> {
+pub(super) fn written(body: &Element, compiler: &Compiler) -> Result<Option<Inertial>> {
     let mut all = body.sections("inertial");
     let Some(e) = all.next() else { return Ok(None) };
     if let Some(other) = all.next() {

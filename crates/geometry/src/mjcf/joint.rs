@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::compiler::Compiler;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::solver::SolverParameters;
 use super::value::Limited;
 
@@ -131,7 +131,7 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element, _: &Compiler) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element, _: &Compiler) -> Result<()> {
         let kinds = [
             ("hinge", JointKind::Hinge),
             ("slide", JointKind::Slide),
@@ -164,7 +164,7 @@ impl Spec {
         e: &Element,
         compiler: &Compiler,
         t_body_frame: &Isometry3<f64>,
-    ) -> Result<Joint, MjcfError> {
+    ) -> Result<Joint> {
         let axis = Unit::try_new(t_body_frame * self.axis, 1e-14)
             .ok_or_else(|| e.invalid("axis", "must not be zero"))?;
         let is_angle = matches!(self.kind, JointKind::Hinge | JointKind::Ball);
@@ -210,7 +210,7 @@ impl Spec {
     }
 
     /// The joint of a `freejoint` element, which has no class.
-    pub(super) fn free(e: &Element, compiler: &Compiler) -> Result<Joint, MjcfError> {
+    pub(super) fn free(e: &Element, compiler: &Compiler) -> Result<Joint> {
         let free = Self { kind: JointKind::Free, ..Self::default() };
         free.build(e, compiler, &Isometry3::identity())
     }

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::joint::JointKind;
 
 /// A state of the whole model.
@@ -25,7 +25,7 @@ pub(super) fn read(
     root: &Element,
     model: &Model,
     written: &[Option<usize>],
-) -> Result<Vec<Keyframe>, MjcfError> {
+) -> Result<Vec<Keyframe>> {
     let joints = || model.bodies.iter().flat_map(|b| &b.joints);
     let degrees = joints().map(|j| j.kind.velocities()).sum();
     let reference = model.reference_positions();
@@ -64,7 +64,7 @@ pub(super) fn read(
 }
 
 /// As many numbers as there are in `default`, which stands where there are none; those that are missing at the end are zero.
-fn filled(e: &Element, field: &'static str, default: Vec<f64>) -> Result<Vec<f64>, MjcfError> {
+fn filled(e: &Element, field: &'static str, default: Vec<f64>) -> Result<Vec<f64>> {
     let Some(mut list) = e.list(field, usize::MAX)? else { return Ok(default) };
     let (given, expected) = (list.len(), default.len());
     if given > expected {

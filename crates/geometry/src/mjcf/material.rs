@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::class::{Classes, MAIN};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// The color of a material.
 #[derive(Clone, Copy, Debug)]
@@ -19,22 +19,19 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.rgba = rgba(e)?.unwrap_or(self.rgba);
         Ok(())
     }
 }
 
 /// The attribute `rgba`.
-pub(super) fn rgba(e: &Element) -> Result<Option<[f32; 4]>, MjcfError> {
+pub(super) fn rgba(e: &Element) -> Result<Option<[f32; 4]>> {
     Ok(e.numbers::<4>("rgba")?.map(|c| c.map(|x| x as f32)))
 }
 
 /// Colors of the materials by name.
-pub(super) fn read(
-    root: &Element,
-    classes: &Classes,
-) -> Result<BTreeMap<String, [f32; 4]>, MjcfError> {
+pub(super) fn read(root: &Element, classes: &Classes) -> Result<BTreeMap<String, [f32; 4]>> {
     let mut all = BTreeMap::new();
     for e in root.in_sections("asset").filter(|e| e.tag == "material") {
         e.take();

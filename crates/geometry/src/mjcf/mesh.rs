@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use super::asset::{Assets, Files};
 use super::class::{Classes, MAIN};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::mesh_mass::{self, MeshInertia};
 use super::{builtin_mesh, msh, orientation};
 use crate::inertial::Inertial;
@@ -34,7 +34,7 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.scale = e.numbers("scale")?.map_or(self.scale, Vector3::from);
         if let Some(position) = e.numbers("refpos")? {
             self.t_file_mesh.translation = Vector3::from(position).into();
@@ -86,25 +86,21 @@ pub(super) struct Meshes<'a> {
 }
 
 impl<'a> Meshes<'a> {
-    pub(super) fn new(
-        root: &'a Element,
-        classes: &'a Classes,
-        files: Files<'a>,
-    ) -> Result<Self, MjcfError> {
+    pub(super) fn new(root: &'a Element, classes: &'a Classes, files: Files<'a>) -> Result<Self> {
         let assets = Assets::new(root, "mesh", &["file", "vertex", "face", "builtin", "params"])?;
         let meshes = Self { assets, files, classes };
         meshes.assets.elements().try_for_each(|e| meshes.spec(e).map(|_| ()))?;
         Ok(meshes)
     }
 
-    fn spec(&self, e: &Element) -> Result<Spec, MjcfError> {
+    fn spec(&self, e: &Element) -> Result<Spec> {
         let mut spec = self.classes.of(e, MAIN)?.mesh.clone();
         spec.read(e)?;
         Ok(spec)
     }
 
     /// The mesh that `geom` names.
-    pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Rc<Mesh>, MjcfError> {
+    pub(super) fn get(&self, geom: &Element, name: &str) -> Result<Rc<Mesh>> {
         self.assets.get(geom, name, |e| {
             let mut raw = match (e.text("file"), e.text("builtin")) {
                 (Some(file), _) => self.load(e, file)?,
@@ -121,7 +117,7 @@ impl<'a> Meshes<'a> {
         })
     }
 
-    fn load(&self, e: &Element, name: &str) -> Result<TriMesh, MjcfError> {
+    fn load(&self, e: &Element, name: &str) -> Result<TriMesh> {
         let path = self.files.path(e, name)?;
         if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("msh")) {
             return msh::load(&path).map_err(|reason| e.unusable(name, reason));
@@ -131,7 +127,7 @@ impl<'a> Meshes<'a> {
 }
 
 /// A mesh whose vertices are in the model itself, with faces where it has some.
-fn written(e: &Element) -> Result<TriMesh, MjcfError> {
+fn written(e: &Element) -> Result<TriMesh> {
     let vertices = e.list("vertex", 3 * MAX_ELEMENTS)?.ok_or_else(|| e.missing("file"))?;
     let faces = e.list("face", 3 * MAX_ELEMENTS)?.unwrap_or_default();
     let count = vertices.len() / 3;

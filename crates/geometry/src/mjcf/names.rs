@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Isometry3;
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::joint::JointKind;
 use super::tendon::Tendon;
 use super::{Geom, JointIndex, Model};
@@ -16,7 +16,7 @@ pub(super) struct Taken(BTreeSet<String>);
 
 impl Taken {
     /// Adds the name of `e`, which no other of this `kind` may have; many may have none.
-    pub(super) fn add(&mut self, e: &Element, kind: &'static str) -> Result<(), MjcfError> {
+    pub(super) fn add(&mut self, e: &Element, kind: &'static str) -> Result<()> {
         let name = e.name();
         if name.is_empty() || self.0.insert(name) { Ok(()) } else { Err(e.duplicate(kind)) }
     }
@@ -79,25 +79,17 @@ impl Names {
     }
 
     /// The tendon that the attribute `field` of `e` names; `None` where it is not read.
-    pub(super) fn tendon(
-        &self,
-        e: &Element,
-        field: &'static str,
-    ) -> Result<Option<usize>, MjcfError> {
+    pub(super) fn tendon(&self, e: &Element, field: &'static str) -> Result<Option<usize>> {
         find(&self.tendons, e, field)
     }
 
     /// The body that the attribute `field` of `e` names; `None` is the world.
-    pub(super) fn body(
-        &self,
-        e: &Element,
-        field: &'static str,
-    ) -> Result<Option<usize>, MjcfError> {
+    pub(super) fn body(&self, e: &Element, field: &'static str) -> Result<Option<usize>> {
         find(&self.bodies, e, field)
     }
 
     /// The joint that the attribute `field` of `e` names.
-    pub(super) fn joint(&self, e: &Element, field: &'static str) -> Result<JointIndex, MjcfError> {
+    pub(super) fn joint(&self, e: &Element, field: &'static str) -> Result<JointIndex> {
         find(&self.joints, e, field)
     }
 
@@ -107,7 +99,7 @@ impl Names {
         e: &Element,
         field: &'static str,
         model: &Model,
-    ) -> Result<JointIndex, MjcfError> {
+    ) -> Result<JointIndex> {
         let joint = self.joint(e, field)?;
         match model.joint(joint).kind {
             JointKind::Hinge | JointKind::Slide => Ok(joint),
@@ -121,7 +113,7 @@ impl Names {
         e: &Element,
         field: &'static str,
         model: &'a Model,
-    ) -> Result<(Option<usize>, &'a Geom), MjcfError> {
+    ) -> Result<(Option<usize>, &'a Geom)> {
         let (body, place) = find(&self.geoms, e, field)?;
         let all = body.map_or(&model.world_geoms, |body| &model.bodies[body].geoms);
         Ok((body, &all[place]))
@@ -132,16 +124,12 @@ impl Names {
         &self,
         e: &Element,
         field: &'static str,
-    ) -> Result<(Option<usize>, Isometry3<f64>), MjcfError> {
+    ) -> Result<(Option<usize>, Isometry3<f64>)> {
         find(&self.sites, e, field)
     }
 }
 
-fn find<T: Copy>(
-    all: &BTreeMap<String, T>,
-    e: &Element,
-    field: &'static str,
-) -> Result<T, MjcfError> {
+fn find<T: Copy>(all: &BTreeMap<String, T>, e: &Element, field: &'static str) -> Result<T> {
     let name = e.text(field).ok_or_else(|| e.missing(field))?;
     all.get(name).copied().ok_or_else(|| e.unknown(field, name))
 }

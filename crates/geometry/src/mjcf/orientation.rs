@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
 
 use super::compiler::Compiler;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// Shorter vectors have no direction.
 const SHORTEST: f64 = 1e-14;
@@ -12,10 +12,7 @@ const SHORTEST: f64 = 1e-14;
 const FORMS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
 /// The orientation that `e` gives, in any of its forms; `None` where it gives none.
-pub(super) fn read(
-    e: &Element,
-    compiler: &Compiler,
-) -> Result<Option<UnitQuaternion<f64>>, MjcfError> {
+pub(super) fn read(e: &Element, compiler: &Compiler) -> Result<Option<UnitQuaternion<f64>>> {
     let mut given = FORMS.into_iter().filter(|form| e.has(form));
     let Some(form) = given.next() else { return Ok(None) };
     if let Some(other) = given.next() {
@@ -48,7 +45,7 @@ pub(super) fn read(
 }
 
 /// The pose of `pos` and whatever orientation `e` gives.
-pub(super) fn pose(e: &Element, compiler: &Compiler) -> Result<Isometry3<f64>, MjcfError> {
+pub(super) fn pose(e: &Element, compiler: &Compiler) -> Result<Isometry3<f64>> {
     let [x, y, z] = e.numbers("pos")?.unwrap_or_default();
     let rotation = read(e, compiler)?.unwrap_or_default();
     Ok(Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation))

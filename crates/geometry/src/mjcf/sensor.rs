@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::actuator::PlacedFrame;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::names::Names;
 use super::shape::Shape;
 use super::{JointIndex, Model};
@@ -90,7 +90,7 @@ impl FramePart {
 }
 
 /// The sensors of `root` that a state determines; others are logged.
-pub(super) fn read(root: &Element, model: &Model, names: &Names) -> Result<Vec<Sensor>, MjcfError> {
+pub(super) fn read(root: &Element, model: &Model, names: &Names) -> Result<Vec<Sensor>> {
     let mut all = Vec::new();
     for e in root.in_sections("sensor") {
         let Some(quantity) = quantity(e, root, model, names)? else {
@@ -105,20 +105,15 @@ pub(super) fn read(root: &Element, model: &Model, names: &Names) -> Result<Vec<S
 }
 
 /// The quantity that `e` measures; `None` where it is not read, or what it is measured of is not.
-fn quantity(
-    e: &Element,
-    root: &Element,
-    model: &Model,
-    names: &Names,
-) -> Result<Option<Quantity>, MjcfError> {
+fn quantity(e: &Element, root: &Element, model: &Model, names: &Names) -> Result<Option<Quantity>> {
     let joint = || names.joint(e, "joint");
     let tendon = || names.tendon(e, "tendon");
     let body = || names.body(e, "body");
-    let site = || -> Result<PlacedFrame, MjcfError> {
+    let site = || -> Result<PlacedFrame> {
         let (body, t_body_frame) = names.site(e, "site")?;
         Ok(PlacedFrame { body, t_body_frame })
     };
-    let actuator = || -> Result<Option<usize>, MjcfError> {
+    let actuator = || -> Result<Option<usize>> {
         let name = e.text("actuator").ok_or_else(|| e.missing("actuator"))?;
         let is_written = || root.in_sections("actuator").any(|own| own.peek("name") == Some(name));
         match model.actuators.iter().position(|own| own.name == name) {
@@ -164,7 +159,7 @@ fn frame(
     part: FramePart,
     model: &Model,
     names: &Names,
-) -> Result<Option<PlacedFrame>, MjcfError> {
+) -> Result<Option<PlacedFrame>> {
     let (body, t_body_frame) = match e.text(kind) {
         Some("site") => names.site(e, name)?,
         Some("xbody") => (names.body(e, name)?, Isometry3::identity()),

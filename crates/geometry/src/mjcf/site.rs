@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::compiler::Compiler;
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::orientation;
 
 /// A frame fixed to a body.
@@ -25,7 +25,7 @@ pub(super) struct Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<()> {
         self.position = e.numbers("pos")?.map_or(self.position, Vector3::from);
         self.rotation = orientation::read(e, compiler)?.unwrap_or(self.rotation);
         self.ends = e.numbers("fromto")?.or(self.ends);
@@ -36,11 +36,7 @@ impl Spec {
     }
 
     /// The site of `e`, which lies in a frame of its body's.
-    pub(super) fn build(
-        self,
-        e: &Element,
-        t_body_frame: &Isometry3<f64>,
-    ) -> Result<Site, MjcfError> {
+    pub(super) fn build(self, e: &Element, t_body_frame: &Isometry3<f64>) -> Result<Site> {
         let t_frame_site = match self.ends {
             Some(ends) => {
                 orientation::between(ends).ok_or_else(|| e.invalid("fromto", "has no length"))?.0

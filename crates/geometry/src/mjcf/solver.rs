@@ -1,7 +1,7 @@
 //! How softly a constraint gives way.
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// MuJoCo's parameters of a soft constraint, `solref` and `solimp`, as the file has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +23,7 @@ impl SolverParameters {
         &mut self,
         e: &Element,
         [reference, impedance]: [&'static str; 2],
-    ) -> Result<(), MjcfError> {
+    ) -> Result<()> {
         e.leading(reference, &mut self.reference)?;
         e.leading(impedance, &mut self.impedance)
     }

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::{MjcfError, Result};
 use crate::io::folder::Folder;
 use crate::io::read_plain;
 use crate::limits::{MAX_MJCF_BYTES, MAX_MJCF_DEPTH, MAX_MJCF_ELEMENTS};
 
 /// The text of `path`.
-pub(super) fn read(path: &Path) -> Result<String, MjcfError> {
+pub(super) fn read(path: &Path) -> Result<String> {
     let error = |source| MjcfError::Read { path: path.into(), source };
     let bytes = read_plain(path, MAX_MJCF_BYTES).map_err(error)?;
     String::from_utf8(bytes).map_err(|e| error(io::Error::new(io::ErrorKind::InvalidData, e)))
@@ -21,11 +21,7 @@ pub(super) fn read(path: &Path) -> Result<String, MjcfError> {
 /// The model of `xml`, with the files that it includes in the place of its `include` elements.
 ///
 /// They are looked for in `folder`, then beside the file that names them, and never outside of `folder`.
-pub(super) fn parse(
-    xml: &str,
-    file: Option<&Path>,
-    folder: Option<&Folder>,
-) -> Result<Element, MjcfError> {
+pub(super) fn parse(xml: &str, file: Option<&Path>, folder: Option<&Folder>) -> Result<Element> {
     let mut source = Source { folder, included: BTreeSet::new(), bytes: 0, elements: 0 };
     let root = source.document(xml, file.map(Arc::from), Path::new(""), 0)?;
     if root.tag != "mujoco" {
@@ -44,7 +40,7 @@ struct Source<'a> {
     elements: usize,
 }
 
-fn within(what: &'static str, count: usize, limit: usize) -> Result<(), MjcfError> {
+fn within(what: &'static str, count: usize, limit: usize) -> Result<()> {
     if count <= limit { Ok(()) } else { Err(MjcfError::TooLarge { what, count, limit }) }
 }
 
@@ -56,7 +52,7 @@ impl Source<'_> {
         file: Option<Arc<Path>>,
         beside: &Path,
         depth: usize,
-    ) -> Result<Element, MjcfError> {
+    ) -> Result<Element> {
         self.bytes += xml.len();
         within("bytes", self.bytes, MAX_MJCF_BYTES)?;
         // What comes before the first tag is blank in some files.
@@ -87,7 +83,7 @@ impl Source<'_> {
         beside: &Path,
         depth: usize,
         siblings: &mut Vec<Element>,
-    ) -> Result<(), MjcfError> {
+    ) -> Result<()> {
         self.elements += 1;
         within("elements", self.elements, MAX_MJCF_ELEMENTS)?;
         within("levels of tags", depth, MAX_MJCF_DEPTH)?;
@@ -105,12 +101,7 @@ impl Source<'_> {
     }
 
     /// Children of the outermost element of the file that `element` names.
-    fn include(
-        &mut self,
-        element: &Element,
-        beside: &Path,
-        depth: usize,
-    ) -> Result<Vec<Element>, MjcfError> {
+    fn include(&mut self, element: &Element, beside: &Path, depth: usize) -> Result<Vec<Element>> {
         let name = element.text("file").ok_or_else(|| element.missing("file"))?;
         let error = |reason: &str| element.unusable(name, reason);
         let Some(folder) = self.folder else {

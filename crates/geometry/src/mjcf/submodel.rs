@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::compiler::{Compiler, Compilers};
 use super::copies::{self, REFERRING, submodel_part};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::reference::{self, Names};
 use super::source;
 use crate::io::folder::Folder;
@@ -15,7 +15,7 @@ use crate::io::folder::Folder;
 const MOST_LEVELS: usize = 16;
 
 /// Unfolds all copies and attached models in `root`, whose files are looked for in `folder`, and returns the compilers of all.
-pub(super) fn unfold(root: &mut Element, folder: Option<&Folder>) -> Result<Compilers, MjcfError> {
+pub(super) fn unfold(root: &mut Element, folder: Option<&Folder>) -> Result<Compilers> {
     let mut compilers = Compilers(Vec::new());
     unfold_at(root, folder, &mut compilers, 0)?;
     Ok(compilers)
@@ -26,7 +26,7 @@ fn unfold_at(
     folder: Option<&Folder>,
     compilers: &mut Compilers,
     level: usize,
-) -> Result<(), MjcfError> {
+) -> Result<()> {
     root.set_scope(compilers.0.len());
     compilers.0.push(Compiler::read(root)?);
     let mut submodels = Submodels::default();
@@ -44,7 +44,7 @@ fn unfold_at(
 }
 
 /// The model in the file that `asset` names.
-fn load(asset: &Element, folder: Option<&Folder>) -> Result<Element, MjcfError> {
+fn load(asset: &Element, folder: Option<&Folder>) -> Result<Element> {
     let name = asset.text("file").ok_or_else(|| asset.missing("file"))?;
     let Some(folder) = folder else {
         return Err(asset.unusable(name, "model files need a folder to be looked for in"));
@@ -81,11 +81,7 @@ pub(super) struct Submodels {
 
 impl Submodels {
     /// The frame that stands for `attach`. What the part refers to, and what refers to it alone, is added to `root`.
-    pub(super) fn attached(
-        &self,
-        attach: &Element,
-        root: &mut Element,
-    ) -> Result<Element, MjcfError> {
+    pub(super) fn attached(&self, attach: &Element, root: &mut Element) -> Result<Element> {
         let name = attach.text("model").unwrap_or_default();
         let prefix = attach.text("prefix").ok_or_else(|| attach.missing("prefix"))?;
         let model = self.all.get(name).ok_or_else(|| attach.unknown("model", name))?;

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use super::class::{Class, Classes, MAIN};
 use super::compiler::{Compiler, Compilers};
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 use super::names::{Names, Taken};
 use super::solver::SolverParameters;
 use super::value::Limited;
@@ -115,7 +115,7 @@ impl Default for Spec {
 }
 
 impl Spec {
-    pub(super) fn read(&mut self, e: &Element) -> Result<(), MjcfError> {
+    pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.range = e.numbers("range")?.unwrap_or(self.range);
         self.limited = e.limited("limited")?.unwrap_or(self.limited);
         self.force_range = e.numbers("actuatorfrcrange")?.unwrap_or(self.force_range);
@@ -140,7 +140,7 @@ impl Spec {
         compiler: &Compiler,
         model: &Model,
         names: &Names,
-    ) -> Result<Tendon, MjcfError> {
+    ) -> Result<Tendon> {
         let (mut joints, mut parts) = (Vec::new(), Vec::new());
         if e.tag == "spatial" {
             parts = cable(e, model, names)?;
@@ -185,7 +185,7 @@ pub(super) fn read(
     classes: &Classes,
     model: &Model,
     names: &Names,
-) -> Result<Vec<Tendon>, MjcfError> {
+) -> Result<Vec<Tendon>> {
     let (mut all, mut taken) = (Vec::new(), Taken::default());
     for e in root.in_sections("tendon") {
         if !matches!(e.tag.as_str(), "fixed" | "spatial") {
@@ -203,9 +203,9 @@ pub(super) fn read(
 }
 
 /// The parts of a cable.
-fn cable(e: &Element, model: &Model, names: &Names) -> Result<Vec<TendonPart>, MjcfError> {
+fn cable(e: &Element, model: &Model, names: &Names) -> Result<Vec<TendonPart>> {
     let mut parts = Vec::new();
-    let point = |part: &Element, field| -> Result<_, MjcfError> {
+    let point = |part: &Element, field| -> Result<_> {
         let (body, t_body_site) = names.site(part, field)?;
         Ok((body, Point3::from(t_body_site.translation.vector)))
     };

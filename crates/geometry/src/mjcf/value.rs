@@ -1,7 +1,7 @@
 //! Attributes as numbers, switches and keywords.
 
 use super::element::Element;
-use super::error::MjcfError;
+use super::error::Result;
 
 /// A switch that may be left to the presence of a range.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,12 +19,12 @@ const LARGEST: f64 = 1e30;
 
 impl Element {
     /// A finite number.
-    pub(super) fn number(&self, field: &'static str) -> Result<Option<f64>, MjcfError> {
+    pub(super) fn number(&self, field: &'static str) -> Result<Option<f64>> {
         Ok(self.numbers::<1>(field)?.map(|[x]| x))
     }
 
     /// A finite number that is not negative.
-    pub(super) fn magnitude(&self, field: &'static str) -> Result<Option<f64>, MjcfError> {
+    pub(super) fn magnitude(&self, field: &'static str) -> Result<Option<f64>> {
         match self.number(field)? {
             Some(x) if x < 0.0 => Err(self.invalid(field, "must not be negative")),
             x => Ok(x),
@@ -32,10 +32,7 @@ impl Element {
     }
 
     /// Exactly `N` finite numbers.
-    pub(super) fn numbers<const N: usize>(
-        &self,
-        field: &'static str,
-    ) -> Result<Option<[f64; N]>, MjcfError> {
+    pub(super) fn numbers<const N: usize>(&self, field: &'static str) -> Result<Option<[f64; N]>> {
         let Some(list) = self.list(field, N)? else { return Ok(None) };
         let count = list.len();
         let exact = |_| self.invalid(field, format!("must have {N} numbers, not {count}"));
@@ -43,18 +40,14 @@ impl Element {
     }
 
     /// Replaces the first numbers of `values` by those given, of which there may be fewer.
-    pub(super) fn leading(&self, field: &'static str, values: &mut [f64]) -> Result<(), MjcfError> {
+    pub(super) fn leading(&self, field: &'static str, values: &mut [f64]) -> Result<()> {
         let list = self.list(field, values.len())?.unwrap_or_default();
         values.iter_mut().zip(list).for_each(|(old, new)| *old = new);
         Ok(())
     }
 
     /// Any finite numbers, at most `most` of them.
-    pub(super) fn list(
-        &self,
-        field: &'static str,
-        most: usize,
-    ) -> Result<Option<Vec<f64>>, MjcfError> {
+    pub(super) fn list(&self, field: &'static str, most: usize) -> Result<Option<Vec<f64>>> {
         let Some(text) = self.text(field) else { return Ok(None) };
         let mut numbers = Vec::new();
         for word in text.split_whitespace() {
@@ -72,7 +65,7 @@ impl Element {
     }
 
     /// The coefficients of a polynomial without a constant, up to the third power; the first is not negative.
-    pub(super) fn coefficients(&self, field: &'static str) -> Result<Option<[f64; 3]>, MjcfError> {
+    pub(super) fn coefficients(&self, field: &'static str) -> Result<Option<[f64; 3]>> {
         let Some(list) = self.list(field, 3)? else { return Ok(None) };
         let mut all = [0.0; 3];
         all[..list.len()].copy_from_slice(&list);
@@ -80,10 +73,7 @@ impl Element {
     }
 
     /// A whole number.
-    pub(super) fn integer<T: TryFrom<i64>>(
-        &self,
-        field: &'static str,
-    ) -> Result<Option<T>, MjcfError> {
+    pub(super) fn integer<T: TryFrom<i64>>(&self, field: &'static str) -> Result<Option<T>> {
         let Some(text) = self.text(field) else { return Ok(None) };
         let number = text.trim().parse::<i64>().ok().and_then(|x| T::try_from(x).ok());
         match number {
@@ -97,7 +87,7 @@ impl Element {
         &self,
         field: &'static str,
         words: &[(&str, T)],
-    ) -> Result<Option<T>, MjcfError> {
+    ) -> Result<Option<T>> {
         let Some(text) = self.text(field) else { return Ok(None) };
         match words.iter().find(|(word, _)| *word == text.trim()) {
             Some((_, value)) => Ok(Some(*value)),
@@ -109,12 +99,12 @@ impl Element {
     }
 
     /// `true` or `false`.
-    pub(super) fn switch(&self, field: &'static str) -> Result<Option<bool>, MjcfError> {
+    pub(super) fn switch(&self, field: &'static str) -> Result<Option<bool>> {
         self.keyword(field, &[("true", true), ("false", false)])
     }
 
     /// `true`, `false` or `auto`.
-    pub(super) fn limited(&self, field: &'static str) -> Result<Option<Limited>, MjcfError> {
+    pub(super) fn limited(&self, field: &'static str) -> Result<Option<Limited>> {
         let words = [("true", Limited::Yes), ("false", Limited::No), ("auto", Limited::Auto)];
         self.keyword(field, &words)
     }

@@ -154,7 +154,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::super::KinematicTree;
-    use crate::closest::{ClosestPoints, SignMethod};
+    use crate::closest::ClosestPoints;
     use crate::mass::signed_volume;
 
     fn link(geometry: &str) -> String {
@@ -249,7 +249,7 @@ mod tests {
             let robot = KinematicTree::from_urdf_str(&link(geometry), None).unwrap();
             let part = &robot.links()[0].parts[0];
             assert_eq!(part.faces.len(), faces, "{geometry}");
-            assert_eq!(ClosestPoints::new(part).unwrap().sign_method(), SignMethod::PseudoNormal);
+            assert!(ClosestPoints::new(part).unwrap().is_closed());
             let volume = signed_volume(part);
             assert!((volume / exact - 1.0).abs() < tolerance, "{geometry}: {volume}");
         }

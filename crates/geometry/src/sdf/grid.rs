@@ -46,11 +46,6 @@ impl SdfGrid {
         Self { lattice, coefficients, bounds, deepest }
     }
 
-    /// Where the samples lie.
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
-    }
-
     /// Distance between samples \[m\].
     pub fn spacing(&self) -> f64 {
         self.lattice.spacing()

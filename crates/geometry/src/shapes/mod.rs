@@ -5,13 +5,11 @@ mod boxes;
 pub(crate) mod closed;
 mod loft;
 mod mug;
-mod ring;
 mod round;
 mod tube;
 
 pub use boxes::{BoxFace, Panel, RoundedBox, cuboid, rounded_box};
 pub use loft::{Section, loft, meridian_lengths, smoothed, subdivided};
 pub use mug::Mug;
-pub use ring::{revolve_ring, torus};
 pub use round::{capsule, cone, cylinder, revolve, sphere, superellipsoid};
 pub use tube::tube;

@@ -136,12 +136,7 @@ fn check(name: &str, mesh: &TriMesh, n: usize, step: usize) {
             (!agree).then(|| format!("{p} {signed} {inside:?} {}", winding_number(mesh, p)))
         })
         .collect();
-    println!(
-        "{name}: {:?}, closed {closed}, {} of {} wrong",
-        tree.sign_method(),
-        wrong.len(),
-        points.len()
-    );
+    println!("{name}: closed {closed}, {} of {} wrong", wrong.len(), points.len());
     assert!(wrong.is_empty(), "{name}: {} wrong, such as {:?}", wrong.len(), &wrong[..1]);
 }
 

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::shapes::{
-    RoundedBox, Section, capsule, cone, cuboid, cylinder, loft, revolve, revolve_ring, rounded_box,
-    sphere, subdivided, superellipsoid, torus, tube,
+    RoundedBox, Section, capsule, cone, cuboid, cylinder, loft, revolve, rounded_box, sphere,
+    subdivided, superellipsoid, tube,
 };
 use prehend_geometry::{Moments, RobustKernel};
 
@@ -32,7 +32,6 @@ fn kernels_of_any_scale_and_residual() {
                 loss.is_finite() && (0.0..=1.0).contains(&weight),
                 "{kernel:?} {r2}: {loss} {weight}"
             );
-            assert!(kernel.weight_derivative(r2) <= 0.0, "{kernel:?} {r2}");
         }
     }
 }
@@ -55,8 +54,6 @@ fn shapes_of_no_size() {
             cone([s, 0.0], 1.0, 8),
             capsule(s, s, 8, 2),
             superellipsoid([s, 1.0, s], [1.0, s], 8),
-            torus(1.0, s, 8, 4),
-            torus(s, s, 8, 4),
             tube(&ends, s, 8, 2),
             cuboid(Vector3::new(s, 1.0, s)),
             rounded_box(&box_of(Vector3::new(1.0, s, s))),
@@ -76,12 +73,8 @@ fn lofts_of_no_size() {
             Section { z: s, half: [s, 1.0], exponent: 1.0 },
             Section { z: 1.0, half: [1.0, 0.0], exponent: 1e3 },
         ];
-        let meshes = [
-            revolve(&square, 8),
-            revolve_ring(&square.map(|[r, z]| [1.0 + r, z]), 8),
-            loft(&sections, 8),
-            loft(&subdivided(&sections, 0.1), 8),
-        ];
+        let meshes =
+            [revolve(&square, 8), loft(&sections, 8), loft(&subdivided(&sections, 0.1), 8)];
         for mesh in meshes {
             assert!(mesh.vertices.iter().all(|v| finite(&v.coords)), "{s}");
             assert!(mesh.uvs.iter().flatten().flatten().all(|x| x.is_finite()), "{s}");

@@ -1,6 +1,8 @@
 //! The tree: medians cut the points into equal leaves, boxes are fitted from the leaves up.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
+
+use crate::box_tree::Bounds;
 
 /// Points in a leaf at most.
 pub(super) const LEAF: usize = 8;
@@ -42,7 +44,7 @@ pub(super) fn build(points: &[Point3<f64>]) -> (Vec<Node>, Vec<Leaf>) {
             }
         }
         leaves.push(leaf);
-        boxes.push(Bounds::of(points, part));
+        boxes.push(bounds(points, part));
     });
 
     let mut nodes = vec![Node { lo: [[0.0; 4]; 3], hi: [[0.0; 4]; 3] }; (count - 1) / 3];
@@ -52,11 +54,11 @@ pub(super) fn build(points: &[Point3<f64>]) -> (Vec<Node>, Vec<Leaf>) {
         for (node, children) in nodes[first..].iter_mut().zip(boxes.chunks_exact(4)) {
             for (lane, child) in children.iter().enumerate() {
                 for axis in 0..3 {
-                    node.lo[axis][lane] = below(child.lo[axis]);
-                    node.hi[axis][lane] = above(child.hi[axis]);
+                    node.lo[axis][lane] = below(child.low[axis]);
+                    node.hi[axis][lane] = above(child.high[axis]);
                 }
             }
-            joined.push(children.iter().fold(Bounds::EMPTY, Bounds::join));
+            joined.push(children.iter().fold(Bounds::EMPTY, |all, child| all.joined(child)));
         }
         boxes = joined;
     }
@@ -68,8 +70,8 @@ fn cut(points: &[Point3<f64>], part: &mut [u32], times: u32) {
     if times == 0 || part.len() < 2 {
         return;
     }
-    let bounds = Bounds::of(points, part);
-    let axis = (bounds.hi - bounds.lo).imax();
+    let bounds = bounds(points, part);
+    let axis = (bounds.high - bounds.low).imax();
     let middle = part.len() / 2;
     part.select_nth_unstable_by(middle, |&a, &b| {
         points[a as usize][axis].total_cmp(&points[b as usize][axis]).then(a.cmp(&b))
@@ -93,28 +95,8 @@ fn halve(part: &[u32], times: u32, take: &mut impl FnMut(&[u32])) {
     halve(high, times - 1, take);
 }
 
-#[derive(Clone, Copy)]
-struct Bounds {
-    lo: Vector3<f64>,
-    hi: Vector3<f64>,
-}
-
-impl Bounds {
-    const EMPTY: Self = Self {
-        lo: Vector3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-        hi: Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-    };
-
-    fn of(points: &[Point3<f64>], part: &[u32]) -> Self {
-        part.iter().fold(Self::EMPTY, |b, &i| {
-            let p = &points[i as usize].coords;
-            Self { lo: b.lo.inf(p), hi: b.hi.sup(p) }
-        })
-    }
-
-    fn join(self, other: &Self) -> Self {
-        Self { lo: self.lo.inf(&other.lo), hi: self.hi.sup(&other.hi) }
-    }
+fn bounds(points: &[Point3<f64>], part: &[u32]) -> Bounds {
+    Bounds::of(part.iter().map(|&i| &points[i as usize]))
 }
 
 /// The largest single-precision number that is not above `x`.

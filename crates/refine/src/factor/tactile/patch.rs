@@ -88,7 +88,7 @@ impl NormalProbe {
         let point = t_cam_link * self.position;
         let local = state.t_cam_object.inverse_transform_point(&point);
         let Some(closest) = object.surface.closest(&local, f64::INFINITY) else { return };
-        let derivative = object.surface.derivative(&local, &closest);
+        let derivative = object.surface.derivative(&closest);
         // The normal, and how it changes with the closest point, in the object's frame.
         let corners = object.corner_normals[closest.face as usize];
         let (mut normal, mut bend) = (Vector3::zeros(), Matrix3::zeros());
