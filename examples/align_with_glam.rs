@@ -20,7 +20,7 @@ struct View {
     t_view_world: Affine3A,
 }
 
-/// Gauss–Newton steps on the picture's loss from `start`: where the model is in the world.
+/// Gauss–Newton steps on the picture's loss from `start`: where the model is in the model.
 fn align(
     view: &View,
     model: &RenderModel,

@@ -13,8 +13,8 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody,
-    SimulationError, State, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model,
+    RigidBody, SimulationError, State, Surface, TimeSteps,
 };
 
 const RADIUS: f64 = 0.03;
@@ -24,7 +24,7 @@ const TIME: f64 = 0.7;
 const TARGET: [f64; 3] = [1.2, 0.15, 0.3];
 
 /// A rubber ball of 60 g above a floor, and where it starts.
-fn ball_and_floor() -> anyhow::Result<(World, State)> {
+fn ball_and_floor() -> anyhow::Result<(Model, State)> {
     let mass = 0.06;
     let (rigid, surface) = (RigidBody::ball(mass, RADIUS)?, Surface::ball(RADIUS)?);
     let contact_area = surface.area();
@@ -32,18 +32,18 @@ fn ball_and_floor() -> anyhow::Result<(World, State)> {
     let bounce = Bounce { restitution: 0.8, impact_speed: 3.0 };
     let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
-    let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
-    world.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
-    let mut start = world.neutral_state();
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let samples = model.add(Body::dynamic("ball", rigid).with_surface(surface));
+    model.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
+    let mut start = model.neutral_state();
     start[samples].pose.translation.z = 0.5;
-    Ok((world, start))
+    Ok((model, start))
 }
 
 /// Where the ball is at equal times, thrown with a velocity.
 fn thrown<S: Scalar>(
-    world: &World,
+    model: &Model,
     states: &State,
     velocity: &[S],
     points: usize,
@@ -51,13 +51,13 @@ fn thrown<S: Scalar>(
     let mut start = states.cast();
     start[1].linear = Vector3::from_column_slice(velocity);
     let time_steps = TimeSteps { dt: TIME / points as f64, steps: points };
-    let run = world.cast().rollout(&start, time_steps)?;
+    let run = model.cast().rollout(&start, time_steps)?;
     Ok(run.iter().map(|states| states[1].pose.translation.vector).collect())
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let (world, states) = ball_and_floor()?;
-    let miss = |velocity: &[Fwd<3>]| match thrown(&world, &states, velocity, 1) {
+    let (model, states) = ball_and_floor()?;
+    let miss = |velocity: &[Fwd<3>]| match thrown(&model, &states, velocity, 1) {
         Ok(path) => (0..3).map(|i| path[1][i].plus(-TARGET[i])).collect(),
         // The solver steps back from what cannot be simulated.
         Err(_) => vec![Fwd::constant(f64::NAN); 3],
@@ -66,7 +66,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let found = LevenbergMarquardt::default()
         .minimize(&guess, |velocity| NormalEquations::forward(miss, velocity))?;
     let paths =
-        [thrown(&world, &states, &guess, 140)?, thrown(&world, &states, &found.parameters, 140)?];
+        [thrown(&model, &states, &guess, 140)?, thrown(&model, &states, &found.parameters, 140)?];
     let off = paths.each_ref().map(|path| (path[140] - Vector3::from(TARGET)).norm());
     let [x, y, z] = [0, 1, 2].map(|i| found.parameters[i]);
     println!("thrown with (1, 0, -1) m/s it misses by {:.1} cm", 100.0 * off[0]);

@@ -10,8 +10,8 @@ use prehend::geometry::shapes;
 use prehend::sim::contact::regularized_coulomb;
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, RigidBody,
-    SimulationError, State, Surface, World,
+    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, Model,
+    RigidBody, SimulationError, State, Surface,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -36,52 +36,52 @@ const TIME: f64 = 0.1;
 const RADIUS: f64 = 0.05;
 
 /// A ball on the floor, and where it starts.
-fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, State)> {
+fn ball_on_floor(law: Quadratic) -> anyhow::Result<(Model, State)> {
     let (ball, mass) = (shapes::sphere(RADIUS, 64), 0.2);
     let points: Vec<Point3<f64>> =
         surface_samples(&ball, 2000, 0).iter().map(|s| s.point).collect();
     let rigid = RigidBody::ball(mass, RADIUS)?;
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&points, ball.area())?;
-    let samples = world.add(Body::dynamic("ball", rigid).with_surface(surface));
+    let samples = model.add(Body::dynamic("ball", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
-    let mut start = world.neutral_state();
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    let mut start = model.neutral_state();
     start[samples].pose.translation.z = RADIUS;
-    Ok((world, start))
+    Ok((model, start))
 }
 
 /// Height \[m\] of the ball at the end, dropped from `drop` \[m\] with the law's `stiffness`.
 fn height<S: Scalar>(
-    world: &World,
+    model: &Model,
     states: &State,
     [drop, stiffness]: [S; 2],
 ) -> Result<S, SimulationError> {
-    let mut world = world.cast();
-    world.contacts[0].params_mut()[0] = stiffness;
+    let mut model = model.cast();
+    model.contacts[0].params_mut()[0] = stiffness;
     let mut states: State<S> = states.cast();
     states[1].pose.translation.z += drop;
-    Ok(world.simulate(&states, TIME)?[1].pose.translation.z)
+    Ok(model.simulate(&states, TIME)?[1].pose.translation.z)
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let (world, states) = ball_on_floor(Quadratic([1e10, 0.5]))?;
+    let (model, states) = ball_on_floor(Quadratic([1e10, 0.5]))?;
     let at = [0.01, 1e10];
 
-    let forward = height(&world, &states, Fwd::<2>::variables(at))?;
+    let forward = height(&model, &states, Fwd::<2>::variables(at))?;
     println!("dropped from 10 mm, after 0.1 s the ball is at {:.4} m", forward.value);
 
     let recording = Recording::start();
     let inputs = recording.variables(at);
-    let adjoints = recording.gradient(height(&world, &states, inputs)?);
+    let adjoints = recording.gradient(height(&model, &states, inputs)?);
     let reverse = inputs.map(|x| adjoints.wrt(x));
 
     for (i, name) in ["drop", "stiffness"].into_iter().enumerate() {
         let off = |fraction: f64| {
             let mut x = at;
             x[i] *= 1.0 + fraction;
-            height(&world, &states, x)
+            height(&model, &states, x)
         };
         let difference = (off(1e-3)? - off(-1e-3)?) / (2e-3 * at[i]);
         let (forward, reverse) = (forward.derivative[i], reverse[i]);

@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend::autodiff::{Recording, Scalar};
 use prehend::sim::articulated::{Joint, JointModel, Link};
-use prehend::sim::{BodyId, RigidBody, SimulationError, State, World};
+use prehend::sim::{BodyId, Model, RigidBody, SimulationError, State};
 
 /// Radius of the circle that rolls the cycloid off \[m\], and free fall \[m/s²\].
 const RADIUS: f64 = 0.25;
@@ -34,23 +34,23 @@ fn along<S: Scalar>(q: S) -> S {
 
 /// Where a bead is `time` \[s\] after it was let go at `q`, along the wire \[m\].
 fn slide<S: Scalar>(
-    (world, bead): &(World, BodyId),
+    (model, bead): &(Model, BodyId),
     q: S,
     time: f64,
 ) -> Result<S, SimulationError> {
-    let world = world.cast();
-    let mut states: State<S> = world.neutral_state();
-    world.set_joint(&mut states, *bead, &[q], &[S::zero()])?;
-    let end = world.simulate(&states, time)?;
-    Ok(along(world.joint_motion(&end, *bead)?[0]))
+    let model = model.cast();
+    let mut states: State<S> = model.neutral_state();
+    model.set_joint(&mut states, *bead, &[q], &[S::zero()])?;
+    let end = model.simulate(&states, time)?;
+    Ok(along(model.joint_motion(&end, *bead)?[0]))
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let mut world = World::new(Vector3::z() * -GRAVITY);
+    let mut model = Model::new(Vector3::z() * -GRAVITY);
     let body = RigidBody::ball(0.02, 5e-3)?;
     let bead = Link::new("bead", Joint::custom(Cycloid), &body);
-    let bead = world.add_articulation(vec![bead])?[0];
-    let scene = (world, bead);
+    let bead = model.add_articulation(vec![bead])?[0];
+    let scene = (model, bead);
 
     let rate = (GRAVITY / (4.0 * RADIUS)).sqrt();
     let to_the_bottom = std::f64::consts::FRAC_PI_2 / rate;

@@ -19,7 +19,7 @@ use prehend::sim::fields::{Cuboid, Placed};
 use prehend::sim::joint_law::{JointLaw, JointLimits, JointSpring};
 use prehend::sim::{
     Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    JointForceId, Law, RigidBody, SimulationError, State, Surface, TimeSteps, World,
+    JointForceId, Law, Model, RigidBody, SimulationError, State, Surface, TimeSteps,
 };
 
 /// Half of the door's width, thickness and height \[m\].
@@ -67,7 +67,7 @@ impl JointLaw for Valves {
 
 /// A door, and a ball that flies towards it.
 struct Doorway {
-    world: World,
+    model: Model,
     leaf: BodyId,
     valves: JointForceId,
     start: State,
@@ -76,17 +76,17 @@ struct Doorway {
 impl Doorway {
     fn new() -> anyhow::Result<Self> {
         // Weight does nothing to a door, and the ball has left before it falls far.
-        let mut world = World::new(Vector3::zeros());
+        let mut model = Model::new(Vector3::zeros());
         let rigid = RigidBody::ball(BALL, RADIUS)?;
-        let ball = world.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(RADIUS)?));
+        let ball = model.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(RADIUS)?));
 
         // The frame of a link is where its joint is, that of a box in its middle.
         let pose = Isometry3::translation(HALF[0], HALF[1], HALF[2]);
         let slab = RigidBody::cuboid(25.0, HALF)?.moved(&pose);
         let hinges = Joint::Revolute(Vector3::z_axis());
-        let leaf = world.add_articulation(vec![Link::new("leaf", hinges, &slab)])?[0];
+        let leaf = model.add_articulation(vec![Link::new("leaf", hinges, &slab)])?[0];
         let field = Cuboid { half_extents: HALF.into(), rounding: 5e-3 };
-        world.bodies[leaf].field = Some(Arc::new(Placed { field, pose }));
+        model.bodies[leaf].field = Some(Arc::new(Placed { field, pose }));
 
         let contact_area = Surface::ball(RADIUS)?.area();
         let target =
@@ -95,26 +95,26 @@ impl Doorway {
         let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
         let law = Arc::new(Law::new(normal, Coulomb { friction: 0.5, slip_scale: 2e-2 })?);
         let bodies = ContactBodies { samples: ball, field: leaf };
-        world.add_contact(bodies, law, GapSmoothing::Hard)?;
+        model.add_contact(bodies, law, GapSmoothing::Hard)?;
         // Shut, it is still pressed to the stop.
-        world.add_joint_force(leaf, JointSpring { stiffness: 10.0, rest: -0.6 })?;
+        model.add_joint_force(leaf, JointSpring { stiffness: 10.0, rest: -0.6 })?;
         let stop = JointLimits { lower: 0.0, upper: 3.0, stiffness: 5e3, damping: 1.0 };
-        world.add_joint_force(leaf, stop)?;
-        let valves = world.add_joint_force(leaf, Valves { sweep: 0.0, latch: 0.0 })?;
+        model.add_joint_force(leaf, stop)?;
+        let valves = model.add_joint_force(leaf, Valves { sweep: 0.0, latch: 0.0 })?;
 
-        let mut start = world.neutral_state();
+        let mut start = model.neutral_state();
         start[ball] = rigid.at_rest(&Isometry3::translation(0.65, -0.5, 1.0));
         start[ball].linear.y = SPEED;
-        Ok(Self { world, leaf, valves, start })
+        Ok(Self { model, leaf, valves, start })
     }
 
     /// Angle \[rad\] and speed \[rad/s\] of the door every [`DT`], with these dampings.
     fn swing<S: Scalar>(&self, dampings: &[S]) -> Result<Vec<[S; 2]>, SimulationError> {
-        let mut world = self.world.cast::<S>();
-        world.joint_force_mut(self.valves).params_mut().copy_from_slice(dampings);
+        let mut model = self.model.cast::<S>();
+        model.joint_force_mut(self.valves).params_mut().copy_from_slice(dampings);
         let start: State<S> = self.start.cast();
-        let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
-        run.iter().map(|states| world.joint_motion(states, self.leaf)).collect()
+        let run = model.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
+        run.iter().map(|states| model.joint_motion(states, self.leaf)).collect()
     }
 
     /// How long the door takes \[s\], with barriers that keep it from being too fast, by the logarithms of both dampings.

@@ -23,7 +23,7 @@ use prehend::geometry::SplitMix64;
 use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
     Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    KelvinVoigt, Law, Motion, RigidBody, State, Surface, TimeSteps, World,
+    KelvinVoigt, Law, Model, Motion, RigidBody, State, Surface, TimeSteps,
 };
 
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.
@@ -55,7 +55,7 @@ fn plunger(time: f64) -> BodyState {
 }
 
 /// Table, parcel and plunger. [`slide`] puts in what is to be found.
-fn scene() -> anyhow::Result<World> {
+fn scene() -> anyhow::Result<Model> {
     let mass = GUESS[1];
     let rigid = RigidBody::cuboid(mass, HALF)?;
     // One sample in the middle of each square of 2 cm.
@@ -67,39 +67,39 @@ fn scene() -> anyhow::Result<World> {
     let parcel = Body::dynamic("parcel", rigid).with_field(Arc::new(sides));
     let tip = Surface::ball(TIP)?;
     let tip_area = tip.area();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
-    let parcel = world.add(parcel.with_surface(Surface::uniform(&bottom, area)?));
-    let plunger = world.add(Body::kinematic("plunger", plunger).with_surface(tip));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let table = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let parcel = model.add(parcel.with_surface(Surface::uniform(&bottom, area)?));
+    let plunger = model.add(Body::kinematic("plunger", plunger).with_surface(tip));
 
     let target = ContactCalibration { mass, gravity: 9.81, penetration: DEPTH, contact_area: area };
     let floor = KelvinVoigt::from_target(&target, 0.3)?;
     let law = Law::new(floor, Coulomb { friction: GUESS[0], slip_scale: 5e-3 })?;
     let smoothing = GapSmoothing::Softplus { width: 0.1 * DEPTH };
-    world.add_contact(ContactBodies { samples: parcel, field: table }, Arc::new(law), smoothing)?;
+    model.add_contact(ContactBodies { samples: parcel, field: table }, Arc::new(law), smoothing)?;
     // The tip is a roller: no friction.
     let spring = HuntCrossley { stiffness: SPRING / tip_area, damping: 0.1, exponent: 1.0 };
     let law = Law::new(spring, Coulomb { friction: 0.0, slip_scale: 5e-3 })?;
     let bodies = ContactBodies { samples: plunger, field: parcel };
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
-    Ok(world)
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    Ok(model)
 }
 
 /// x and y \[m\] and yaw \[rad\] of the parcel in each frame.
-fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> {
+fn slide<S: Scalar>(scene: &Model, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> {
     let [friction, mass, x, y, z, gyration] = std::array::from_fn(|i| values[i].times(UNITS[i]));
     // Inertia about x and y hardly matters: that of a uniform box.
     let [a, b, c] = HALF.map(|half| half * half / 3.0);
     let inertia = Vector3::new(mass.times(b + c), mass.times(a + c), mass * gyration * gyration);
     let rigid = RigidBody::new(mass, Matrix3::from_diagonal(&inertia), Point3::new(x, y, z))?;
-    let mut world = scene.cast::<S>();
-    world.bodies[1].motion = Motion::Dynamic(rigid);
-    *world.contacts[0].param_mut("friction")? = friction;
-    let mut start = world.neutral_state();
+    let mut model = scene.cast::<S>();
+    model.bodies[1].motion = Motion::Dynamic(rigid);
+    *model.contacts[0].param_mut("friction")? = friction;
+    let mut start = model.neutral_state();
     start[1] = rigid.at_rest(&lift(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH)));
-    let run = world.rollout(&start, FRAMES)?;
+    let run = model.rollout(&start, FRAMES)?;
     let seen = |states: &State<S>| {
-        let pose = rigid.model_pose(&states[1].pose);
+        let pose = rigid.body_pose(&states[1].pose);
         let [_, _, k, w] = pose.rotation.coords.into();
         [pose.translation.x, pose.translation.y, k.atan2(w).times(2.0)]
     };
@@ -150,7 +150,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
 }
 
 /// The slide from above, one millimeter a pixel.
-fn draw(scene: &World, recording: &[[f64; 3]], found: &[f64], file: &Path) -> anyhow::Result<()> {
+fn draw(scene: &Model, recording: &[[f64; 3]], found: &[f64], file: &Path) -> anyhow::Result<()> {
     let root = SVGBackend::new(file, (760, 330)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)

@@ -1,6 +1,6 @@
-//! Learns the friction of a floor from where 1 024 spinning balls go: a batch of worlds, and one Gauss–Newton step after the other.
+//! Learns the friction of a floor from where 1 024 spinning balls go: a batch of models, and one Gauss–Newton step after the other.
 //!
-//! The worlds share shapes and law and differ in how the ball is thrown. Forward mode through all of them says how each end changes with the
+//! The models share shapes and law and differ in how the ball is thrown. Forward mode through all of them says how each end changes with the
 //! friction coefficient; the ends that were seen carry 3 mm of noise.
 //!
 //! `cargo run --release --example learn_friction_from_throws` draws what was simulated over what was seen in `target/learn_friction_from_throws.svg`.
@@ -19,8 +19,8 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Batch, Body, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
-    SimulationError, State, TimeSteps, World,
+    Batch, Body, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model,
+    Shape, SimulationError, State, TimeSteps,
 };
 
 const THROWS: usize = 1024;
@@ -35,20 +35,20 @@ const NOISE: f64 = 3e-3;
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 0.4, steps: 1 };
 
 /// A ball on a floor, y up.
-fn world() -> anyhow::Result<World> {
-    let mut world = World::new(Vector3::y() * -9.81);
+fn model() -> anyhow::Result<Model> {
+    let mut model = Model::new(Vector3::y() * -9.81);
     let floor = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
-    let floor = world.add(Body::fixed_from_shape("floor", &floor));
+    let floor = model.add(Body::fixed_from_shape("floor", &floor));
     let ball = Body::from_shape("ball", &Shape::from_parry(&Ball::new(RADIUS))?, DENSITY)?;
     let mass = DENSITY * 4.0 / 3.0 * PI * RADIUS.powi(3);
     let contact_area = PI * RADIUS * RADIUS;
-    let ball = world.add(ball);
+    let ball = model.add(ball);
     let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area };
     let normal =
         HuntCrossley::from_target(&target, 1.0, Bounce { restitution: 0.3, impact_speed: 0.5 })?;
     let law = Law::new(normal, Coulomb { friction: GUESS, slip_scale: 2e-2 })?;
-    world.add_contacts_between(&[ball], &[floor], Arc::new(law), GapSmoothing::Hard)?;
-    Ok(world)
+    model.add_contacts_between(&[ball], &[floor], Arc::new(law), GapSmoothing::Hard)?;
+    Ok(model)
 }
 
 /// How the ball is thrown: it slides on, for it spins backwards and aside.
@@ -63,32 +63,32 @@ fn throw(random: &mut SplitMix64) -> BodyState {
 /// Where the balls are in the end, on a floor of this friction: x and z of each \[m\].
 fn ends<S: Scalar>(
     batch: &Batch,
-    world: &World,
+    model: &Model,
     throws: &[BodyState],
     friction: S,
 ) -> Result<Vec<[S; 2]>, SimulationError> {
-    let mut world = world.cast::<S>();
-    for group in &mut world.contact_groups {
+    let mut model = model.cast::<S>();
+    for group in &mut model.contact_groups {
         *group.contact.param_mut("friction")? = friction;
     }
     let floor = BodyState::at_rest(Isometry3::identity());
-    let start = |throw: &BodyState| (world.clone(), State::new([floor, *throw]).cast());
+    let start = |throw: &BodyState| (model.clone(), State::new([floor, *throw]).cast());
     let variants = throws.iter().map(start);
     let ends = batch.simulate(variants, TIME_STEPS).into_iter();
     ends.map(|end| end.map(|states| states[1].pose.translation).map(|at| [at.x, at.z])).collect()
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let world = world()?;
-    let batch = Batch::new(&world)?;
+    let model = model()?;
+    let batch = Batch::new(&model)?;
     let mut random = SplitMix64::new(2026);
     let throws: Vec<BodyState> = (0..THROWS).map(|_| throw(&mut random)).collect();
-    let mut seen = ends(&batch, &world, &throws, FRICTION)?;
+    let mut seen = ends(&batch, &model, &throws, FRICTION)?;
     seen.iter_mut().flatten().for_each(|x| *x += NOISE * random.normal());
-    let guessed = ends(&batch, &world, &throws, GUESS)?;
+    let guessed = ends(&batch, &model, &throws, GUESS)?;
 
     let began = Instant::now();
-    let residuals = |x: &[Fwd<1>]| match ends(&batch, &world, &throws, x[0]) {
+    let residuals = |x: &[Fwd<1>]| match ends(&batch, &model, &throws, x[0]) {
         Ok(ends) => {
             let off = ends.iter().flatten().zip(seen.iter().flatten());
             off.map(|(end, seen)| end.plus(-seen).times(1.0 / NOISE)).collect()
@@ -109,7 +109,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     );
     let file = Path::new("target/learn_friction_from_throws.svg");
     std::fs::create_dir_all("target")?;
-    draw(&seen, &guessed, &ends(&batch, &world, &throws, friction)?, file)?;
+    draw(&seen, &guessed, &ends(&batch, &model, &throws, friction)?, file)?;
     println!("drawn in {}", file.display());
     anyhow::ensure!((friction - FRICTION).abs() < 4.0 * sigma && sigma < 1e-3);
     Ok(())

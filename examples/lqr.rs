@@ -1,6 +1,6 @@
 //! A cart balances a pole, and a gripper brings back a box that was hit: linear-quadratic regulators by the exact Jacobian of a step.
 //!
-//! `World::linearize_step` gives x′ = A x + B u about an equilibrium, contacts and friction included. The regulator u = −K x minimizes the sum of
+//! `Model::linearize_step` gives x′ = A x + B u about an equilibrium, contacts and friction included. The regulator u = −K x minimizes the sum of
 //! xᵀQ x + uᵀR u over a horizon, by Riccati's difference equation.
 //!
 //! `cargo run --release --example lqr` prints how far both end from their equilibria with the regulator and without.
@@ -13,8 +13,8 @@ use prehend::sim::contact::{BristleFriction, Coulomb, GapSmoothing, KelvinVoigt,
 use prehend::sim::fields::Cuboid;
 use prehend::sim::joint_law::Motor;
 use prehend::sim::{
-    Body, BodyId, ContactBodies, JointForceId, RigidBody, SemiImplicitEuler, SimulationError,
-    State, Step, TimeSteps, World,
+    Body, BodyId, ContactBodies, JointForceId, Model, RigidBody, SemiImplicitEuler,
+    SimulationError, State, Step, TimeSteps,
 };
 
 const GRAVITY: f64 = 9.81;
@@ -23,9 +23,9 @@ const HOLD: usize = 10;
 /// Commands that a regulator looks ahead.
 const HORIZON: usize = 1500;
 
-/// A world at an equilibrium. Motors are on the first joints, which have one coordinate each.
+/// A model at an equilibrium. Motors are on the first joints, which have one coordinate each.
 struct Plant {
-    world: World,
+    model: Model,
     equilibrium: State,
     free: Option<BodyId>,
     /// With their efforts at the equilibrium \[N or N m\].
@@ -37,7 +37,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let plant = cart_pole()?;
     let gain = plant.regulator(&[1.0, 10.0, 0.1, 0.1], 1e-2)?;
     // The pole leans by a quarter of a radian.
-    let start = plant.world.displaced(&plant.equilibrium, &[0.0, 0.25, 0.0, 0.0]);
+    let start = plant.model.displaced(&plant.equilibrium, &[0.0, 0.25, 0.0, 0.0]);
     let held = plant.run(&start, Some(&gain), 6.0)?[1];
     let free = plant.run(&start, None, 1.0)?[1];
     println!("pole: {held:.1e} rad from upright after 6 s, without regulator {free:.1} after 1 s");
@@ -50,7 +50,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     // The box is hit along the fingers and from below [m/s].
     let mut hit = [0.0; 20];
     (hit[10], hit[12]) = (0.1, 0.1);
-    let start = plant.world.displaced(&plant.equilibrium, &hit);
+    let start = plant.model.displaced(&plant.equilibrium, &hit);
     let away = |gain| Ok::<_, anyhow::Error>(1e3 * plant.run(&start, gain, 3.0)?.rows(0, 3).norm());
     let (held, free) = (away(Some(&gain))?, away(None)?);
     println!("box: {held:.2} mm from its place after 3 s, without regulator {free:.0} mm");
@@ -64,11 +64,11 @@ fn cart_pole() -> anyhow::Result<Plant> {
     let cart = Link::new("cart", slide, &RigidBody::cuboid(1.0, [0.1, 0.05, 0.05])?);
     let tip = RigidBody::ball(0.1, 0.03)?.moved(&Isometry3::translation(0.0, 0.0, 0.5));
     let pole = Link::new("pole", Joint::Revolute(Vector3::y_axis()), &tip);
-    let mut world = World::new(Vector3::new(0.0, 0.0, -GRAVITY));
-    let joints = world.add_articulation(vec![cart, pole.on(0, Isometry3::identity())])?;
-    let motors = vec![(world.add_joint_force(joints[0], Motor { effort: 0.0 })?, 0.0)];
-    let equilibrium = world.neutral_state();
-    Ok(Plant { world, equilibrium, free: None, motors, dt: 2e-3 })
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -GRAVITY));
+    let joints = model.add_articulation(vec![cart, pole.on(0, Isometry3::identity())])?;
+    let motors = vec![(model.add_joint_force(joints[0], Motor { effort: 0.0 })?, 0.0)];
+    let equilibrium = model.neutral_state();
+    Ok(Plant { model, equilibrium, free: None, motors, dt: 2e-3 })
 }
 
 /// A box between two fingers that slide along x on a carriage, that along x on a lift, and that along z; all are driven.
@@ -84,28 +84,28 @@ fn gripper() -> anyhow::Result<Plant> {
     };
     let carriage = part("carriage", 0.3, x)?.on(0, Isometry3::identity());
     let [left, right] = [finger("left", -half - pad)?, finger("right", half + pad)?];
-    let mut world = World::new(Vector3::new(0.0, 0.0, -GRAVITY));
-    let joints = world.add_articulation(vec![part("lift", 0.5, z)?, carriage, left, right])?;
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -GRAVITY));
+    let joints = model.add_articulation(vec![part("lift", 0.5, z)?, carriage, left, right])?;
     let rigid = RigidBody::cuboid(0.2, [half; 3])?;
     let shape = Cuboid { half_extents: Vector3::repeat(half), rounding: 1e-3 };
-    let held = world.add(Body::dynamic("box", rigid).with_cuboid(shape, 0.01)?);
+    let held = model.add(Body::dynamic("box", rigid).with_cuboid(shape, 0.01)?);
     let friction = Coulomb { friction: 0.8, slip_scale: 1e-2 };
     let friction = BristleFriction { friction, deflection: 1e-4 };
     let law = Arc::new(Law::new(KelvinVoigt { stiffness: 3e7, damping: 3e4 }, friction)?);
     for field in joints[2..].iter().copied() {
         let half_extents = Vector3::new(pad, half, half);
-        world.bodies[field].field = Some(Arc::new(Cuboid { half_extents, rounding: 0.0 }));
+        model.bodies[field].field = Some(Arc::new(Cuboid { half_extents, rounding: 0.0 }));
         let smoothing = GapSmoothing::Softplus { width: 2e-5 };
-        world.add_contact(ContactBodies { samples: held, field }, law.clone(), smoothing)?;
+        model.add_contact(ContactBodies { samples: held, field }, law.clone(), smoothing)?;
     }
     // The lift carries all, and the fingers press against each other.
     let efforts = [GRAVITY * (0.5 + 0.3 + 0.1 + 0.1 + 0.2), 0.0, grip, -grip];
     let mut motors = Vec::new();
     for (joint, effort) in joints.iter().zip(efforts) {
-        motors.push((world.add_joint_force(*joint, Motor { effort })?, effort));
+        motors.push((model.add_joint_force(*joint, Motor { effort })?, effort));
     }
-    let equilibrium = world.neutral_state();
-    let plant = Plant { world, equilibrium, free: Some(held), motors, dt: 2e-4 };
+    let equilibrium = model.neutral_state();
+    let plant = Plant { model, equilibrium, free: Some(held), motors, dt: 2e-4 };
     // The fingers close while lift and carriage are held in place.
     let mut hold = DMatrix::zeros(4, 20);
     for joint in 0..2 {
@@ -118,12 +118,12 @@ fn gripper() -> anyhow::Result<Plant> {
 impl Plant {
     /// Displacement from the equilibrium, in the order of a linearized step.
     fn coordinates(&self, state: &State) -> DVector<f64> {
-        self.world.displacement(&self.equilibrium, state).into()
+        self.model.displacement(&self.equilibrium, state).into()
     }
 
     /// Feedback gain K of least cost for a diagonal Q and R = `effort` · 1.
     fn regulator(&self, weights: &[f64], effort: f64) -> anyhow::Result<DMatrix<f64>> {
-        let linear = self.world.linearize_step(&self.equilibrium, Step::new(0, self.dt))?;
+        let linear = self.model.linearize_step(&self.equilibrium, Step::new(0, self.dt))?;
         let first = if self.free.is_some() { 6 } else { 0 };
         let by_effort = linear.by_force.columns(first, self.motors.len());
         // Over the steps between two commands.
@@ -155,15 +155,15 @@ impl Plant {
         seconds: f64,
     ) -> anyhow::Result<State> {
         let time_steps = TimeSteps { dt: self.dt, steps: (seconds / self.dt) as usize };
-        let control = |step: Step, world: &mut World, states: &mut State| {
+        let control = |step: Step, model: &mut Model, states: &mut State| {
             let (Some(gain), 0) = (gain, step.index % HOLD) else { return Ok(()) };
             let correction = gain * self.coordinates(states);
             for ((motor, effort), correction) in self.motors.iter().zip(correction.iter()) {
-                world.joint_force_mut(*motor).set_param("effort", effort - correction)?;
+                model.joint_force_mut(*motor).set_param("effort", effort - correction)?;
             }
             Ok::<_, SimulationError>(())
         };
-        Ok(self.world.simulate_controlled(&SemiImplicitEuler, start, time_steps, control)?)
+        Ok(self.model.simulate_controlled(&SemiImplicitEuler, start, time_steps, control)?)
     }
 
     /// Displacements after some seconds from `start`.

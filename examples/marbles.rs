@@ -17,7 +17,7 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
     Adaptive, Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    Law, Shape, SimulationError, State, TimeSteps, World,
+    Law, Model, Shape, SimulationError, State, TimeSteps,
 };
 
 /// Radius \[m\] and density \[kg/m³\] of a marble.
@@ -43,9 +43,9 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// The marbles above the ground, y up, and the states of all bodies.
-fn marbles() -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::y() * -9.81);
-    let ground = world.add(Body::fixed_from_shape("ground", &ground()?));
+fn marbles() -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::y() * -9.81);
+    let ground = model.add(Body::fixed_from_shape("ground", &ground()?));
     let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let mut balls: Vec<BodyId> = Vec::new();
@@ -55,7 +55,7 @@ fn marbles() -> anyhow::Result<(World, State)> {
         let x = -0.5 + 0.05 * row;
         let above = height(x, z) + 2.0 * RADIUS;
         states.push(BodyState::at_rest(Isometry3::translation(x, above, z)));
-        balls.push(world.add(Body::from_shape(&format!("marble {i}"), &shape, DENSITY)?));
+        balls.push(model.add(Body::from_shape(&format!("marble {i}"), &shape, DENSITY)?));
     }
     let mass = DENSITY * 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
@@ -63,14 +63,14 @@ fn marbles() -> anyhow::Result<(World, State)> {
     let normal =
         HuntCrossley::from_target(&target, 1.5, Bounce { restitution: 0.5, impact_speed: 0.5 })?;
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 })?);
-    world.add_contacts_between(&balls, &[ground], law.clone(), GapSmoothing::Hard)?;
-    world.add_contacts_between(&balls, &balls, law, GapSmoothing::Hard)?;
-    Ok((world, State::new(states)))
+    model.add_contacts_between(&balls, &[ground], law.clone(), GapSmoothing::Hard)?;
+    model.add_contacts_between(&balls, &balls, law, GapSmoothing::Hard)?;
+    Ok((model, State::new(states)))
 }
 
 /// Where all marbles are at equal times, if number `moved` starts `by` \[m\] aside (x, z).
 fn run<S: Scalar>(
-    (world, states): &(World, State),
+    (model, states): &(Model, State),
     integrator: &Adaptive,
     moved: usize,
     by: [S; 2],
@@ -80,7 +80,7 @@ fn run<S: Scalar>(
     let place = &mut start[1 + moved].pose.translation;
     (place.x, place.z) = (place.x + by[0], place.z + by[1]);
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.cast().rollout_with(integrator, &start, time_steps)?.states;
+    let run = model.cast().rollout_with(integrator, &start, time_steps)?.states;
     let places = |states: &State<S>| {
         states.bodies()[1..].iter().map(|s| s.pose.translation.vector).collect()
     };

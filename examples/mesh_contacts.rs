@@ -50,11 +50,11 @@ pub(crate) fn main() -> anyhow::Result<()> {
         let began = std::time::Instant::now();
         let steps = MOMENTS - 1;
         let run =
-            scene.world.rollout(&scene.start, TimeSteps { dt: time / steps as f64, steps })?;
+            scene.model.rollout(&scene.start, TimeSteps { dt: time / steps as f64, steps })?;
         println!("{}: {time} s in {:.1} s", scene.name, began.elapsed().as_secs_f64());
-        let body = scene.world.bodies[scene.moving].rigid().context("the body moves")?;
+        let body = scene.model.bodies[scene.moving].rigid().context("the body moves")?;
         let poses: Vec<_> =
-            run.iter().map(|states| body.model_pose(&states[scene.moving].pose)).collect();
+            run.iter().map(|states| body.body_pose(&states[scene.moving].pose)).collect();
         let moved = (poses[steps].translation.vector - poses[0].translation.vector).norm();
         anyhow::ensure!((1e-4..0.5).contains(&moved), "{} moved by {moved} m", scene.name);
         rows.push(draw(scene, &run[0][0].pose, &poses, view)?);

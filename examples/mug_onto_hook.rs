@@ -20,8 +20,8 @@ use prehend::geometry::shapes::{Mug, tube};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, look_at};
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
-    Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape,
-    ShapeOptions, SimulationError, TimeSteps, World,
+    Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model, RigidBody, Shape,
+    ShapeOptions, SimulationError, TimeSteps,
 };
 
 /// Radius of the hook's rod, and where along it the mug is to hang \[m\].
@@ -57,7 +57,7 @@ fn shape(mesh: &TriMesh, spacing: f64, cell: f64) -> anyhow::Result<Shape> {
 
 /// A mug before a hook.
 struct Throw {
-    world: World,
+    model: Model,
     mug: RigidBody,
     /// Pose of the mug's model when it is let go.
     hand: Isometry3<f64>,
@@ -67,19 +67,19 @@ struct Throw {
 
 impl Throw {
     fn new(mug: &Mug) -> anyhow::Result<Self> {
-        let mut world = World::new(Vector3::z() * -9.81);
-        let hook = world.add(Body::fixed_from_shape("hook", &shape(&hook(), 3e-3, 1.5e-3)?));
+        let mut model = Model::new(Vector3::z() * -9.81);
+        let hook = model.add(Body::fixed_from_shape("hook", &shape(&hook(), 3e-3, 1.5e-3)?));
         // Of stoneware.
         let body = Body::from_shape("mug", &shape(&mug.mesh(), 4e-3, 2.5e-3)?, 2400.0)?;
         let rigid = *body.rigid().context("a mug has a mass")?;
-        let thrown = world.add(body);
+        let thrown = model.add(body);
         let (mass, contact_area) = (rigid.mass(), 2e-5);
         let target = ContactCalibration { mass, gravity: 9.81, penetration: 3e-4, contact_area };
         let bounce = Bounce { restitution: 0.2, impact_speed: 0.5 };
         let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
         let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 2e-2 })?;
         let smoothing = GapSmoothing::Softplus { width: 2e-5 };
-        world.add_symmetric_contact(thrown, hook, Arc::new(law), smoothing)?;
+        model.add_symmetric_contact(thrown, hook, Arc::new(law), smoothing)?;
         // The handle up, its opening along the rod.
         let turn =
             UnitQuaternion::from_basis_unchecked(&[Vector3::z(), Vector3::x(), Vector3::y()]);
@@ -89,7 +89,7 @@ impl Throw {
             Point3::new(0.0, 0.0, middle),
         ];
         let hand = Translation3::new(0.11, 0.0, 0.03) * turn * Translation3::from(-marks[0].coords);
-        Ok(Self { world, mug: rigid, hand, marks })
+        Ok(Self { model, mug: rigid, hand, marks })
     }
 
     /// Poses of the mug's model at equal times within `time` \[s\], thrown with velocity and spin `x`.
@@ -99,15 +99,15 @@ impl Throw {
         time: f64,
         steps: usize,
     ) -> Result<Vec<Isometry3<S>>, SimulationError> {
-        let world = self.world.cast::<S>();
+        let model = self.model.cast::<S>();
         let unit = |i: usize| x[i].times(UNITS[i]);
-        let mut start = world.neutral_state();
+        let mut start = model.neutral_state();
         start[1] = self.mug.at_rest(&self.hand).cast();
         start[1].linear = Vector3::new(unit(0), unit(1), unit(2));
         start[1].angular = Vector3::new(unit(3), unit(4), unit(5));
-        let run = world.rollout(&start, TimeSteps { dt: time / steps as f64, steps })?;
+        let run = model.rollout(&start, TimeSteps { dt: time / steps as f64, steps })?;
         let mug = self.mug.cast::<S>();
-        Ok(run.iter().map(|states| mug.model_pose(&states[1].pose)).collect())
+        Ok(run.iter().map(|states| mug.body_pose(&states[1].pose)).collect())
     }
 
     /// How far handle and mug are from where they hang, `time` \[s\] after a throw \[m\].

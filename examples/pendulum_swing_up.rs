@@ -17,8 +17,8 @@ use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::joint_law::Motor;
 use prehend::sim::{
-    Adaptive, BodyId, Integrator, JointForceId, RigidBody, RungeKutta4, SimulationError, State,
-    Step, StepCheckpointed, TimeSteps, World,
+    Adaptive, BodyId, Integrator, JointForceId, Model, RigidBody, RungeKutta4, SimulationError,
+    State, Step, StepCheckpointed, TimeSteps,
 };
 
 /// Length of the rod \[m\], and mass of the ball at its end \[kg\].
@@ -33,7 +33,7 @@ const PARTS: usize = 5;
 
 /// A pendulum that hangs from a motor.
 struct Pendulum {
-    world: World,
+    model: Model,
     rod: BodyId,
     motor: JointForceId,
 }
@@ -44,10 +44,10 @@ impl Pendulum {
         let ball = ball.moved(&Isometry3::translation(0.0, 0.0, -LENGTH));
         // About this axis a positive angle is one towards x.
         let hinge = Joint::Revolute(-Vector3::y_axis());
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let rod = world.add_articulation(vec![Link::new("rod", hinge, &ball)])?[0];
-        let motor = world.add_joint_force(rod, Motor { effort: 0.0 })?;
-        Ok(Self { world, rod, motor })
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+        let rod = model.add_articulation(vec![Link::new("rod", hinge, &ball)])?[0];
+        let motor = model.add_joint_force(rod, Motor { effort: 0.0 })?;
+        Ok(Self { model, rod, motor })
     }
 
     /// Angle \[rad\] and speed \[rad/s\] of the rod before each step and at the end. Each of `efforts` lasts for `parts` steps.
@@ -57,14 +57,14 @@ impl Pendulum {
         efforts: &[S],
         parts: usize,
     ) -> Result<Vec<[S; 2]>, SimulationError> {
-        let world = self.world.cast::<S>();
-        let start = world.neutral_state();
-        let control = |step: Step, world: &mut World<S>, _: &mut State<S>| {
-            world.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])
+        let model = self.model.cast::<S>();
+        let start = model.neutral_state();
+        let control = |step: Step, model: &mut Model<S>, _: &mut State<S>| {
+            model.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])
         };
         let time_steps = TimeSteps { dt: HOLD / parts as f64, steps: parts * efforts.len() };
-        let run = world.rollout_controlled(integrator, &start, time_steps, control)?;
-        run.iter().map(|states| world.joint_motion(states, self.rod)).collect()
+        let run = model.rollout_controlled(integrator, &start, time_steps, control)?;
+        run.iter().map(|states| model.joint_motion(states, self.rod)).collect()
     }
 
     /// How far the rod ends from upright and at rest.
@@ -87,7 +87,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let highest = all_it_has.iter().map(|[angle, _]| *angle).fold(0.0, f64::max);
     println!("at all of its effort the motor lifts the pendulum to {:.0}°", highest.to_degrees());
 
-    let integrator = StepCheckpointed::new(RungeKutta4, &pendulum.world)?;
+    let integrator = StepCheckpointed::new(RungeKutta4, &pendulum.model)?;
     let miss = |x: &[Var]| pendulum.miss(&integrator, x).unwrap_or(f64::NAN.into());
     let criteria = Criteria { iterations: 400, ..Adam::default().criteria };
     let adam = Adam { rate: 0.1, criteria, ..Adam::default() };

@@ -15,8 +15,8 @@ use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, SceneVars};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
-    SimulationError, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Model, RigidBody,
+    SimulationError, Surface, TimeSteps,
 };
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };
@@ -35,32 +35,32 @@ fn block() -> TriMesh {
 }
 
 /// The block on a table.
-fn world() -> anyhow::Result<World> {
+fn model() -> anyhow::Result<Model> {
     let inertia = Matrix3::from_diagonal(&Vector3::new(2.4e-4, 3.3e-4, 3.3e-4));
     let rigid = RigidBody::new(0.4, inertia, Point3::origin())?;
     let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
         .map(|(x, y)| Point3::new(0.03 * x, 0.02 * y, -HALF[2]));
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&feet, 4e-4)?;
-    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
+    let samples = model.add(Body::dynamic("block", rigid).with_surface(surface));
     let spring = KelvinVoigt { stiffness: 4e7, damping: 4e5 };
     let law = Law::new(spring, Coulomb { friction: 0.3, slip_scale: 1e-2 })?;
     let smoothing = GapSmoothing::Softplus { width: 5e-5 };
-    world.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)?;
-    Ok(world)
+    model.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)?;
+    Ok(model)
 }
 
 /// Where the block is in each picture.
-fn slide<S: Scalar>(world: &World, x: &[S]) -> Result<Vec<Isometry3<S>>, SimulationError> {
+fn slide<S: Scalar>(model: &Model, x: &[S]) -> Result<Vec<Isometry3<S>>, SimulationError> {
     let [vx, vy, spin, friction] = std::array::from_fn(|i| x[i].times(UNITS[i]));
-    let mut world = world.cast::<S>();
-    *world.contacts[0].param_mut("friction")? = friction;
-    let mut start = world.neutral_state();
+    let mut model = model.cast::<S>();
+    *model.contacts[0].param_mut("friction")? = friction;
+    let mut start = model.neutral_state();
     let block = &mut start[1];
     *block = BodyState::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).cast();
     (block.linear.x, block.linear.y, block.angular.z) = (vx, vy, spin);
-    let run = world.rollout(&start, PICTURES)?;
+    let run = model.rollout(&start, PICTURES)?;
     Ok(run[1..].iter().map(|states| states[1].pose).collect())
 }
 
@@ -76,20 +76,22 @@ pub(crate) fn main() -> anyhow::Result<()> {
         .nth(1)
         .filter(|_| !cfg!(test))
         .unwrap_or("target/pixels_to_physics".to_owned());
-    let (world, model) = (world()?, Arc::new(RenderModel::new(&block())?));
+    let (model, mesh_model) = (model()?, Arc::new(RenderModel::new(&block())?));
     let renderer = Renderer::new(Light::headlight(0.5, 0.5));
     let (empty, t_cam_world) = scene();
     let truth: Vec<f64> = TRUTH.iter().zip(UNITS).map(|(x, unit)| x / unit).collect();
     let guess: Vec<f64> = GUESS.iter().zip(UNITS).map(|(x, unit)| x / unit).collect();
-    let seen: Vec<_> = (slide(&world, &truth)?.into_iter())
-        .map(|pose| renderer.render(&empty.clone().with(model.clone(), t_cam_world * pose)).buffers)
+    let seen: Vec<_> = (slide(&model, &truth)?.into_iter())
+        .map(|pose| {
+            renderer.render(&empty.clone().with(mesh_model.clone(), t_cam_world * pose)).buffers
+        })
         .collect();
 
     // Sum of squared differences of all colors in all pictures.
-    let shown = empty.clone().with(model.clone(), Isometry3::identity());
+    let shown = empty.clone().with(mesh_model.clone(), Isometry3::identity());
     let loss = |x: &[Var]| -> anyhow::Result<Var> {
         let mut sum = Var::default();
-        for (pose, seen) in slide(&world, x)?.into_iter().zip(&seen) {
+        for (pose, seen) in slide(&model, x)?.into_iter().zip(&seen) {
             let pose = lift::<Var>(&t_cam_world) * pose;
             let vars = SceneVars { poses: vec![(0, pose)], ..SceneVars::default() };
             let image = renderer.record(&shown, &vars)?;
@@ -114,9 +116,9 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let picture = |x: &[f64]| -> anyhow::Result<Vec<RgbImage>> {
         let mut large = empty.clone();
         large.camera = large.camera.scaled(3.0);
-        let poses = slide(&world, x)?;
+        let poses = slide(&model, x)?;
         let every_second = poses.iter().step_by(2).map(|pose| {
-            let scene = large.clone().with(model.clone(), t_cam_world * pose);
+            let scene = large.clone().with(mesh_model.clone(), t_cam_world * pose);
             Ok(renderer.render(&scene).buffers.to_rgb()?)
         });
         every_second.collect()

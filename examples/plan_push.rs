@@ -16,8 +16,8 @@ use prehend::sim::contact::Bounce;
 use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
     Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
-    HuntCrossley, Law, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, Trajectory,
-    World,
+    HuntCrossley, Law, Model, Motion, RigidBody, SimulationError, State, Surface, TimeSteps,
+    Trajectory,
 };
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].
@@ -64,7 +64,7 @@ fn spline<S: Scalar>(points: Vec<Vector2<S>>) -> impl Trajectory<S> {
 }
 
 /// A box of 500 g on a table, the finger, and where they are at the start.
-fn scene() -> anyhow::Result<(World, State)> {
+fn scene() -> anyhow::Result<(Model, State)> {
     let mass = 0.5;
     let rigid = RigidBody::cuboid(mass, HALF)?;
     // One sample in the middle of each square of 2 cm.
@@ -76,10 +76,10 @@ fn scene() -> anyhow::Result<(World, State)> {
     let tip = Surface::ball(FINGER)?;
     let tip_area = tip.area();
     let still = BodyState::at_rest(Isometry3::identity());
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
-    let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
-    let finger = world.add(Body::kinematic("finger", move |_: f64| still).with_surface(tip));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let table = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let pushed = model.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
+    let finger = model.add(Body::kinematic("finger", move |_: f64| still).with_surface(tip));
 
     let friction = Coulomb { friction: 0.35, slip_scale: 5e-3 };
     let normal = |penetration: f64, contact_area: f64| {
@@ -89,26 +89,26 @@ fn scene() -> anyhow::Result<(World, State)> {
     };
     let law = Law::new(normal(DEPTH, area)?, friction)?;
     let bodies = ContactBodies { samples: pushed, field: table };
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     // The finger must not creep along the box in the seconds of the push.
     let law = Law::new(normal(5e-4, tip_area)?, BristleFriction { friction, deflection: 5e-4 })?;
     let bodies = ContactBodies { samples: finger, field: pushed };
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
-    let mut start = world.neutral_state();
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    let mut start = model.neutral_state();
     start[pushed].pose.translation.z = HALF[2] - DEPTH;
-    Ok((world, start))
+    Ok((model, start))
 }
 
 /// x, y and yaw of the box at equal times.
 fn push<S: Scalar>(
-    (world, start): &(World, State),
+    (model, start): &(Model, State),
     parameters: &[S],
     steps: usize,
 ) -> Result<Vec<[S; 3]>, SimulationError> {
-    let mut world = world.cast::<S>();
-    world.bodies[2].motion = Motion::Kinematic(Arc::new(spline(points(parameters))));
+    let mut model = model.cast::<S>();
+    model.bodies[2].motion = Motion::Kinematic(Arc::new(spline(points(parameters))));
     let start: State<S> = start.cast();
-    let run = world.rollout(&start, TimeSteps { dt: TIME / steps as f64, steps })?;
+    let run = model.rollout(&start, TimeSteps { dt: TIME / steps as f64, steps })?;
     let seen = |states: &State<S>| {
         let pose = &states[1].pose;
         let [_, _, k, w] = pose.rotation.coords.into();

@@ -14,7 +14,7 @@ use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::{
     Body, BodyId, BodyState, BristleFriction, ContactCalibration, Coulomb, GapSmoothing,
-    HuntCrossley, KelvinVoigt, Law, Shape, SimulationError, State, TimeSteps, World,
+    HuntCrossley, KelvinVoigt, Law, Model, Shape, SimulationError, State, TimeSteps,
 };
 
 /// Half of a box's edge without, and the radius of, the rounding \[m\].
@@ -27,10 +27,10 @@ const BALLS: usize = 5;
 const SPEED: f64 = 1.0;
 
 /// Three boxes that fall, a little turned, onto each other; z up.
-fn stack() -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::z() * -9.81);
+fn stack() -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::z() * -9.81);
     let floor = Shape::from_parry(&HalfSpace::new(Vector::Z))?;
-    let floor = world.add(Body::fixed_from_shape("floor", &floor));
+    let floor = model.add(Body::fixed_from_shape("floor", &floor));
     let inner_shape = Cuboid::new(Vector::splat(HALF));
     let shape = Shape::from_parry(&RoundCuboid { inner_shape, border_radius: ROUNDING })?;
     let mut states = vec![BodyState::at_rest(Isometry3::identity())];
@@ -39,21 +39,21 @@ fn stack() -> anyhow::Result<(World, State)> {
         let height = (2 * level + 1) as f64 * (HALF + ROUNDING) + 1e-3 * (level + 1) as f64;
         let turn = Vector3::new(0.02, -0.015, 0.15) * level as f64;
         states.push(BodyState::at_rest(Isometry3::new(Vector3::new(0.0, 0.0, height), turn)));
-        boxes.push(world.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?));
+        boxes.push(model.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?));
     }
     // 20 µm deep under a box, and critically damped.
     let normal = KelvinVoigt { stiffness: 2.5e7, damping: 7e4 };
     let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
     let law = Arc::new(Law::new(normal, BristleFriction { friction, deflection: 1e-4 })?);
     let smoothing = GapSmoothing::Softplus { width: 5e-6 };
-    world.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
-    world.add_contacts_between(&boxes, &boxes, law, smoothing)?;
-    Ok((world, State::new(states)))
+    model.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
+    model.add_contacts_between(&boxes, &boxes, law, smoothing)?;
+    Ok((model, State::new(states)))
 }
 
 /// Steel balls in a row along x, weightless, the first of them a little apart.
-fn cradle() -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::zeros());
+fn cradle() -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::zeros());
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let mut balls: Vec<BodyId> = Vec::new();
     let mut states = Vec::new();
@@ -61,32 +61,32 @@ fn cradle() -> anyhow::Result<(World, State)> {
         let apart = if i == 0 { -0.1 } else { 0.0 };
         let x = i as f64 * (2.0 * RADIUS + GAP) + apart;
         states.push(BodyState::at_rest(Isometry3::translation(x, 0.0, 0.0)));
-        balls.push(world.add(Body::from_shape(&format!("ball {i}"), &shape, 7800.0)?));
+        balls.push(model.add(Body::from_shape(&format!("ball {i}"), &shape, 7800.0)?));
     }
-    let mass = world.bodies[balls[0]].rigid().map_or(0.0, |rigid| rigid.mass());
+    let mass = model.bodies[balls[0]].rigid().map_or(0.0, |rigid| rigid.mass());
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
     let target = ContactCalibration { mass, gravity: 9.81, penetration: 1e-7, contact_area };
     let bounce = Bounce { restitution: 0.98, impact_speed: 0.5 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.1, slip_scale: 1e-2 })?;
-    world.add_contacts_between(&balls, &balls, Arc::new(law), GapSmoothing::Hard)?;
-    Ok((world, State::new(states)))
+    model.add_contacts_between(&balls, &balls, Arc::new(law), GapSmoothing::Hard)?;
+    Ok((model, State::new(states)))
 }
 
 /// The states of the balls at equal times, if the first one comes with `speed` \[m/s\].
 fn strike<S: Scalar>(
-    (world, states): &(World, State),
+    (model, states): &(Model, State),
     speed: S,
     steps: usize,
 ) -> Result<Vec<State<S>>, SimulationError> {
     let mut start: State<S> = states.cast();
     start[0].linear.x = speed;
-    world.cast().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
+    model.cast().rollout(&start, TimeSteps { dt: 0.25 / steps as f64, steps })
 }
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let (world, start) = stack()?;
-    let stack = world.rollout(&start, TimeSteps { dt: 0.4, steps: 5 })?;
+    let (model, start) = stack()?;
+    let stack = model.rollout(&start, TimeSteps { dt: 0.4, steps: 5 })?;
     let fastest = stack[5].bodies()[1..4].iter().map(|s| s.linear.norm()).fold(0.0, f64::max);
     println!("the stack stands after two seconds: nothing moves faster than {fastest:.0e} m/s");
 

@@ -8,7 +8,7 @@ use std::{fs, io};
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_070),
     ("geometry", 15_466),
-    ("sim", 16_443),
+    ("sim", 16_448),
     ("render", 10_630),
     ("refine", 30_630),
 ];
@@ -161,7 +161,7 @@ fn modules_of_sim_form_no_circle() {
     for module in ["guide", "prelude", "scenes"] {
         imports.remove(module);
     }
-    assert!(imports.len() > 10 && imports["world"].contains("contact"), "{imports:?}");
+    assert!(imports.len() > 10 && imports["model"].contains("contact"), "{imports:?}");
     let left = circles(imports);
     assert!(left.is_empty(), "in a circle, or above one: {left:#?}");
 }

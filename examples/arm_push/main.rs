@@ -15,8 +15,8 @@ use nalgebra::Vector2;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Scalar, Var, jacobian};
 use prehend::sim::{
-    Adaptive, Integrator, SemiImplicitEuler, SimulationError, State, Step, StepCheckpointed,
-    TimeSteps, World,
+    Adaptive, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, StepCheckpointed,
+    TimeSteps,
 };
 use scene::Scene;
 
@@ -58,17 +58,17 @@ fn push<S: Scalar>(
     let start: State<S> = scene.start.cast();
     let ticks = (TIME / TICK).round() as usize;
     let mut run = Vec::with_capacity(ticks + 1);
-    let control = |step: Step, world: &mut World<S>, states: &mut State<S>| {
+    let control = |step: Step, model: &mut Model<S>, states: &mut State<S>| {
         if step.index.is_multiple_of(parts) {
             let targets = planned(scene.first, plan, step.start);
             for (servo, target) in scene.servos.into_iter().zip(targets) {
-                world.joint_force_mut(servo).params_mut()[0] = target;
+                model.joint_force_mut(servo).params_mut()[0] = target;
             }
             run.push(states.clone());
         }
     };
     let time_steps = TimeSteps { dt: TICK / parts as f64, steps: parts * ticks };
-    let end = scene.world.cast().simulate_controlled(integrator, &start, time_steps, control)?;
+    let end = scene.model.cast().simulate_controlled(integrator, &start, time_steps, control)?;
     run.push(end);
     Ok(run)
 }
@@ -80,7 +80,7 @@ fn place<S: Scalar>(scene: &Scene, states: &State<S>) -> Vector2<S> {
 
 pub(crate) fn main() -> anyhow::Result<()> {
     let scene = Scene::new()?;
-    let integrator = StepCheckpointed::new(SemiImplicitEuler, &scene.world)?;
+    let integrator = StepCheckpointed::new(SemiImplicitEuler, &scene.model)?;
     // Off by a millimeter counts as much as a bend of the plan by half a radian.
     let residuals = |plan: &[Var]| {
         let end =

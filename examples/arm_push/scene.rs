@@ -9,7 +9,7 @@ use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::joint_law::PositionServo;
 use prehend::sim::{
     Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    JointForceId, Law, RigidBody, State, Surface, World,
+    JointForceId, Law, Model, RigidBody, State, Surface,
 };
 
 /// Lengths of upper arm and forearm, and the height at which they turn above the table \[m\].
@@ -23,9 +23,9 @@ const DEPTH: f64 = 2e-4;
 /// Where the box stands at first \[m\].
 pub(crate) const BOX: [f64; 2] = [0.27, 0.16];
 
-/// The world, what to look at in it, and its states at the start.
+/// The model, what to look at in it, and its states at the start.
 pub(crate) struct Scene {
-    pub(crate) world: World,
+    pub(crate) model: Model,
     pub(crate) arm: [BodyId; 2],
     pub(crate) servos: [JointForceId; 2],
     pub(crate) pushed: BodyId,
@@ -36,8 +36,8 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new() -> anyhow::Result<Self> {
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+        let table = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
 
         let mass = 0.5;
         let rigid = RigidBody::cuboid(mass, HALF)?;
@@ -48,14 +48,14 @@ impl Scene {
         let area = 4.0 * HALF[0] * HALF[1];
         let sides = Cuboid { half_extents: HALF.into(), rounding: 2e-3 };
         let pushed = Body::dynamic("box", rigid).with_field(Arc::new(sides));
-        let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
+        let pushed = model.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
 
         let rod = |name, length: f64| -> anyhow::Result<Link> {
             let rod = RigidBody::cuboid(2.0 * length, [0.5 * length, 0.02, 0.015])?;
             let rod = rod.moved(&Isometry3::translation(0.5 * length, 0.0, 0.0));
             Ok(Link::new(name, Joint::Revolute(Vector3::z_axis()), &rod).with_armature(0.01))
         };
-        let links = world.add_articulation(vec![
+        let links = model.add_articulation(vec![
             rod("upper arm", LINKS[0])?.at(Isometry3::translation(0.0, 0.0, HEIGHT)),
             rod("forearm", LINKS[1])?.on(0, Isometry3::translation(LINKS[0], 0.0, 0.0)),
         ])?;
@@ -63,9 +63,9 @@ impl Scene {
         let tip = Isometry3::translation(LINKS[1], 0.0, HALF[2] - HEIGHT);
         let peg = Surface::ball(PEG)?.moved(&tip);
         let peg_area = peg.area();
-        world.bodies[arm[1]].surface = Some(Arc::new(peg));
+        model.bodies[arm[1]].surface = Some(Arc::new(peg));
         let servo = PositionServo { target: 0.0, stiffness: 60.0, damping: 5.0, max_effort: 10.0 };
-        let servos = [world.add_joint_force(arm[0], servo)?, world.add_joint_force(arm[1], servo)?];
+        let servos = [model.add_joint_force(arm[0], servo)?, model.add_joint_force(arm[1], servo)?];
 
         let normal = |penetration: f64, contact_area: f64| {
             let target = ContactCalibration { mass, gravity: 9.81, penetration, contact_area };
@@ -77,16 +77,16 @@ impl Scene {
         ] {
             let law = Law::new(normal, Coulomb { friction, slip_scale: 5e-3 })?;
             let bodies = ContactBodies { samples, field };
-            world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+            model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
         }
 
-        let mut start = world.neutral_state();
+        let mut start = model.neutral_state();
         let first = [2.0, -2.2];
         for (link, angle) in arm.into_iter().zip(first) {
-            world.set_joint(&mut start, link, &[angle], &[0.0])?;
+            model.set_joint(&mut start, link, &[angle], &[0.0])?;
         }
         start[pushed] = rigid.at_rest(&Isometry3::translation(BOX[0], BOX[1], HALF[2] - DEPTH));
-        Ok(Self { world, arm, servos, pushed, start, first })
+        Ok(Self { model, arm, servos, pushed, start, first })
     }
 }
 

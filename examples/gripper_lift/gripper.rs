@@ -4,13 +4,13 @@ use std::path::Path;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend::geometry::mjcf::Model;
+use prehend::geometry::mjcf::Model as MjcfModel;
 use prehend::geometry::robot::{KinematicTree, RobotShape};
 use prehend::sim::articulated::Joint;
 use prehend::sim::contact::LawError;
 use prehend::sim::joint_law::PositionServo;
 use prehend::sim::robot::{MjcfOptions, UrdfOptions};
-use prehend::sim::{BodyId, JointForceId, World};
+use prehend::sim::{BodyId, JointForceId, Model};
 
 /// Two fingers that slide towards each other under a plate.
 const URDF: &str = r#"<robot name="slides">
@@ -47,20 +47,20 @@ pub(crate) struct Gripper {
 }
 
 impl Gripper {
-    pub(crate) fn add(world: &mut World) -> anyhow::Result<Self> {
+    pub(crate) fn add(model: &mut Model) -> anyhow::Result<Self> {
         let data = std::env::var_os("PREHEND_DATA").unwrap_or_else(|| "../shared/data".into());
         let file = Path::new(&data).join("robots/robotiq_2f85/2f85.xml");
-        if file.is_file() { Self::from_mjcf(world, &file) } else { Self::from_urdf(world) }
+        if file.is_file() { Self::from_mjcf(model, &file) } else { Self::from_urdf(model) }
     }
 
     /// The gripper of the file, upside down: 0.16 m from its base to where it pinches.
-    fn from_mjcf(world: &mut World, file: &Path) -> anyhow::Result<Self> {
-        let model = Model::from_file(file)?;
+    fn from_mjcf(model: &mut Model, file: &Path) -> anyhow::Result<Self> {
+        let mjcf = MjcfModel::from_file(file)?;
         // Up is the model's −z.
         let base = Joint::Prismatic(-Vector3::z_axis());
-        let t_world_model = over(0.19);
-        let options = MjcfOptions { t_world_model, base, ..MjcfOptions::default() };
-        let robot = world.add_mjcf(&model, &options)?;
+        let t_world_mjcf = over(0.19);
+        let options = MjcfOptions { t_world_mjcf, base, ..MjcfOptions::default() };
+        let robot = model.add_mjcf(&mjcf, &options)?;
         for warning in &robot.warnings {
             println!("not read: {warning}");
         }
@@ -68,31 +68,31 @@ impl Gripper {
         let base = body("base_mount")?;
         let closer = robot.actuator("fingers_actuator").context("no actuator")?;
         let corners = robot.bodies.iter().filter_map(|&body| {
-            let surface = world.bodies[body].surface.as_ref()?;
+            let surface = model.bodies[body].surface.as_ref()?;
             Some((body, surface.points().iter().map(|point| point.position).collect()))
         });
         Ok(Self {
-            name: model.name.clone(),
+            name: mjcf.name.clone(),
             base,
             pads: [body("left_pad")?, body("right_pad")?],
             corners: corners.collect(),
-            lift: lift(world, base)?,
+            lift: lift(model, base)?,
             closers: vec![(closer, "control", 255.0)],
         })
     }
 
-    fn from_urdf(world: &mut World) -> anyhow::Result<Self> {
+    fn from_urdf(model: &mut Model) -> anyhow::Result<Self> {
         let robot = KinematicTree::from_urdf_str(URDF, None)?;
         let shape = RobotShape::new(&robot, 2e-3, 8e-3)?;
         let base = Joint::Prismatic(-Vector3::z_axis());
         let options = UrdfOptions { t_world_base: over(0.12), base, ..UrdfOptions::default() };
-        let links = world.add_articulated_robot(&robot, Some(&shape), &options)?;
+        let links = model.add_articulated_robot(&robot, Some(&shape), &options)?;
         let link = |name: &str| {
             Ok::<_, anyhow::Error>(links[robot.link_index(name).context("no such link")?])
         };
         let pads = [link("left")?, link("right")?];
         let servo = PositionServo { target: 0.0, stiffness: 1e3, damping: 30.0, max_effort: 10.0 };
-        let closers = pads.map(|pad| world.add_joint_force(pad, servo)).into_iter();
+        let closers = pads.map(|pad| model.add_joint_force(pad, servo)).into_iter();
         let closers = closers.map(|id| Ok((id?, "target", 0.05)));
         let parts = robot.links().iter().zip(&links);
         let corners = parts.map(|(link, body)| {
@@ -105,21 +105,21 @@ impl Gripper {
             pads,
             corners: corners.collect(),
             closers: closers.collect::<anyhow::Result<_>>()?,
-            lift: lift(world, base)?,
+            lift: lift(model, base)?,
         })
     }
 
     /// Closes by a part of all it can, and goes to a height \[m\] over that at the start.
     pub(crate) fn command(
         &self,
-        world: &mut World,
+        model: &mut Model,
         closed: f64,
         height: f64,
     ) -> Result<(), LawError> {
         for (id, param, most) in &self.closers {
-            world.joint_force_mut(*id).set_param(param, closed * most)?;
+            model.joint_force_mut(*id).set_param(param, closed * most)?;
         }
-        world.joint_force_mut(self.lift).set_param("target", height)
+        model.joint_force_mut(self.lift).set_param("target", height)
     }
 }
 
@@ -129,8 +129,8 @@ fn over(height: f64) -> Isometry3<f64> {
 }
 
 /// A stiff servo that carries the gripper.
-fn lift(world: &mut World, base: BodyId) -> anyhow::Result<JointForceId> {
+fn lift(model: &mut Model, base: BodyId) -> anyhow::Result<JointForceId> {
     let servo =
         PositionServo { target: 0.0, stiffness: 2e4, damping: 4e2, max_effort: f64::INFINITY };
-    Ok(world.add_joint_force(base, servo)?)
+    Ok(model.add_joint_force(base, servo)?)
 }

@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
     Adaptive, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, DynContactLaw,
-    GapSmoothing, KelvinVoigt, Law, RigidBody, SimulationError, State, Step, TimeSteps, World,
+    GapSmoothing, KelvinVoigt, Law, Model, RigidBody, SimulationError, State, Step, TimeSteps,
 };
 
 use gripper::Gripper;
@@ -30,39 +30,39 @@ const LIFT: f64 = 0.1;
 const GRIP: f64 = 6.0;
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let gripper = Gripper::add(&mut world)?;
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let gripper = Gripper::add(&mut model)?;
     println!("{}", gripper.name);
     let floor = Body::fixed("floor").with_field(Arc::new(HalfSpace::floor()));
-    let floor = world.add(floor);
+    let floor = model.add(floor);
     let rigid = RigidBody::cuboid(MASS, HALF)?;
     let shape = Cuboid { half_extents: HALF.into(), rounding: 1e-3 };
-    let lifted = world.add(Body::dynamic("box", rigid).with_cuboid(shape, 0.01)?);
+    let lifted = model.add(Body::dynamic("box", rigid).with_cuboid(shape, 0.01)?);
 
     let law: Arc<dyn DynContactLaw> = Arc::new(law()?);
     let smoothing = GapSmoothing::Softplus { width: 2e-5 };
     for field in [gripper.pads[0], gripper.pads[1], floor] {
         let bodies = ContactBodies { samples: lifted, field };
-        world.add_contact(bodies, law.clone(), smoothing)?;
+        model.add_contact(bodies, law.clone(), smoothing)?;
     }
 
-    let mut start = world.neutral_state();
+    let mut start = model.neutral_state();
     start[lifted] = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2]));
     let time_steps = TimeSteps { dt: 0.02, steps: (HELD / 0.02) as usize };
     let mut closing: f64 = 0.0;
-    let control = |step: Step, world: &mut World, states: &mut State| {
+    let control = |step: Step, model: &mut Model, states: &mut State| {
         // Fingers close until they feel the box, and open where they press too much.
-        let felt = world.contact_wrench(gripper.pads[0], states)?.fixed_rows::<3>(0).norm();
+        let felt = model.contact_wrench(gripper.pads[0], states)?.fixed_rows::<3>(0).norm();
         let pace = (1.0 - felt / GRIP).clamp(-1.0, 1.0);
         closing = (closing + pace * step.dt / (0.8 * CLOSED)).clamp(0.0, 1.0);
         let rising = ((step.start - CLOSED) / (LIFTED - CLOSED)).clamp(0.0, 1.0);
         // From rest to rest.
         let rising = rising * rising * (3.0 - 2.0 * rising);
-        gripper.command(world, closing, LIFT * rising)?;
+        gripper.command(model, closing, LIFT * rising)?;
         Ok::<_, SimulationError>(())
     };
     let began = std::time::Instant::now();
-    let run = world.rollout_controlled(&Adaptive::default(), &start, time_steps, control)?;
+    let run = model.rollout_controlled(&Adaptive::default(), &start, time_steps, control)?;
     println!("{HELD} s simulated in {:.1} s", began.elapsed().as_secs_f64());
 
     let height = |states: &State| states[lifted].pose.translation.z;
@@ -71,7 +71,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     // How the box has moved in the hand since it was gripped.
     let held = |states: &State| states[gripper.base].pose.inverse() * states[lifted].pose;
     let slip = held(before).inverse() * held(end);
-    let [force, other] = gripper.pads.map(|pad| world.contact_wrench(pad, end));
+    let [force, other] = gripper.pads.map(|pad| model.contact_wrench(pad, end));
     let grip = 0.5 * (force?.fixed_rows::<3>(0).norm() + other?.fixed_rows::<3>(0).norm());
     println!("the box rises by {:.1} mm between pads that press with {grip:.1} N", 1e3 * rise);
     println!(

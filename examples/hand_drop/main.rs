@@ -18,7 +18,7 @@ use prehend::sim::joint_law::PositionServo;
 use prehend::sim::robot::UrdfOptions;
 use prehend::sim::{
     Body, BodyId, ContactBodies, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing,
-    HuntCrossley, Law, RigidBody, State, Surface, TimeSteps, World,
+    HuntCrossley, Law, Model, RigidBody, State, Surface, TimeSteps,
 };
 
 /// The ball: radius \[m\], mass \[kg\], and how high over the base of the hand it starts \[m\].
@@ -32,12 +32,12 @@ const DT: f64 = 0.01;
 pub(crate) fn main() -> anyhow::Result<()> {
     let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None)?;
     let shape = RobotShape::new(&robot, 3e-3, 6e-3)?;
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    // Palm up: the hand's x is the world's z.
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    // Palm up: the hand's x is the model's z.
     let turn = Vector3::y() * -std::f64::consts::FRAC_PI_2;
     let t_world_base = Isometry3::new(Vector3::zeros(), turn);
     let options = UrdfOptions { t_world_base, ..UrdfOptions::default() };
-    let links = world.add_articulated_robot(&robot, Some(&shape), &options)?;
+    let links = model.add_articulated_robot(&robot, Some(&shape), &options)?;
 
     // Half closed, as a bowl.
     let held = default_grasp().joints.map(|angle| 0.8 * angle);
@@ -46,29 +46,29 @@ pub(crate) fn main() -> anyhow::Result<()> {
         let joint = robot.joints().iter().find(|joint| joint.name == *name);
         let link = links[joint.context("every variable is a joint's")?.child];
         let servo = PositionServo { target, stiffness: 2.0, damping: 0.05, max_effort: 0.7 };
-        world.add_joint_force(link, servo)?;
+        model.add_joint_force(link, servo)?;
         joints.push((link, target));
     }
     let ball = RigidBody::ball(MASS, RADIUS)?;
     let area = 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
     let surface = Surface::uniform(&sphere(600), area)?;
-    let id = world.add(Body::dynamic("ball", ball).with_surface(surface));
+    let id = model.add(Body::dynamic("ball", ball).with_surface(surface));
     let law: Arc<dyn DynContactLaw> = Arc::new(rubber()?);
     for (link, shape) in links.iter().zip(shape.links()) {
         if shape.grid().is_some() {
             let bodies = ContactBodies { samples: id, field: *link };
             let smoothing = GapSmoothing::Softplus { width: 5e-5 };
-            world.add_contact(bodies, law.clone(), smoothing)?;
+            model.add_contact(bodies, law.clone(), smoothing)?;
         }
     }
 
-    let mut start = world.neutral_state();
+    let mut start = model.neutral_state();
     for (link, angle) in &joints {
-        world.set_joint(&mut start, *link, &[*angle], &[0.0])?;
+        model.set_joint(&mut start, *link, &[*angle], &[0.0])?;
     }
     start[id] = ball.at_rest(&Isometry3::translation(-0.05, 0.01, HEIGHT));
     let began = std::time::Instant::now();
-    let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
+    let run = model.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
     println!("{TIME} s simulated in {:.1} s", began.elapsed().as_secs_f64());
 
     let height = |states: &State| states[id].pose.translation.z;
@@ -78,7 +78,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
     let mut yielded = 0.0_f64;
     for states in &run {
         for (link, angle) in &joints {
-            yielded = yielded.max((world.joint_motion(states, *link)?[0] - angle).abs());
+            yielded = yielded.max((model.joint_motion(states, *link)?[0] - angle).abs());
         }
     }
     let end = &run[run.len() - 1];

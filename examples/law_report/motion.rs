@@ -6,7 +6,7 @@ use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
     Adaptive, Body, BodyState, BuildError, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps, World,
+    Model, RigidBody, SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps,
 };
 
 use super::curves::Curve;
@@ -55,45 +55,45 @@ impl Specimen<'_> {
 
     /// Height over time of a bounce at 0.5 m/s.
     pub(crate) fn bounce_curve(&self) -> Result<Curve, SimulationError> {
-        let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
+        let (model, start) = self.model(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
         let dt = 2.0 * duration() / 200.0;
         let mut points = Vec::new();
         let mut add = |time: f64, states: &State| {
             points.push([time * 1e3, states[BODY].pose.translation.z * 1e3]);
         };
         let time_steps = TimeSteps { dt, steps: 200 };
-        let end = unaudited(&world, &start, time_steps, |step, states| add(step.start, states))?;
+        let end = unaudited(&model, &start, time_steps, |step, states| add(step.start, states))?;
         add(200.0 * dt, &end);
         let name = "bounce at 0.5 m/s, without gravity".to_owned();
         Ok(Curve { name, axes: ["ms", "height [mm]"], points })
     }
 
     /// The body above the surface, or `depth` \[m\] deep, with a velocity.
-    fn world(
+    fn model(
         &self,
         gravity: Vector3<f64>,
         depth: f64,
         velocity: Vector3<f64>,
-    ) -> Result<(World, State), SimulationError> {
+    ) -> Result<(Model, State), SimulationError> {
         let failed = |error| BuildError::Body { body: "specimen".to_owned(), error };
         // Nothing here turns it.
         let inertia = Matrix3::identity() * self.mass;
         let rigid = RigidBody::new(self.mass, inertia, Point3::origin()).map_err(failed)?;
         let surface = Surface::uniform(&[Point3::origin()], AREA).map_err(failed)?;
-        let mut world = World::new(gravity);
+        let mut model = Model::new(gravity);
         let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.cutoff() };
-        let field = world.add(Body::fixed("plane").with_field(Arc::new(plane)));
-        let samples = world.add(Body::dynamic("specimen", rigid).with_surface(surface));
+        let field = model.add(Body::fixed("plane").with_field(Arc::new(plane)));
+        let samples = model.add(Body::dynamic("specimen", rigid).with_surface(surface));
         let bodies = ContactBodies { samples, field };
-        world.add_contact(bodies, Arc::clone(self.law), GapSmoothing::Hard)?;
+        model.add_contact(bodies, Arc::clone(self.law), GapSmoothing::Hard)?;
         let mut state = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -depth));
         state.linear = velocity;
-        Ok((world, State::new([BodyState::at_rest(Isometry3::identity()), state])))
+        Ok((model, State::new([BodyState::at_rest(Isometry3::identity()), state])))
     }
 
     fn rest(&self) -> Result<Finding, SimulationError> {
-        let (world, start) = self.world(down(), 1.1 * DEPTH, Vector3::zeros())?;
-        let end = simulate(&world, &start, 40.0 * duration())?[BODY];
+        let (model, start) = self.model(down(), 1.1 * DEPTH, Vector3::zeros())?;
+        let end = simulate(&model, &start, 40.0 * duration())?[BODY];
         let off = (end.pose.translation.z + DEPTH).abs() / DEPTH;
         Ok(Finding {
             what: "off its rest after 40 half periods, of its depth".to_owned(),
@@ -108,8 +108,8 @@ impl Specimen<'_> {
     }
 
     fn restitution(&self, speed: f64) -> Result<Finding, SimulationError> {
-        let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -speed)?;
-        let restitution = simulate(&world, &start, 20.0 * duration())?[BODY].linear.z / speed;
+        let (model, start) = self.model(Vector3::zeros(), 0.0, Vector3::z() * -speed)?;
+        let restitution = simulate(&model, &start, 20.0 * duration())?[BODY].linear.z / speed;
         Ok(Finding {
             what: format!("restitution at {speed} m/s"),
             measured: restitution,
@@ -119,9 +119,9 @@ impl Specimen<'_> {
     }
 
     fn stop(&self, friction: f64) -> Result<Finding, SimulationError> {
-        let (world, start) = self.world(down(), DEPTH, Vector3::x() * SLIDE)?;
+        let (model, start) = self.model(down(), DEPTH, Vector3::x() * SLIDE)?;
         let time = 2.0 * SLIDE / (friction * GRAVITY);
-        let end = simulate(&world, &start, time)?[BODY].pose.translation.x;
+        let end = simulate(&model, &start, time)?[BODY].pose.translation.x;
         let expected = SLIDE * SLIDE / (2.0 * friction * GRAVITY);
         let ratio = end / expected;
         Ok(Finding {
@@ -136,10 +136,10 @@ impl Specimen<'_> {
     fn creep(&self, friction: f64) -> Result<Finding, SimulationError> {
         let angle = (0.5 * friction).atan();
         let gravity = Vector3::new(angle.sin(), 0.0, -angle.cos()) * GRAVITY;
-        let (world, start) = self.world(gravity, DEPTH, Vector3::zeros())?;
+        let (model, start) = self.model(gravity, DEPTH, Vector3::zeros())?;
         let half = 40.0 * duration();
-        let settled = simulate(&world, &start, half)?;
-        let end = simulate(&world, &settled, half)?;
+        let settled = simulate(&model, &start, half)?;
+        let end = simulate(&model, &settled, half)?;
         let [settled, end] = [settled, end].map(|states| states[BODY].pose.translation.x);
         let speed = (end - settled) / half;
         Ok(Finding {
@@ -151,8 +151,8 @@ impl Specimen<'_> {
     }
 
     fn steps(&self) -> Result<[Finding; 2], SimulationError> {
-        let (world, start) = self.world(down(), DEPTH, Vector3::zeros())?;
-        let rate = world.contact_frequency(&start);
+        let (model, start) = self.model(down(), DEPTH, Vector3::zeros())?;
+        let rate = model.contact_frequency(&start);
         let note = |what: &str, measured: f64, remark: &str| Finding {
             what: what.to_owned(),
             measured,
@@ -171,19 +171,19 @@ impl Specimen<'_> {
 }
 
 /// The states after `time` \[s\].
-fn simulate(world: &World, start: &State, time: f64) -> Result<State, SimulationError> {
-    unaudited(world, start, TimeSteps { dt: time, steps: 1 }, |_, _| ())
+fn simulate(model: &Model, start: &State, time: f64) -> Result<State, SimulationError> {
+    unaudited(model, start, TimeSteps { dt: time, steps: 1 }, |_, _| ())
 }
 
 /// The states at the end, those at the beginning of each step handed to `visit`: whether energy is made is a finding, not an error.
 fn unaudited(
-    world: &World,
+    model: &Model,
     start: &State,
     time_steps: TimeSteps,
     mut visit: impl FnMut(Step, &State),
 ) -> Result<State, SimulationError> {
-    let control = |step: Step, _: &mut World, states: &mut State| visit(step, states);
-    world.simulate_controlled(&Adaptive::default(), start, time_steps, control)
+    let control = |step: Step, _: &mut Model, states: &mut State| visit(step, states);
+    model.simulate_controlled(&Adaptive::default(), start, time_steps, control)
 }
 
 /// Half a period of the contact that rests \[s\].

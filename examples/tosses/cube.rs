@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::Scalar;
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, BuildError, ContactBodies, GapSmoothing, Integrator, Motion, RigidBody, SimulationError,
-    State, Surface, TimeSteps, World,
+    Body, BuildError, ContactBodies, GapSmoothing, Integrator, Model, Motion, RigidBody,
+    SimulationError, State, Surface, TimeSteps,
 };
 
 use super::law::CubeLaw;
@@ -48,31 +48,31 @@ pub(crate) fn path<S: Scalar>(
     let moments = Vector3::new(ix_to_z * iz, iy_to_z * iz, iz).map(|i| i.times(MASS) * size * size);
     let rigid = RigidBody::new(S::constant(MASS), Matrix3::from_diagonal(&moments), com)
         .map_err(|error| BuildError::Body { body: "cube".to_owned(), error })?;
-    let mut world = table((corner_radius * size).value())?.cast::<S>();
-    world.gravity.z = -g * size;
-    world.bodies[1].motion = Motion::Dynamic(rigid);
+    let mut model = table((corner_radius * size).value())?.cast::<S>();
+    model.gravity.z = -g * size;
+    model.bodies[1].motion = Motion::Dynamic(rigid);
     // Four corners carry the cube at the depth.
     let stiffness = g.times(0.25 * MASS) * size / (depth * size).powf(n);
     let law = [stiffness, n, c, s * size, mu0, mu1, u1 * size, v0 * size, v1 * size, a, n1 * size];
-    world.contacts[0].set_params(&law)?;
+    model.contacts[0].set_params(&law)?;
 
     let lean = lean(along, across, &start.velocity);
     let mut pose = start.pose;
     let upright = |v: Vector3<S>| (v - lean * v.z) * size;
     pose.translation.vector = upright(pose.translation.vector);
-    let mut initial = world.neutral_state();
+    let mut initial = model.neutral_state();
     let cube = &mut initial[1];
     *cube = rigid.at_rest(&pose);
     cube.angular = pose.rotation * start.spin;
     cube.linear = upright(start.velocity) + cube.angular.cross(&(pose.rotation * com.coords));
     let Steps { integrator, per_row, board } = steps;
     if !board {
-        world.contacts.clear();
+        model.contacts.clear();
     }
     let time_steps = TimeSteps { dt: 1.0 / (RATE * *per_row as f64), steps: (rows - 1) * per_row };
-    let run = world.rollout_with(integrator, &initial, time_steps)?.states;
+    let run = model.rollout_with(integrator, &initial, time_steps)?.states;
     let recorded = |states: &State<S>| {
-        let mut pose = rigid.model_pose(&states[1].pose);
+        let mut pose = rigid.body_pose(&states[1].pose);
         let place = pose.translation.vector / size;
         pose.translation.vector = place + lean * place.z;
         pose
@@ -88,7 +88,7 @@ fn lean<S: Scalar>(along: S, across: S, velocity: &Vector3<S>) -> Vector3<S> {
 }
 
 /// A cube with round corners above the board.
-fn table(radius: f64) -> Result<World, SimulationError> {
+fn table(radius: f64) -> Result<Model, SimulationError> {
     let failed = |error| BuildError::Body { body: "cube".to_owned(), error };
     let side = |bit: usize, i: usize| if i >> bit & 1 == 0 { radius - HALF } else { HALF - radius };
     let corners: Vec<Point3<f64>> =
@@ -97,10 +97,10 @@ fn table(radius: f64) -> Result<World, SimulationError> {
         Surface::uniform(&corners, 8.0).and_then(|s| s.rounded(radius)).map_err(failed)?;
     let rigid =
         RigidBody::new(MASS, Matrix3::identity() * 1e-3, Point3::origin()).map_err(failed)?;
-    let mut world = World::new(Vector3::zeros());
-    let field = world.add(Body::fixed("board").with_field(Arc::new(HalfSpace::floor())));
-    let samples = world.add(Body::dynamic("cube", rigid).with_surface(surface));
+    let mut model = Model::new(Vector3::zeros());
+    let field = model.add(Body::fixed("board").with_field(Arc::new(HalfSpace::floor())));
+    let samples = model.add(Body::dynamic("cube", rigid).with_surface(surface));
     let law = Arc::new(CubeLaw([0.0; 11]));
-    world.add_contact(ContactBodies { samples, field }, law, GapSmoothing::Hard)?;
-    Ok(world)
+    model.add_contact(ContactBodies { samples, field }, law, GapSmoothing::Hard)?;
+    Ok(model)
 }

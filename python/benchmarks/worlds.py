@@ -14,20 +14,20 @@ from prehend import POSITION, VELOCITY
 BALLS, RADIUS, DT, STEPS = 10, 0.05, 1e-3, 100
 
 
-def balls() -> tuple[prehend.World, np.ndarray]:
+def balls() -> tuple[prehend.Model, np.ndarray]:
     """Balls that slide and roll on a floor, one beside the other."""
-    world = prehend.World()
-    world.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    model = prehend.Model()
+    model.add_body("floor", prehend.Shape.half_space(), fixed=True)
     inertia = 3 * [0.4 * 0.5 * RADIUS**2]
     for ball in range(BALLS):
-        world.add_body(f"ball {ball}", prehend.Shape.ball(RADIUS), mass=0.5, com=[0, 0, 0], inertia=inertia)
-        world.add_contact(
+        model.add_body(f"ball {ball}", prehend.Shape.ball(RADIUS), mass=0.5, com=[0, 0, 0], inertia=inertia)
+        model.add_contact(
             f"ball {ball}", "floor", "hunt_crossley",
             stiffness=1.56e5, damping=0.6, exponent=1.0, friction=0.4, slip_scale=0.1,
         )
-    states = world.neutral_states()
+    states = model.neutral_states()
     states[1:, POSITION] = [[0.0, 0.2 * ball, RADIUS - 1e-3] for ball in range(BALLS)]
-    return world, states
+    return model, states
 
 
 def median(run: Callable[[], object], times: int) -> float:
@@ -40,12 +40,12 @@ def median(run: Callable[[], object], times: int) -> float:
 
 
 def main() -> None:
-    world, states = balls()
-    stone = prehend.World()
+    model, states = balls()
+    stone = prehend.Model()
     stone.add_body("stone", prehend.Shape.ball(0.1))
     step, rest = stone.rollout(1e-4, 1, integrator="semi_implicit_euler"), stone.neutral_states()
     print(f"a step of one free body: {1e6 * median(lambda: step(rest, end=True), 20001):.2f} µs a call")
-    rollout = world.rollout(DT, STEPS, integrator="semi_implicit_euler")
+    rollout = model.rollout(DT, STEPS, integrator="semi_implicit_euler")
     for count in (1, 64, 1024):
         starts = np.repeat(states[None], count, 0)
         speeds = 0.2 + 1e-4 * (np.arange(count) % 997)[:, None] + 0.01 * np.arange(BALLS)

@@ -11,25 +11,25 @@ from prehend import POSITION, VELOCITY
 TRUTH = 0.3
 
 
-def scene() -> tuple[prehend.World, int, str]:
+def scene() -> tuple[prehend.Model, int, str]:
     """A box over a floor: its row in states, and the name of their friction."""
-    world = prehend.World()
-    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
-    box = world.add_body("box", prehend.Shape.cuboid([0.05, 0.04, 0.03], spacing=0.02), density=500.0)
-    contact = world.add_contact(
+    model = prehend.Model()
+    floor = model.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    box = model.add_body("box", prehend.Shape.cuboid([0.05, 0.04, 0.03], spacing=0.02), density=500.0)
+    contact = model.add_contact(
         box, floor, "hunt_crossley", smoothing=5e-5,
         stiffness=1e8, damping=1.0, exponent=1.0, friction=TRUTH, slip_scale=1e-2,
     )
-    return world, box, contact["friction"]
+    return model, box, contact["friction"]
 
 
 def main() -> None:
-    world, box, friction = scene()
+    model, box, friction = scene()
     random = np.random.default_rng(1)
-    starts = np.repeat(world.neutral_states()[None], 8, 0)
+    starts = np.repeat(model.neutral_states()[None], 8, 0)
     starts[:, box, POSITION] = [0.0, 0.0, 0.035]
     starts[:, box, VELOCITY] = random.normal(size=(8, 3)) * [0.5, 0.5, 0.0]
-    rollout = world.rollout(0.02, 10, parameters=[friction])
+    rollout = model.rollout(0.02, 10, parameters=[friction])
     seen = rollout(starts)[:, 1:, box, POSITION]
     seen += 1e-4 * random.normal(size=seen.shape)
 

@@ -2,8 +2,8 @@
 
 use prehend_autodiff::Scalar;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State,
-    Step, World,
+    Adaptive, BackwardEuler, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError,
+    State, Step,
 };
 use pyo3::prelude::*;
 
@@ -77,14 +77,14 @@ macro_rules! each {
 impl Integrator for AnyIntegrator {
     fn step<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         state: &State<S>,
         step: Step,
     ) -> Result<State<S>, SimulationError> {
         if is_interrupted() {
             return Err(SimulationError::Interrupted);
         }
-        each!(self, integrator => integrator.step(world, state, step))
+        each!(self, integrator => integrator.step(model, state, step))
     }
 
     fn stability_limit(&self) -> f64 {
@@ -99,8 +99,8 @@ impl Integrator for AnyIntegrator {
         each!(self, integrator => integrator.finds_contacts())
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
-        each!(self, integrator => integrator.check_differentiable(world))
+    fn check_differentiable<S: Scalar>(&self, model: &Model<S>) -> Result<(), SimulationError> {
+        each!(self, integrator => integrator.check_differentiable(model))
     }
 
     fn controls_error(&self) -> bool {

@@ -6,6 +6,7 @@ mod copies;
 mod error;
 mod integrator;
 mod link;
+mod model;
 mod python_law;
 mod read_options;
 mod refine;
@@ -14,7 +15,6 @@ mod robot;
 mod rollout;
 mod shape;
 mod threads;
-mod world;
 
 use pyo3::prelude::*;
 
@@ -25,6 +25,10 @@ mod _prehend {
     use super::error::Error;
     #[pymodule_export]
     use super::link::Link;
+    #[pymodule_export]
+    use super::model::Model;
+    #[pymodule_export]
+    use super::model::laws::{contact_laws, joint_laws};
     #[pymodule_export]
     use super::refine::{
         _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, PoseNetwork, Rig, Tracker,
@@ -46,8 +50,4 @@ mod _prehend {
     use super::rollout::Rollout;
     #[pymodule_export]
     use super::shape::Shape;
-    #[pymodule_export]
-    use super::world::World;
-    #[pymodule_export]
-    use super::world::laws::{contact_laws, joint_laws};
 }

@@ -11,7 +11,7 @@ use crate::shape::Shape;
 /// A link of an articulation and the joint that it hangs on.
 ///
 /// `joint` is "fixed", "revolute", "prismatic", "spherical" or "floating", along `axis` in the link's frame; `parent` is the place of the parent
-/// in the list given to `World.add_articulation`, None for the world; `at` is the pose of the joint in the parent's frame (4 × 4 or a
+/// in the list given to `Model.add_articulation`, None for the world; `at` is the pose of the joint in the parent's frame (4 × 4 or a
 /// translation). Mass properties are given as `mass` [kg], `com` [m] and `inertia` [kg m²] about the center of mass (3 × 3 or its diagonal), or
 /// follow from `shape` and `density` [kg/m³] or `mass`; with a shape the link touches others.
 #[pyclass(frozen, module = "prehend")]

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use crate::error::wrong;
-use crate::world::laws::Values;
+use crate::model::laws::Values;
 
 /// Gap, its rate, slip, normal and area.
 const MOTION: usize = 9;

@@ -1,8 +1,8 @@
-//! Robots in a world.
+//! Robots in a model.
 
 use std::collections::BTreeMap;
 
-use prehend_geometry::mjcf::Model;
+use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::{KinematicTree, Motion};
 use prehend_sim::BodyId;
 use prehend_sim::robot::MjcfRobot;
@@ -10,9 +10,9 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Array, Numbers, array, in_order, pose as pose_of};
 use crate::error::{Raise, wrong};
-use crate::world::World;
+use crate::model::Model;
 
-/// A robot that was added to a world.
+/// A robot that was added to a model.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Robot {
     /// The row of each body by its name.
@@ -33,21 +33,21 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    /// `before` are the names of the parameters before it was added to `world`.
+    /// `before` are the names of the parameters before it was added to `model`.
     pub(crate) fn of_mjcf(
-        model: &Model,
+        mjcf: &MjcfModel,
         robot: MjcfRobot,
-        world: &prehend_sim::World,
+        model: &prehend_sim::Model,
         before: &[String],
     ) -> Self {
         let before: std::collections::HashSet<&String> = before.iter().collect();
-        let names = world.parameter_names();
+        let names = model.parameter_names();
         // Those of actuators, in their order: nothing else is called so.
         let controls = names.iter().filter(|name| !before.contains(name));
         let controls = controls
             .filter(|name| name.rsplit('.').next().is_some_and(|own| own.starts_with("control")));
         let actuators = robot.actuators.iter().enumerate().map(|(k, (name, _))| named(name, k));
-        let bodies = model.bodies.iter().zip(&robot.bodies);
+        let bodies = mjcf.bodies.iter().zip(&robot.bodies);
         Self {
             bodies: bodies
                 .enumerate()
@@ -60,7 +60,7 @@ impl Robot {
                 .collect(),
             actuators: actuators.zip(controls.cloned()).collect(),
             warnings: robot.warnings.clone(),
-            reference: model.reference_positions(),
+            reference: mjcf.reference_positions(),
             mjcf: Some(robot),
         }
     }
@@ -93,18 +93,18 @@ fn named(name: &str, number: usize) -> String {
 #[pymethods]
 impl Robot {
     /// Puts the joints of a robot in MJCF to `positions` in MuJoCo's order, its `qpos`, or where the file has them, at rest.
-    #[pyo3(signature = (world, states, positions=None))]
+    #[pyo3(signature = (model, states, positions=None))]
     fn set_positions(
         &self,
-        world: &World,
+        model: &Model,
         states: &Bound<'_, PyAny>,
         positions: Option<Numbers<'_>>,
     ) -> PyResult<()> {
         let robot = self.of_mujoco("positions in MuJoCo's order")?;
         let positions =
             positions.map_or_else(|| self.reference.clone(), |p| in_order(&p).into_owned());
-        crate::world::states::change(&world.world, states, |all| {
-            robot.set_positions(&world.world, all, &positions).raise()
+        crate::model::states::change(&model.model, states, |all| {
+            robot.set_positions(&model.model, all, &positions).raise()
         })
     }
 
@@ -119,12 +119,12 @@ impl Robot {
     fn sensor<'py>(
         &self,
         py: Python<'py>,
-        world: &World,
+        model: &Model,
         states: Numbers<'py>,
         name: &str,
     ) -> PyResult<Array<'py>> {
-        let state = crate::world::states::state(&world.world, &states)?;
-        let reading = self.of_mujoco("sensors")?.sensor(&world.world, &state, name).raise()?;
+        let state = crate::model::states::state(&model.model, &states)?;
+        let reading = self.of_mujoco("sensors")?.sensor(&model.model, &state, name).raise()?;
         let count = reading.len();
         array(py, reading, &[count])
     }
@@ -132,17 +132,17 @@ impl Robot {
     /// Puts a mocap body of a robot in MJCF at `pose` (4 × 4 or a translation), between steps: it has no velocity.
     fn set_mocap(
         &self,
-        world: &mut World,
+        model: &mut Model,
         states: &Bound<'_, PyAny>,
         name: &str,
         pose: Numbers<'_>,
     ) -> PyResult<()> {
         let (robot, pose) = (self.of_mujoco("mocap bodies")?, pose_of(Some(&pose), "pose")?);
-        let mut moved = world.world.clone();
-        crate::world::states::change(&world.world, states, |all| {
+        let mut moved = model.model.clone();
+        crate::model::states::change(&model.model, states, |all| {
             robot.set_mocap(&mut moved, all, name, &pose).raise()
         })?;
-        world.world = moved;
+        model.model = moved;
         Ok(())
     }
 

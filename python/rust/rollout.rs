@@ -14,14 +14,14 @@ use crate::threads;
 /// Numbers of a state.
 pub(crate) const STATE: usize = 13;
 
-/// A rollout of a world as a function of its initial states, of some parameters, and of controls. Made by `World.rollout`.
+/// A rollout of a model as a function of its initial states, of some parameters, and of controls. Made by `Model.rollout`.
 ///
 /// `rollout(states, parameters=None, controls=None, *, end=False)` gives the states at 0, dt, …, steps·dt, of shape (steps + 1, rows, 13), or those at the
-/// end alone, (rows, 13). `parameters` are as many as their names, those of the world if left out; `controls` are (steps, names).
+/// end alone, (rows, 13). `parameters` are as many as their names, those of the model if left out; `controls` are (steps, names).
 ///
 /// A row of states is position [m], unit quaternion (x, y, z, w), velocity [m/s] and angular velocity [rad/s] of the center of mass, world frame; of a link or
 /// a fixed body, of the origin of its frame. Rows are bodies, then joints and contacts with bristles; those of links follow from their joints, whose columns
-/// `World.joint_row` tells. With one more dimension in front, inputs are a batch: those without are the same for all, and worlds are simulated side by
+/// `Model.joint_row` tells. With one more dimension in front, inputs are a batch: those without are the same for all, and worlds are simulated side by
 /// side on all cores.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Rollout {

@@ -209,7 +209,7 @@ impl Shape {
         Self::new(SharedShape::compound(placed), rounding, spacing, cell)
     }
 
-    /// Its dimensions by name, those by which a world can be differentiated [m].
+    /// Its dimensions by name, those by which a model can be differentiated [m].
     #[getter]
     fn dimensions(&self) -> std::collections::BTreeMap<String, f64> {
         self.shape.dimensions().into_iter().collect()

@@ -5,11 +5,11 @@ import prehend
 
 
 def thrown_ball(smoothing=1e-5):
-    """A ball that is thrown at a floor: the world, its states, the ball's row, and the names of the contact's parameters."""
-    world = prehend.World()
-    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
-    ball = world.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
-    contact = world.add_contact(
+    """A ball that is thrown at a floor: the model, its states, the ball's row, and the names of the contact's parameters."""
+    model = prehend.Model()
+    floor = model.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    ball = model.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
+    contact = model.add_contact(
         ball,
         floor,
         "penalty",
@@ -19,16 +19,16 @@ def thrown_ball(smoothing=1e-5):
         friction=0.4,
         slip_scale=2e-2,
     )
-    states = world.neutral_states()
-    world.set_pose(states, ball, [0.0, 0.0, 0.04], velocity=[0.5, 0.1, -0.3])
-    return world, states, ball, contact
+    states = model.neutral_states()
+    model.set_pose(states, ball, [0.0, 0.0, 0.04], velocity=[0.5, 0.1, -0.3])
+    return model, states, ball, contact
 
 
 def bounce(**options):
     """The rollout of that throw over the bounce, by friction and mass, with a push at each step, and its inputs."""
-    world, states, _, contact = thrown_ball()
+    model, states, _, contact = thrown_ball()
     names = [contact["friction"], "ball.mass"]
-    rollout = world.rollout(5e-4, 120, parameters=names, controls=["ball.force_y"], **options)
+    rollout = model.rollout(5e-4, 120, parameters=names, controls=["ball.force_y"], **options)
     controls = 0.01 * np.sin(np.arange(120.0))[:, None]
     return rollout, (states, np.array([0.4, 0.1]), controls)
 

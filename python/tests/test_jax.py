@@ -90,9 +90,9 @@ def test_arrays_of_numpy_are_constants_under_jit_and_vmap():
 
 
 def test_whole_numbers_are_states_too():
-    world = prehend.World()
-    world.add_body("stone", prehend.Shape.ball(0.1))
-    function = prehend.jax.rollout(world.rollout(0.1, 2), end=True)
+    model = prehend.Model()
+    model.add_body("stone", prehend.Shape.ball(0.1))
+    function = prehend.jax.rollout(model.rollout(0.1, 2), end=True)
     assert function([[0] * 6 + [1] + [0] * 6])[0, 9] == pytest.approx(-1.962)
 
 
@@ -102,10 +102,10 @@ os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 import numpy as np, prehend, jax
 jax.config.update("jax_enable_x64", True)
 import prehend.jax
-world = prehend.World()
-world.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
-throw = prehend.jax.rollout(world.rollout(1e-3, 2), end=True)
-many = np.repeat(world.neutral_states()[None], 4000, 0)
+model = prehend.Model()
+model.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
+throw = prehend.jax.rollout(model.rollout(1e-3, 2), end=True)
+many = np.repeat(model.neutral_states()[None], 4000, 0)
 loss = lambda states: throw(states)[0, :3].sum()
 ends, slopes = jax.jit(jax.vmap(throw))(many), jax.jit(jax.vmap(jax.grad(loss)))(many)
 print(np.asarray(ends).shape, np.asarray(slopes).shape)

@@ -12,43 +12,43 @@ needs_data = pytest.mark.skipif(DATA is None, reason="PREHEND_DATA is not set")
 
 
 def pendulum():
-    world = prehend.World()
+    model = prehend.Model()
     rod = prehend.Link("rod", "revolute", axis=[0, 1, 0], mass=1.0, com=[0, 0, -1], inertia=3 * [4e-3])
-    [rod] = world.add_articulation([rod])
-    return world, rod
+    [rod] = model.add_articulation([rod])
+    return model, rod
 
 
 def test_a_pendulum_has_its_period():
-    world, rod = pendulum()
-    states = world.neutral_states()
+    model, rod = pendulum()
+    states = model.neutral_states()
     angle = 0.3
-    world.set_joint(states, rod, [angle])
+    model.set_joint(states, rod, [angle])
     # 4 K(sin(θ/2)) √(I / m g l) by the arithmetic-geometric mean.
     a, b = 1.0, np.cos(0.5 * angle)
     for _ in range(20):
         a, b = 0.5 * (a + b), np.sqrt(a * b)
     period = 2 * np.pi / a * np.sqrt(1.004 / 9.81)
-    end = world.rollout(period, 1)(states, end=True)
-    assert world.joint(end, rod)[0][0] == pytest.approx(angle, abs=1e-4)
-    assert end[world.joint_row(rod), 0] == world.joint(end, rod)[0][0]
+    end = model.rollout(period, 1)(states, end=True)
+    assert model.joint(end, rod)[0][0] == pytest.approx(angle, abs=1e-4)
+    assert end[model.joint_row(rod), 0] == model.joint(end, rod)[0][0]
 
 
 def test_a_motor_is_a_control_with_its_derivative():
-    world, rod = pendulum()
-    motor = world.add_joint_force(rod, "motor", effort=0.0)
-    world.add_joint_force("rod", "damper", damping=0.1)
+    model, rod = pendulum()
+    motor = model.add_joint_force(rod, "motor", effort=0.0)
+    model.add_joint_force("rod", "damper", damping=0.1)
     assert motor == {"effort": "rod.joint.effort"}
-    rollout = world.rollout(0.02, 50, controls=[motor["effort"]])
+    rollout = model.rollout(0.02, 50, controls=[motor["effort"]])
     controls = np.sin(np.arange(50.0))[:, None]
-    run, pullback = prehend.vjp(rollout, world.neutral_states(), None, controls)
-    row = world.joint_row(rod)
+    run, pullback = prehend.vjp(rollout, model.neutral_states(), None, controls)
+    row = model.joint_row(rod)
     weights = np.zeros_like(run[-1])
     weights[row, 0] = 1.0
     slopes = pullback(weights).controls
     step = 1e-4
     for k in [0, 20, 49]:
         ends = [
-            rollout(world.neutral_states(), None, controls + sign * step * np.eye(50)[:, [k]], end=True)
+            rollout(model.neutral_states(), None, controls + sign * step * np.eye(50)[:, [k]], end=True)
             for sign in (1, -1)
         ]
         difference = (ends[0][row, 0] - ends[1][row, 0]) / (2 * step)
@@ -56,41 +56,41 @@ def test_a_motor_is_a_control_with_its_derivative():
 
 
 def test_a_servo_holds_a_two_link_arm():
-    world = prehend.World()
+    model = prehend.Model()
     bar = prehend.Shape.capsule(0.1, 0.02)
     links = [
         prehend.Link("upper", axis=[0, 0, 1], at=[0, 0, 1], shape=bar, mass=0.5),
         prehend.Link("lower", axis=[0, 0, 1], parent=0, at=[0, 0.25, 0], shape=bar, mass=0.5),
     ]
-    upper, lower = world.add_articulation(links)
+    upper, lower = model.add_articulation(links)
     for link, target in [(upper, 0.5), (lower, -0.8)]:
-        world.add_joint_force(
+        model.add_joint_force(
             link, "position_servo", target=target, stiffness=20.0, damping=1.0, max_effort=50.0
         )
-    end = world.rollout(1.0, 5)(world.neutral_states(), end=True)
-    assert world.joint(end, upper)[0][0] == pytest.approx(0.5, abs=1e-2)
-    assert world.joint(end, lower)[0][0] == pytest.approx(-0.8, abs=1e-2)
+    end = model.rollout(1.0, 5)(model.neutral_states(), end=True)
+    assert model.joint(end, upper)[0][0] == pytest.approx(0.5, abs=1e-2)
+    assert model.joint(end, lower)[0][0] == pytest.approx(-0.8, abs=1e-2)
     # The pose of a link is where its joints put it.
-    turn = world.pose(end, lower)[:2, 0]
+    turn = model.pose(end, lower)[:2, 0]
     assert np.arctan2(turn[1], turn[0]) == pytest.approx(-0.3, abs=1e-2)
 
 
 def test_tendons_couple_joints_and_bushings_close_loops():
-    world = prehend.World(gravity=[0, 0, 0])
+    model = prehend.Model(gravity=[0, 0, 0])
     inertia = 3 * [1e-2]
     links = [
         prehend.Link(name, axis=[0, 0, 1], at=[x, 0, 0], mass=1.0, com=[0.1, 0, 0], inertia=inertia)
         for name, x in [("left", 0.0), ("right", 1.0)]
     ]
-    left, right = world.add_articulation(links)
+    left, right = model.add_articulation(links)
     # They are of one articulation, and a spring holds the sum of their angles.
-    world.add_joint_force([(left, 1.0), ((right, 0), 1.0)], "spring", stiffness=50.0, rest=0.4)
+    model.add_joint_force([(left, 1.0), ((right, 0), 1.0)], "spring", stiffness=50.0, rest=0.4)
     for link in (left, right):
-        world.add_joint_force(link, "damper", damping=1.0)
-    end = world.rollout(2.0, 1)(world.neutral_states(), end=True)
-    angles = [world.joint(end, link)[0][0] for link in (left, right)]
+        model.add_joint_force(link, "damper", damping=1.0)
+    end = model.rollout(2.0, 1)(model.neutral_states(), end=True)
+    angles = [model.joint(end, link)[0][0] for link in (left, right)]
     assert sum(angles) == pytest.approx(0.4, abs=1e-3) and angles[0] == pytest.approx(angles[1], abs=1e-6)
-    names = world.add_bushing(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
+    names = model.add_bushing(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
     assert names["linear_stiffness"] == "left-right.linear_stiffness"
 
 
@@ -101,15 +101,15 @@ def test_mjcf_and_urdf_become_robots(tmp_path):
         <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.4"/></body></worldbody>
         <actuator><motor name="drive" joint="hinge"/></actuator></mujoco>"""
     )
-    world = prehend.World()
-    robot = world.add_mjcf(mjcf)
+    model = prehend.Model()
+    robot = model.add_mjcf(mjcf)
     assert list(robot.bodies) == ["arm"] and list(robot.joints) == ["hinge"]
-    states = world.neutral_states()
-    robot.set_positions(world, states, [0.4])
-    assert world.joint(states, "arm")[0] == [0.4]
-    rollout = world.rollout(0.1, 2, controls=[robot.actuators["drive"]])
+    states = model.neutral_states()
+    robot.set_positions(model, states, [0.4])
+    assert model.joint(states, "arm")[0] == [0.4]
+    rollout = model.rollout(0.1, 2, controls=[robot.actuators["drive"]])
     pushed, free = (rollout(states, None, np.full((2, 1), push), end=True) for push in (0.1, 0.0))
-    row = world.joint_row("arm")
+    row = model.joint_row("arm")
     assert pushed[row, 0] > free[row, 0]
 
     urdf = tmp_path / "arm.urdf"
@@ -120,25 +120,25 @@ def test_mjcf_and_urdf_become_robots(tmp_path):
         <joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
         <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
     )
-    robot = world.add_urdf(urdf, pose=[1, 0, 0], shapes=False)
+    robot = model.add_urdf(urdf, pose=[1, 0, 0], shapes=False)
     assert set(robot.bodies) == {"base", "arm"} and list(robot.joints) == ["hinge"]
     with pytest.raises(prehend.Error, match="missing.xml"):
-        world.add_mjcf(tmp_path / "missing.xml")
+        model.add_mjcf(tmp_path / "missing.xml")
 
 
 def test_robots_are_read_as_told(tmp_path):
-    world = prehend.World()
+    model = prehend.Model()
     mjcf = tmp_path / "arm.xml"
     mjcf.write_text(
         """<mujoco><worldbody><body name="arm"><joint name="hinge"/><geom size="0.1"/></body></worldbody>
         <actuator><dcmotor name="drive" joint="hinge"/></actuator></mujoco>"""
     )
     with pytest.raises(prehend.Error, match="drive"):
-        world.add_mjcf(mjcf)
-    robot = world.add_mjcf(mjcf, partial=True)
+        model.add_mjcf(mjcf)
+    robot = model.add_mjcf(mjcf, partial=True)
     assert not robot.actuators and "drive" in robot.warnings[0]
     with pytest.raises(prehend.Error, match="partly"):
-        world.add_mjcf(mjcf, partly=True)
+        model.add_mjcf(mjcf, partly=True)
 
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "a.stl").write_text(
@@ -157,9 +157,9 @@ def test_robots_are_read_as_told(tmp_path):
     mesh = '<geometry><mesh filename="package://arm_description/a.stl"/></geometry>'
     urdf.write_text(f"""<robot name="arm"><link name="base"><collision>{mesh}</collision></link></robot>""")
     with pytest.raises(prehend.Error, match="a.stl"):
-        world.add_urdf(urdf, shapes=False)
+        model.add_urdf(urdf, shapes=False)
     packages = {"arm_description": tmp_path / "meshes"}
-    assert "base" in world.add_urdf(urdf, shapes=False, packages=packages).bodies
+    assert "base" in model.add_urdf(urdf, shapes=False, packages=packages).bodies
     assert prehend.Hand(urdf, packages=packages).joints == []
 
 
@@ -170,29 +170,29 @@ def test_sensors_and_mocap_bodies(tmp_path):
         <body name="arm"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></worldbody>
         <sensor><jointpos name="angle" joint="hinge"/><framepos name="tip" objtype="site" objname="tip"/></sensor></mujoco>"""
     )
-    world = prehend.World()
-    robot = world.add_mjcf(path)
-    states = world.neutral_states()
-    robot.set_positions(world, states, [0.3])
-    robot.set_mocap(world, states, "hand", [1, 2, 3])
+    model = prehend.Model()
+    robot = model.add_mjcf(path)
+    states = model.neutral_states()
+    robot.set_positions(model, states, [0.3])
+    robot.set_mocap(model, states, "hand", [1, 2, 3])
     assert robot.sensors == ["angle", "tip"]
-    np.testing.assert_allclose(robot.sensor(world, states, "angle"), [0.3])
-    np.testing.assert_allclose(robot.sensor(world, states, "tip"), [1.1, 2, 3])
+    np.testing.assert_allclose(robot.sensor(model, states, "angle"), [0.3])
+    np.testing.assert_allclose(robot.sensor(model, states, "tip"), [1.1, 2, 3])
     with pytest.raises(prehend.Error, match="gyro"):
-        robot.sensor(world, states, "gyro")
+        robot.sensor(model, states, "gyro")
     with pytest.raises(prehend.Error, match="arm"):
-        robot.set_mocap(world, states, "arm", [0, 0, 0])
+        robot.set_mocap(model, states, "arm", [0, 0, 0])
 
 
 @needs_data
 def test_a_gripper_of_the_data_closes():
     path = next(Path(DATA, "robots").rglob("2f85.xml"))
-    world = prehend.World()
-    robot = world.add_mjcf(path)
-    states = world.neutral_states()
-    robot.set_positions(world, states)
+    model = prehend.Model()
+    robot = model.add_mjcf(path)
+    states = model.neutral_states()
+    robot.set_positions(model, states)
     [control] = robot.actuators.values()
-    rollout = world.rollout(1e-4, 2000, controls=[control], integrator="semi_implicit_euler")
+    rollout = model.rollout(1e-4, 2000, controls=[control], integrator="semi_implicit_euler")
     end = rollout(states, None, np.full((2000, 1), 200.0), end=True)
     driver = robot.joints["right_driver_joint"][0]
-    assert world.joint(end, driver)[0][0] > 0.1
+    assert model.joint(end, driver)[0][0] > 0.1

@@ -21,8 +21,8 @@ class Penalty:
 
 
 def test_a_law_in_python_is_the_same_law():
-    world, states, _, contact = thrown_ball()
-    own = prehend.World()
+    model, states, _, contact = thrown_ball()
+    own = prehend.Model()
     floor = own.add_body("floor", prehend.Shape.half_space(), fixed=True)
     ball = own.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
     with pytest.warns(UserWarning, match="slow"):
@@ -31,7 +31,7 @@ def test_a_law_in_python_is_the_same_law():
         )
     assert names == contact
     options = {"parameters": list(names.values()), "integrator": "semi_implicit_euler"}
-    fast, slow = (w.rollout(2e-4, 200, **options) for w in (world, own))
+    fast, slow = (w.rollout(2e-4, 200, **options) for w in (model, own))
     np.testing.assert_allclose(slow(states), fast(states), rtol=1e-9, atol=1e-12)
     weights = np.cos(np.arange(26.0)).reshape(2, 13)
     gradients = [prehend.vjp(f, states)[1](weights) for f in (fast, slow)]
@@ -63,19 +63,19 @@ def test_dual_numbers_have_their_derivatives():
 
 @pytest.mark.filterwarnings("ignore:a contact law in Python")
 def test_what_is_wrong_with_a_law_is_said():
-    world, states, _, _ = thrown_ball()
+    model, states, _, _ = thrown_ball()
     with pytest.raises(prehend.Error, match="a contact law is a name, or an object"):
-        world.add_contact("ball", "floor", object())
+        model.add_contact("ball", "floor", object())
     with pytest.raises(prehend.Error, match="parameter 'stiffness' is missing"):
-        world.add_contact("ball", "floor", Penalty())
+        model.add_contact("ball", "floor", Penalty())
 
     class Broken:
         def law(self, p, contact):
             raise RuntimeError("this law is broken")
 
-    world.add_contact("ball", "floor", Broken())
+    model.add_contact("ball", "floor", Broken())
     states[1, 2] = 0.029
-    rollout = world.rollout(1e-3, 1, integrator="semi_implicit_euler")
+    rollout = model.rollout(1e-3, 1, integrator="semi_implicit_euler")
     with pytest.raises(RuntimeError, match="this law is broken"):
         rollout(states)
     # A batch has more threads than one, and the next call knows nothing of it.

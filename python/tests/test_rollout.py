@@ -80,8 +80,8 @@ def test_what_is_the_same_for_all_worlds_gets_the_sum():
 
 
 def test_values_of_the_world_are_used_where_none_are_given():
-    world, states, _, contact = thrown_ball()
-    rollout = world.rollout(1e-3, 20, parameters=[contact["friction"]])
+    model, states, _, contact = thrown_ball()
+    rollout = model.rollout(1e-3, 20, parameters=[contact["friction"]])
     np.testing.assert_array_equal(rollout.values, [0.4])
     np.testing.assert_array_equal(rollout(states), rollout(states, [0.4]))
     assert (rollout.steps, rollout.dt, rollout.rows) == (20, 1e-3, 2)
@@ -153,16 +153,16 @@ def forked(rollout, states, parameters, controls, queue):
 
 INTERRUPTED = """
 import os, signal, threading, time, prehend
-world = prehend.World()
-world.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
-rollout = world.rollout(1e-3, 20_000_000, integrator="semi_implicit_euler")
+model = prehend.Model()
+model.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
+rollout = model.rollout(1e-3, 20_000_000, integrator="semi_implicit_euler")
 threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
 began = time.monotonic()
 try:
-    rollout(world.neutral_states(), end=True)
+    rollout(model.neutral_states(), end=True)
 except KeyboardInterrupt:
     print(time.monotonic() - began < 20)
-print(prehend.World().rollout(1e-3, 1).steps)
+print(prehend.Model().rollout(1e-3, 1).steps)
 """
 
 
@@ -188,8 +188,8 @@ def test_a_forked_process_has_threads_of_its_own():
 
 
 def test_other_threads_run_meanwhile():
-    world, states, _, _ = thrown_ball()
-    rollout = world.rollout(1e-6, 200_000, integrator="semi_implicit_euler")
+    model, states, _, _ = thrown_ball()
+    rollout = model.rollout(1e-6, 200_000, integrator="semi_implicit_euler")
     ticks, running = [], True
 
     def tick():

@@ -16,8 +16,8 @@ def tensors(inputs, **options):
 
 @pytest.mark.parametrize("end", [False, True])
 def test_gradcheck_in_double_precision(end):
-    world, states, ball = two_bodies()
-    rollout = world.rollout(
+    model, states, ball = two_bodies()
+    rollout = model.rollout(
         1e-3, 6, parameters=["ball/floor.friction", "ball.mass"], controls=["ball.force_y"],
         integrator="semi_implicit_euler",
     )
@@ -36,15 +36,15 @@ def test_gradcheck_in_double_precision(end):
 
 
 def two_bodies():
-    world = prehend.World()
-    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
-    ball = world.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
-    world.add_contact(
+    model = prehend.Model()
+    floor = model.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    ball = model.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
+    model.add_contact(
         ball, floor, "penalty", smoothing=1e-3, stiffness=2e4, damping=1e2, friction=0.4, slip_scale=0.1
     )
-    states = world.neutral_states()
-    world.set_pose(states, ball, [0.0, 0.0, 0.0295])
-    return world, states, ball
+    states = model.neutral_states()
+    model.set_pose(states, ball, [0.0, 0.0, 0.0295])
+    return model, states, ball
 
 
 def test_gradients_are_those_of_numpy_to_the_bit():
@@ -72,8 +72,8 @@ def test_single_precision_comes_back_as_such():
 
 
 def test_adam_finds_the_friction_of_a_throw():
-    world, states, ball = two_bodies()
-    rollout = world.rollout(0.05, 1, parameters=["ball/floor.friction"])
+    model, states, ball = two_bodies()
+    rollout = model.rollout(0.05, 1, parameters=["ball/floor.friction"])
     rows = torch.from_numpy(states)
     rows[ball, 7] = 1.0
     target = prehend.torch.rollout(rollout, rows, torch.tensor([0.25], dtype=torch.float64))
@@ -106,9 +106,9 @@ def test_what_is_changed_before_going_back_is_noticed():
 
 
 def test_whole_numbers_are_states_too():
-    world = prehend.World()
-    world.add_body("stone", prehend.Shape.ball(0.1))
-    rollout = world.rollout(0.1, 2)
+    model = prehend.Model()
+    model.add_body("stone", prehend.Shape.ball(0.1))
+    rollout = model.rollout(0.1, 2)
     row = torch.tensor([[0] * 6 + [1] + [0] * 6])
     assert prehend.torch.rollout(rollout, row)[-1, 0, 9].item() == pytest.approx(-1.962)
-    assert prehend.torch.rollout(rollout, world.neutral_states(), end=True).dtype == torch.float64
+    assert prehend.torch.rollout(rollout, model.neutral_states(), end=True).dtype == torch.float64

@@ -10,8 +10,8 @@ use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
 use prehend::sim::fields::HalfSpace;
 use prehend::sim::{
-    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
-    SemiImplicitEuler, State, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Model, RigidBody,
+    SemiImplicitEuler, State, Surface, TimeSteps,
 };
 
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
@@ -24,54 +24,54 @@ fn block() -> TriMesh {
     mesh
 }
 
-fn world(mesh: &TriMesh) -> World {
+fn model(mesh: &TriMesh) -> Model {
     let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin()).unwrap();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
-    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
+    let samples = model.add(Body::dynamic("block", rigid).with_surface(surface));
     let spring = KelvinVoigt { stiffness: 2e6, damping: 1e3 };
     let law = Law::new(spring, Coulomb { friction: 0.4, slip_scale: 5e-2 }).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 5e-4 };
-    world.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
-    world
+    model.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
+    model
 }
 
-/// Poses of the block at the end, in the world, for a throw of the given tangent.
-fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
+/// Poses of the block at the end, in the model, for a throw of the given tangent.
+fn end<S: Scalar>(model: &Model, tangent: &[S]) -> Isometry3<S> {
     let mut start = BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
     let still = BodyState::at_rest(Isometry3::identity()).cast();
     let thrown = start.retract(&std::array::from_fn(|i| tangent[i]));
     let states =
-        world.cast().simulate_with(&SemiImplicitEuler, &State::new([still, thrown]), TIME_STEPS);
+        model.cast().simulate_with(&SemiImplicitEuler, &State::new([still, thrown]), TIME_STEPS);
     states.unwrap().states[1].pose
 }
 
 #[test]
 fn an_image_loss_flows_back_through_a_rollout() {
     let mesh = block();
-    let (world, model) = (world(&mesh), Arc::new(RenderModel::new(&mesh).unwrap()));
+    let (model, mesh_model) = (model(&mesh), Arc::new(RenderModel::new(&mesh).unwrap()));
     let camera = Camera { fx: 110.0, fy: 110.0, cx: 31.3, cy: 23.6, width: 64, height: 48 };
-    // Looks along the world's y axis, with z up.
+    // Looks along the model's y axis, with z up.
     let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::FRAC_PI_2);
     let t_cam_world = Isometry3::from_parts(Translation3::new(-0.02, 0.04, 0.3), turn);
     let renderer = Renderer::new(Light::headlight(0.5, 0.5));
-    let scene_at = |pose: Isometry3<f64>| Scene::new(camera).with(model.clone(), pose);
-    let still = end(&world, &[0.0; 12]);
+    let scene_at = |pose: Isometry3<f64>| Scene::new(camera).with(mesh_model.clone(), pose);
+    let still = end(&model, &[0.0; 12]);
     let target =
         renderer.render(&scene_at(t_cam_world * Translation3::new(0.004, 0.003, -0.002) * still));
     let target = &target.buffers;
     let plain = |x: &[f64]| -> f64 {
-        let image = renderer.render(&scene_at(t_cam_world * end(&world, x))).buffers;
+        let image = renderer.render(&scene_at(t_cam_world * end(&model, x))).buffers;
         let color = image.color.as_flattened().iter().zip(target.color.as_flattened());
         let alpha = image.alpha.iter().zip(&target.alpha);
         color.chain(alpha).map(|(a, b)| (a - b).powi(2)).sum()
     };
     let (value, by) = gradient(
         |x| {
-            let pose = lift::<Var>(&t_cam_world) * end(&world, x);
+            let pose = lift::<Var>(&t_cam_world) * end(&model, x);
             let vars = SceneVars { poses: vec![(0, pose)], ..SceneVars::default() };
             let image = renderer.record(&scene_at(Isometry3::identity()), &vars).unwrap();
             let color = image.color.as_flattened().iter().zip(target.color.as_flattened());

@@ -32,9 +32,9 @@ def chain(first, count):
 def tree(joints, floats):
     if floats:
         chains = "".join(chain(first, 6) for first in range(0, joints, 6))
-        world = body("root", "<freejoint/>", chains)
+        model = body("root", "<freejoint/>", chains)
     else:
-        world = chain(0, joints)
+        model = chain(0, joints)
     option = '<option timestep="1e-4"><flag contact="disable" constraint="disable"/></option>'
     return f"<mujoco>{option}<worldbody>{world}</worldbody></mujoco>"
 

@@ -28,7 +28,7 @@ def chain(first, count):
 
 
 def tree(joints, floats, height):
-    world = body("<freejoint/>", "".join(chain(k, 6) for k in range(0, joints, 6))) if floats else chain(0, joints)
+    model = body("<freejoint/>", "".join(chain(k, 6) for k in range(0, joints, 6))) if floats else chain(0, joints)
     return f"""<mujoco><option timestep="1e-4"/><worldbody><geom type="plane" size="9 9 1" pos="0 0 {height}"/>
         {world}</worldbody></mujoco>"""
 

@@ -10,8 +10,8 @@ use nalgebra::{DVector, Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Articulation, Joint, Link};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, BodyState, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law,
-    SemiImplicitEuler, State, Step, Surface, TimeSteps, World,
+    Body, BodyState, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, KelvinVoigt, Law, Model,
+    SemiImplicitEuler, State, Step, Surface, TimeSteps,
 };
 
 /// Evaluations in a row, and how often; the fastest counts.
@@ -47,35 +47,35 @@ fn tree(joints: usize, floats: bool) -> anyhow::Result<Articulation> {
 }
 
 /// The tree over a floor that its last link, or the last of each chain of six, touches with a ball.
-fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
     let ends: Vec<usize> = (0..tree.links().len())
         .filter(|link| tree.links().iter().all(|other| other.parent != Some(*link)))
         .collect();
     let ranges: Vec<_> = (0..tree.links().len()).map(|link| tree.range(link)).collect();
-    let bodies = world.add_articulation(tree.links().to_vec())?;
-    let mut states = world.neutral_state();
+    let bodies = model.add_articulation(tree.links().to_vec())?;
+    let mut states = model.neutral_state();
     for (body, [coordinates, dofs]) in bodies.iter().zip(ranges) {
-        world.set_joint(&mut states, *body, &q[coordinates], &v[dofs])?;
+        model.set_joint(&mut states, *body, &q[coordinates], &v[dofs])?;
     }
     let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
     let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
     let law: Arc<dyn DynContactLaw> = Arc::new(law);
     for end in ends {
-        world.bodies[bodies[end]].surface = Some(Arc::new(Surface::ball(0.03)?));
+        model.bodies[bodies[end]].surface = Some(Arc::new(Surface::ball(0.03)?));
         let height = states[bodies[end]].pose.translation.z - 0.029;
         let field = HalfSpace { height, ..HalfSpace::floor() };
-        let floor = world.add(Body::fixed("floor").with_field(Arc::new(field)));
+        let floor = model.add(Body::fixed("floor").with_field(Arc::new(field)));
         let bodies = ContactBodies { samples: bodies[end], field: floor };
-        world.add_contact(bodies, law.clone(), GapSmoothing::Softplus { width: 1e-4 })?;
+        model.add_contact(bodies, law.clone(), GapSmoothing::Softplus { width: 1e-4 })?;
     }
     // Floors were added since.
     let mut rows = states.rows().to_vec();
-    let floors = world.bodies.len() - states.bodies().len();
+    let floors = model.bodies.len() - states.bodies().len();
     let links = states.bodies().len();
     rows.splice(links..links, vec![BodyState::at_rest(Isometry3::identity()); floors]);
-    let states = world.state_of_rows(rows, 0.0)?;
-    Ok((world, states))
+    let states = model.state_of_rows(rows, 0.0)?;
+    Ok((model, states))
 }
 
 fn time(name: &str, mut evaluate: impl FnMut()) {
@@ -111,9 +111,9 @@ fn main() -> anyhow::Result<()> {
             let accelerations: DVector<f64> = at.forward_dynamics(&tau);
             black_box(at.forward_dynamics_derivatives(&accelerations));
         });
-        let (world, states) = touching(tree.clone(), &q, &v)?;
+        let (model, states) = touching(tree.clone(), &q, &v)?;
         let step = Step::new(0, 1e-4);
-        let mut alone = world.clone();
+        let mut alone = model.clone();
         alone.contacts.clear();
         let steps = TimeSteps { dt: 1e-5, steps: 100 };
         time(&of("100 steps, checked"), || {
@@ -121,10 +121,10 @@ fn main() -> anyhow::Result<()> {
             black_box(run.is_ok());
         });
         time(&of("step with contacts"), || {
-            black_box(world.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
+            black_box(model.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
         });
         time(&of("step with contacts and its Jacobian"), || {
-            black_box(world.linearize_step(black_box(&states), step).is_ok());
+            black_box(model.linearize_step(black_box(&states), step).is_ok());
         });
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Times batches of worlds on as many threads as `RAYON_NUM_THREADS` says: `cargo bench -p prehend-sim --bench batch`.
+//! Times batches of models on as many threads as `RAYON_NUM_THREADS` says: `cargo bench -p prehend-sim --bench batch`.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use prehend_sim::contact::Bounce;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
     Batch, Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    Law, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Law, Model, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps,
 };
 
-/// Balls of a world, each with a contact of its own.
+/// Balls of a model, each with a contact of its own.
 const BALLS: usize = 10;
 /// Radius \[m\] and mass \[kg\].
 const RADIUS: f64 = 0.05;
@@ -21,9 +21,9 @@ const MASS: f64 = 0.5;
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-3, steps: 100 };
 
 /// Balls that slide and roll on a floor, one beside the other.
-fn balls() -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::z() * -9.81);
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+fn balls() -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::z() * -9.81);
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let (rigid, surface) = (RigidBody::ball(MASS, RADIUS)?, Arc::new(Surface::ball(RADIUS)?));
     let contact_area = surface.area();
@@ -33,27 +33,27 @@ fn balls() -> anyhow::Result<(World, State)> {
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-1 })?);
     for i in 0..BALLS {
         let ball = Body::dynamic(&format!("ball {i}"), rigid).with_surface(Arc::clone(&surface));
-        let samples = world.add(ball);
+        let samples = model.add(ball);
         let bodies = ContactBodies { samples, field };
-        world.add_contact(bodies, law.clone(), GapSmoothing::Hard)?;
+        model.add_contact(bodies, law.clone(), GapSmoothing::Hard)?;
         let pose = Isometry3::translation(0.0, 0.2 * i as f64, RADIUS - 1e-3);
         states.push(rigid.at_rest(&pose));
     }
-    Ok((world, State::new(states)))
+    Ok((model, State::new(states)))
 }
 
-/// World `index` of a batch: each ball with a speed of its own, `faster` \[m/s\] than that.
+/// Model `index` of a batch: each ball with a speed of its own, `faster` \[m/s\] than that.
 fn variant<S: Scalar>(
-    world: &World,
+    model: &Model,
     states: &State,
     index: usize,
     faster: &[S; BALLS],
-) -> (World<S>, State<S>) {
+) -> (Model<S>, State<S>) {
     let mut states: State<S> = states.cast();
     for (i, faster) in faster.iter().enumerate() {
         states[i + 1].linear.x = faster.plus(0.2 + 1e-4 * (index % 997) as f64 + 0.01 * i as f64);
     }
-    (world.cast(), states)
+    (model.cast(), states)
 }
 
 fn far<S: Scalar>(ends: &[Result<State<S>, SimulationError>]) -> anyhow::Result<S> {
@@ -78,16 +78,16 @@ fn median<T>(runs: usize, run: impl Fn() -> anyhow::Result<T>) -> anyhow::Result
 }
 
 fn main() -> anyhow::Result<()> {
-    let (world, states) = balls()?;
-    let batch = Batch::with_integrator(SemiImplicitEuler, &world)?;
+    let (model, states) = balls()?;
+    let batch = Batch::with_integrator(SemiImplicitEuler, &model)?;
     let value = |count: usize| {
-        let variants = (0..count).map(|i| variant(&world, &states, i, &[0.0; BALLS]));
+        let variants = (0..count).map(|i| variant(&model, &states, i, &[0.0; BALLS]));
         far(&batch.simulate(variants, TIME_STEPS))
     };
     let gradient = |count: usize| {
         let recording = Recording::start();
         let faster: [Var; BALLS] = recording.variables([0.0; BALLS]);
-        let variants = (0..count).map(|i| variant(&world, &states, i, &faster));
+        let variants = (0..count).map(|i| variant(&model, &states, i, &faster));
         let adjoints = recording.gradient(far(&batch.simulate(variants, TIME_STEPS))?);
         Ok(faster.map(|faster| adjoints.wrt(faster)))
     };

@@ -11,18 +11,18 @@ use std::time::Instant;
 use grasp::{Derivatives, FirstOrder, Grasp, loss, start, time_steps};
 use prehend_autodiff::{Fwd, Scalar, gradient};
 use prehend_sim::contact::LeakSteps;
-use prehend_sim::{GapSmoothing, State, World};
+use prehend_sim::{GapSmoothing, Model, State};
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();
-    let graspd = forward_mode(&grasp.world(2000, GapSmoothing::grasp_d())?, 20)?;
+    let graspd = forward_mode(&grasp.model(2000, GapSmoothing::grasp_d())?, 20)?;
     anyhow::ensure!(close(&graspd, &grasp::LEAKY_REFERENCE, 1e-6), "{graspd:?}");
     println!("| samples | steps | run | ms | M contact-points·steps/s | × forward |");
     println!("|--:|--:|---|--:|--:|--:|");
     let leak = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
     for count in [500, 2000, 8000] {
-        let hard = grasp.world(count, GapSmoothing::Hard)?;
-        let leaky = grasp.world(count, leak)?;
+        let hard = grasp.model(count, GapSmoothing::Hard)?;
+        let leaky = grasp.model(count, leak)?;
         for steps in [20, 100] {
             let expected = forward_mode(&hard, steps)?;
             let reference = grasp::reference(count, steps);
@@ -52,20 +52,20 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn value(world: &World, steps: usize) -> anyhow::Result<f64> {
-    let end = world.simulate_with(&FirstOrder, &State::new(start()), time_steps(steps))?.states;
+fn value(model: &Model, steps: usize) -> anyhow::Result<f64> {
+    let end = model.simulate_with(&FirstOrder, &State::new(start()), time_steps(steps))?.states;
     Ok(loss(&end[1]))
 }
 
-fn forward_mode(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
+fn forward_mode(model: &Model, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
     let states = State::new([hand.cast(), ellipsoid.pose_variables()]);
-    let end = world.cast::<Fwd<6>>().simulate_with(&FirstOrder, &states, time_steps(steps))?.states;
+    let end = model.cast::<Fwd<6>>().simulate_with(&FirstOrder, &states, time_steps(steps))?.states;
     let Fwd { value, derivative } = loss(&end[1]);
     Ok((value, derivative))
 }
 
-fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
+fn adjoint(model: &Model, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
     let mut failure = None;
     let (value, slopes) = gradient(
@@ -73,7 +73,7 @@ fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
             let mut tangent = [Scalar::constant(0.0); 12];
             tangent[..6].copy_from_slice(x);
             let states = State::new([hand.cast(), ellipsoid.retract(&tangent)]);
-            match world.cast().simulate_with(&FirstOrder, &states, time_steps(steps)) {
+            match model.cast().simulate_with(&FirstOrder, &states, time_steps(steps)) {
                 Ok(run) => loss(&run.states[1]),
                 Err(error) => {
                     failure = Some(error);

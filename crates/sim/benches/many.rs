@@ -1,4 +1,4 @@
-//! Times worlds of many bodies, on as many threads as `RAYON_NUM_THREADS` says: `cargo bench -p prehend-sim --bench many`.
+//! Times models of many bodies, on as many threads as `RAYON_NUM_THREADS` says: `cargo bench -p prehend-sim --bench many`.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use prehend_autodiff::{Recording, Var};
 use prehend_sim::contact::Bounce;
 use prehend_sim::{
     BackwardEuler, Body, BodyId, BodyState, ContactBodies, ContactCalibration, Coulomb,
-    GapSmoothing, HuntCrossley, Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State,
-    TimeSteps, World,
+    GapSmoothing, HuntCrossley, Integrator, Law, Model, RungeKutta4, SemiImplicitEuler, Shape,
+    State, TimeSteps,
 };
 
 /// Radius of the balls \[m\].
@@ -43,10 +43,10 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// `count` balls at `height` \[m\] over hills, one beside the other.
-fn balls(count: usize, height: f64) -> anyhow::Result<(World, State)> {
-    let mut world = World::new(Vector3::y() * -9.81);
+fn balls(count: usize, height: f64) -> anyhow::Result<(Model, State)> {
+    let mut model = Model::new(Vector3::y() * -9.81);
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
-    let floor = world.add(Body::fixed_from_shape("ground", &ground()?));
+    let floor = model.add(Body::fixed_from_shape("ground", &ground()?));
     let mut states = vec![BodyState::at_rest(Isometry3::identity())];
     let side = (count as f64).sqrt().ceil() as usize;
     let place = |i: usize| APART * (i as f64 - 0.5 * (side - 1) as f64);
@@ -56,7 +56,7 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, State)> {
         let up = height + 0.02 * (i % 7) as f64;
         let pose = Isometry3::translation(place(i % side), up, place(i / side));
         states.extend(ball.rigid().map(|rigid| rigid.at_rest(&pose)));
-        ids.push(world.add(ball));
+        ids.push(model.add(ball));
     }
     let mass = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3) * 1e3;
     let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
@@ -64,29 +64,29 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, State)> {
     let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 3e-2 })?);
-    world.add_contacts_between(&ids, &[floor], law.clone(), GapSmoothing::Hard)?;
+    model.add_contacts_between(&ids, &[floor], law.clone(), GapSmoothing::Hard)?;
     if count > 1 {
-        world.add_contacts_between(&ids, &ids, law, GapSmoothing::Hard)?;
+        model.add_contacts_between(&ids, &ids, law, GapSmoothing::Hard)?;
     }
-    Ok((world, State::new(states)))
+    Ok((model, State::new(states)))
 }
 
 /// `count` balls in a pile of five by five, each a little in those beside and below it.
-fn pile(count: usize) -> anyhow::Result<(World, State)> {
-    let (mut world, mut states) = balls(count, 0.0)?;
+fn pile(count: usize) -> anyhow::Result<(Model, State)> {
+    let (mut model, mut states) = balls(count, 0.0)?;
     let flat = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
-    world.bodies[0] = Body::fixed_from_shape("ground", &flat);
+    model.bodies[0] = Body::fixed_from_shape("ground", &flat);
     let apart = 2.0 * RADIUS - 1e-4;
     for (i, state) in states.bodies_mut()[1..].iter_mut().enumerate() {
         let [x, y, z] = [i % 5, i / 25, i / 5 % 5].map(|k| apart * k as f64);
         state.pose = Isometry3::translation(x, RADIUS - 1e-4 + y, z);
     }
-    Ok((world, states))
+    Ok((model, states))
 }
 
-/// The world with every contact of its groups by itself.
-fn every_pair(grouped: &World) -> anyhow::Result<World> {
-    let mut world = World { contact_groups: Vec::new(), ..grouped.clone() };
+/// The model with every contact of its groups by itself.
+fn every_pair(grouped: &Model) -> anyhow::Result<Model> {
+    let mut model = Model { contact_groups: Vec::new(), ..grouped.clone() };
     for group in &grouped.contact_groups {
         let [balls, others] = group.bodies();
         for (&samples, &field) in balls.iter().flat_map(|a| others.iter().map(move |b| (a, b))) {
@@ -94,25 +94,25 @@ fn every_pair(grouped: &World) -> anyhow::Result<World> {
             if balls != others || samples < field {
                 let bodies = ContactBodies { samples, field };
                 let law = Arc::clone(group.contact.law());
-                world.add_contact(bodies, law, group.contact.smoothing)?;
+                model.add_contact(bodies, law, group.contact.smoothing)?;
             }
         }
     }
-    Ok(world)
+    Ok(model)
 }
 
 /// A row of a table: steps of a pile, and with the gradient of where its balls end by all velocities.
 fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
     integrator: I,
-    (what, world): (&str, &World),
+    (what, model): (&str, &Model),
     states: &State,
 ) -> anyhow::Result<()> {
     let steps = TimeSteps { dt: 1e-4, steps: 10 };
-    let forward = median(9, || Ok(world.simulate_with(&integrator, states, steps)?))?;
+    let forward = median(9, || Ok(model.simulate_with(&integrator, states, steps)?))?;
     let reverse = median(9, || {
         let recording = Recording::start();
         let start = with_velocities(&recording, states);
-        let end = world.cast().simulate_with(&integrator, &start, steps)?.states;
+        let end = model.cast().simulate_with(&integrator, &start, steps)?.states;
         Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
     })?;
     let [forward, reverse] = [forward, reverse].map(|time| 1e3 * time / steps.steps as f64);
@@ -169,21 +169,21 @@ fn main() -> anyhow::Result<()> {
     println!("|---|--:|--:|--:|");
     let (grouped, states) = pile(100)?;
     let pairs = every_pair(&grouped)?;
-    for world in [("every pair", &pairs), ("a group", &grouped)] {
-        steps_of_a_pile(SemiImplicitEuler, world, &states)?;
-        steps_of_a_pile(RungeKutta4, world, &states)?;
-        steps_of_a_pile(BackwardEuler, world, &states)?;
+    for model in [("every pair", &pairs), ("a group", &grouped)] {
+        steps_of_a_pile(SemiImplicitEuler, model, &states)?;
+        steps_of_a_pile(RungeKutta4, model, &states)?;
+        steps_of_a_pile(BackwardEuler, model, &states)?;
     }
     println!("\n| balls that fall onto hills, 2 s | time | with gradient | × |");
     println!("|---|--:|--:|--:|");
     for count in [1, 10, 100, 1000] {
-        let (world, states) = balls(count, 0.5)?;
+        let (model, states) = balls(count, 0.5)?;
         let runs = if count < 100 { 5 } else { 1 };
-        let forward = median(runs, || Ok(world.simulate(&states, 2.0)?))?;
+        let forward = median(runs, || Ok(model.simulate(&states, 2.0)?))?;
         let reverse = median(runs, || {
             let recording = Recording::start();
             let start = with_velocities(&recording, &states);
-            let end = world.cast().simulate(&start, 2.0)?;
+            let end = model.cast().simulate(&start, 2.0)?;
             Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
         })?;
         println!("| {count} | {forward:.3} s | {reverse:.3} s | {:.1} |", reverse / forward);

@@ -11,14 +11,14 @@ use prehend_sim::contact::Bounce;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
     Adaptive, Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
-    HuntCrossley, Integrator, Law, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps, World,
+    HuntCrossley, Integrator, Law, Model, RigidBody, SemiImplicitEuler, State, Surface, TimeSteps,
 };
 
 /// Free fall, impact and slide \[s\].
 const TIME: f64 = 0.5;
 
 /// A cube of 10 cm and 0.37 kg, thrown from 20 cm with 1 m/s and 3 rad/s.
-fn cube() -> anyhow::Result<(World, State)> {
+fn cube() -> anyhow::Result<(Model, State)> {
     let (mass, side) = (0.37, 0.1);
     let inertia = Matrix3::identity() * (mass * side * side / 6.0);
     let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
@@ -26,26 +26,26 @@ fn cube() -> anyhow::Result<(World, State)> {
         |bit: usize, axis: usize| if bit >> axis & 1 == 0 { -0.5 * side } else { 0.5 * side };
     let corners: Vec<Point3<f64>> =
         (0..8).map(|i| Point3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let samples =
-        world.add(Body::dynamic("cube", rigid).with_surface(Surface::uniform(&corners, 8e-4)?));
+        model.add(Body::dynamic("cube", rigid).with_surface(Surface::uniform(&corners, 8e-4)?));
     let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 })?;
     let bodies = ContactBodies { samples, field };
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let pose = Isometry3::new(Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.3, 0.2, 0.1));
     let mut start = State::new([BodyState::at_rest(Isometry3::identity()), rigid.at_rest(&pose)]);
     start[samples].linear.x = 1.0;
     start[samples].angular.y = 3.0;
-    Ok((world, start))
+    Ok((model, start))
 }
 
 /// Where the cube ends along x \[m\], by its initial velocities if `N` is 3 (linear) or 6 (angular too).
 fn end<const N: usize>(
-    (world, start): &(World, State),
+    (model, start): &(Model, State),
     integrator: &impl Integrator,
     steps: usize,
 ) -> anyhow::Result<Fwd<N>> {
@@ -53,17 +53,17 @@ fn end<const N: usize>(
     (0..N).for_each(|i| tangent[6 + i] = Fwd::variable(0.0, i));
     let states = State::new([start[0].cast(), start[1].retract(&tangent)]);
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.cast().simulate_with(integrator, &states, time_steps)?;
+    let run = model.cast().simulate_with(integrator, &states, time_steps)?;
     Ok(run.states[1].pose.translation.x)
 }
 
 fn value(
-    (world, start): &(World, State),
+    (model, start): &(Model, State),
     integrator: &impl Integrator,
     steps: usize,
 ) -> anyhow::Result<f64> {
     let time_steps = TimeSteps { dt: TIME / steps as f64, steps };
-    let run = world.simulate_with(integrator, start, time_steps)?;
+    let run = model.simulate_with(integrator, start, time_steps)?;
     Ok(run.states[1].pose.translation.x)
 }
 
@@ -85,7 +85,7 @@ fn main() -> anyhow::Result<()> {
 
 fn row(
     name: &str,
-    scene: &(World, State),
+    scene: &(Model, State),
     integrator: &impl Integrator,
     steps: usize,
     truth: &Fwd<3>,

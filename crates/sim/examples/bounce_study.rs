@@ -14,7 +14,7 @@ use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
     Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing,
-    Integrator, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Integrator, Model, RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps,
 };
 use rayon::prelude::*;
 
@@ -71,17 +71,17 @@ fn study(
     smoothing: GapSmoothing,
     steps_per_contact: f64,
 ) -> Result<Errors, Box<dyn Error>> {
-    let mut world = World::new(Vector3::zeros());
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::zeros());
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
     let surface = Surface::new(&[Point3::origin()], &[1.0])?;
-    let point = world.add(Body::dynamic("point", rigid).with_surface(surface));
-    world.add_contact(
+    let point = model.add(Body::dynamic("point", rigid).with_surface(surface));
+    model.add_contact(
         ContactBodies { samples: point, field },
         Arc::new(Power::new(exponent)),
         smoothing,
     )?;
-    let world = world.cast::<Fwd<1>>();
+    let model = model.cast::<Fwd<1>>();
 
     let dt = std::f64::consts::PI * DEPTH / SPEED / steps_per_contact;
     let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
@@ -91,7 +91,7 @@ fn study(
         start.pose.translation.z = Fwd::variable(height, 0);
         start.linear.z = Fwd::constant(-SPEED);
         let still = BodyState::at_rest(Isometry3::identity()).cast();
-        let end = world.simulate_with(integrator, &State::new([still, start]), time_steps)?.states;
+        let end = model.simulate_with(integrator, &State::new([still, start]), time_steps)?.states;
         let slope = end[point].pose.translation.z.derivative[0];
         Ok([(slope + 1.0).abs(), (end[point].linear.z.value - SPEED).abs()])
     };

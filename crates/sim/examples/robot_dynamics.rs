@@ -13,11 +13,11 @@ use std::path::Path;
 
 use anyhow::Context;
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
-use prehend_geometry::mjcf::{EqualityKind, Model, Transmission};
+use prehend_geometry::mjcf::{EqualityKind, Model as MjcfModel, Transmission};
 use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
 use prehend_geometry::{GridCache, Inertial, ReadOptions};
 use prehend_sim::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
-use prehend_sim::{BodyId, State, World};
+use prehend_sim::{BodyId, Model, State};
 use serde_json::{Value, json};
 
 /// Degrees of freedom up to which mass matrices are printed.
@@ -55,38 +55,38 @@ trait Robot {
 }
 
 struct Mjcf {
+    mjcf: MjcfModel,
     model: Model,
-    world: World,
     robot: MjcfRobot,
 }
 
 impl Mjcf {
     fn new(file: &str, read: &ReadOptions, shapes: bool) -> anyhow::Result<Self> {
-        let whole = Model::from_file_with(file, read)?;
-        let mut model = whole.clone();
+        let whole = MjcfModel::from_file_with(file, read)?;
+        let mut mjcf = whole.clone();
         // Smooth dynamics alone.
-        model.equalities.iter_mut().for_each(|e| e.active = false);
-        model.tendons.iter_mut().for_each(|t| (t.range, t.friction_loss) = (None, 0.0));
-        for joint in model.bodies.iter_mut().flat_map(|b| &mut b.joints) {
+        mjcf.equalities.iter_mut().for_each(|e| e.active = false);
+        mjcf.tendons.iter_mut().for_each(|t| (t.range, t.friction_loss) = (None, 0.0));
+        for joint in mjcf.bodies.iter_mut().flat_map(|b| &mut b.joints) {
             (joint.range, joint.friction_loss) = (None, 0.0);
         }
-        let mut world = World::new(model.gravity);
+        let mut model = Model::new(mjcf.gravity);
         let partial = read.partial;
         let options = MjcfOptions { shapes, partial, ..MjcfOptions::default() };
-        let robot = world.add_mjcf(&model, &options)?;
+        let robot = model.add_mjcf(&mjcf, &options)?;
         // Ranges are part of the description.
-        Ok(Self { model: whole, world, robot })
+        Ok(Self { mjcf: whole, model, robot })
     }
 }
 
 impl Robot for Mjcf {
     fn description(&self) -> Value {
-        let bodies = self.model.bodies.iter().map(|b| body(&b.name, b.inertial.as_ref()));
+        let bodies = self.mjcf.bodies.iter().map(|b| body(&b.name, b.inertial.as_ref()));
         let joints =
-            self.model.bodies.iter().flat_map(|b| &b.joints).map(
+            self.mjcf.bodies.iter().flat_map(|b| &b.joints).map(
                 |j| json!({"name": j.name, "kind": format!("{:?}", j.kind), "range": j.range}),
             );
-        let actuators = self.model.actuators.iter().map(|a| {
+        let actuators = self.mjcf.actuators.iter().map(|a| {
             let transmission = match a.transmission {
                 Transmission::Joint { .. } => "joint",
                 Transmission::Tendon(_) => "tendon",
@@ -96,19 +96,19 @@ impl Robot for Mjcf {
             };
             json!({"name": a.name, "transmission": transmission, "control": a.control_range})
         });
-        let warnings = self.model.warnings.iter().map(ToString::to_string);
+        let warnings = self.mjcf.warnings.iter().map(ToString::to_string);
         json!({
             "bodies": bodies.collect::<Vec<_>>(),
             "joints": joints.collect::<Vec<_>>(),
             "actuators": actuators.collect::<Vec<_>>(),
-            "tendons": self.model.tendons.len(),
-            "equalities": self.model.equalities.iter().map(|e| match e.kind {
+            "tendons": self.mjcf.tendons.len(),
+            "equalities": self.mjcf.equalities.iter().map(|e| match e.kind {
                 EqualityKind::Connect { .. } => "connect",
                 EqualityKind::Weld { .. } => "weld",
                 EqualityKind::Joint { .. } => "joint",
                 EqualityKind::Tendon { .. } => "tendon",
             }).collect::<Vec<_>>(),
-            "keyframes": self.model.keyframes.len(),
+            "keyframes": self.mjcf.keyframes.len(),
             "warnings": warnings.chain(self.robot.warnings.iter().cloned()).collect::<Vec<_>>(),
         })
     }
@@ -116,16 +116,16 @@ impl Robot for Mjcf {
     fn at(&self, state: &Value) -> anyhow::Result<Value> {
         let [qpos, qvel, qacc, ctrl, act] =
             ["qpos", "qvel", "qacc", "ctrl", "act"].map(|key| numbers(&state[key]));
-        let mut world = self.world.clone();
+        let mut model = self.model.clone();
         for ((_, id), control) in self.robot.actuators.iter().zip(ctrl) {
-            world.joint_force_mut(*id).set_param("control", control)?;
+            model.joint_force_mut(*id).set_param("control", control)?;
         }
-        let mut states = world.neutral_state();
-        self.robot.set_positions(&world, &mut states, &qpos)?;
-        self.robot.set_velocities(&world, &mut states, &qvel)?;
-        self.robot.set_activations(&world, &mut states, &act)?;
-        let acceleration = self.robot.accelerations(&world, &states);
-        let mass = self.robot.mass_matrix(&world, &states);
+        let mut states = model.neutral_state();
+        self.robot.set_positions(&model, &mut states, &qpos)?;
+        self.robot.set_velocities(&model, &mut states, &qvel)?;
+        self.robot.set_activations(&model, &mut states, &act)?;
+        let acceleration = self.robot.accelerations(&model, &states);
+        let mass = self.robot.mass_matrix(&model, &states);
         let effort = &mass * (DVector::from_vec(qacc) - DVector::from_column_slice(&acceleration));
         Ok(output(&states, &self.robot.bodies, &mass, &acceleration, effort.as_slice()))
     }
@@ -133,7 +133,7 @@ impl Robot for Mjcf {
 
 struct Urdf {
     tree: KinematicTree,
-    world: World,
+    model: Model,
     bodies: Vec<BodyId>,
 }
 
@@ -144,15 +144,15 @@ impl Urdf {
             let (spacing, margin) = (RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN);
             RobotShape::cached(&tree, spacing, margin, Some(&GridCache::new(folder)))?;
         }
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
         // Where joints move no mass, next to none.
         let [plain, least] =
             [0.0, 1e-9].map(|armature| UrdfOptions { armature, ..UrdfOptions::default() });
-        let bodies = world
+        let bodies = model
             .add_articulated_robot(&tree, None, &plain)
-            .or_else(|_| world.add_articulated_robot(&tree, None, &least))?;
-        world.joint_forces.clear();
-        Ok(Self { tree, world, bodies })
+            .or_else(|_| model.add_articulated_robot(&tree, None, &least))?;
+        model.joint_forces.clear();
+        Ok(Self { tree, model, bodies })
     }
 }
 
@@ -168,8 +168,8 @@ impl Robot for Urdf {
     }
 
     fn at(&self, state: &Value) -> anyhow::Result<Value> {
-        let mut states = self.world.neutral_state();
-        let own = &self.world.articulations[0];
+        let mut states = self.model.neutral_state();
+        let own = &self.model.articulations[0];
         let (n, mut order) = (own.tree.nv(), Vec::new());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
         // Followers after what they mimic, to be where they are told.
@@ -184,9 +184,9 @@ impl Robot for Urdf {
                 to[dof] = state[key][&joint.name].as_f64().context("a joint without a value")?;
             }
             order.push((joint.name.clone(), dof));
-            self.world.set_joint(&mut states, body, &[q[dof]], &[v[dof]])?;
+            self.model.set_joint(&mut states, body, &[q[dof]], &[v[dof]])?;
         }
-        let at = own.tree.kinematics(&q, &v).under(self.world.gravity);
+        let at = own.tree.kinematics(&q, &v).under(self.model.gravity);
         let (mass, effort) = (at.mass_matrix(), at.inverse_dynamics(&a));
         let acceleration = at.forward_dynamics(&vec![0.0; n]);
         let mut all =

@@ -1,4 +1,4 @@
-//! Many worlds at once.
+//! Many models at once.
 
 use std::sync::Arc;
 
@@ -8,35 +8,35 @@ use crate::body_state::{STATE, coordinates_of};
 use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
+use crate::integrator::model_template::{ModelTemplate, ParameterDelta};
 use crate::integrator::step_checkpointed::StepCheckpointed;
-use crate::integrator::world_template::{ParameterDelta, WorldTemplate};
+use crate::model::Model;
 use crate::state::State;
 use crate::time::TimeSteps;
-use crate::world::World;
 
-/// Simulates worlds that share bodies, shapes and laws and differ in numbers and states, side by side on the threads of `rayon`.
+/// Simulates models that share bodies, shapes and laws and differ in numbers and states, side by side on the threads of `rayon`.
 ///
 /// Any scalar goes: plain numbers simulate, [`Fwd`](prehend_autodiff::Fwd) carries sensitivities, and with
 /// [`Var`](prehend_autodiff::Var) all runs are one node, which keeps the numbers that each run began with. The sweep simulates
 /// each again, side by side as well; runs on which the loss does not depend are left out. Results and derivatives are the same, to
 /// the last bit, for any number of threads.
 ///
-/// Whatever [`World::parameters`] lists may differ, and may carry derivatives; so may states.
+/// Whatever [`Model::parameters`] lists may differ, and may carry derivatives; so may states.
 ///
 /// ```
 /// use nalgebra::Vector3;
 /// use prehend_autodiff::{Recording, Scalar};
-/// use prehend_sim::{Batch, Body, RigidBody, SimulationError, TimeSteps, World};
+/// use prehend_sim::{Batch, Body, RigidBody, SimulationError, TimeSteps, Model};
 ///
-/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// let id = world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
-/// let batch = Batch::new(&world)?;
+/// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+/// let id = model.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let batch = Batch::new(&model)?;
 ///
 /// // By how much does the mean height of 100 throws change with gravity?
 /// let recording = Recording::start();
 /// let gravity = recording.variable(-9.81);
 /// let throws = (0..100).map(|i| {
-///     let mut lifted = world.cast();
+///     let mut lifted = model.cast();
 ///     lifted.gravity.z = gravity;
 ///     let mut start = lifted.neutral_state();
 ///     start[id].linear.z = Scalar::constant(0.1 * f64::from(i));
@@ -52,45 +52,45 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct Batch<I = Adaptive> {
-    template: Arc<WorldTemplate<I>>,
+    template: Arc<ModelTemplate<I>>,
 }
 
 impl Batch {
-    /// Batch of worlds like `world`, with [`Adaptive`] steps.
+    /// Batch of models like `model`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`Batch::with_integrator`].
-    pub fn new<S: Scalar>(world: &World<S>) -> Result<Self> {
-        Self::with_integrator(Adaptive::default(), world)
+    pub fn new<S: Scalar>(model: &Model<S>) -> Result<Self> {
+        Self::with_integrator(Adaptive::default(), model)
     }
 }
 
 impl<I: Integrator + Send + 'static> Batch<I> {
-    /// Batch of worlds like `world`, with the steps of `integrator`.
+    /// Batch of models like `model`, with the steps of `integrator`.
     ///
     /// # Errors
-    /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
-    pub fn with_integrator<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self> {
-        Ok(Self { template: WorldTemplate::new(integrator, world)? })
+    /// If a body of the model has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
+    pub fn with_integrator<S: Scalar>(integrator: I, model: &Model<S>) -> Result<Self> {
+        Ok(Self { template: ModelTemplate::new(integrator, model)? })
     }
 
-    /// State of each of `variants`, a world and the state that it starts from, after `time_steps`, as
-    /// [`World::simulate_with`] finds it.
+    /// State of each of `variants`, a model and the state that it starts from, after `time_steps`, as
+    /// [`Model::simulate_with`] finds it.
     ///
     /// Variants are taken one after the other, and only what they change is kept.
     ///
     /// # Errors
-    /// Each for itself: those of [`World::simulate_with`]; if the world differs from that of the batch in more than parameters, or a
+    /// Each for itself: those of [`Model::simulate_with`]; if the model differs from that of the batch in more than parameters, or a
     /// trajectory carries derivatives.
     pub fn simulate<S: Scalar>(
         &self,
-        variants: impl IntoIterator<Item = (World<S>, State<S>)>,
+        variants: impl IntoIterator<Item = (Model<S>, State<S>)>,
         time_steps: TimeSteps,
     ) -> Vec<Result<State<S>>> {
         let mut refused = Vec::new();
         let mut runs = Vec::new();
-        for (index, (world, state)) in variants.into_iter().enumerate() {
-            match self.run(&world, &state, time_steps) {
+        for (index, (model, state)) in variants.into_iter().enumerate() {
+            match self.run(&model, &state, time_steps) {
                 Ok(run) => runs.push(run),
                 Err(error) => refused.push((index, error)),
             }
@@ -108,18 +108,18 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     /// A run and the numbers that it starts with.
     fn run<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         state: &State<S>,
         time_steps: TimeSteps,
     ) -> Result<(Run<I>, Vec<S>)> {
-        world.check_trajectories()?;
-        if !self.template.is_of(world) {
-            return Err(SimulationError::AnotherWorld);
+        model.check_trajectories()?;
+        if !self.template.is_of(model) {
+            return Err(SimulationError::AnotherModel);
         }
         if S::ORDER > 0 {
-            self.template.integrator.check_differentiable(world)?;
+            self.template.integrator.check_differentiable(model)?;
         }
-        let ParameterDelta { places, values } = self.template.changes(world);
+        let ParameterDelta { places, values } = self.template.changes(model);
         let numbers = coordinates_of(state.rows()).chain(values).collect();
         let run = Run {
             template: Arc::clone(&self.template),
@@ -132,12 +132,12 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     }
 }
 
-/// Steps of a body that one world records at once at most: some 10 kB each.
+/// Steps of a body that one model records at once at most: some 10 kB each.
 const FEW: usize = 2000;
 
-/// A simulation as a function of the states' coordinates and of the world's parameters at `places`, to the states at its end.
+/// A simulation as a function of the states' coordinates and of the model's parameters at `places`, to the states at its end.
 struct Run<I> {
-    template: Arc<WorldTemplate<I>>,
+    template: Arc<ModelTemplate<I>>,
     places: Box<[u32]>,
     /// Number of rows that it starts from.
     rows: usize,
@@ -151,7 +151,7 @@ impl<I: Integrator + Send + 'static> Recompute for Run<I> {
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>> {
         let (states, values) = x.split_at(STATE * self.rows);
-        let world = self.template.world(&self.places, values)?;
+        let model = self.template.model(&self.places, values)?;
         let state = self.template.state(states, self.start);
         // Few steps are recorded as they are, of many one at a time.
         let TimeSteps { steps, .. } = self.time_steps;
@@ -160,11 +160,11 @@ impl<I: Integrator + Send + 'static> Recompute for Run<I> {
         let end = match S::RECORDED && !few {
             true => {
                 let steps = StepCheckpointed::of(&self.template);
-                world.simulate_with(&steps, &state, self.time_steps)
+                model.simulate_with(&steps, &state, self.time_steps)
             }
             false => {
                 let integrator = &self.template.integrator;
-                world.simulate_with(integrator, &state, self.time_steps)
+                model.simulate_with(integrator, &state, self.time_steps)
             }
         };
         Ok(coordinates_of(end?.states.rows()).collect())

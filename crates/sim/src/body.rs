@@ -19,8 +19,8 @@ pub struct RigidBody<S: Scalar = f64> {
 }
 
 impl<S: Scalar> RigidBody<S> {
-    /// A body of `mass` \[kg\], `inertia` about its center of mass along the model's axes \[kg m²\] and
-    /// center of mass `com` in its model frame \[m\].
+    /// A body of `mass` \[kg\], `inertia` about its center of mass along the axes of the body frame \[kg m²\] and
+    /// center of mass `com` in its body frame \[m\].
     ///
     /// # Errors
     /// Unless the mass is positive, the inertia symmetric positive definite and that of a body, and everything finite.
@@ -52,7 +52,7 @@ impl<S: Scalar> RigidBody<S> {
         Ok(Self { mass, inertia, inverse_inertia, com })
     }
 
-    /// A solid, uniform box of `mass` \[kg\] around the origin of its model frame with edges along the axes, `half_extents` \[m\]
+    /// A solid, uniform box of `mass` \[kg\] around the origin of its body frame with edges along the axes, `half_extents` \[m\]
     /// from it.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl<S: Scalar> RigidBody<S> {
         Self::new(mass, Matrix3::from_diagonal(&moments), Point3::origin())
     }
 
-    /// A solid, uniform ball of `mass` \[kg\] and `radius` \[m\] around the origin of its model frame.
+    /// A solid, uniform ball of `mass` \[kg\] and `radius` \[m\] around the origin of its body frame.
     ///
     /// # Errors
     /// Unless both are positive and finite.
@@ -74,7 +74,7 @@ impl<S: Scalar> RigidBody<S> {
         Self::new(mass, Matrix3::from_diagonal_element(moment), Point3::origin())
     }
 
-    /// Body moved in its model frame: what was at the origin is at `motion`.
+    /// Body moved in its body frame: what was at the origin is at `motion`.
     #[must_use]
     pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let rotation = motion.rotation.to_rotation_matrix().into_inner().map(S::constant);
@@ -102,19 +102,19 @@ impl<S: Scalar> RigidBody<S> {
         self.mass
     }
 
-    /// Inertia about the center of mass, along the model's axes \[kg m²\].
+    /// Inertia about the center of mass, along the axes of the body frame \[kg m²\].
     #[inline]
     pub fn inertia(&self) -> &Matrix3<S> {
         &self.inertia
     }
 
-    /// Center of mass in the model frame \[m\].
+    /// Center of mass in the body frame \[m\].
     #[inline]
     pub fn com(&self) -> &Point3<S> {
         &self.com
     }
 
-    /// A zero that carries the derivatives of the center of mass, in the model frame \[m\]; none if it is a constant.
+    /// A zero that carries the derivatives of the center of mass, in the body frame \[m\]; none if it is a constant.
     #[inline]
     pub(crate) fn com_change(&self) -> Option<Vector3<S>> {
         let change = self.com.coords.map(|x| x.plus(-x.value()));
@@ -176,15 +176,15 @@ impl<S: Scalar> RigidBody<S> {
         (linear, self.momentum(&state.pose.rotation, &state.angular) + torque * dt)
     }
 
-    /// `t_world_com` of a body whose model frame is at `t_world_model`.
+    /// `t_world_com` of a body whose body frame is at `t_world_body`.
     #[inline]
-    pub fn com_pose(&self, t_world_model: &Isometry3<S>) -> Isometry3<S> {
-        t_world_model * Translation3::from(self.com.coords)
+    pub fn com_pose(&self, t_world_body: &Isometry3<S>) -> Isometry3<S> {
+        t_world_body * Translation3::from(self.com.coords)
     }
 
-    /// `t_world_model` of a body whose center-of-mass frame is at `t_world_com`.
+    /// `t_world_body` of a body whose center-of-mass frame is at `t_world_com`.
     #[inline]
-    pub fn model_pose(&self, t_world_com: &Isometry3<S>) -> Isometry3<S> {
+    pub fn body_pose(&self, t_world_com: &Isometry3<S>) -> Isometry3<S> {
         t_world_com * Translation3::from(-self.com.coords)
     }
 
@@ -198,9 +198,9 @@ impl<S: Scalar> RigidBody<S> {
         }
     }
 
-    /// The body at rest with its model frame at `t_world_model`. Derivatives by the center of mass are in the state, too.
-    pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> BodyState<S> {
-        BodyState::at_rest(self.com_pose(t_world_model))
+    /// The body at rest with its body frame at `t_world_body`. Derivatives by the center of mass are in the state, too.
+    pub fn at_rest(&self, t_world_body: &Isometry3<S>) -> BodyState<S> {
+        BodyState::at_rest(self.com_pose(t_world_body))
     }
 }
 
@@ -259,7 +259,7 @@ mod tests {
         let pose = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.3, 0.2, -0.5));
         let at_com = body.com_pose(&pose);
         assert!((at_com.translation.vector - (pose * com).coords).norm() < 1e-15);
-        assert!((body.model_pose(&at_com).to_homogeneous() - pose.to_homogeneous()).norm() < 1e-15);
+        assert!((body.body_pose(&at_com).to_homogeneous() - pose.to_homogeneous()).norm() < 1e-15);
     }
 
     #[test]

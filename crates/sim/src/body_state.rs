@@ -69,7 +69,7 @@ impl<S: Scalar> BodyState<S> {
         }
     }
 
-    /// The state of a frame fixed to the body at `offset` from its center of mass, in the model's axes \[m\].
+    /// The state of a frame fixed to the body at `offset` from its center of mass, in the axes of the body frame \[m\].
     #[inline]
     pub fn shifted(&self, offset: &Vector3<S>) -> Self {
         let arm = self.pose.rotation * offset;

@@ -11,9 +11,9 @@ use prehend_autodiff::Scalar;
 use crate::body_state::Rows;
 use crate::error::Result;
 use crate::handle::BodyId;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 use energy::EnergyBalance;
 use step_resolution::StepResolution;
 use tunneling::Tunneling;
@@ -69,7 +69,7 @@ impl fmt::Display for Resolution {
 
 /// Follows a simulation from step to step.
 pub(crate) struct Diagnostics<'a, S: Scalar> {
-    world: &'a World<S>,
+    model: &'a Model<S>,
     /// None if the integrator holds its error itself.
     roughness: Option<StepResolution>,
     tunneling: Option<Tunneling>,
@@ -78,11 +78,11 @@ pub(crate) struct Diagnostics<'a, S: Scalar> {
 
 impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not.
-    pub(crate) fn new(world: &'a World<S>, initial: &Rows<S>, controls_error: bool) -> Self {
-        let roughness = (!controls_error).then(|| StepResolution::new(world, initial));
-        let tunneling = (!controls_error).then(|| Tunneling::new(world, initial));
-        let energy = EnergyBalance::new(world, initial, controls_error);
-        Self { world, roughness, tunneling, energy }
+    pub(crate) fn new(model: &'a Model<S>, initial: &Rows<S>, controls_error: bool) -> Self {
+        let roughness = (!controls_error).then(|| StepResolution::new(model, initial));
+        let tunneling = (!controls_error).then(|| Tunneling::new(model, initial));
+        let energy = EnergyBalance::new(model, initial, controls_error);
+        Self { model, roughness, tunneling, energy }
     }
 
     /// After `step` has led to `states`.
@@ -94,9 +94,9 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
             roughness.step(step, states);
         }
         if let Some(tunneling) = &mut self.tunneling {
-            tunneling.step(self.world, step, states);
+            tunneling.step(self.model, step, states);
         }
-        self.energy.step(self.world, step, states)
+        self.energy.step(self.model, step, states)
     }
 
     /// Report on a number of steps that have led to `state`.
@@ -105,12 +105,12 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// If contacts have made energy, or velocities are too large to be squared.
     pub(crate) fn finish(mut self, steps: usize, state: &State<S>) -> Result<Resolution> {
         let (time, states) = (state.time, state.rows());
-        self.energy.check(self.world, time, states)?;
+        self.energy.check(self.model, time, states)?;
         let roughness = self.roughness.as_ref().map(StepResolution::mean);
         if roughness.is_some_and(|roughness| !roughness.is_finite()) {
-            return Err(self.world.blown_up(states, time));
+            return Err(self.model.blown_up(states, time));
         }
-        let name = |body: BodyId| self.world.bodies[body].name.clone();
+        let name = |body: BodyId| self.model.bodies[body].name.clone();
         let roughest = self.roughness.as_ref().and_then(StepResolution::roughest);
         Ok(Resolution {
             steps,

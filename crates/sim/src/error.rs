@@ -1,4 +1,4 @@
-//! Errors of building a world, and of simulating it.
+//! Errors of building a model, and of simulating it.
 
 use thiserror::Error;
 
@@ -11,11 +11,11 @@ use crate::shape::error::ShapeError;
 /// Result of what simulates.
 pub type Result<T, E = SimulationError> = std::result::Result<T, E>;
 
-/// Error of building or changing a world.
+/// Error of building or changing a model.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum BuildError {
-    /// A body is not of this world.
-    #[error("there is no body {body}: the world has {bodies}")]
+    /// A body is not of this model.
+    #[error("there is no body {body}: the model has {bodies}")]
     NoBody {
         /// The body.
         body: BodyId,
@@ -88,8 +88,8 @@ pub enum BuildError {
     /// A force along no joint.
     #[error("a force along joints needs an axis to act along")]
     NoAxes,
-    /// Parameters of a world that are too few or too many.
-    #[error("{given} parameters for a world of {expected}")]
+    /// Parameters of a model that are too few or too many.
+    #[error("{given} parameters for a model of {expected}")]
     Parameters {
         /// Number given.
         given: usize,
@@ -148,7 +148,7 @@ pub enum SimulationError {
     /// An integrator was told to stop.
     #[error("interrupted")]
     Interrupted,
-    /// The world is none that can be simulated.
+    /// The model is none that can be simulated.
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A parameter of a contact is out of its range.
@@ -179,7 +179,7 @@ pub enum SimulationError {
     },
     /// Too few or too many generalized coordinates.
     #[error(
-        "{} positions and {} velocities were given: the world has {} and {}",
+        "{} positions and {} velocities were given: the model has {} and {}",
         .given[0],
         .given[1],
         .expected[0],
@@ -188,7 +188,7 @@ pub enum SimulationError {
     GeneralizedCoordinates {
         /// Numbers of positions and velocities given.
         given: [usize; 2],
-        /// Numbers that the world has.
+        /// Numbers that the model has.
         expected: [usize; 2],
     },
     /// An integrator that knows no joints.
@@ -227,8 +227,8 @@ pub enum SimulationError {
         /// Its value.
         value: f64,
     },
-    /// A world has no parameter of that name, or it was named before.
-    #[error("the world has no parameter called '{name}', or it was named twice: see its names")]
+    /// A model has no parameter of that name, or it was named before.
+    #[error("the model has no parameter called '{name}', or it was named twice: see its names")]
     NoParameter {
         /// The name.
         name: String,
@@ -257,9 +257,9 @@ pub enum SimulationError {
         /// Number expected.
         expected: usize,
     },
-    /// A world that differs in more than parameters from the one its integrator was made for.
-    #[error("the integrator was made for a world of other bodies or contacts")]
-    AnotherWorld,
+    /// A model that differs in more than parameters from the one its integrator was made for.
+    #[error("the integrator was made for a model of other bodies or contacts")]
+    AnotherModel,
     /// The velocity of a trajectory is not the rate of its pose.
     #[error(
         "body '{body}' is driven by a trajectory whose velocity at {time} s is far from the rate of its pose, which what touches it \
@@ -291,7 +291,7 @@ pub enum SimulationError {
         /// Time \[s\].
         time: f64,
     },
-    /// Contacts or steps have made energy. Not asked in a world where a body is kinematic, or fixed and given a velocity.
+    /// Contacts or steps have made energy. Not asked in a model where a body is kinematic, or fixed and given a velocity.
     #[error(
         "{} made {energy:.3e} J by {time} s, most of it in body '{body}'{}: time steps that are too long, or a law that is not passive",
         if contact.is_some() { "contacts have" } else { "the motion has" },

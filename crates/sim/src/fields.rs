@@ -7,7 +7,7 @@ use prehend_geometry::{DistanceField, FieldSample};
 use crate::body::error::BodyError;
 use crate::surface::Surface;
 
-/// A field that is moved in the model frame: what was at the origin is at `pose`.
+/// A field that is moved in the body frame: what was at the origin is at `pose`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed<F> {
     /// The field.

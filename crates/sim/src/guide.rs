@@ -1,6 +1,6 @@
-//! From a world in twenty lines to gradients of long rollouts.
+//! From a model in twenty lines to gradients of long rollouts.
 //!
-//! # A world
+//! # A model
 //! Bodies, what touches what, gravity. Samples of one body's surface touch the distance field of another; a field is a
 //! grid made of a mesh ([`SdfGrid`](prehend_geometry::SdfGrid)), one of [`fields`](crate::fields), or a
 //! [`DistanceField`](prehend_geometry::DistanceField) of your own:
@@ -10,7 +10,7 @@
 //!
 //! use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! use prehend_sim::fields::HalfSpace;
-//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, Surface, World};
+//! use prehend_sim::{Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, Surface, Model};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // 200 g; inertia in kg m², center of mass in m.
@@ -19,40 +19,40 @@
 //! let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //!
-//! let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! // Four feet of 1 cm² each.
 //! let surface = Surface::uniform(&feet, 4e-4)?;
-//! let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
+//! let stool = model.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! // Pressure per depth [N/m³] and per speed [N s/m³]: the stool sinks in by half a millimeter.
 //! // What sticks creeps below 1 cm/s.
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
 //! // Contact fades in over a tenth of that depth.
 //! let bodies = ContactBodies { samples: stool, field: floor };
-//! world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
+//! model.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
 //!
-//! let mut start = world.neutral_state();
-//! world.set_pose(&mut start, stool, &Isometry3::translation(0.0, 0.0, 0.02))?;
+//! let mut start = model.neutral_state();
+//! model.set_pose(&mut start, stool, &Isometry3::translation(0.0, 0.0, 0.02))?;
 //! start[stool].linear.x = 0.3;
-//! let end = world.simulate(&start, 0.2)?;
+//! let end = model.simulate(&start, 0.2)?;
 //! // It slid to a halt: v²/2μg.
-//! let slid = world.pose(&end, stool).translation.x;
+//! let slid = model.pose(&end, stool).translation.x;
 //! assert!((slid - 0.3 * 0.3 / (2.0 * 0.5 * 9.81)).abs() < 3e-4, "{slid}");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! The pose in a state is that of the center of mass: [`World::set_pose`] sets it from the pose of the body's frame, and
-//! [`World::pose`] goes back, for renderers. For fixed and kinematic bodies the two are the same; a link's state is
+//! The pose in a state is that of the center of mass: [`Model::set_pose`] sets it from the pose of the body's frame, and
+//! [`Model::pose`] goes back, for renderers. For fixed and kinematic bodies the two are the same; a link's state is
 //! the pose of its frame. A simulation begins at the [time](crate::State::time) of its state.
 //!
 //! Return `anyhow::Result` from `main`: it prints messages of errors, `Box<dyn Error>` only their fields.
 //!
-//! You choose no step: [`World::simulate`] and [`World::rollout`] (states at the times of [`TimeSteps`](crate::TimeSteps)) use
+//! You choose no step: [`Model::simulate`] and [`Model::rollout`] (states at the times of [`TimeSteps`](crate::TimeSteps)) use
 //! [`Adaptive::default`](crate::Adaptive), which holds tolerances of states and derivatives whatever the stiffness, or returns an
-//! error. For [steps of your own](#steps-of-your-own-choice), ask [`World::check_time_step`] before and
-//! `simulate_with(…)?.resolution.is_fine()` afterwards; [`World::simulate_controlled`] has no such report. Stiffness and damping
+//! error. For [steps of your own](#steps-of-your-own-choice), ask [`Model::check_time_step`] before and
+//! `simulate_with(…)?.resolution.is_fine()` afterwards; [`Model::simulate_controlled`] has no such report. Stiffness and damping
 //! from depth at rest: [`ContactCalibration`](crate::ContactCalibration).
 //!
 //! # Bodies on a trajectory
@@ -67,19 +67,19 @@
 //! # use prehend_autodiff::{Fwd, Scalar};
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::zeros());
-//! let table = world.add(Body::kinematic("table", |time: f64| {
+//! # let mut model = Model::new(Vector3::zeros());
+//! let table = model.add(Body::kinematic("table", |time: f64| {
 //!     let mut state = BodyState::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
 //!     state.linear.x = 0.1; // What touches it feels this velocity.
 //!     state
 //! }));
-//! let start = world.neutral_state();
-//! let end = world.simulate(&start, 0.5)?;
+//! let start = model.neutral_state();
+//! let end = model.simulate(&start, 0.5)?;
 //! assert!((end[table].pose.translation.x - 0.05).abs() < 1e-12);
 //!
 //! // By its speed: over numbers that carry derivatives, the same for all that it touches.
 //! let speed = Fwd::<1>::variable(0.1, 0);
-//! let mut lifted = world.cast();
+//! let mut lifted = model.cast();
 //! lifted.bodies[table].motion = Motion::Kinematic(Arc::new(move |time: f64| {
 //!     let mut state = BodyState::at_rest(Isometry3::identity());
 //!     (state.pose.translation.x, state.linear.x) = (speed.times(time), speed);
@@ -107,14 +107,14 @@
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A slope of 6°.
-//! let mut world = World::new(Vector3::new(1.0, 0.0, -9.75));
-//! let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! let mut model = Model::new(Vector3::new(1.0, 0.0, -9.75));
+//! let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! // Two boxes of 4 cm and 200 g with edges of 1 mm; samples 1 cm apart.
 //! let (half, mass) = (0.02, 0.2);
 //! let rigid = RigidBody::cuboid(mass, [half; 3])?;
 //! let shape = Cuboid { half_extents: Vector3::repeat(half), rounding: 1e-3 };
-//! let lower = world.add(Body::dynamic("lower", rigid).with_cuboid(shape, 0.01)?);
-//! let upper = world.add(Body::dynamic("upper", rigid).with_cuboid(shape, 0.01)?);
+//! let lower = model.add(Body::dynamic("lower", rigid).with_cuboid(shape, 0.01)?);
+//! let upper = model.add(Body::dynamic("upper", rigid).with_cuboid(shape, 0.01)?);
 //!
 //! // Both weigh on the floor: a face of the lower one sinks in by a tenth of a millimeter.
 //! let contact_area = 4.0 * half * half;
@@ -123,13 +123,13 @@
 //! let friction = BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 //! let law = Arc::new(Law::new(normal, friction)?);
 //! let smoothing = GapSmoothing::Softplus { width: 1e-5 };
-//! world.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
-//! world.add_symmetric_contact(upper, lower, law, smoothing)?;
+//! model.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
+//! model.add_symmetric_contact(upper, lower, law, smoothing)?;
 //!
-//! let mut start = world.neutral_state();
+//! let mut start = model.neutral_state();
 //! start[lower].pose.translation.z = half;
 //! start[upper].pose.translation.z = 3.0 * half;
-//! let run = world.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
+//! let run = model.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
 //! let place = |second: usize| run[second][upper].pose.translation.x;
 //! assert!((place(3) - place(1)).abs() < 1e-7);
 //! # Ok(())
@@ -143,7 +143,7 @@
 //! If both bodies have samples and fields, each one's samples touch the other's field, with half of the force. Penetration is
 //! tested at samples, not where edges cross between them: keep the sample spacing below half of the smaller body's edges, or
 //! turned boxes may pass through each other. The directions are two contacts, along the axes of their own field's body;
-//! [`World::set_contact_param`] sets a parameter of both.
+//! [`Model::set_contact_param`] sets a parameter of both.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -153,25 +153,25 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let surface = Arc::new(Surface::uniform(&[Point3::origin()], 1e-4)?);
-//! # let mut world = World::new(Vector3::zeros());
+//! # let mut model = Model::new(Vector3::zeros());
 //! // Half-spaces, for brevity, the upper one upside down.
 //! let body = |name| Body::dynamic(name, rigid).with_surface(surface.clone()).with_field(Arc::new(HalfSpace::floor()));
-//! let (lower, upper) = (world.add(body("lower")), world.add(body("upper")));
+//! let (lower, upper) = (model.add(body("lower")), model.add(body("upper")));
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
 //! let law = Law::new(spring, friction)?;
-//! world.add_symmetric_contact(lower, upper, Arc::new(law), GapSmoothing::Hard)?;
+//! model.add_symmetric_contact(lower, upper, Arc::new(law), GapSmoothing::Hard)?;
 //! let turned = Isometry3::new(Vector3::new(0.0, 0.0, -1e-3), Vector3::x() * std::f64::consts::PI);
-//! let mut state = world.neutral_state();
-//! world.set_pose(&mut state, upper, &turned)?;
+//! let mut state = model.neutral_state();
+//! model.set_pose(&mut state, upper, &turned)?;
 //! // 1e7 N/m³ · 1 mm · 1 cm², half of it each way.
-//! assert!((world.wrenches(&state, 0)[upper].z - 1.0).abs() < 1e-9);
+//! assert!((model.wrenches(&state, 0)[upper].z - 1.0).abs() < 1e-9);
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! # Steps of your own choice
-//! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
+//! Where speed counts more than certainty, [`Model::simulate_with`] takes the steps of an
 //! [`Integrator`](crate::Integrator), and reports how well they resolved the motion, and the first body that passed through another
 //! ([`Resolution`](crate::Resolution)).
 //! An energy gain by contacts of more than a quarter of the largest kinetic energy is an error, as by default; it is not tested
@@ -190,23 +190,23 @@
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //! # let surface = Surface::uniform(&feet, 4e-4)?;
-//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
+//! # let stool = model.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! # let bodies = ContactBodies { samples: stool, field: floor };
-//! # world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
-//! # let mut start = world.neutral_state();
+//! # model.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
+//! # let mut start = model.neutral_state();
 //! # start[stool].pose.translation.z = 0.021;
-//! let right = world.simulate(&start, 0.5)?;
+//! let right = model.simulate(&start, 0.5)?;
 //! let time_steps = TimeSteps { dt: 1e-2, steps: 50 };
 //! let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: 256 };
-//! let coarse = world.simulate_with(&BackwardEuler, &start, time_steps)?;
-//! let finer = world.simulate_with(&divided, &start, time_steps)?;
+//! let coarse = model.simulate_with(&BackwardEuler, &start, time_steps)?;
+//! let finer = model.simulate_with(&divided, &start, time_steps)?;
 //! for end in [&coarse.states, &finer.states] {
 //!     assert!((end[stool].pose.translation.z - right[stool].pose.translation.z).abs() < 1e-4);
 //! }
@@ -242,17 +242,17 @@
 //! }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 1e-4)?;
-//! # let puck = world.add(Body::dynamic("puck", rigid).with_surface(surface));
-//! # let mut start = world.neutral_state();
+//! # let puck = model.add(Body::dynamic("puck", rigid).with_surface(surface));
+//! # let mut start = model.neutral_state();
 //! # start[puck].pose.translation.z = -1e-3;
 //! # start[puck].linear.x = 0.3;
 //!
 //! let bodies = ContactBodies { samples: puck, field: floor };
-//! world.add_contact(bodies, Arc::new(Wet([1.962e10, 0.5])), GapSmoothing::Hard)?;
-//! let mut lifted = world.cast::<Fwd<1>>();
+//! model.add_contact(bodies, Arc::new(Wet([1.962e10, 0.5])), GapSmoothing::Hard)?;
+//! let mut lifted = model.cast::<Fwd<1>>();
 //! lifted.contacts[0].params_mut()[1].derivative = [1.0]; // Of the only contact.
 //! let end = lifted.simulate(&start.cast(), 0.2)?;
 //! // v = v₀ exp(−c g t), by c:
@@ -265,46 +265,46 @@
 //! Longer: `examples/custom_contact_law.rs`.
 //!
 //! # Gradients, forward
-//! Write the quantity once over the scalar: [`World::cast`] makes constants of a world; then overwrite the inputs.
+//! Write the quantity once over the scalar: [`Model::cast`] makes constants of a model; then overwrite the inputs.
 //! [`Fwd`](prehend_autodiff::Fwd) is for few. To vary mass, inertia or center of mass, replace the body's [`RigidBody`]. All numbers
-//! as one vector: [`World::parameters`]. If the center of mass varies at a fixed pose of the model, make the initial state by
+//! as one vector: [`Model::parameters`]. If the center of mass varies at a fixed pose of the model, make the initial state by
 //! [`RigidBody::at_rest`] of the new body.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! use prehend_autodiff::{Fwd, Recording, Scalar};
 //! use prehend_sim::{BuildError, Motion, SimulationError};
-//! # use prehend_sim::{Body, RigidBody, State, World};
+//! # use prehend_sim::{Body, RigidBody, State, Model};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let ball = world.add(Body::dynamic("ball", rigid));
-//! # world.bodies[ball].external_wrench.z = 1.0;
-//! # let start = world.neutral_state();
+//! # let ball = model.add(Body::dynamic("ball", rigid));
+//! # model.bodies[ball].external_wrench.z = 1.0;
+//! # let start = model.neutral_state();
 //! // Height after a while, by the speed at the start and the mass.
 //! fn height<S: Scalar>(
-//!     world: &World,
+//!     model: &Model,
 //!     start: &State,
 //!     [speed, mass]: [S; 2],
 //! ) -> Result<S, SimulationError> {
-//!     let mut world = world.cast::<S>();
-//!     if let Motion::Dynamic(body) = &mut world.bodies[0].motion {
+//!     let mut model = model.cast::<S>();
+//!     if let Motion::Dynamic(body) = &mut model.bodies[0].motion {
 //!         *body = RigidBody::new(mass, *body.inertia(), *body.com())
 //!             .map_err(|error| BuildError::Body { body: "ball".to_owned(), error })?;
 //!     }
 //!     let mut start: State<S> = start.cast();
 //!     start[0].linear.z = speed;
-//!     Ok(world.simulate(&start, 0.1)?[0].pose.translation.z)
+//!     Ok(model.simulate(&start, 0.1)?[0].pose.translation.z)
 //! }
 //!
-//! let forward = height(&world, &start, Fwd::<2>::variables([0.5, 0.2]))?;
+//! let forward = height(&model, &start, Fwd::<2>::variables([0.5, 0.2]))?;
 //! assert!((forward.derivative[0] - 0.1).abs() < 1e-12);
 //!
 //! // Reverse mode, for many inputs: the same function.
 //! let recording = Recording::start();
 //! let inputs = recording.variables([0.5, 0.2]);
-//! let adjoints = recording.gradient(height(&world, &start, inputs)?);
+//! let adjoints = recording.gradient(height(&model, &start, inputs)?);
 //! assert!((adjoints.wrt(inputs[1]) - forward.derivative[1]).abs() < 1e-12);
 //! # Ok(())
 //! # }
@@ -315,13 +315,13 @@
 //! | call | a step | in all |
 //! |---|--:|--:|
 //! | `simulate_with(&SemiImplicitEuler, …)` over [`Var`](prehend_autodiff::Var) | 10 kB | 100 MB |
-//! | the same, [`StepCheckpointed::new(SemiImplicitEuler, &world)?`](crate::StepCheckpointed) | 0.5 to 1.3 kB | 5 to 13 MB |
+//! | the same, [`StepCheckpointed::new(SemiImplicitEuler, &model)?`](crate::StepCheckpointed) | 0.5 to 1.3 kB | 5 to 13 MB |
 //! | [`RolloutFunction`](crate::RolloutFunction): `evaluate`, `vjp` | 104 bytes a body | 2 MB |
 //!
 //! The last two record one step of the rollout at a time, with [`Adaptive`](crate::Adaptive) all its substeps: give it many steps.
 //!
 //! # Identification
-//! Parameters from observed motion, by nonlinear least squares. Where a trial step leads to an invalid world, such as one of
+//! Parameters from observed motion, by nonlinear least squares. Where a trial step leads to an invalid model, such as one of
 //! negative friction, return NaN residuals: the solver then tries a shorter step. Each trial costs a rollout: stop where the
 //! predicted decrease is below the observations' noise ([`Criteria`](prehend_autodiff::optimize::Criteria)). Mass is not
 //! identifiable from free sliding. Angles wrap: compare points of a body, and check the final cost.
@@ -333,34 +333,34 @@
 //! use prehend_autodiff::{Fwd, Scalar};
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let rigid = RigidBody::cuboid(0.2, [0.02; 3])?;
 //! # let block = Body::dynamic("block", rigid).with_surface(Surface::cuboid([0.02; 3], 0.02)?);
-//! # let block = world.add(block);
+//! # let block = model.add(block);
 //! # let bodies = ContactBodies { samples: block, field: floor };
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
-//! let contact = world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
-//! # let mut start = world.neutral_state();
+//! let contact = model.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
+//! # let mut start = model.neutral_state();
 //! # start[block].pose.translation.z = 0.02;
 //! // Where a block is every 20 ms, by its friction and its speed at the start.
 //! fn places<S: Scalar>(
-//!     world: &World,
+//!     model: &Model,
 //!     start: &State,
 //!     (block, contact): (BodyId, ContactId),
 //!     [friction, speed]: [S; 2],
 //! ) -> Result<Vec<S>, SimulationError> {
-//!     let mut world = world.cast::<S>();
-//!     world.set_contact_param(contact, "friction", friction)?;
+//!     let mut model = model.cast::<S>();
+//!     model.set_contact_param(contact, "friction", friction)?;
 //!     let mut start: State<S> = start.cast();
 //!     start[block].linear.x = speed;
-//!     let run = world.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
+//!     let run = model.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
 //!     Ok(run.iter().map(|states| states[block].pose.translation.x).collect())
 //! }
 //!
-//! let seen = places(&world, &start, (block, contact), [0.35, 0.6])?;
-//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, (block, contact), [x[0], x[1]]) {
+//! let seen = places(&model, &start, (block, contact), [0.35, 0.6])?;
+//! let residuals = |x: &[Fwd<2>]| match places(&model, &start, (block, contact), [x[0], x[1]]) {
 //!     Ok(places) => places.iter().zip(&seen).map(|(place, seen)| place.plus(-seen)).collect(),
 //!     Err(_) => vec![Fwd::constant(f64::NAN); seen.len()],
 //! };
@@ -377,29 +377,29 @@
 //! # Together with other losses
 //! States of a rollout over `Var` are numbers on the tape. Initial states may be computed on it, poses may be inputs of a renderer
 //! or a network, and one reverse sweep differentiates the composition, with a controller between steps
-//! ([`World::simulate_controlled`]):
+//! ([`Model::simulate_controlled`]):
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! # use prehend_autodiff::{Recording, Var};
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::zeros());
+//! # let mut model = Model::new(Vector3::zeros());
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let ball = world.add(Body::dynamic("ball", rigid));
+//! # let ball = model.add(Body::dynamic("ball", rigid));
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
-//! let mut start = world.neutral_state();
+//! let mut start = model.neutral_state();
 //! start[ball].pose.translation.x = 1.0;
 //! let mut loss = Var::from(0.0);
-//! let control = |step: Step, world: &mut World<Var>, state: &mut State<Var>| {
+//! let control = |step: Step, model: &mut Model<Var>, state: &mut State<Var>| {
 //!     if step.start >= 0.1 {
-//!         world.bodies[ball].external_wrench.x = -gain * state[ball].pose.translation.x;
+//!         model.bodies[ball].external_wrench.x = -gain * state[ball].pose.translation.x;
 //!     }
 //!     loss += state[ball].pose.translation.vector.norm_squared();
 //! };
 //! let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
-//! world.cast().simulate_controlled(&Adaptive::default(), &start.cast(), time_steps, control)?;
+//! model.cast().simulate_controlled(&Adaptive::default(), &start.cast(), time_steps, control)?;
 //! // A stiffer spring brings it back sooner.
 //! assert!(recording.gradient(loss).wrt(gain) < 0.0);
 //! # Ok(())
@@ -417,21 +417,21 @@
 //! # use prehend_sim::prelude::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
-//! # let stool = world.add(Body::dynamic("stool", rigid).with_surface(surface));
+//! # let stool = model.add(Body::dynamic("stool", rigid).with_surface(surface));
 //! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
 //! use prehend_sim::contact::LeakSteps;
 //!
 //! let smoothing = GapSmoothing::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
-//! world.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
-//! # let mut state = world.neutral_state();
+//! model.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
+//! # let mut state = model.neutral_state();
 //! # state[stool].pose.translation.z = 1e-3;
 //! let mut lifted: State<Fwd<1>> = state.cast();
 //! lifted[stool].pose.translation.z.derivative = [1.0];
-//! let force = world.cast().wrenches(&lifted, 0)[stool].z;
+//! let force = model.cast().wrenches(&lifted, 0)[stool].z;
 //! assert!(force.value == 0.0 && force.derivative[0] < 0.0);
 //! # Ok(())
 //! # }
@@ -453,4 +453,4 @@
 pub mod joints;
 
 #[cfg(doc)]
-use crate::{Body, RigidBody, World};
+use crate::{Body, Model, RigidBody};

@@ -1,58 +1,58 @@
-//! Handles of what was added to a world.
+//! Handles of what was added to a model.
 
 use std::fmt;
 use std::ops::{Index, IndexMut};
 
-/// Handle of a body of a world: given by [`World::add`](crate::World::add), and the index of its body and of its part of a [`State`](crate::State).
+/// Handle of a body of a model: given by [`Model::add`](crate::Model::add), and the index of its body and of its part of a [`State`](crate::State).
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{Body, World};
+/// use prehend_sim::{Body, Model};
 ///
-/// let mut world = World::new(Vector3::zeros());
-/// let belt = world.add(Body::fixed("belt"));
-/// let mut state = world.neutral_state();
+/// let mut model = Model::new(Vector3::zeros());
+/// let belt = model.add(Body::fixed("belt"));
+/// let mut state = model.neutral_state();
 /// state[belt].linear.x = 0.1;
-/// assert_eq!(world.bodies[belt].name, "belt");
+/// assert_eq!(model.bodies[belt].name, "belt");
 /// ```
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
 pub struct BodyId(pub(crate) usize);
 
 impl BodyId {
-    /// The place of the body among those of its world, from 0.
+    /// The place of the body among those of its model, from 0.
     pub fn index(self) -> usize {
         self.0
     }
 }
 
-/// Handle of contacts that were added together: given by [`World::add_contact`](crate::World::add_contact),
-/// [`add_symmetric_contact`](crate::World::add_symmetric_contact) and [`add_contacts_between`](crate::World::add_contacts_between).
+/// Handle of contacts that were added together: given by [`Model::add_contact`](crate::Model::add_contact),
+/// [`add_symmetric_contact`](crate::Model::add_symmetric_contact) and [`add_contacts_between`](crate::Model::add_contacts_between).
 ///
-/// [`World::set_contact_param`](crate::World::set_contact_param) sets a parameter of all of them.
+/// [`Model::set_contact_param`](crate::Model::set_contact_param) sets a parameter of all of them.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub struct ContactId(pub(crate) ContactPlace);
 
-/// Place of contacts in a world.
+/// Place of contacts in a model.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub(crate) enum ContactPlace {
-    /// A range of [`World::contacts`](crate::World::contacts).
+    /// A range of [`Model::contacts`](crate::Model::contacts).
     Pairs {
         /// Index of the first.
         first: usize,
         /// Number of them.
         count: usize,
     },
-    /// One of [`World::contact_groups`](crate::World::contact_groups).
+    /// One of [`Model::contact_groups`](crate::Model::contact_groups).
     Group(usize),
 }
 
-/// Handle of a bushing of a world: given by [`World::add_bushing`](crate::World::add_bushing), for
-/// [`World::bushing_mut`](crate::World::bushing_mut).
+/// Handle of a bushing of a model: given by [`Model::add_bushing`](crate::Model::add_bushing), for
+/// [`Model::bushing_mut`](crate::Model::bushing_mut).
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub struct BushingId(pub(crate) usize);
 
-/// Handle of a force along joints of a world: given by [`World::add_joint_force`](crate::World::add_joint_force), for
-/// [`World::joint_force_mut`](crate::World::joint_force_mut).
+/// Handle of a force along joints of a model: given by [`Model::add_joint_force`](crate::Model::add_joint_force), for
+/// [`Model::joint_force_mut`](crate::Model::joint_force_mut).
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub struct JointForceId(pub(crate) usize);
 

@@ -2,25 +2,25 @@
 
 pub(crate) mod adaptive;
 pub(crate) mod backward_euler;
+pub(crate) mod model_template;
 pub(crate) mod runge_kutta;
 pub(crate) mod semi_implicit;
 pub(crate) mod step_checkpointed;
 pub(crate) mod sub_stepped;
-pub(crate) mod world_template;
 
 use prehend_autodiff::Scalar;
 
 use crate::error::Result;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
 /// A time stepping scheme, written once over the scalar: plain numbers simulate, others differentiate.
 ///
 /// ```
 /// use nalgebra::Vector3;
 /// use prehend_autodiff::Scalar;
-/// use prehend_sim::{Integrator, SimulationError, State, Step, World};
+/// use prehend_sim::{Integrator, SimulationError, State, Step, Model};
 ///
 /// /// Bodies that fly straight on.
 /// struct Drift;
@@ -28,7 +28,7 @@ use crate::world::World;
 /// impl Integrator for Drift {
 ///     fn step<S: Scalar>(
 ///         &self,
-///         _: &World<S>,
+///         _: &Model<S>,
 ///         state: &State<S>,
 ///         step: Step,
 ///     ) -> Result<State<S>, SimulationError> {
@@ -45,10 +45,10 @@ pub trait Integrator: Sync {
     ///
     /// # Errors
     /// If the scheme solves equations and they were not solved.
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>>;
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>>;
 
     /// The largest dt·max(ω, c) at which linear contacts of angular frequency ω and damping rate c
-    /// ([`World::contact_frequency`]) are stable, whatever the smaller of the two; infinite for a scheme that is stable always.
+    /// ([`Model::contact_frequency`]) are stable, whatever the smaller of the two; infinite for a scheme that is stable always.
     ///
     /// The default suits semi-implicit and higher-order explicit schemes (explicit Euler has no such limit: it is unstable).
     fn stability_limit(&self) -> f64 {
@@ -60,17 +60,17 @@ pub trait Integrator: Sync {
         false
     }
 
-    /// True if it looks for the contacts of [`World::contact_groups`] itself. Others are given a world in which those that may
-    /// touch within the step are [`contacts`](World::contacts).
+    /// True if it looks for the contacts of [`Model::contact_groups`] itself. Others are given a model in which those that may
+    /// touch within the step are [`contacts`](Model::contacts).
     fn finds_contacts(&self) -> bool {
         false
     }
 
-    /// Checks that derivatives of its steps in `world` are those of the motion. What takes steps by values first asks here.
+    /// Checks that derivatives of its steps in `model` are those of the motion. What takes steps by values first asks here.
     ///
     /// # Errors
     /// If they are not.
-    fn check_differentiable<S: Scalar>(&self, _world: &World<S>) -> Result<()> {
+    fn check_differentiable<S: Scalar>(&self, _world: &Model<S>) -> Result<()> {
         Ok(())
     }
 
@@ -87,7 +87,7 @@ mod tests {
     struct Still;
 
     impl Integrator for Still {
-        fn step<S: Scalar>(&self, _: &World<S>, state: &State<S>, _: Step) -> Result<State<S>> {
+        fn step<S: Scalar>(&self, _: &Model<S>, state: &State<S>, _: Step) -> Result<State<S>> {
             Ok(state.clone())
         }
     }

@@ -4,12 +4,12 @@
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and
 //! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`](contact::NormalLaw) and a
 //! [`FrictionLaw`](contact::FrictionLaw). Forces and their derivatives are gathered into one wrench a step, so that a
-//! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
+//! rollout of a [`Model`] carries exact derivatives by its initial states and by every number of the model.
 //!
-//! Links that joints hold together are [`articulated`]: they are bodies of a world like others, with laws along their joints
+//! Links that joints hold together are [`articulated`]: they are bodies of a model like others, with laws along their joints
 //! ([`JointLaw`](joint_law::JointLaw)), contacts, loops ([`Bushing`]) and sensors, from code, URDF or MJCF.
 //!
-//! The [`guide`] goes from a world in twenty lines to gradients of long rollouts.
+//! The [`guide`] goes from a model in twenty lines to gradients of long rollouts.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
 //! center of mass, velocities are those of the center of mass, in the world frame.
@@ -31,6 +31,7 @@ mod integrator;
 pub mod joint_law;
 mod linearize_step;
 mod magnitude;
+mod model;
 pub mod prelude;
 pub mod robot;
 mod rollout;
@@ -42,7 +43,6 @@ mod spatial;
 mod state;
 mod surface;
 mod time;
-mod world;
 
 /// The version of parry whose shapes [`Shape::from_parry`] reads.
 pub use parry3d_f64 as parry;
@@ -67,6 +67,16 @@ pub use integrator::semi_implicit::SemiImplicitEuler;
 pub use integrator::step_checkpointed::StepCheckpointed;
 pub use integrator::sub_stepped::SubStepped;
 pub use linearize_step::LinearizedStep;
+pub use model::Model;
+pub use model::articulated_body::ArticulatedBody;
+pub use model::body::{Body, Motion};
+pub use model::bushing::{Bushing, BushingStiffness};
+pub use model::contact_group::ContactGroup;
+pub use model::contact_pair::{ContactBodies, ContactPair};
+pub use model::joint_force::{JointAxis, JointForce};
+pub use model::material::Material;
+pub use model::trajectory::Trajectory;
+pub use model::transmission::Transmissions;
 pub use rollout::{ControlResult, Simulation, StepError};
 pub use rollout_function::{RolloutFunction, RolloutGradient, RolloutInputs};
 pub use shape::Shape;
@@ -75,13 +85,3 @@ pub use shape::options::ShapeOptions;
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};
 pub use time::{Step, TimeSteps};
-pub use world::World;
-pub use world::articulated_body::ArticulatedBody;
-pub use world::body::{Body, Motion};
-pub use world::bushing::{Bushing, BushingStiffness};
-pub use world::contact_group::ContactGroup;
-pub use world::contact_pair::{ContactBodies, ContactPair};
-pub use world::joint_force::{JointAxis, JointForce};
-pub use world::material::Material;
-pub use world::trajectory::Trajectory;
-pub use world::transmission::Transmissions;

@@ -16,10 +16,10 @@ use crate::error::Result;
 #[cfg(doc)]
 use crate::integrator::semi_implicit::SemiImplicitEuler;
 use crate::integrator::semi_implicit::{advance, moved};
+use crate::model::Model;
+use crate::model::joint_force::JointAxis;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
-use crate::world::joint_force::JointAxis;
 use generalized::Generalized;
 use joint_advance::JointAdvance;
 
@@ -27,8 +27,8 @@ use joint_advance::JointAdvance;
 ///
 /// With N degrees of freedom, rows and columns are displacements, then velocities. Of each free body displacements are
 /// six, a twist about its center of mass along the world's axes, as in [`BodyState::tangent`](crate::BodyState::tangent); of each joint they are as many as it has
-/// velocities, and along these. Free bodies come first, then articulations, both in their order in the world. [`World::displaced`] and
-/// [`World::displacement`] apply and find such displacements.
+/// velocities, and along these. Free bodies come first, then articulations, both in their order in the model. [`Model::displaced`] and
+/// [`Model::displacement`] apply and find such displacements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearizedStep {
     /// State after the step.
@@ -39,14 +39,14 @@ pub struct LinearizedStep {
     pub by_force: DMatrix<f64>,
 }
 
-impl World {
+impl Model {
     /// A step of [`SemiImplicitEuler`] with its Jacobian. The step says when it begins, whatever `state.time` is.
     ///
     /// Contacts with bristles are as they are given, their deflections are no rows. Where there are such contacts, laws along spherical joints or joint
     /// types of one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
     ///
     /// # Errors
-    /// As [`World::step`].
+    /// As [`Model::step`].
     pub fn linearize_step(&self, state: &State, step: Step) -> Result<LinearizedStep> {
         let mut state = self.with_deflections(state.clone());
         self.check(&state, step)?;

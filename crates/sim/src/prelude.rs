@@ -14,7 +14,7 @@ pub use crate::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
 pub use crate::{
     Adaptive, BackwardEuler, Batch, Body, BodyId, BodyState, BuildError, Bushing, BushingId,
     BushingStiffness, ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Material,
-    Motion, RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape,
-    ShapeOptions, SimulationError, State, Step, StepCheckpointed, SubStepped, Surface, TimeSteps,
-    World,
+    Model, Motion, RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler,
+    Shape, ShapeOptions, SimulationError, State, Step, StepCheckpointed, SubStepped, Surface,
+    TimeSteps,
 };

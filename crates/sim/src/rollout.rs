@@ -10,12 +10,12 @@ use crate::diagnostics::{Diagnostics, Resolution};
 use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
+use crate::model::Model;
+use crate::model::bushing::Bushing;
+use crate::model::contact_pair::ContactPair;
+use crate::model::sample_culling::SampleCulling;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
-use crate::world::World;
-use crate::world::bushing::Bushing;
-use crate::world::contact_pair::ContactPair;
-use crate::world::sample_culling::SampleCulling;
 
 /// Result of a simulation with an integrator of one's own choice.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,15 +63,15 @@ pub struct StepError {
     pub limit: f64,
 }
 
-impl World {
+impl Model {
     /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `state`: dt·ω ≤
-    /// [`Integrator::stability_limit`] for their [`World::contact_frequency`] ω. Impacts to come are not among them.
+    /// [`Integrator::stability_limit`] for their [`Model::contact_frequency`] ω. Impacts to come are not among them.
     ///
     /// # Errors
     /// With the longest step that passes.
     ///
     /// # Panics
-    /// If it is no state of this world.
+    /// If it is no state of this model.
     pub fn check_time_step(
         &self,
         integrator: &impl Integrator,
@@ -83,7 +83,7 @@ impl World {
     }
 }
 
-impl<S: Scalar> World<S> {
+impl<S: Scalar> Model<S> {
     /// State `time` \[s\] later. Kinematic bodies start where their trajectory is at the time of `initial`.
     ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
@@ -91,29 +91,29 @@ impl<S: Scalar> World<S> {
     /// what the adjoint needs.
     ///
     /// # Errors
-    /// Unless the state is one of this world and finite, and the time is positive; if the velocity of a trajectory is not the rate of
+    /// Unless the state is one of this model and finite, and the time is positive; if the velocity of a trajectory is not the rate of
     /// its pose; where forces jump or grow so that no step is short enough, a state stops being finite or contacts make energy
-    /// (see [`World::simulate_with`]), which body, contact and time.
+    /// (see [`Model::simulate_with`]), which body, contact and time.
     pub fn simulate(&self, initial: &State<S>, time: f64) -> Result<State<S>> {
         let once = TimeSteps { dt: time, steps: 1 };
         Ok(self.simulate_with(&Adaptive::default(), initial, once)?.states)
     }
 
-    /// States at the time of `initial` and after each step, as [`World::simulate`] finds them.
+    /// States at the time of `initial` and after each step, as [`Model::simulate`] finds them.
     ///
     /// # Errors
-    /// See [`World::simulate`].
+    /// See [`Model::simulate`].
     pub fn rollout(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<Vec<State<S>>> {
         Ok(self.rollout_with(&Adaptive::default(), initial, time_steps)?.states)
     }
 
-    /// [`World::simulate`] with the steps of `integrator`, and a report on how well they resolve the motion.
+    /// [`Model::simulate`] with the steps of `integrator`, and a report on how well they resolve the motion.
     ///
     /// Contacts that make energy are an error unless a body is kinematic, or fixed and moving: such a body may bring energy
-    /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
+    /// with it. Laws that drive things on purpose are for [`Model::simulate_controlled`] and [`Model::step`], which do not ask.
     ///
     /// # Errors
-    /// Unless the state is one of this world and finite, and the time step is positive; if the velocity of a trajectory is not the
+    /// Unless the state is one of this model and finite, and the time step is positive; if the velocity of a trajectory is not the
     /// rate of its pose; where a state stops being finite or contacts make energy, which body, contact and time; if a step's equations were not solved.
     pub fn simulate_with(
         &self,
@@ -124,7 +124,7 @@ impl<S: Scalar> World<S> {
         self.run(integrator, self.initialize(initial, time_steps)?, time_steps, |_| ())
     }
 
-    /// [`World::simulate_with`] of what has begun, each step of which is handed to `visit`.
+    /// [`Model::simulate_with`] of what has begun, each step of which is handed to `visit`.
     pub(crate) fn run(
         &self,
         integrator: &impl Integrator,
@@ -136,8 +136,8 @@ impl<S: Scalar> World<S> {
         let mut near = SampleCulling::new(self);
         let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
         for step in time_steps.after(state.time) {
-            let world = if once { near.world(self, state.rows(), step.dt) } else { self };
-            state = world.advance(integrator, &state, step)?;
+            let model = if once { near.model(self, state.rows(), step.dt) } else { self };
+            state = model.advance(integrator, &state, step)?;
             visit(&state);
             diagnostics.step(step, state.rows())?;
         }
@@ -145,10 +145,10 @@ impl<S: Scalar> World<S> {
         Ok(Simulation { states: state, resolution })
     }
 
-    /// States of [`World::simulate_with`] at the start and after each step.
+    /// States of [`Model::simulate_with`] at the start and after each step.
     ///
     /// # Errors
-    /// See [`World::simulate_with`].
+    /// See [`Model::simulate_with`].
     pub fn rollout_with(
         &self,
         integrator: &impl Integrator,
@@ -163,12 +163,12 @@ impl<S: Scalar> World<S> {
         Ok(Simulation { states, resolution })
     }
 
-    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the state and may set external
-    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of fixed bodies, for
+    /// [`Model::simulate_with`] under `control`, which is called before each step: it sees the state and may set external
+    /// wrenches, gravity, parameters of laws, of contacts and [along joints](Model::joint_force_mut), and the states of fixed bodies, for
     /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
     /// either, whose error ends it, too.
     ///
-    /// Nothing is said of how well the steps resolve the motion, as [`World::simulate_with`] does: see [`World::check_time_step`].
+    /// Nothing is said of how well the steps resolve the motion, as [`Model::simulate_with`] does: see [`Model::check_time_step`].
     ///
     /// Over a scalar that carries derivatives they pass through the controller too.
     ///
@@ -177,18 +177,18 @@ impl<S: Scalar> World<S> {
     /// # use prehend_autodiff::Fwd;
     /// # use prehend_sim::prelude::*;
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # let mut world = World::new(Vector3::zeros());
+    /// # let mut model = Model::new(Vector3::zeros());
     /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
-    /// # let ball = world.add(Body::dynamic("ball", rigid));
-    /// # let mut start = world.neutral_state();
+    /// # let ball = model.add(Body::dynamic("ball", rigid));
+    /// # let mut start = model.neutral_state();
     /// # start[ball].pose.translation.x = 1.0;
     /// // A spring of 2 N/m pulls the ball back; how far, by its stiffness?
     /// let stiffness = Fwd::<1>::variable(2.0, 0);
     /// let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
-    /// let control = |_, world: &mut World<_>, state: &mut State<_>| {
-    ///     world.bodies[ball].external_wrench.x = -stiffness * state[ball].pose.translation.x;
+    /// let control = |_, model: &mut Model<_>, state: &mut State<_>| {
+    ///     model.bodies[ball].external_wrench.x = -stiffness * state[ball].pose.translation.x;
     /// };
-    /// let (lifted, start) = (world.cast(), start.cast());
+    /// let (lifted, start) = (model.cast(), start.cast());
     /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
     /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
     /// # Ok(())
@@ -196,7 +196,7 @@ impl<S: Scalar> World<S> {
     /// ```
     ///
     /// # Errors
-    /// As [`World::simulate_with`], but for energy, which a controller may bring.
+    /// As [`Model::simulate_with`], but for energy, which a controller may bring.
     pub fn simulate_controlled<R: ControlResult>(
         &self,
         integrator: &impl Integrator,
@@ -207,7 +207,7 @@ impl<S: Scalar> World<S> {
         self.controlled(integrator, initial, time_steps, control, |_| ())
     }
 
-    /// States of [`World::simulate_controlled`] at the start and after each step, or until `control` ends it.
+    /// States of [`Model::simulate_controlled`] at the start and after each step, or until `control` ends it.
     ///
     /// # Errors
     /// See there.
@@ -233,15 +233,15 @@ impl<S: Scalar> World<S> {
         mut control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
         mut visit: impl FnMut(&State<S>),
     ) -> Result<State<S>> {
-        let (mut state, mut world) = (self.initialize(initial, time_steps)?, self.clone());
+        let (mut state, mut model) = (self.initialize(initial, time_steps)?, self.clone());
         for step in time_steps.after(state.time) {
-            if control(step, &mut world, &mut state).into_flow()?.is_break() {
+            if control(step, &mut model, &mut state).into_flow()?.is_break() {
                 break;
             }
             state.time = step.start;
             visit(&state);
-            world.check(&state, step)?;
-            state = world.advance(integrator, &state, step)?;
+            model.check(&state, step)?;
+            state = model.advance(integrator, &state, step)?;
         }
         Ok(state)
     }
@@ -249,7 +249,7 @@ impl<S: Scalar> World<S> {
     /// State at the end of a step: the integrator's, then that of kinematic bodies. The step says when it begins, whatever `state.time` is.
     ///
     /// # Errors
-    /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
+    /// As [`Model::simulate_with`], but for energy, which takes more than a step to tell.
     pub fn step(
         &self,
         integrator: &impl Integrator,
@@ -263,7 +263,7 @@ impl<S: Scalar> World<S> {
         self.advance(integrator, &state, step)
     }
 
-    /// [`World::step`] of what has been checked.
+    /// [`Model::step`] of what has been checked.
     pub(crate) fn advance(
         &self,
         integrator: &impl Integrator,
@@ -305,7 +305,7 @@ impl<S: Scalar> World<S> {
     /// State from which a rollout begins: `initial` with kinematic bodies where their trajectories are at its time.
     ///
     /// # Errors
-    /// See [`World::check`] and [`World::check_velocities`].
+    /// See [`Model::check`] and [`Model::check_velocities`].
     pub(crate) fn initialize(&self, initial: &State<S>, time_steps: TimeSteps) -> Result<State<S>> {
         let mut state = self.with_deflections(initial.clone());
         let first = Step { index: 0, start: initial.time, dt: time_steps.dt };
@@ -358,24 +358,24 @@ mod tests {
 
     #[test]
     fn parameters_out_of_range_and_missing_states_are_refused() {
-        let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        let step = |world: &World, states: &State, dt| {
-            world.step(&SemiImplicitEuler, states, Step::new(0, dt)).map(|_| ()).unwrap_err()
+        let (mut model, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let step = |model: &Model, states: &State, dt| {
+            model.step(&SemiImplicitEuler, states, Step::new(0, dt)).map(|_| ()).unwrap_err()
         };
         assert_eq!(
-            step(&world, &State::new(&states.bodies()[..1]), 1e-3),
+            step(&model, &State::new(&states.bodies()[..1]), 1e-3),
             SimulationError::States { states: 1, bodies: 2, joints: 0, bristles: 0 }
         );
-        assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
+        assert_eq!(step(&model, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
             ([-1e7, 2e4, 0.6], "stiffness must be positive, is -10000000"),
             ([1e7, 2e4, -0.1], "friction must be zero or positive, is -0.1"),
             ([1e7, f64::NAN, 0.6], "parameter of a contact must be finite, is NaN"),
         ] {
-            world.contacts[0].set_params(&bad).unwrap();
-            assert_eq!(step(&world, &states, 1e-3).to_string(), message);
+            model.contacts[0].set_params(&bad).unwrap();
+            assert_eq!(step(&model, &states, 1e-3).to_string(), message);
         }
-        let error = world.contacts[0].set_params(&[1e7]).unwrap_err();
+        let error = model.contacts[0].set_params(&[1e7]).unwrap_err();
         assert_eq!(error, LawError::Count { given: 1, expected: 3 });
     }
 
@@ -386,20 +386,20 @@ mod tests {
             ("penalty_grain", &[5e6, 2e4, 0.6, 0.5, 1e-2, 1.0, 0.0, 0.0][..], 2),
             ("penalty_stribeck", &[5e6, 2e4, 0.6, 0.3, 0.05, 1e-2], 3),
         ] {
-            let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-            world.contacts[0].set_law(registry.create(name, values).unwrap().into());
-            let (step, good) = (Step::new(0, 1e-3), world.parameters());
+            let (mut model, states) = egg_on(bowl(), GapSmoothing::Hard);
+            model.contacts[0].set_law(registry.create(name, values).unwrap().into());
+            let (step, good) = (Step::new(0, 1e-3), model.parameters());
             for (k, parameter) in
                 registry.entry(name).unwrap().parameters[2..][..parts].iter().enumerate()
             {
                 let mut bad = good.clone();
                 bad[good.len() - parts + k] = -1.0;
-                let changed = world.with_parameters(&bad).unwrap();
+                let changed = model.with_parameters(&bad).unwrap();
                 let refused = changed.step(&SemiImplicitEuler, &states, step).unwrap_err();
                 assert!(
                     matches!(&refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
                 );
-                let mut lifted = world.cast::<Fwd<1>>();
+                let mut lifted = model.cast::<Fwd<1>>();
                 lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);
                 let states = states.cast();
                 assert_eq!(lifted.step(&SemiImplicitEuler, &states, step).unwrap_err(), refused);
@@ -409,13 +409,13 @@ mod tests {
 
     #[test]
     fn driven_bodies_start_on_their_trajectory() {
-        let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let (mut model, states) = egg_on(bowl(), GapSmoothing::Hard);
         let rising = |time: f64| BodyState {
             linear: Vector3::z(),
             ..BodyState::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
         };
-        world.bodies[0].motion = Motion::Kinematic(Arc::new(rising));
-        let run = world
+        model.bodies[0].motion = Motion::Kinematic(Arc::new(rising));
+        let run = model
             .rollout_with(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 })
             .unwrap()
             .states;
@@ -425,33 +425,33 @@ mod tests {
 
     #[test]
     fn a_controller_ends_a_simulation() {
-        let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let (model, states) = egg_on(bowl(), GapSmoothing::Hard);
         let time_steps = TimeSteps { dt: 1e-3, steps: 100 };
-        let control = |step: Step, _: &mut World, states: &mut State| {
+        let control = |step: Step, _: &mut Model, states: &mut State| {
             states[1].linear.x = 0.1;
             match step.index {
                 7 => ControlFlow::Break(()),
                 _ => ControlFlow::Continue(()),
             }
         };
-        let run = world.rollout_controlled(&SemiImplicitEuler, &states, time_steps, control);
+        let run = model.rollout_controlled(&SemiImplicitEuler, &states, time_steps, control);
         let run = run.unwrap();
         assert_eq!(run.len(), 8);
-        let end = world.simulate_controlled(&SemiImplicitEuler, &states, time_steps, control);
+        let end = model.simulate_controlled(&SemiImplicitEuler, &states, time_steps, control);
         assert_eq!(&end.unwrap(), run.last().unwrap());
-        let fails = |step: Step, _: &mut World, _: &mut State| match step.index {
+        let fails = |step: Step, _: &mut Model, _: &mut State| match step.index {
             3 => Err(SimulationError::TimeStep(0.0)),
             _ => Ok(ControlFlow::Continue(())),
         };
-        let failed = world.simulate_controlled(&SemiImplicitEuler, &states, time_steps, fails);
+        let failed = model.simulate_controlled(&SemiImplicitEuler, &states, time_steps, fails);
         assert_eq!(failed, Err(SimulationError::TimeStep(0.0)));
     }
 
     #[test]
     fn bad_starts_and_blow_ups_say_where() {
-        let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let (model, states) = egg_on(bowl(), GapSmoothing::Hard);
         let roll = |states: &State, dt| {
-            world.rollout_with(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
+            model.rollout_with(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&State::new(&states.bodies()[..1]), 1e-3).unwrap_err();

@@ -9,29 +9,29 @@ use crate::body_state::{BodyState, STATE, coordinates_of, states_of};
 use crate::error::{Result, SimulationError};
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::integrator::world_template::WorldTemplate;
+use crate::integrator::model_template::ModelTemplate;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
-use crate::world::World;
 
-/// The states of a world at 0, dt, …, `steps`·dt as a function of the initial states, of some of its
-/// [parameters](World::parameters), and of others that a controller sets before each step.
+/// The states of a model at 0, dt, …, `steps`·dt as a function of the initial states, of some of its
+/// [parameters](Model::parameters), and of others that a controller sets before each step.
 ///
 /// A state is a row of 13 numbers: position x, y, z \[m\], unit quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
 /// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts with bristles, as in
-/// [`World::neutral_state`]. The rows of links follow from those of joints.
+/// [`Model::neutral_state`]. The rows of links follow from those of joints.
 ///
 /// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
 ///
 /// ```
 /// use nalgebra::{Isometry3, Vector3};
-/// use prehend_sim::{Body, RigidBody, RolloutFunction, RolloutInputs, TimeSteps, World};
+/// use prehend_sim::{Body, RigidBody, RolloutFunction, RolloutInputs, TimeSteps, Model};
 ///
-/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+/// model.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
 /// let time_steps = TimeSteps { dt: 0.1, steps: 5 };
 /// // By gravity, and by a push that changes from step to step.
-/// let throw = RolloutFunction::new(&world, time_steps, &["gravity.z"], &["stone.force_x"])?;
+/// let throw = RolloutFunction::new(&model, time_steps, &["gravity.z"], &["stone.force_x"])?;
 /// let states = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0];
 /// let inputs = RolloutInputs { states: &states, parameters: &[-9.81], controls: &[1.0; 5] };
 /// let run = throw.evaluate(inputs)?;
@@ -47,7 +47,7 @@ use crate::world::World;
 /// ```
 #[derive(Debug)]
 pub struct RolloutFunction<I = Adaptive> {
-    template: Arc<WorldTemplate<I>>,
+    template: Arc<ModelTemplate<I>>,
     time_steps: TimeSteps,
     /// Places of the parameters among all, then of the controls.
     places: Box<[u32]>,
@@ -80,33 +80,33 @@ pub struct RolloutGradient {
 }
 
 impl RolloutFunction {
-    /// Function of `world`, with [`Adaptive`] steps.
+    /// Function of `model`, with [`Adaptive`] steps.
     ///
     /// # Errors
     /// See [`RolloutFunction::with_integrator`].
     pub fn new(
-        world: &World,
+        model: &Model,
         time_steps: TimeSteps,
         parameters: &[&str],
         controls: &[&str],
     ) -> Result<Self> {
-        Self::with_integrator(Adaptive::default(), world, time_steps, parameters, controls)
+        Self::with_integrator(Adaptive::default(), model, time_steps, parameters, controls)
     }
 }
 
 impl<I: Integrator> RolloutFunction<I> {
-    /// Function of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
+    /// Function of `model` with the steps of `integrator`, by the parameters of these [names](Model::parameter_names). Those that are no inputs keep their values.
     ///
     /// # Errors
     /// If there is no such parameter or one is named twice, there is no step or its time is not positive.
     pub fn with_integrator(
         integrator: I,
-        world: &World,
+        model: &Model,
         time_steps: TimeSteps,
         parameters: &[&str],
         controls: &[&str],
     ) -> Result<Self> {
-        let names = world.parameter_names();
+        let names = model.parameter_names();
         let mut left: HashMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
         let mut places = Vec::with_capacity(parameters.len() + controls.len());
         for &name in parameters.iter().chain(controls) {
@@ -119,13 +119,13 @@ impl<I: Integrator> RolloutFunction<I> {
         if time_steps.steps == 0 {
             return Err(SimulationError::Inputs { what: "steps", given: 0, expected: 1 });
         }
-        let template = WorldTemplate::new(integrator, world)?;
+        let template = ModelTemplate::new(integrator, model)?;
         Ok(Self { template, time_steps, places: places.into(), parameters: parameters.len() })
     }
 
-    /// The world as it was given.
-    pub fn world(&self) -> &World {
-        self.template.world_values()
+    /// The model as it was given.
+    pub fn model(&self) -> &Model {
+        self.template.model_values()
     }
 
     /// The steps.
@@ -140,13 +140,13 @@ impl<I: Integrator> RolloutFunction<I> {
 
     /// Length of a row of all states at one time: 13 for each body, joint and contact with bristles.
     pub fn width(&self) -> usize {
-        STATE * self.world().state_count()
+        STATE * self.model().state_count()
     }
 
     /// The states at 0, dt, …, `steps`·dt, one after the other.
     ///
     /// # Errors
-    /// As [`World::simulate_with`], with controls as [`World::simulate_controlled`]; if inputs are too few or too many, a quaternion has not the length 1, or there
+    /// As [`Model::simulate_with`], with controls as [`Model::simulate_controlled`]; if inputs are too few or too many, a quaternion has not the length 1, or there
     /// is no memory for so many steps.
     pub fn evaluate<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>> {
         let mut run = Vec::new();
@@ -177,17 +177,17 @@ impl<I: Integrator> RolloutFunction<I> {
         self.check(&inputs)?;
         let (integrator, time_steps) = (&self.template.integrator, self.time_steps);
         let initial = self.template.state(inputs.states, 0.0);
-        let world = self.template.world(&self.places, &self.values_at(&inputs, 0))?;
-        let mut state = world.initialize(&initial, time_steps)?;
+        let model = self.template.model(&self.places, &self.values_at(&inputs, 0))?;
+        let mut state = model.initialize(&initial, time_steps)?;
         visit(&state);
         let [_, controls] = self.inputs();
         if controls == 0 {
-            return Ok(world.run(integrator, state, time_steps, visit)?.states);
+            return Ok(model.run(integrator, state, time_steps, visit)?.states);
         }
         for step in self.steps() {
-            let world = self.template.world(&self.places, &self.values_at(&inputs, step.index))?;
-            world.check(&state, step)?;
-            state = world.advance(integrator, &state, step)?;
+            let model = self.template.model(&self.places, &self.values_at(&inputs, step.index))?;
+            model.check(&state, step)?;
+            state = model.advance(integrator, &state, step)?;
             visit(&state);
         }
         Ok(state)
@@ -236,7 +236,7 @@ impl<I: Integrator> RolloutFunction<I> {
     /// The derivatives are those of [`StepCheckpointed`](crate::StepCheckpointed).
     ///
     /// # Errors
-    /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, the integrator's steps have no derivatives in this world, or
+    /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, the integrator's steps have no derivatives in this model, or
     /// derivatives are not finite.
     pub fn vjp(
         &self,
@@ -245,7 +245,7 @@ impl<I: Integrator> RolloutFunction<I> {
         adjoints: &[f64],
     ) -> Result<RolloutGradient> {
         self.check(&inputs)?;
-        self.template.integrator.check_differentiable(self.world())?;
+        self.template.integrator.check_differentiable(self.model())?;
         let (width, steps) = (self.width(), self.time_steps.steps);
         let expected = width * (steps + 1);
         for (what, given) in [("numbers of a run", run.len()), ("adjoints", adjoints.len())] {
@@ -265,15 +265,15 @@ impl<I: Integrator> RolloutFunction<I> {
             let before = step.index * width..(step.index + 1) * width;
             let states = &run[before.clone()];
             let [by_before, by_values] =
-                self.pull_back(&inputs, step.index, states, &by_states, |world, state| {
-                    world.advance(&self.template.integrator, state, step)
+                self.pull_back(&inputs, step.index, states, &by_states, |model, state| {
+                    model.advance(&self.template.integrator, state, step)
                 })?;
             add(step.index, &by_values);
             by_states = by_before;
             by_states.iter_mut().zip(&adjoints[before]).for_each(|(by, own)| *by += own);
         }
         let begin =
-            |world: &World<Var>, state: &State<Var>| world.initialize(state, self.time_steps);
+            |model: &Model<Var>, state: &State<Var>| model.initialize(state, self.time_steps);
         let [states, by_values] = self.pull_back(&inputs, 0, inputs.states, &by_states, begin)?;
         add(0, &by_values);
         Ok(RolloutGradient { states, parameters: by_parameters, controls: by_controls })
@@ -287,7 +287,7 @@ impl<I: Integrator> RolloutFunction<I> {
         step: usize,
         before: &[f64],
         adjoints: &[f64],
-        change: impl FnOnce(&World<Var>, &State<Var>) -> Result<State<Var>>,
+        change: impl FnOnce(&Model<Var>, &State<Var>) -> Result<State<Var>>,
     ) -> Result<[Vec<f64>; 2]> {
         let time = Step::new(step, self.time_steps.dt).start;
         let values = self.values_at(inputs, step);
@@ -297,8 +297,8 @@ impl<I: Integrator> RolloutFunction<I> {
         let recording = Recording::start();
         let states = recording.variables_of(before);
         let values = recording.variables_of(&values);
-        let world = self.template.world(&self.places, &values)?;
-        let after = change(&world, &self.template.state(&states, time))?;
+        let model = self.template.model(&self.places, &values)?;
+        let after = change(&model, &self.template.state(&states, time))?;
         let seeds = coordinates_of(after.rows()).zip(adjoints.iter().copied());
         let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();
         let adjoints = recording.vjp(&seeds);
@@ -306,11 +306,11 @@ impl<I: Integrator> RolloutFunction<I> {
         let (by_states, by_values) = (by(&states), by(&values));
         if let Some(failed) = by_states.iter().position(|slope| !slope.is_finite()) {
             let states: Vec<BodyState> = states_of(before).collect();
-            return Err(self.world().not_finite_at(failed / STATE, &states, time));
+            return Err(self.model().not_finite_at(failed / STATE, &states, time));
         }
         match by_values.iter().all(|slope| slope.is_finite()) {
             true => Ok([by_states, by_values]),
-            false => Err(world.blown_up(after.rows(), time)),
+            false => Err(model.blown_up(after.rows(), time)),
         }
     }
 

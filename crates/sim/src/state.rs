@@ -1,4 +1,4 @@
-//! State of a world.
+//! State of a model.
 
 use std::ops::{Index, IndexMut};
 
@@ -7,23 +7,23 @@ use prehend_autodiff::Scalar;
 
 use crate::body_state::BodyState;
 
-/// State of a world at a time: all that a simulation goes on from.
+/// State of a model at a time: all that a simulation goes on from.
 ///
 /// Poses and velocities of bodies are read and written by their handles. Those of links follow from their joints, which
-/// [`World::set_joint`](crate::World::set_joint) and [`World::joint`](crate::World::joint) write and read. Deflections of contacts with
+/// [`Model::set_joint`](crate::Model::set_joint) and [`Model::joint`](crate::Model::joint) write and read. Deflections of contacts with
 /// [`Bristles`](crate::contact::Bristles) go along.
 ///
 /// ```
 /// use nalgebra::{Isometry3, Vector3};
-/// use prehend_sim::{Body, RigidBody, World};
+/// use prehend_sim::{Body, RigidBody, Model};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// let ball = world.add(Body::dynamic("ball", RigidBody::ball(0.1, 0.03)?));
-/// let mut start = world.neutral_state();
-/// world.set_pose(&mut start, ball, &Isometry3::translation(0.0, 0.0, 1.0))?;
+/// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+/// let ball = model.add(Body::dynamic("ball", RigidBody::ball(0.1, 0.03)?));
+/// let mut start = model.neutral_state();
+/// model.set_pose(&mut start, ball, &Isometry3::translation(0.0, 0.0, 1.0))?;
 /// start[ball].linear.x = 0.5;
-/// let end = world.simulate(&start, 0.2)?;
+/// let end = model.simulate(&start, 0.2)?;
 /// assert_eq!(end.time, 0.2);
 /// assert!((end[ball].pose.translation.x - 0.1).abs() < 1e-9);
 /// # Ok(())
@@ -40,14 +40,14 @@ pub struct State<S: Scalar = f64> {
 }
 
 impl<S: Scalar> State<S> {
-    /// State at time 0 of a world without joints, whose bodies are in these states, in the order in which they were added; contacts are not
-    /// deflected. Others start from [`World::neutral_state`](crate::World::neutral_state).
+    /// State at time 0 of a model without joints, whose bodies are in these states, in the order in which they were added; contacts are not
+    /// deflected. Others start from [`Model::neutral_state`](crate::Model::neutral_state).
     pub fn new(bodies: impl Into<Vec<BodyState<S>>>) -> Self {
         let rows = bodies.into();
         Self { time: 0.0, bodies: rows.len(), rows }
     }
 
-    /// State of a world of so many bodies.
+    /// State of a model of so many bodies.
     pub(crate) fn from_rows(rows: Vec<BodyState<S>>, bodies: usize, time: f64) -> Self {
         Self { time, bodies: bodies.min(rows.len()), rows }
     }
@@ -76,7 +76,7 @@ impl<S: Scalar> State<S> {
         self.rows.resize(count, BodyState::at_rest(Isometry3::identity()));
     }
 
-    /// State of the same world with other rows at another time \[s\].
+    /// State of the same model with other rows at another time \[s\].
     pub(crate) fn with(&self, rows: Vec<BodyState<S>>, time: f64) -> Self {
         Self { time, rows, bodies: self.bodies }
     }

@@ -7,7 +7,7 @@ use crate::body::error::{BodyError, check_lengths};
 /// A sample of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Position in the model frame \[m\].
+    /// Position in the body frame \[m\].
     pub position: Point3<f64>,
     /// Area the sample stands for \[m²\].
     pub area: f64,
@@ -35,7 +35,7 @@ pub struct Surface {
 pub(crate) struct Block {
     start: usize,
     end: usize,
-    /// Model frame \[m\].
+    /// Body frame \[m\].
     pub(crate) center: Point3<f64>,
     /// Infinite where nothing is known but that asking does not pay \[m\].
     pub(crate) radius: f64,
@@ -45,7 +45,7 @@ pub(crate) struct Block {
 const BLOCK: usize = 16;
 
 impl Surface {
-    /// Samples at `points` in the model frame \[m\] that stand for `areas` \[m²\].
+    /// Samples at `points` in the body frame \[m\] that stand for `areas` \[m²\].
     ///
     /// # Errors
     /// Where the two differ in number, there are none, or one is not finite or of no area.
@@ -103,7 +103,7 @@ impl Surface {
         Ok(self)
     }
 
-    /// Samples moved in the model frame: what was at the origin is at `motion`.
+    /// Samples moved in the body frame: what was at the origin is at `motion`.
     #[must_use]
     pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let mut moved = self.clone();
@@ -350,13 +350,13 @@ mod tests {
         let ball = Body::dynamic("ball", rigid).with_surface(surface.clone());
         let law = Arc::new(penalty(1e8, 1e6, 0.3, 1e-3));
         let smoothing = GapSmoothing::Softplus { width: 1e-6 };
-        let world = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
+        let model = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
         let sinks = mass * 9.81 / (1e8 * surface.area());
         let pose = Isometry3::translation(0.0, 0.0, radius - sinks);
         let mut start =
             State::new([BodyState::at_rest(Isometry3::identity()), rigid.at_rest(&pose)]);
         start[1].linear.x = speed;
-        let end = world.simulate(&start, 0.3).unwrap()[1];
+        let end = model.simulate(&start, 0.3).unwrap()[1];
         // It slides until 2v/7μg = 0.097 s and then rolls at 5v/7.
         assert!((end.linear.x - 5.0 / 7.0 * speed).abs() < 1e-6, "{}", end.linear.x);
         assert!((end.angular.y - end.linear.x / radius).abs() < 1e-3);
@@ -380,13 +380,13 @@ mod tests {
             rigid.at_rest(&Isometry3::translation(0.0, 0.0, radius)),
         ]);
         let smoothing = GapSmoothing::Softplus { width: 1e-6 };
-        let mut world = on_ground(Vector3::zeros(), floor(), ball, Arc::new(law), smoothing);
+        let mut model = on_ground(Vector3::zeros(), floor(), ball, Arc::new(law), smoothing);
         let mut falling = start.clone();
         falling[1].linear.z = -1.0;
-        let bounced = world.simulate(&falling, 0.1).unwrap()[1].linear.z;
+        let bounced = model.simulate(&falling, 0.1).unwrap()[1].linear.z;
         assert!((bounced - 0.5).abs() < 2e-3, "{bounced}");
-        world.gravity.z = -9.81;
-        let depth = radius - world.simulate(&start, 1.0).unwrap()[1].pose.translation.z;
+        model.gravity.z = -9.81;
+        let depth = radius - model.simulate(&start, 1.0).unwrap()[1].pose.translation.z;
         assert!((depth / penetration - 1.0).abs() < 1e-3, "{depth}");
     }
 

@@ -14,7 +14,7 @@ use crate::threads::detached;
 /// A robot hand, prepared once for any number of frames: collision geometry of a URDF or MJCF file, and taxels of a CSV file with the columns idx, patch,
 /// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
 ///
-/// Options of reading are those of `World.add_urdf`. What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
+/// Options of reading are those of `Model.add_urdf`. What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Hand {
     pub(super) hand: Arc<prehend_refine::Hand>,

@@ -4,10 +4,10 @@ Turn on double precision first, ``jax.config.update("jax_enable_x64", True)``: o
 
 >>> import jax, prehend, prehend.jax
 >>> jax.config.update("jax_enable_x64", True)
->>> world = prehend.World()
->>> ball = world.add_body("ball", prehend.Shape.ball(0.1))
->>> throw = prehend.jax.rollout(world.rollout(0.1, 5, parameters=["gravity.z"]), end=True)
->>> start = world.neutral_states()
+>>> model = prehend.Model()
+>>> ball = model.add_body("ball", prehend.Shape.ball(0.1))
+>>> throw = prehend.jax.rollout(model.rollout(0.1, 5, parameters=["gravity.z"]), end=True)
+>>> start = model.neutral_states()
 >>> height = jax.jit(lambda gravity: throw(start, gravity)[ball, 2])
 >>> round(float(jax.grad(height)(jax.numpy.array([-9.81]))[0]), 6)
 0.125
@@ -42,7 +42,7 @@ STATE = 13
 def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
     """The function (states, parameters, controls) → states at 0, dt, …, steps·dt, of shape (steps + 1, rows, 13), or at the end alone, (rows, 13).
 
-    Parameters and controls that are left out are those of the world and none. For batches use ``jax.vmap``, whose worlds are simulated side by side.
+    Parameters and controls that are left out are those of the model and none. For batches use ``jax.vmap``, whose worlds are simulated side by side.
     Derivatives are first ones, in reverse mode: ``jax.grad``, ``vjp`` and ``jacrev``, not ``jacfwd`` or ``hessian``.
     """
 

@@ -13,7 +13,7 @@ the three components of the force across it. ``p`` are its parameters, in the or
 
 Numbers may be :class:`Dual`: what carries derivatives. Write the law with arithmetic and NumPy's ``sqrt``, ``exp``, ``log``, ``sin``, ``cos``, ``tan``,
 ``tanh`` and ``arctan``, and its derivatives are exact. Python is called at each point of contact in each step, which takes some hundred times as
-long as a law in Rust: :func:`prehend.World.add_contact` warns of it.
+long as a law in Rust: :func:`prehend.Model.add_contact` warns of it.
 """
 
 from __future__ import annotations

@@ -46,10 +46,10 @@ def vjp(
     """The run of a rollout, of shape (steps + 1, rows, 13), and its pullback.
 
     >>> import numpy as np, prehend
-    >>> world = prehend.World()
-    >>> ball = world.add_body("ball", prehend.Shape.ball(0.1))
-    >>> throw = world.rollout(0.1, 5, parameters=["gravity.z"])
-    >>> run, pullback = prehend.vjp(throw, world.neutral_states())
+    >>> model = prehend.Model()
+    >>> ball = model.add_body("ball", prehend.Shape.ball(0.1))
+    >>> throw = model.rollout(0.1, 5, parameters=["gravity.z"])
+    >>> run, pullback = prehend.vjp(throw, model.neutral_states())
     >>> by_height = np.zeros_like(run[-1])
     >>> by_height[ball, 2] = 1.0
     >>> round(float(pullback(by_height).parameters[0]), 6)

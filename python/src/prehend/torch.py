@@ -1,11 +1,11 @@
 """Rollouts as functions of PyTorch's autograd.
 
 >>> import prehend, prehend.torch, torch
->>> world = prehend.World()
->>> ball = world.add_body("ball", prehend.Shape.ball(0.1))
->>> throw = world.rollout(0.1, 5, parameters=["gravity.z"])
+>>> model = prehend.Model()
+>>> ball = model.add_body("ball", prehend.Shape.ball(0.1))
+>>> throw = model.rollout(0.1, 5, parameters=["gravity.z"])
 >>> gravity = torch.tensor([-9.81], dtype=torch.float64, requires_grad=True)
->>> states = torch.from_numpy(world.neutral_states())
+>>> states = torch.from_numpy(model.neutral_states())
 >>> end = prehend.torch.rollout(throw, states, gravity, end=True)
 >>> end[ball, 2].backward()
 >>> round(gravity.grad.item(), 6)

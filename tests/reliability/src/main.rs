@@ -28,7 +28,7 @@ enum Command {
     Fuzz(Fuzz),
     /// Kill long commands, fill the disk, break inputs, at random moments
     Faults(Faults),
-    /// Carry loads: long films, many frames, large meshes, images and worlds
+    /// Carry loads: long films, many frames, large meshes, images and models
     Loads(Loads),
     /// Run the tests of numbers: finite ones from finite inputs, and the same ones on other instruction sets (with qemu-user)
     Numbers,

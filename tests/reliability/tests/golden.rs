@@ -67,13 +67,13 @@ fn pose<S: Scalar>(pose: &Isometry3<S>) -> Vec<S> {
 
 /// A box that is thrown onto the floor, slides and tumbles.
 fn thrown<S: Scalar>(tangent: &[S]) -> BodyState<S> {
-    let world = body_over_floor(12).unwrap();
+    let model = body_over_floor(12).unwrap();
     let mut start = BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
     let still = BodyState::at_rest(Isometry3::identity()).cast();
     let start = start.retract(&std::array::from_fn(|i| tangent[i]));
-    world.cast().simulate(&State::new([still, start]), 0.2).unwrap()[1]
+    model.cast().simulate(&State::new([still, start]), 0.2).unwrap()[1]
 }
 
 #[test]

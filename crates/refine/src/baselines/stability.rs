@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Quadratic;
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody,
-    StepError, Surface, TimeSteps, World,
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, Model,
+    RigidBody, StepError, Surface, TimeSteps,
 };
 
 use super::stability_loss::{StabilityLoss, weights_relative_to_fall};
@@ -111,17 +111,17 @@ impl StabilityFactor {
             .map_err(|e| fail(e.to_string()))?;
         let (alpha, band) = settings.leak;
         let smoothing = GapSmoothing::Leaky { alpha, band, steps: LeakSteps::All };
-        let mut world = World::new(gravity);
+        let mut model = Model::new(gravity);
         let field = Arc::new(robot.posed(&hand.t_cam_hand, &hand.joints)?);
         // Its field is in the camera's frame already.
-        let field = world.add(Body::fixed("hand").with_field(field));
-        let samples = world.add(Body::dynamic(&object.name, rigid).with_surface(surface));
-        world
+        let field = model.add(Body::fixed("hand").with_field(field));
+        let samples = model.add(Body::dynamic(&object.name, rigid).with_surface(surface));
+        model
             .add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing)
             .map_err(|e| fail(e.to_string()))?;
         let steps = settings.steps.0;
         let stability = StabilityLoss {
-            world,
+            model,
             object: samples,
             rigid,
             time_steps: TimeSteps { dt: settings.time / steps as f64, steps },

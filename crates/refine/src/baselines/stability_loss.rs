@@ -23,7 +23,7 @@ pub(super) fn weights_relative_to_fall(gravity: f64, time: f64, radius: f64) -> 
 #[derive(Clone, Debug)]
 pub(super) struct StabilityLoss {
     /// The object among its surroundings.
-    pub(super) world: World,
+    pub(super) model: Model,
     /// The object's body.
     pub(super) object: BodyId,
     /// Its mass properties.
@@ -49,13 +49,13 @@ impl StabilityLoss {
     /// # Errors
     /// Where the simulation blows up (see [`Self::check`]) or cannot begin.
     pub(super) fn value(&self, pose: &Isometry3<f64>) -> Result<f64, SimulationError> {
-        let rollout = |start: &BodyState| Ok(self.residual(&self.world, start)?.norm_squared());
+        let rollout = |start: &BodyState| Ok(self.residual(&self.model, start)?.norm_squared());
         let rollouts: Vec<f64> =
             self.starts(pose).par_iter().map(rollout).collect::<Result<_, SimulationError>>()?;
         Ok(rollouts.iter().sum::<f64>() / STARTS as f64)
     }
 
-    /// The loss and its derivatives by a left twist (translation \[m\], rotation \[rad\]) of `pose` about the point `center` (world
+    /// The loss and its derivatives by a left twist (translation \[m\], rotation \[rad\]) of `pose` about the point `center` (model
     /// frame); the loss is twice the value of the residuals' model. Under leaky smoothing these are the leaky derivatives.
     ///
     /// # Errors
@@ -65,11 +65,11 @@ impl StabilityLoss {
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
     ) -> Result<Quadratic<6>, SimulationError> {
-        let world = self.world.cast::<Fwd<6>>();
+        let model = self.model.cast::<Fwd<6>>();
         let rollouts: Vec<SVector<Fwd<6>, 12>> = self
             .starts(pose)
             .par_iter()
-            .map(|start| self.residual(&world, &start.pose_variables()))
+            .map(|start| self.residual(&model, &start.pose_variables()))
             .collect::<Result<_, SimulationError>>()?;
         let mut sum = Quadratic::zeros();
         for residual in &rollouts {
@@ -92,14 +92,14 @@ impl StabilityLoss {
     }
 
     /// Checks that the time step resolves the contacts with the object at rest at `pose`: for their
-    /// [`World::contact_frequency`] ω, dt·ω is at most four fifths of [`Integrator::stability_limit`](prehend_sim::Integrator::stability_limit).
+    /// [`Model::contact_frequency`] ω, dt·ω is at most four fifths of [`Integrator::stability_limit`](prehend_sim::Integrator::stability_limit).
     ///
     /// # Errors
     /// With the longest step that does.
     pub(super) fn check(&self, pose: &Isometry3<f64>) -> Result<(), StepError> {
-        let states = self.states(&self.world, self.rigid.at_rest(pose));
+        let states = self.states(&self.model, self.rigid.at_rest(pose));
         let dt = self.time_steps.dt;
-        let check = self.world.check_time_step(&SemiImplicitEuler, &states, dt / SAFETY);
+        let check = self.model.check_time_step(&SemiImplicitEuler, &states, dt / SAFETY);
         check.map_err(|StepError { limit, .. }| StepError { dt, limit: SAFETY * limit })
     }
 
@@ -111,8 +111,8 @@ impl StabilityLoss {
     }
 
     /// The states of all bodies, the object in one of its own.
-    fn states<S: Scalar>(&self, world: &World<S>, object: BodyState<S>) -> State<S> {
-        let mut states = world.neutral_state();
+    fn states<S: Scalar>(&self, model: &Model<S>, object: BodyState<S>) -> State<S> {
+        let mut states = model.neutral_state();
         states[self.object] = object;
         states
     }
@@ -120,13 +120,13 @@ impl StabilityLoss {
     /// Displacement and rotation of the object since the start and its velocities, at the end of a rollout, scaled.
     fn residual<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         start: &BodyState<S>,
     ) -> Result<SVector<S, 12>, SimulationError> {
-        let go_on = |_: Step, _: &mut World<S>, _: &mut State<S>| ();
-        let initial = self.states(world, *start);
+        let go_on = |_: Step, _: &mut Model<S>, _: &mut State<S>| ();
+        let initial = self.states(model, *start);
         let end =
-            world.simulate_controlled(&SemiImplicitEuler, &initial, self.time_steps, go_on)?;
+            model.simulate_controlled(&SemiImplicitEuler, &initial, self.time_steps, go_on)?;
         let state = &end[self.object];
         let shift = state.pose.translation.vector - start.pose.translation.vector;
         let turn = so3_log(&(state.pose.rotation * start.pose.rotation.inverse()));
@@ -163,15 +163,15 @@ mod tests {
         let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
         let rigid = RigidBody::new(0.2, inertia, Point3::new(0.001, -0.002, 0.003)).unwrap();
         let surface = Surface::uniform(&ellipsoid(200, [0.03, 0.025, 0.02]), 6e-3).unwrap();
-        let mut world = World::new(Vector3::z() * -9.81);
-        let field = world.add(Body::fixed("ground").with_field(field));
-        let object = world.add(Body::dynamic("object", rigid).with_surface(surface));
+        let mut model = Model::new(Vector3::z() * -9.81);
+        let field = model.add(Body::fixed("ground").with_field(field));
+        let object = model.add(Body::dynamic("object", rigid).with_surface(surface));
         let spring = KelvinVoigt { stiffness: 2e7, damping: 5e4 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
         let bodies = ContactBodies { samples: object, field };
-        world.add_contact(bodies, Arc::new(law), smoothing).unwrap();
+        model.add_contact(bodies, Arc::new(law), smoothing).unwrap();
         StabilityLoss {
-            world,
+            model,
             object,
             rigid,
             time_steps: TimeSteps { dt: 1e-3, steps: 20 },

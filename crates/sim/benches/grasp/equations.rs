@@ -4,8 +4,8 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_sim::contact::regularized_coulomb;
 use prehend_sim::{
-    BodyState, ContactForce, ContactKinematics, ContactLaw, Integrator, RigidBody, SimulationError,
-    State, Step, World,
+    BodyState, ContactForce, ContactKinematics, ContactLaw, Integrator, Model, RigidBody,
+    SimulationError, State, Step,
 };
 
 /// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.
@@ -48,14 +48,14 @@ impl Integrator for FirstOrder {
 
     fn step<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         states: &State<S>,
         step: Step,
     ) -> Result<State<S>, SimulationError> {
-        let wrenches = world.wrenches(states, step.index);
-        let bodies = world.bodies.iter().zip(states.bodies()).zip(&wrenches);
+        let wrenches = model.wrenches(states, step.index);
+        let bodies = model.bodies.iter().zip(states.bodies()).zip(&wrenches);
         let next = bodies.map(|((body, state), wrench)| match body.rigid() {
-            Some(rigid) => advance(rigid, &world.gravity, state, wrench, step.dt),
+            Some(rigid) => advance(rigid, &model.gravity, state, wrench, step.dt),
             None => *state,
         });
         Ok(State::new(next.collect::<Vec<_>>()))

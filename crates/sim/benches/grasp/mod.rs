@@ -15,8 +15,8 @@ use nalgebra::{
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 use prehend_sim::{
-    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, Surface, TimeSteps,
-    World,
+    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, Model, RigidBody, Surface,
+    TimeSteps,
 };
 
 pub(crate) use equations::FirstOrder;
@@ -43,19 +43,19 @@ impl Grasp {
     }
 
     /// Hand (body 0) and ellipsoid (body 1) with `count` samples.
-    pub(crate) fn world(&self, count: usize, smoothing: GapSmoothing) -> anyhow::Result<World> {
+    pub(crate) fn model(&self, count: usize, smoothing: GapSmoothing) -> anyhow::Result<Model> {
         let squares = AXES.map(|a| a * a);
         let moments = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]];
         let inertia = Matrix3::from_diagonal(&(Vector3::from(moments) * (MASS / 5.0)));
         let rigid = RigidBody::new(MASS, inertia, Point3::origin())?;
         // Weights are in the law: a sample stands for itself.
         let surface = Surface::new(&spiral(count), &vec![1.0; count])?;
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let field = world.add(Body::fixed("hand").with_field(Arc::clone(&self.field)));
-        let samples = world.add(Body::dynamic("ellipsoid", rigid).with_surface(surface));
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+        let field = model.add(Body::fixed("hand").with_field(Arc::clone(&self.field)));
+        let samples = model.add(Body::dynamic("ellipsoid", rigid).with_surface(surface));
         let law: Arc<dyn DynContactLaw> = Arc::new(SmoothedPenalty::shared_by(count));
-        world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
-        Ok(world)
+        model.add_contact(ContactBodies { samples, field }, law, smoothing)?;
+        Ok(model)
     }
 }
 

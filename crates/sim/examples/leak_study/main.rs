@@ -17,8 +17,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
-    BodyState, Coulomb, GapSmoothing, KelvinVoigt, Law, SemiImplicitEuler, SimulationError, State,
-    TimeSteps, World,
+    BodyState, Coulomb, GapSmoothing, KelvinVoigt, Law, Model, SemiImplicitEuler, SimulationError,
+    State, TimeSteps,
 };
 use scene::OBJECT;
 use smoothing::{SmoothedGradient, Smoothing};
@@ -43,7 +43,7 @@ fn smoothings() -> [(&'static str, GapSmoothing); 6] {
 
 /// The scene with one smoothing.
 struct Drop {
-    world: World,
+    model: Model,
     time_steps: TimeSteps,
 }
 
@@ -54,7 +54,7 @@ impl Drop {
             Coulomb { friction: 0.5, slip_scale: 1e-2 },
         )?);
         let time_steps = TimeSteps { dt: 1e-3, steps };
-        Ok(Self { world: scene::world(points, law, smoothing)?, time_steps })
+        Ok(Self { model: scene::model(points, law, smoothing)?, time_steps })
     }
 
     /// The loss and its gradient, with the object dropped `shift` \[m\] away.
@@ -63,7 +63,7 @@ impl Drop {
         for i in 0..3 {
             start.pose.translation.vector[i] += Fwd::variable(shift[i], i);
         }
-        let loss = self.loss(&self.world.cast(), start)?;
+        let loss = self.loss(&self.model.cast(), start)?;
         Ok((loss.value, loss.derivative.into()))
     }
 
@@ -71,14 +71,14 @@ impl Drop {
     fn value(&self, shift: &Vector3<f64>) -> Result<f64, SimulationError> {
         let mut start = scene::start();
         start.pose.translation.vector += shift;
-        self.loss(&self.world, start)
+        self.loss(&self.model, start)
     }
 
     /// A hundred times the squared distance from a target, and squared velocities.
-    fn loss<S: Scalar>(&self, world: &World<S>, start: BodyState<S>) -> Result<S, SimulationError> {
+    fn loss<S: Scalar>(&self, model: &Model<S>, start: BodyState<S>) -> Result<S, SimulationError> {
         let still = BodyState::at_rest(Isometry3::identity()).cast();
         let states = State::new([still, start]);
-        let end = world.simulate_with(&SemiImplicitEuler, &states, self.time_steps)?.states[OBJECT];
+        let end = model.simulate_with(&SemiImplicitEuler, &states, self.time_steps)?.states[OBJECT];
         let target = Vector3::new(0.0, 0.0, 0.035).map(S::constant);
         let off = (end.pose.translation.vector - target).norm_squared();
         Ok(off.times(100.0) + end.linear.norm_squared() + end.angular.norm_squared())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, Surface, World,
+    Body, BodyState, ContactBodies, DynContactLaw, GapSmoothing, Model, RigidBody, Surface,
 };
 
 /// Mass of the object \[kg\].
@@ -92,11 +92,11 @@ impl DistanceField for Hand {
 pub(crate) const OBJECT: usize = 1;
 
 /// The hand, fixed, and the object with `count` samples of one unit of area together.
-pub(crate) fn world(
+pub(crate) fn model(
     count: usize,
     law: Arc<dyn DynContactLaw>,
     smoothing: GapSmoothing,
-) -> anyhow::Result<World> {
+) -> anyhow::Result<Model> {
     let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
     let point = |i: usize| {
         let place = i as f64 + 0.5;
@@ -109,12 +109,12 @@ pub(crate) fn world(
     let [a, b, c] = AXES.map(|axis| axis * axis * MASS / 5.0);
     let inertia = Matrix3::from_diagonal(&Vector3::new(b + c, a + c, a + b));
     let rigid = RigidBody::new(MASS, inertia, Point3::origin())?;
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = world.add(Body::fixed("hand").with_field(Arc::new(Hand)));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = model.add(Body::fixed("hand").with_field(Arc::new(Hand)));
     let object = Body::dynamic("object", rigid).with_surface(Surface::uniform(&points, 1.0)?);
-    let samples = world.add(object);
-    world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
-    Ok(world)
+    let samples = model.add(object);
+    model.add_contact(ContactBodies { samples, field }, law, smoothing)?;
+    Ok(model)
 }
 
 /// Where the object begins: just in touch with palm and fingers, falling and turning slowly.

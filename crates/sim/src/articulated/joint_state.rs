@@ -1,4 +1,4 @@
-//! The state of a joint in a world: its coordinates are the pose of a [`BodyState`], its velocities the velocities.
+//! The state of a joint in a model: its coordinates are the pose of a [`BodyState`], its velocities the velocities.
 //!
 //! Numbers come first in place and velocity; a rotation and its angular velocity, along the link's axes, are those of the state.
 
@@ -9,7 +9,7 @@ use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 use super::joint::{Joint, quaternion};
 use crate::body_state::BodyState;
 
-/// Positions and velocities: of one joint, or of all that moves in a world.
+/// Positions and velocities: of one joint, or of all that moves in a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState<S = f64> {
     /// Positions \[rad or m\].

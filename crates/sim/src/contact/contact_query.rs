@@ -30,7 +30,7 @@ fn are_opposite(a: Option<Vector3<f64>>, b: Option<Vector3<f64>>) -> bool {
 pub struct ContactQuery<'a> {
     /// The samples that may touch.
     pub surface: &'a Surface,
-    /// Center of mass of the body that carries them, in its model frame \[m\].
+    /// Center of mass of the body that carries them, in its body frame \[m\].
     pub com: Point3<f64>,
     /// The body's state, as the field sees it.
     pub state: BodyState,
@@ -77,7 +77,7 @@ impl ContactQuery<'_> {
         self.field.distance(&self.place(point), within).is_some()
     }
 
-    /// Position of a point of the body's model frame.
+    /// Position of a point of the body's body frame.
     #[inline]
     fn place(&self, point: &Point3<f64>) -> Point3<f64> {
         let BodyState { pose, .. } = &self.state;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
-/// One contact point. Vectors are along the axes of the model frame of the body with the field; under symmetric contact each
+/// One contact point. Vectors are along the axes of the body frame of the body with the field; under symmetric contact each
 /// direction has the axes of its own field's body.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactKinematics<S: Scalar> {

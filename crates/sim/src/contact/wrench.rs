@@ -211,7 +211,7 @@ mod tests {
     use crate::contact::dynamic::QueryWrench;
     use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
-    use crate::{BodyState, ContactLaw, GapSmoothing, State, Surface, World};
+    use crate::{BodyState, ContactLaw, GapSmoothing, Model, State, Surface};
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(
@@ -231,11 +231,11 @@ mod tests {
     }
 
     /// The wrench on body 1 presses it up, the same with derivatives as without, and those match differences.
-    fn assert_derivatives(world: &World, states: &State, what: &str) {
-        let wrench = |state: BodyState| world.wrenches(&State::new([states[0], state]), 0)[1];
+    fn assert_derivatives(model: &Model, states: &State, what: &str) {
+        let wrench = |state: BodyState| model.wrenches(&State::new([states[0], state]), 0)[1];
         let mut lifted: State<Fwd<12>> = states.cast();
         lifted[1] = states[1].variables();
-        let exact = world.cast().wrenches(&lifted, 0)[1];
+        let exact = model.cast().wrenches(&lifted, 0)[1];
         let value = wrench(states[1]);
         assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
         assert!(value.z > 0.0);
@@ -257,9 +257,9 @@ mod tests {
     fn derivatives_match_differences() {
         for field in [floor(), bowl()] {
             for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 5e-4 }] {
-                let (world, mut states) = egg_on(Arc::clone(&field), smoothing);
+                let (model, mut states) = egg_on(Arc::clone(&field), smoothing);
                 states[1].pose.translation.z -= 1e-3;
-                assert_derivatives(&world, &states, &format!("{smoothing:?}"));
+                assert_derivatives(&model, &states, &format!("{smoothing:?}"));
             }
         }
     }
@@ -267,12 +267,12 @@ mod tests {
     #[test]
     fn derivatives_of_rounded_samples_match_differences() {
         for field in [floor(), bowl()] {
-            let (mut world, mut states) = egg_on(field, GapSmoothing::Softplus { width: 5e-4 });
+            let (mut model, mut states) = egg_on(field, GapSmoothing::Softplus { width: 5e-4 });
             states[1].pose.translation.z += 3e-3;
-            let surface = world.bodies[1].surface.take().unwrap();
+            let surface = model.bodies[1].surface.take().unwrap();
             let rounded = Surface::clone(&surface).rounded(4e-3).unwrap();
-            world.bodies[1].surface = Some(Arc::new(rounded));
-            assert_derivatives(&world, &states, "rounded");
+            model.bodies[1].surface = Some(Arc::new(rounded));
+            assert_derivatives(&model, &states, "rounded");
         }
     }
 

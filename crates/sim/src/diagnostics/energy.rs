@@ -9,12 +9,12 @@ use crate::contact::bristles::Bristles;
 use crate::contact::point::ContactKinematics;
 use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
+use crate::model::Model;
+use crate::model::body::{Body, Motion};
+use crate::model::contact_pair::ContactPair;
+use crate::model::joint_force::JointForce;
 use crate::spatial::spatial;
 use crate::time::Step;
-use crate::world::World;
-use crate::world::body::{Body, Motion};
-use crate::world::contact_pair::ContactPair;
-use crate::world::joint_force::JointForce;
 
 /// Part of the largest kinetic energy that contacts may seem to have made: methods of first order are off by as much where they
 /// are still of use.
@@ -38,9 +38,9 @@ const GAUSS: [(f64, f64); 5] = [
     (0.953_089_922_969_332, 0.118_463_442_528_095),
 ];
 
-/// The energy of a world in which nothing but gravity, constant wrenches and contacts acts.
+/// The energy of a model in which nothing but gravity, constant wrenches and contacts acts.
 pub(super) struct EnergyBalance {
-    /// True if it is such a world, and the work of torques is known: bodies on trajectories bring energy with them, and a body
+    /// True if it is such a model, and the work of torques is known: bodies on trajectories bring energy with them, and a body
     /// may have turned any way within steps of any length.
     closed: bool,
     initial: Vec<BodyState>,
@@ -56,7 +56,7 @@ pub(super) struct EnergyBalance {
 impl EnergyBalance {
     /// Balance of a simulation from `initial` by an integrator that `controls_error`, with steps of any length, or not.
     pub(super) fn new<S: Scalar>(
-        world: &World<S>,
+        model: &Model<S>,
         initial: &Rows<S>,
         controls_error: bool,
     ) -> Self {
@@ -66,18 +66,18 @@ impl EnergyBalance {
             Motion::Fixed => state.linear != Vector3::zeros() || state.angular != Vector3::zeros(),
             Motion::Kinematic(_) => true,
         };
-        let moved = world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
-        let torques = world.bodies.iter().any(|body| torque(body) != Vector3::zeros());
-        let pushed = world.joint_forces.iter().any(|force| !force.law().is_passive());
+        let moved = model.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
+        let torques = model.bodies.iter().any(|body| torque(body) != Vector3::zeros());
+        let pushed = model.joint_forces.iter().any(|force| !force.law().is_passive());
         let is_pulled = |body: &Body<S>| {
             matches!(body.motion, Motion::Link) && body.external_wrench.norm().value() > 0.0
         };
-        let pulled = world.bodies.iter().any(is_pulled);
+        let pulled = model.bodies.iter().any(is_pulled);
         let closed = !(moved || pushed || pulled || controls_error && torques);
-        let trees = world.articulations.iter().map(|own| own.tree.map(S::value)).collect();
+        let trees = model.articulations.iter().map(|own| own.tree.map(S::value)).collect();
         let mut balance =
             Self { closed, initial, trees, articulated: NOTHING, work: 0.0, kinetic: 0.0 };
-        balance.articulated = balance.articulated_energy(world, &balance.initial);
+        balance.articulated = balance.articulated_energy(model, &balance.initial);
         balance
     }
 
@@ -85,18 +85,18 @@ impl EnergyBalance {
     #[inline]
     pub(super) fn step<S: Scalar>(
         &mut self,
-        world: &World<S>,
+        model: &Model<S>,
         step: Step,
         states: &Rows<S>,
     ) -> Result<()> {
-        for (body, state) in world.bodies.iter().zip(states) {
+        for (body, state) in model.bodies.iter().zip(states) {
             let torque = torque(body);
             if torque != Vector3::zeros() {
                 self.work += torque.dot(&state.angular.map(|x| x.value())) * step.dt;
             }
         }
         match (step.index + 1).is_multiple_of(EVERY) {
-            true => self.check(world, step.end(), states),
+            true => self.check(model, step.end(), states),
             false => Ok(()),
         }
     }
@@ -104,12 +104,12 @@ impl EnergyBalance {
     /// Energy of all links \[J\].
     fn articulated_energy<S: Scalar, T: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         states: &Rows<T>,
     ) -> Energy {
-        let gravity = world.gravity.map(|x| x.value());
+        let gravity = model.gravity.map(|x| x.value());
         let mut sum = NOTHING;
-        for (tree, (own, joints)) in self.trees.iter().zip(world.articulated(states)) {
+        for (tree, (own, joints)) in self.trees.iter().zip(model.articulated(states)) {
             let [q, v] = own
                 .coordinates(joints)
                 .map(|all| all.into_iter().map(|x| x.value()).collect::<Vec<f64>>());
@@ -123,20 +123,20 @@ impl EnergyBalance {
     /// Compares the energy at `states` with that at the start.
     pub(super) fn check<S: Scalar>(
         &mut self,
-        world: &World<S>,
+        model: &Model<S>,
         time: f64,
         states: &Rows<S>,
     ) -> Result<()> {
         let [mut kinetic, mut gain] = [0.0, -self.work];
-        for body in world.free_bodies() {
+        for body in model.free_bodies() {
             let (before, now) = (&self.initial[body], states[body].value());
-            let moving = kinetic_energy(world, body, &now);
+            let moving = kinetic_energy(model, body, &now);
             kinetic += moving;
             gain += moving
-                - kinetic_energy(world, body, before)
-                - work_of_pull(world, body, before, &now);
+                - kinetic_energy(model, body, before)
+                - work_of_pull(model, body, before, &now);
         }
-        let articulated = self.articulated_energy(world, states);
+        let articulated = self.articulated_energy(model, states);
         kinetic += articulated.kinetic;
         gain += articulated.kinetic + articulated.potential
             - self.articulated.kinetic
@@ -145,13 +145,13 @@ impl EnergyBalance {
         if !self.closed || gain <= TOLERANCE * self.kinetic {
             return Ok(());
         }
-        gain -= work_along_joints(world, &self.initial, states);
+        gain -= work_along_joints(model, &self.initial, states);
         if gain <= TOLERANCE * self.kinetic {
             return Ok(());
         }
         // What contacts had stored at the start they may give back.
         let now: Vec<BodyState> = states.iter().map(BodyState::value).collect();
-        let plain = world.to_f64();
+        let plain = model.to_f64();
         let stored = |states: &Rows| stored_energy(&plain.with_touching(states, 0.0), states);
         let before = stored(&self.initial);
         let energy = gain - before + stored(&now);
@@ -159,10 +159,10 @@ impl EnergyBalance {
             return Ok(());
         }
         let fastest = |a: &BodyId, b: &BodyId| {
-            let energy = |body: BodyId| kinetic_energy(world, body, &now[body]);
+            let energy = |body: BodyId| kinetic_energy(model, body, &now[body]);
             energy(*a).total_cmp(&energy(*b))
         };
-        let body = world.moved_bodies().max_by(fastest).unwrap_or(BodyId(0));
+        let body = model.moved_bodies().max_by(fastest).unwrap_or(BodyId(0));
         let (body, contact) = plain.with_touching(&now, 0.0).names(&now, body);
         Err(SimulationError::Energy { body, contact, time, energy })
     }
@@ -174,18 +174,18 @@ fn torque<S: Scalar>(body: &Body<S>) -> Vector3<f64> {
 }
 
 /// Kinetic energy of a free body \[J\].
-fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &BodyState) -> f64 {
-    let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
+fn kinetic_energy<S: Scalar>(model: &Model<S>, body: BodyId, state: &BodyState) -> f64 {
+    let Some(rigid) = model.bodies[body].rigid() else { return 0.0 };
     let spin = state.pose.rotation.inverse() * state.angular;
     let inertia = rigid.inertia().map(|x| x.value());
     0.5 * (rigid.mass().value() * state.linear.norm_squared() + spin.dot(&(inertia * spin)))
 }
 
 /// Work of springs along joints, and of all else that acts there, while nothing moved fast \[J\].
-fn work_along_joints<S: Scalar>(world: &World<S>, before: &Rows, now: &Rows<S>) -> f64 {
+fn work_along_joints<S: Scalar>(model: &Model<S>, before: &Rows, now: &Rows<S>) -> f64 {
     let lifted: Vec<BodyState<S>> = before.iter().map(BodyState::cast).collect();
     let work = |force: &JointForce<S>| {
-        let position = |states: &Rows<S>| Some(world.along(force, states)?.position.value());
+        let position = |states: &Rows<S>| Some(model.along(force, states)?.position.value());
         let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
         let p: Vec<f64> = force.params().iter().map(|p| p.value()).collect();
         let effort = |x: f64| force.law().effort(&p, from + x * (to - from), 0.0);
@@ -196,29 +196,29 @@ fn work_along_joints<S: Scalar>(world: &World<S>, before: &Rows, now: &Rows<S>) 
         };
         (to - from) / PARTS as f64 * (0..PARTS).map(part).sum::<f64>()
     };
-    world.joint_forces.iter().map(work).sum()
+    model.joint_forces.iter().map(work).sum()
 }
 
 /// Work of gravity and the external force on a free body that has moved from `before` to `now` \[J\].
 fn work_of_pull<S: Scalar>(
-    world: &World<S>,
+    model: &Model<S>,
     body: BodyId,
     before: &BodyState,
     now: &BodyState,
 ) -> f64 {
-    let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
+    let Some(rigid) = model.bodies[body].rigid() else { return 0.0 };
     let force =
-        world.gravity * rigid.mass() + world.bodies[body].external_wrench.fixed_rows::<3>(0);
+        model.gravity * rigid.mass() + model.bodies[body].external_wrench.fixed_rows::<3>(0);
     let shift = now.pose.translation.vector - before.pose.translation.vector;
     force.map(|x| x.value()).dot(&shift)
 }
 
 /// Energy that resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
 /// there is none, and that of bristles and bushings as they return.
-fn stored_energy(world: &World, states: &Rows) -> f64 {
-    let mut energy = energy_of_bristles(world, states) + world.energy_of_bushings(states);
-    for pair in &world.contacts {
-        let Some(query) = world.contact_query(pair, world.relative_value(pair, states)) else {
+fn stored_energy(model: &Model, states: &Rows) -> f64 {
+    let mut energy = energy_of_bristles(model, states) + model.energy_of_bushings(states);
+    for pair in &model.contacts {
+        let Some(query) = model.contact_query(pair, model.relative_value(pair, states)) else {
             continue;
         };
         let (reach, smoothing) = (pair.law().cutoff(), pair.smoothing);
@@ -245,7 +245,7 @@ fn stored_energy(world: &World, states: &Rows) -> f64 {
 }
 
 /// The work of the bristles of all contacts with bristles, from their deflections to none, while nothing else moves \[J\].
-fn energy_of_bristles(world: &World, states: &Rows) -> f64 {
+fn energy_of_bristles(model: &Model, states: &Rows) -> f64 {
     let resting: Vec<BodyState> =
         states.iter().map(|state| BodyState::at_rest(state.pose)).collect();
     let work = |((pair, _), state): ((&ContactPair, Bristles), &BodyState)| {
@@ -254,11 +254,11 @@ fn energy_of_bristles(world: &World, states: &Rows) -> f64 {
         let twist = spatial(&linear, &angular);
         let along = |part: f64| {
             let deflection = BodyState::at_rest(state.pose).deflected(&(state.deflection() * part));
-            world.pair_wrench(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
+            model.pair_wrench(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
         };
         let undeflected = along(0.0);
         let mean: f64 = GAUSS.iter().map(|(x, weight)| weight * along(*x)).sum();
         undeflected - mean
     };
-    world.bristle_contacts().zip(&states[world.joint_places().end..]).map(work).sum()
+    model.bristle_contacts().zip(&states[model.joint_places().end..]).map(work).sum()
 }

@@ -6,9 +6,9 @@ use prehend_autodiff::Scalar;
 use crate::body::RigidBody;
 use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
+use crate::model::Model;
 use crate::spatial::spatial;
 use crate::time::Step;
-use crate::world::World;
 
 /// Part of a body's speed below which a change of it is rounding, or an integrator's own error.
 const NOISE: f64 = 1e-6;
@@ -70,15 +70,15 @@ struct FollowedJoint {
 }
 
 impl StepResolution {
-    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &Rows<S>) -> Self {
+    pub(super) fn new<S: Scalar>(model: &Model<S>, initial: &Rows<S>) -> Self {
         let follow = |body: BodyId| {
-            let rigid = world.bodies[body].rigid()?.map(S::value);
+            let rigid = model.bodies[body].rigid()?.map(S::value);
             let state = initial[body].value();
-            let wrench = world.bodies[body].external_wrench.map(|x| x.value());
+            let wrench = model.bodies[body].external_wrench.map(|x| x.value());
             Some(Followed {
                 body,
                 length: rigid.gyration_radius(),
-                pull: world.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / rigid.mass(),
+                pull: model.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / rigid.mass(),
                 torque: wrench.fixed_rows::<3>(3).into_owned(),
                 linear: state.linear,
                 momentum: rigid.momentum(&state.pose.rotation, &state.angular),
@@ -86,9 +86,9 @@ impl StepResolution {
                 kick: None,
             })
         };
-        let bodies = world.free_bodies().into_iter().filter_map(follow).collect();
-        let links = world.articulations.iter().flat_map(|own| own.bodies());
-        let joints = world.joint_places().zip(links).map(|(place, link)| {
+        let bodies = model.free_bodies().into_iter().filter_map(follow).collect();
+        let links = model.articulations.iter().flat_map(|own| own.bodies());
+        let joints = model.joint_places().zip(links).map(|(place, link)| {
             let velocity = initial.get(place).map_or_else(Vector6::zeros, velocity);
             FollowedJoint { place, link: *link, velocity, kick: None }
         });

@@ -3,11 +3,11 @@
 use prehend_autodiff::Scalar;
 
 use crate::body_state::{BodyState, Rows};
+use crate::model::Model;
+use crate::model::body::Body;
+use crate::model::broad_phase::BroadPhase;
+use crate::model::contact_pair::{ContactBodies, ContactPair};
 use crate::time::Step;
-use crate::world::World;
-use crate::world::body::Body;
-use crate::world::broad_phase::BroadPhase;
-use crate::world::contact_pair::{ContactBodies, ContactPair};
 
 /// Part of the thickness of what they may touch by which samples move safely within a step.
 const SAFE_TRAVEL: f64 = 0.25;
@@ -24,8 +24,8 @@ pub(super) struct Tunneling {
 }
 
 impl Tunneling {
-    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &Rows<S>) -> Self {
-        let fields = world.bodies.iter().filter_map(|body| body.field.as_ref());
+    pub(super) fn new<S: Scalar>(model: &Model<S>, initial: &Rows<S>) -> Self {
+        let fields = model.bodies.iter().filter_map(|body| body.field.as_ref());
         let thinnest = fields.map(|field| field.thickness()).fold(f64::INFINITY, f64::min);
         let watched = if thinnest.is_finite() { initial } else { &[] };
         let radius = |body: &Body<S>| {
@@ -34,7 +34,7 @@ impl Tunneling {
         };
         Self {
             before: watched.iter().map(BodyState::value).collect(),
-            radii: world.bodies.iter().map(radius).collect(),
+            radii: model.bodies.iter().map(radius).collect(),
             thinnest,
             first: None,
         }
@@ -42,14 +42,14 @@ impl Tunneling {
 
     /// After `step` has led to `states`.
     #[inline]
-    pub(super) fn step<S: Scalar>(&mut self, world: &World<S>, step: Step, states: &Rows<S>) {
+    pub(super) fn step<S: Scalar>(&mut self, model: &Model<S>, step: Step, states: &Rows<S>) {
         if self.before.is_empty() || self.first.is_some() {
             return;
         }
-        let passed = |pair: &&ContactPair<S>| self.has_passed(world, pair, states);
-        let mut found = world.contacts.iter().find(passed).map(|pair| pair.bodies);
-        if found.is_none() && !world.contact_groups.is_empty() {
-            found = self.in_groups(world, step, states);
+        let passed = |pair: &&ContactPair<S>| self.has_passed(model, pair, states);
+        let mut found = model.contacts.iter().find(passed).map(|pair| pair.bodies);
+        if found.is_none() && !model.contact_groups.is_empty() {
+            found = self.in_groups(model, step, states);
         }
         self.first = found.map(|bodies| (bodies, step.start));
         self.before.iter_mut().zip(states).for_each(|(before, state)| *before = state.value());
@@ -63,7 +63,7 @@ impl Tunneling {
     /// A passage between bodies of groups.
     fn in_groups<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         step: Step,
         states: &Rows<S>,
     ) -> Option<ContactBodies> {
@@ -75,21 +75,21 @@ impl Tunneling {
         }
         let moved: Vec<f64> =
             bodies().map(|((before, after), _)| travel(before, &after.value(), 0.0)).collect();
-        let near = BroadPhase::new(world).find(&self.before, &moved, step.dt);
-        let pairs = world.contacts_with(&near);
-        let passed = |pair: &&ContactPair<S>| self.has_passed(world, pair, states);
+        let near = BroadPhase::new(model).find(&self.before, &moved, step.dt);
+        let pairs = model.contacts_with(&near);
+        let passed = |pair: &&ContactPair<S>| self.has_passed(model, pair, states);
         pairs.iter().find(passed).map(|pair| pair.bodies)
     }
 
     fn has_passed<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         pair: &ContactPair<S>,
         states: &Rows<S>,
     ) -> bool {
         let [before, after] =
-            [world.relative_value(pair, &self.before), world.relative_value(pair, states)];
-        let Some(query) = world.contact_query(pair, after) else { return false };
+            [model.relative_value(pair, &self.before), model.relative_value(pair, states)];
+        let Some(query) = model.contact_query(pair, after) else { return false };
         let radius = query.surface.radius_about(&query.com);
         travel(&before, &after, radius) > SAFE_TRAVEL * query.field.thickness()
             && query.has_passed(before)

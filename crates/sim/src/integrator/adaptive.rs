@@ -15,11 +15,11 @@ use prehend_geometry::DistanceField;
 
 use super::Integrator;
 use crate::error::{Result, SimulationError};
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
-/// Dormand and Prince's method of fifth order with steps that it chooses: what [`World::simulate`] uses.
+/// Dormand and Prince's method of fifth order with steps that it chooses: what [`Model::simulate`] uses.
 ///
 /// Each step of a rollout is divided until the estimated error of every substep is within the tolerances. Two errors are held:
 /// that of the states, and that of a *sensitivity*, the derivative of the states along a direction drawn at the start of
@@ -52,13 +52,13 @@ use crate::world::World;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{Adaptive, Body, RigidBody, TimeSteps, World};
+/// use prehend_sim::{Adaptive, Body, RigidBody, TimeSteps, Model};
 ///
-/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
-/// let start = world.neutral_state();
+/// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+/// model.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let start = model.neutral_state();
 /// let tight = Adaptive { tolerance: 1e-10, sensitivity_tolerance: 1e-9, ..Adaptive::default() };
-/// let run = world.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
+/// let run = model.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
 /// assert!((run[10][0].linear.z + 9.81).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -103,20 +103,20 @@ impl Integrator for Adaptive {
     /// # Errors
     /// If a tolerance is not positive; if a contact's force jumps at touch and derivatives are asked for; where a body passes
     /// through another; where steps would have to be too short or too many; where a state stops being finite.
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>> {
         self.check()?;
         if S::ORDER > 0 {
-            self.check_differentiable(world)?;
+            self.check_differentiable(model)?;
         }
-        Ok(state.with(windows::step(self, world, state.rows(), step)?, step.end()))
+        Ok(state.with(windows::step(self, model, state.rows(), step)?, step.end()))
     }
 
     fn finds_contacts(&self) -> bool {
         true
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<()> {
-        world.check_onsets()
+    fn check_differentiable<S: Scalar>(&self, model: &Model<S>) -> Result<()> {
+        model.check_onsets()
     }
 
     fn stability_limit(&self) -> f64 {

@@ -12,10 +12,10 @@ use prehend_autodiff::{LocalFunction, Scalar};
 use crate::body::RigidBody;
 use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
+use crate::model::Model;
+use crate::model::body::Body;
 use crate::spatial::spatial;
 use crate::time::Step;
-use crate::world::World;
-use crate::world::body::Body;
 
 /// Change of a state, or its rate. Body: position of the center of mass, its velocity, rotation vector, angular momentum. Joint:
 /// position, velocity, rotation vector, angular velocity. Contact with bristles: both halves of its deflection, two zeros.
@@ -28,7 +28,7 @@ pub(super) type Change<S> = [Vector3<S>; 4];
 
 /// One step of an explicit method: where it starts, and the slopes of the stages so far.
 pub(super) struct Stages<'a, S: Scalar> {
-    world: &'a World<S>,
+    model: &'a Model<S>,
     states: &'a Rows<S>,
     step: Step,
     free: Vec<Free<'a, S>>,
@@ -51,7 +51,7 @@ struct Free<'a, S: Scalar> {
 impl<'a, S: Scalar> Stages<'a, S> {
     /// The first of `count` stages, of a step that starts with `wrenches` on the bodies.
     pub(super) fn new(
-        world: &'a World<S>,
+        model: &'a Model<S>,
         states: &'a Rows<S>,
         wrenches: &[Vector6<S>],
         step: Step,
@@ -62,11 +62,11 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let momentum = rigid.momentum(&state.pose.rotation, &state.angular);
             Some(Free { id: BodyId(id), rigid, momentum })
         };
-        let free: Vec<Free<'_, S>> = world.bodies.iter().enumerate().filter_map(free).collect();
-        let moving = free.len() + states.len() - world.bodies.len();
+        let free: Vec<Free<'_, S>> = model.bodies.iter().enumerate().filter_map(free).collect();
+        let moving = free.len() + states.len() - model.bodies.len();
         let change = vec![[Vector3::zeros(); 4]; moving];
         let slopes = Vec::with_capacity(count * moving);
-        let mut stages = Self { world, states, step, free, moving, slopes, change };
+        let mut stages = Self { model, states, step, free, moving, slopes, change };
         stages.add_slopes(states, wrenches);
         stages
     }
@@ -83,8 +83,8 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.add_combined(weights, &mut change);
         let mut states = self.moved(&change);
         self.change = change;
-        self.world.place_bodies(&mut states, self.step.start + fraction * self.step.dt);
-        let wrenches = self.world.wrenches_of(&states, self.step.index);
+        self.model.place_bodies(&mut states, self.step.start + fraction * self.step.dt);
+        let wrenches = self.model.wrenches_of(&states, self.step.index);
         self.add_slopes(&states, &wrenches);
         (states, wrenches)
     }
@@ -131,15 +131,15 @@ impl<'a, S: Scalar> Stages<'a, S> {
             state.pose.rotation = turned(&state.pose.rotation, turn);
             state.angular = free.rigid.angular(&state.pose.rotation, &(free.momentum + momentum));
         }
-        let (joints, deflections) = change[self.free.len()..].split_at(self.world.joint_count());
-        for (place, [position, velocity, turn, spin]) in self.world.joint_places().zip(joints) {
+        let (joints, deflections) = change[self.free.len()..].split_at(self.model.joint_count());
+        for (place, [position, velocity, turn, spin]) in self.model.joint_places().zip(joints) {
             let state = &mut moved[place];
             state.pose.translation.vector += position;
             state.linear += velocity;
             state.pose.rotation = turned(&state.pose.rotation, turn);
             state.angular += spin;
         }
-        let states = moved.iter_mut().skip(self.world.joint_places().end);
+        let states = moved.iter_mut().skip(self.model.joint_places().end);
         for (state, [linear, angular, ..]) in states.zip(deflections) {
             *state = state.deflected(&spatial(linear, angular));
         }
@@ -152,13 +152,13 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
             let turning = turn_rate(turn, &state.angular);
-            let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
+            let acceleration = self.model.gravity + force * (S::one() / free.rigid.mass());
             self.slopes.push([state.linear, acceleration, turning, torque.into_owned()]);
         }
-        let joints = self.world.joint_places();
+        let joints = self.model.joint_places();
         let deflections = self.moving - self.free.len() - joints.len();
         let changes = &self.change[self.free.len()..];
-        for ((place, joint), change) in joints.clone().zip(self.world.joints()).zip(changes) {
+        for ((place, joint), change) in joints.clone().zip(self.model.joints()).zip(changes) {
             let (state, turn, rate) = (&states[place], &change[2], &wrenches[place]);
             let [position, angular] = joint.rate_of_pose(state);
             let turning = if joint.turns() { turn_rate(turn, &angular) } else { Vector3::zeros() };

@@ -8,9 +8,9 @@ use super::Integrator;
 use crate::body::RigidBody;
 use crate::body_state::{BodyState, Rows};
 use crate::error::Result;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
 /// Semi-implicit Euler, first order: the standard for stiff penalty contact.
 ///
@@ -21,10 +21,10 @@ use crate::world::World;
 pub struct SemiImplicitEuler;
 
 impl Integrator for SemiImplicitEuler {
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
-        let (wrenches, dt) = (world.wrenches_of(state.rows(), step.index), S::constant(step.dt));
-        let mut next = moved(world, state.rows(), &wrenches, dt);
-        world.integrate_bristles(&mut next, &wrenches, dt);
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let (wrenches, dt) = (model.wrenches_of(state.rows(), step.index), S::constant(step.dt));
+        let mut next = moved(model, state.rows(), &wrenches, dt);
+        model.integrate_bristles(&mut next, &wrenches, dt);
         Ok(state.with(next, step.end()))
     }
 
@@ -42,19 +42,19 @@ impl Integrator for SemiImplicitEuler {
 
 /// The states after `dt` \[s\] with these wrenches on bodies and accelerations of joints, before contacts with bristles are deflected.
 pub(crate) fn moved<S: Scalar>(
-    world: &World<S>,
+    model: &Model<S>,
     states: &Rows<S>,
     wrenches: &[Vector6<S>],
     dt: S,
 ) -> Vec<BodyState<S>> {
-    let bodies = world.bodies.iter().zip(states).zip(wrenches);
+    let bodies = model.bodies.iter().zip(states).zip(wrenches);
     let next = bodies.map(|((body, state), wrench)| match body.rigid() {
-        Some(rigid) => advance(rigid, &world.gravity, state, wrench, dt),
+        Some(rigid) => advance(rigid, &model.gravity, state, wrench, dt),
         None => *state,
     });
     let mut next: Vec<BodyState<S>> = next.collect();
     next.extend_from_slice(&states[next.len()..]);
-    world.integrate_joints(&mut next, wrenches, dt);
+    model.integrate_joints(&mut next, wrenches, dt);
     next
 }
 

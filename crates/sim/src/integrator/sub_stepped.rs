@@ -6,14 +6,14 @@ use prehend_autodiff::Scalar;
 use super::Integrator;
 use crate::body_state::{BodyState, Rows};
 use crate::error::{Result, SimulationError};
+use crate::model::Model;
+use crate::model::body::Body;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
-use crate::world::body::Body;
 
 /// Another integrator, each step of which is divided as far as stiffness and damping of the contacts demand.
 ///
-/// The fastest of the contacts (see [`World::contact_frequency`]) is looked for at the start of the step and where
+/// The fastest of the contacts (see [`Model::contact_frequency`]) is looked for at the start of the step and where
 /// the bodies would drift in it, so that impacts are foreseen. Steps are then as short as
 /// [`Integrator::stability_limit`] allows, with a margin of a fifth. A step whose equations an implicit integrator
 /// does not solve is divided into twice as many.
@@ -23,13 +23,13 @@ use crate::world::body::Body;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, SubStepped, TimeSteps, World};
+/// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, SubStepped, TimeSteps, Model};
 ///
-/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-/// world.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
-/// let start = world.neutral_state();
+/// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+/// model.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));
+/// let start = model.neutral_state();
 /// let integrator = SubStepped { integrator: SemiImplicitEuler, max_substeps: 32 };
-/// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
+/// let run = model.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
 /// assert!((run[100][0].linear.z + 9.81).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -47,27 +47,27 @@ const MARGIN: f64 = 0.8;
 impl<I: Integrator> SubStepped<I> {
     fn divided<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         state: &State<S>,
         step: Step,
         parts: usize,
     ) -> Result<State<S>> {
         let mut state = state.clone();
         for part in step.parts(parts) {
-            state = self.integrator.step(world, &state, part)?;
+            state = self.integrator.step(model, &state, part)?;
             state.time = part.end();
-            world.update_kinematics(&mut state);
+            model.update_kinematics(&mut state);
         }
         Ok(state)
     }
 
     /// Number of substeps that the contacts demand.
-    fn demanded<S: Scalar>(&self, world: &World<S>, states: &Rows<S>, dt: f64) -> f64 {
+    fn demanded<S: Scalar>(&self, model: &Model<S>, states: &Rows<S>, dt: f64) -> f64 {
         let limit = self.integrator.stability_limit();
         if limit.is_infinite() {
             return 1.0;
         }
-        let plain = world.to_f64();
+        let plain = model.to_f64();
         let now: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let drift = |(body, state): (&Body, &BodyState)| {
             let mut falling = *state;
@@ -87,12 +87,12 @@ impl<I: Integrator> SubStepped<I> {
 }
 
 impl<I: Integrator> Integrator for SubStepped<I> {
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
-        let needed = self.demanded(world, state.rows(), step.dt);
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let needed = self.demanded(model, state.rows(), step.dt);
         let max_substeps = self.max_substeps.max(1);
         if needed.is_nan() || needed > max_substeps as f64 {
             let (step, time) = (step.index, step.start);
-            let (body, contact) = world.most_accelerated(state.rows());
+            let (body, contact) = model.most_accelerated(state.rows());
             return Err(SimulationError::SubSteps {
                 step,
                 time,
@@ -104,7 +104,7 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         }
         let mut parts = needed as usize;
         loop {
-            match self.divided(world, state, step, parts) {
+            match self.divided(model, state, step, parts) {
                 Err(SimulationError::Unsolved { .. }) if 2 * parts <= max_substeps => parts *= 2,
                 // Parts have numbers of their own.
                 Err(mut error) => {
@@ -118,8 +118,8 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         }
     }
 
-    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<()> {
-        self.integrator.check_differentiable(world)
+    fn check_differentiable<S: Scalar>(&self, model: &Model<S>) -> Result<()> {
+        self.integrator.check_differentiable(model)
     }
 
     fn controls_error(&self) -> bool {
@@ -139,24 +139,24 @@ mod tests {
 
     #[test]
     fn impacts_are_foreseen_and_flights_are_not_divided() {
-        let (world, mut states) = egg_on(floor(), GapSmoothing::Hard);
+        let (model, mut states) = egg_on(floor(), GapSmoothing::Hard);
         states[1].pose.translation.z += 1e-3;
         states[1].linear.z = -0.5;
         let step = Step::new(2, 1e-2);
         let parts = |states: &State| {
             let euler = SubStepped { integrator: SemiImplicitEuler, max_substeps: 1000 };
-            euler.demanded(&world, states.bodies(), step.dt)
+            euler.demanded(&model, states.bodies(), step.dt)
         };
         let impact = parts(&states);
-        assert!(impact > 2.0 && world.contact_frequency(&states) == 0.0, "{impact}");
+        assert!(impact > 2.0 && model.contact_frequency(&states) == 0.0, "{impact}");
         let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: impact as usize };
-        let done = divided.step(&world, &states, step).unwrap();
+        let done = divided.step(&model, &states, step).unwrap();
         let fine = TimeSteps { dt: step.dt / impact, steps: impact as usize };
-        let expected = world.simulate_with(&SemiImplicitEuler, &states, fine).unwrap().states;
+        let expected = model.simulate_with(&SemiImplicitEuler, &states, fine).unwrap().states;
         assert_eq!(done.bodies(), expected.bodies());
         let too_few = SubStepped { max_substeps: impact as usize - 1, ..divided };
         assert_eq!(
-            too_few.step(&world, &states, step).unwrap_err(),
+            too_few.step(&model, &states, step).unwrap_err(),
             SimulationError::SubSteps {
                 step: 2,
                 time: 0.02,
@@ -167,7 +167,7 @@ mod tests {
             }
         );
         let wider = SubStepped { integrator: RungeKutta4, max_substeps: 1000 };
-        assert!(wider.demanded(&world, states.bodies(), step.dt) < impact);
+        assert!(wider.demanded(&model, states.bodies(), step.dt) < impact);
         states[1].pose.translation.z += 0.1;
         assert_eq!(parts(&states), 1.0);
     }

@@ -6,7 +6,7 @@ use prehend_autodiff::{Fwd, Scalar};
 use crate::articulated::{ArticulationError, Joint, JointModel, Link};
 use crate::contact::LawError;
 use crate::joint_law::*;
-use crate::{Body, BuildError, RigidBody, SimulationError, World};
+use crate::{Body, BuildError, Model, RigidBody, SimulationError};
 
 fn laws() -> Vec<Box<dyn DynJointLaw>> {
     let servo = PositionServo { target: 0.7, stiffness: 3.0, damping: 0.2, max_effort: 1e3 };
@@ -105,40 +105,40 @@ fn what_brings_no_energy_says_so() {
 
 #[test]
 fn what_cannot_be_is_refused_where_it_is_added() {
-    let mut world = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::zeros());
     let rod = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();
     let hinge = Joint::Revolute(Vector3::x_axis());
-    let stone = world.add(Body::dynamic("stone", rod));
+    let stone = model.add(Body::dynamic("stone", rod));
     let links = vec![Link::new("rod", hinge.clone(), &rod), Link::new("plate", Joint::Fixed, &rod)];
-    let links = world.add_articulation(links).unwrap();
-    let other = world.add_articulation(vec![Link::new("other", hinge.clone(), &rod)]).unwrap()[0];
+    let links = model.add_articulation(links).unwrap();
+    let other = model.add_articulation(vec![Link::new("other", hinge.clone(), &rod)]).unwrap()[0];
     let damper = |damping| JointDamper { damping };
     let refused = |error: BuildError| error.to_string();
     for (error, message) in [
         (
-            refused(world.add_joint_force(links[0], damper(-1.0)).unwrap_err()),
+            refused(model.add_joint_force(links[0], damper(-1.0)).unwrap_err()),
             "the law along the joint of link 'rod': damping must be zero or positive, is -1",
         ),
         (
-            refused(world.add_joint_force(links[1], damper(1.0)).unwrap_err()),
+            refused(model.add_joint_force(links[1], damper(1.0)).unwrap_err()),
             "the joint of link 'plate' has no axis 0 to act along: a fixed or a floating one has none",
         ),
         (
-            refused(world.add_joint_force(stone, damper(1.0)).unwrap_err()),
+            refused(model.add_joint_force(stone, damper(1.0)).unwrap_err()),
             "body 'stone' is no link of an articulation",
         ),
     ] {
         assert_eq!(error, message);
     }
     let both = [(links[0].into(), 1.0), (other.into(), -1.0)];
-    let apart = world.add_coupled_force(&both, std::sync::Arc::new(damper(1.0))).unwrap_err();
+    let apart = model.add_coupled_force(&both, std::sync::Arc::new(damper(1.0))).unwrap_err();
     assert!(matches!(apart, BuildError::Apart { .. }));
-    let id = world.add_joint_force(links[0], damper(1.0)).unwrap();
-    assert!(world.joint_force_mut(id).set_param("friction", 1.0).is_err());
-    world.joint_force_mut(id).set_param("damping", f64::NAN).unwrap();
-    let states = world.neutral_state();
+    let id = model.add_joint_force(links[0], damper(1.0)).unwrap();
+    assert!(model.joint_force_mut(id).set_param("friction", 1.0).is_err());
+    model.joint_force_mut(id).set_param("damping", f64::NAN).unwrap();
+    let states = model.neutral_state();
     assert!(matches!(
-        world.simulate(&states, 0.1),
+        model.simulate(&states, 0.1),
         Err(SimulationError::Build(BuildError::JointLaw { .. }))
     ));
 
@@ -152,11 +152,11 @@ fn what_cannot_be_is_refused_where_it_is_added() {
             Isometry3::identity()
         }
     }
-    let many = world.add_articulation(vec![Link::new("many", Joint::custom(Many), &rod)]);
+    let many = model.add_articulation(vec![Link::new("many", Joint::custom(Many), &rod)]);
     let expected = ArticulationError::DegreesOfFreedom { link: "many".to_owned(), count: 4 };
     assert_eq!(many, Err(BuildError::Articulation(expected)));
-    let light = world.add_articulation(vec![Link::massless("feather", hinge.clone())]);
+    let light = model.add_articulation(vec![Link::massless("feather", hinge.clone())]);
     assert!(matches!(light, Err(BuildError::Articulation(ArticulationError::Mass { .. }))));
     let carried = Link::new("stone", Joint::Fixed, &rod).on(0, Isometry3::identity());
-    assert!(world.add_articulation(vec![Link::massless("feather", hinge), carried]).is_ok());
+    assert!(model.add_articulation(vec![Link::massless("feather", hinge), carried]).is_ok());
 }

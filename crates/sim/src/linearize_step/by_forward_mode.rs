@@ -7,12 +7,12 @@ use super::LinearizedStep;
 use super::generalized::Generalized;
 use crate::error::Result;
 use crate::integrator::semi_implicit::SemiImplicitEuler;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
-impl World {
-    /// [`World::linearize_step`] by forward mode, direction by direction: what its closed form is tested against.
+impl Model {
+    /// [`Model::linearize_step`] by forward mode, direction by direction: what its closed form is tested against.
     ///
     /// # Errors
     /// As there.
@@ -42,9 +42,9 @@ impl World {
         let still = self.displaced(&start, &zeros);
         for (slot, body) in self.free_bodies().into_iter().enumerate() {
             for k in 0..6 {
-                let mut world = lifted.clone();
-                world.bodies[body].external_wrench[k].derivative[0] = 1.0;
-                let after = world.step(&SemiImplicitEuler, &still, step)?;
+                let mut model = lifted.clone();
+                model.bodies[body].external_wrench[k].derivative[0] = 1.0;
+                let after = model.step(&SemiImplicitEuler, &still, step)?;
                 by_force.set_column(6 * slot + k, &slopes(&after));
             }
         }

@@ -8,15 +8,15 @@ use crate::articulated::Joint;
 use crate::body_state::BodyState;
 #[cfg(doc)]
 use crate::linearize_step::LinearizedStep;
+use crate::model::Model;
 use crate::spatial::spatial;
 use crate::state::State;
-use crate::world::World;
 
-impl World {
+impl Model {
     /// State displaced \[m, rad\] and sped up \[m/s, rad/s\] by 2N numbers, as a [`LinearizedStep`] orders them. Deflections of contacts stay.
     ///
     /// # Panics
-    /// Unless they are 2N, and it is a state of this world.
+    /// Unless they are 2N, and it is a state of this model.
     pub fn displaced<S: Scalar>(&self, state: &State, by: &[S]) -> State<S> {
         assert_eq!(by.len(), 2 * self.degrees_of_freedom(), "numbers of a displacement");
         let (moves, speeds) = by.split_at(by.len() / 2);
@@ -41,10 +41,10 @@ impl World {
         displaced
     }
 
-    /// The 2N numbers by which `to` is [displaced](World::displaced) from `from`. Rotations by π or more come back the shorter way.
+    /// The 2N numbers by which `to` is [displaced](Model::displaced) from `from`. Rotations by π or more come back the shorter way.
     ///
     /// # Panics
-    /// If they are no states of this world.
+    /// If they are no states of this model.
     pub fn displacement<S: Scalar>(&self, from: &State, to: &State<S>) -> Vec<S> {
         let (mut moves, mut speeds) = (Vec::<S>::new(), Vec::<S>::new());
         let mut add = |joint: &Joint, motion: Isometry3<S>, a: &BodyState<S>, b: &BodyState<S>| {

@@ -8,17 +8,17 @@ use super::pair::Between;
 use crate::articulated::Kinematics;
 use crate::articulated::tree_factor::TreeFactor;
 use crate::body_state::Rows;
+use crate::model::Model;
+use crate::model::articulated_body::ArticulatedBody;
+use crate::model::joint_force::Along;
 use crate::spatial::{angular, cross_motion, linear};
-use crate::world::World;
-use crate::world::articulated_body::ArticulatedBody;
-use crate::world::joint_force::Along;
 
 /// Forces on free bodies and accelerations of joints, with derivatives by all coordinates.
 pub(super) struct Generalized {
     /// Number of coordinates, and the first of those of joints.
     pub(super) count: usize,
     pub(super) joints: usize,
-    /// As [`World::wrenches`] has them.
+    /// As [`Model::wrenches`] has them.
     pub(super) wrenches: Vec<Vector6<f64>>,
     /// Derivatives of wrenches on free bodies and accelerations of joints, by displacements and by velocities.
     pub(super) by_position: DMatrix<f64>,
@@ -29,15 +29,15 @@ pub(super) struct Generalized {
 
 impl Generalized {
     /// At `states`, whose links are moved to where their joints put them.
-    pub(super) fn new(world: &World, states: &mut Rows, step: usize) -> Self {
-        let trees = trees(world, states);
+    pub(super) fn new(model: &Model, states: &mut Rows, step: usize) -> Self {
+        let trees = trees(model, states);
         for Tree { own, at, .. } in &trees {
             let bodies = own.bodies().iter();
             bodies.zip(at.link_states()).for_each(|(body, state)| states[*body] = state);
         }
-        let mut all = Self::empty(world, &trees);
-        all.add_forces(world, states, &trees, step);
-        let efforts = all.add_joint_forces(world, states, &trees);
+        let mut all = Self::empty(model, &trees);
+        all.add_forces(model, states, &trees, step);
+        let efforts = all.add_joint_forces(model, states, &trees);
         for (tree, efforts) in trees.iter().zip(&efforts) {
             let accelerations = all.accelerate(tree, efforts);
             for (index, link) in tree.own.tree.links().iter().enumerate() {
@@ -49,9 +49,9 @@ impl Generalized {
     }
 
     /// Without any but by efforts.
-    pub(super) fn without_forces(world: &World, states: &Rows) -> Self {
-        let trees = trees(world, states);
-        let mut all = Self::empty(world, &trees);
+    pub(super) fn without_forces(model: &Model, states: &Rows) -> Self {
+        let trees = trees(model, states);
+        let mut all = Self::empty(model, &trees);
         for Tree { at, first, .. } in &trees {
             let inverse = at.inverse_mass_matrix();
             let (from, n) = (first - all.joints, inverse.nrows());
@@ -60,26 +60,26 @@ impl Generalized {
         all
     }
 
-    fn empty(world: &World, trees: &[Tree<'_>]) -> Self {
-        let joints = 6 * world.free_bodies().len();
+    fn empty(model: &Model, trees: &[Tree<'_>]) -> Self {
+        let joints = 6 * model.free_bodies().len();
         let count = joints + trees.iter().map(|tree| tree.dofs).sum::<usize>();
         let [by_position, by_velocity] = [(); 2].map(|()| DMatrix::zeros(count, count));
         let by_effort = DMatrix::zeros(count - joints, count - joints);
-        let wrenches = world.bodies.iter().map(|body| body.external_wrench).collect();
+        let wrenches = model.bodies.iter().map(|body| body.external_wrench).collect();
         Self { count, joints, wrenches, by_position, by_velocity, by_effort }
     }
 
     /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
-    fn add_forces(&mut self, world: &World, states: &Rows, trees: &[Tree<'_>], step: usize) {
-        let contacts = world.contacts.iter();
-        let contacts = contacts.filter_map(|pair| Between::contact(world, pair, states, step));
+    fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[Tree<'_>], step: usize) {
+        let contacts = model.contacts.iter();
+        let contacts = contacts.filter_map(|pair| Between::contact(model, pair, states, step));
         let bushings =
-            world.bushings.iter().map(|bushing| Between::bushing(world, bushing, states));
+            model.bushings.iter().map(|bushing| Between::bushing(model, bushing, states));
         let mut motions: Vec<Option<Vec<Motion>>> = Vec::new();
-        motions.resize_with(world.bodies.len(), || None);
+        motions.resize_with(model.bodies.len(), || None);
         let mut own = Vec::new();
-        if !(world.contacts.is_empty() && world.bushings.is_empty()) {
-            own = places(world, trees);
+        if !(model.contacts.is_empty() && model.bushings.is_empty()) {
+            own = places(model, trees);
         }
         for between in contacts.chain(bushings) {
             for body in between.bodies {
@@ -129,13 +129,13 @@ impl Generalized {
     /// Adds the slopes of forces along joints, and returns the efforts of each tree.
     fn add_joint_forces(
         &mut self,
-        world: &World,
+        model: &Model,
         states: &Rows,
         trees: &[Tree<'_>],
     ) -> Vec<Vec<f64>> {
         let mut efforts: Vec<Vec<f64>> = trees.iter().map(|tree| vec![0.0; tree.dofs]).collect();
-        for force in &world.joint_forces {
-            let Some(Along { articulation, dofs, position, velocity }) = world.along(force, states)
+        for force in &model.joint_forces {
+            let Some(Along { articulation, dofs, position, velocity }) = model.along(force, states)
             else {
                 continue;
             };
@@ -229,13 +229,13 @@ struct Tree<'a> {
     dofs: usize,
 }
 
-fn trees<'a>(world: &'a World, states: &Rows) -> Vec<Tree<'a>> {
-    let mut first = 6 * world.free_bodies().len();
-    let mut trees = Vec::with_capacity(world.articulations.len());
-    for (index, own) in world.articulations.iter().enumerate() {
+fn trees<'a>(model: &'a Model, states: &Rows) -> Vec<Tree<'a>> {
+    let mut first = 6 * model.free_bodies().len();
+    let mut trees = Vec::with_capacity(model.articulations.len());
+    for (index, own) in model.articulations.iter().enumerate() {
         let dofs = own.tree.nv();
-        let [q, v] = own.coordinates(&states[world.joint_range(index)]);
-        let at = own.tree.kinematics(&q, &v).under(world.gravity);
+        let [q, v] = own.coordinates(&states[model.joint_range(index)]);
+        let at = own.tree.kinematics(&q, &v).under(model.gravity);
         trees.push(Tree { own, at, first, dofs });
         first += dofs;
     }
@@ -252,9 +252,9 @@ enum Place {
     Link(usize, usize),
 }
 
-fn places(world: &World, trees: &[Tree<'_>]) -> Vec<Place> {
-    let mut places = vec![Place::Fixed; world.bodies.len()];
-    for (slot, body) in world.free_bodies().into_iter().enumerate() {
+fn places(model: &Model, trees: &[Tree<'_>]) -> Vec<Place> {
+    let mut places = vec![Place::Fixed; model.bodies.len()];
+    for (slot, body) in model.free_bodies().into_iter().enumerate() {
         places[body] = Place::Free(6 * slot);
     }
     for (index, tree) in trees.iter().enumerate() {

@@ -7,10 +7,10 @@ use prehend_autodiff::{Fwd, Scalar};
 use crate::body_state::Rows;
 use crate::contact::contact_query::ContactQuery;
 use crate::handle::BodyId;
+use crate::model::Model;
+use crate::model::bushing::Bushing;
+use crate::model::contact_pair::ContactPair;
 use crate::spatial::spatial;
-use crate::world::World;
-use crate::world::bushing::Bushing;
-use crate::world::contact_pair::ContactPair;
 
 /// A force between two bodies.
 pub(super) struct Between {
@@ -24,13 +24,13 @@ pub(super) struct Between {
 impl Between {
     /// Linearized force of a contact without a memory; none where nothing touches.
     pub(super) fn contact(
-        world: &World,
+        model: &Model,
         pair: &ContactPair,
         states: &Rows,
         step: usize,
     ) -> Option<Self> {
         let bodies = [pair.bodies.samples, pair.bodies.field];
-        let query = world.contact_query(pair, world.relative_value(pair, states))?;
+        let query = model.contact_query(pair, model.relative_value(pair, states))?;
         let query = ContactQuery { smoothing: pair.smoothing.at_step(step), ..query };
         let found = pair.law().wrench_jacobian(&pair.param_values(), &query, false);
         if found.wrench == Vector6::zeros() && found.by_state == [[0.0; 12]; 6] {
@@ -68,12 +68,12 @@ impl Between {
     }
 
     /// Linearized force of a bushing.
-    pub(super) fn bushing(world: &World, bushing: &Bushing, states: &Rows) -> Self {
+    pub(super) fn bushing(model: &Model, bushing: &Bushing, states: &Rows) -> Self {
         let inputs = Fwd::<24>::variables([0.0; 24]);
         let [a, b] = [0, 1].map(|end| {
             states[bushing.bodies[end]].retract(&std::array::from_fn(|i| inputs[12 * end + i]))
         });
-        let both = world.pull(bushing, [&a, &b], bushing.stiffness.numbers().map(Fwd::constant));
+        let both = model.pull(bushing, [&a, &b], bushing.stiffness.numbers().map(Fwd::constant));
         let on = both.map(|wrench| wrench.map(|x| x.value));
         let by = both.map(|wrench| {
             [0, 12].map(|lane| SMatrix::from_fn(|i, j| wrench[i].derivative[lane + j]))

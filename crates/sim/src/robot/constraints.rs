@@ -11,15 +11,15 @@ use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::friction::JointFriction;
 use crate::joint_law::limits::JointLimits;
 use crate::joint_law::spring::JointSpring;
-use crate::world::World;
-use crate::world::joint_force::JointAxis;
+use crate::model::Model;
+use crate::model::joint_force::JointAxis;
 
 /// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
 const FRICTION_SCALE: f64 = 0.01;
 /// Share of a limit's effort per speed against it \[s/rad or s/m\]: nothing bounces off faster than its inverse.
 const LIMIT_DAMPING: f64 = 100.0;
 
-impl World {
+impl Model {
     /// Adds damping \[N m s/rad or N s/m\] and dry friction \[N m or N\] along a sum of joints, where they are positive.
     pub(super) fn add_losses(
         &mut self,

@@ -1,4 +1,4 @@
-//! Robots of descriptions as bodies of a world.
+//! Robots of descriptions as bodies of a model.
 
 mod constraints;
 pub(crate) mod mjcf;

@@ -6,16 +6,16 @@ use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
 use crate::articulated::{Joint, Link};
 use crate::error::BuildError;
 use crate::handle::BodyId;
-use crate::world::World;
-use crate::world::joint_force::JointAxis;
-use crate::world::transmission::Coupling;
+use crate::model::Model;
+use crate::model::joint_force::JointAxis;
+use crate::model::transmission::Coupling;
 
 /// Options of reading a robot in URDF that forces move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfOptions {
     /// Base → world.
     pub t_world_base: Isometry3<f64>,
-    /// Joint between the world and the base.
+    /// Joint between the model and the base.
     pub base: Joint,
     /// Time constant of limits and of joints that mimic others \[s\].
     pub time_constant: f64,
@@ -31,16 +31,16 @@ impl Default for UrdfOptions {
     }
 }
 
-impl World {
+impl Model {
     /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of position of its joints,
     /// and returns each link's body, in the order of [`KinematicTree::links`]. With a shape, links have its distance fields; samples are the
     /// caller's to give.
     ///
-    /// Limits of effort and speed are not used, and there are no motors: add them by [`World::add_joint_force`]. Joints that mimic others follow
+    /// Limits of effort and speed are not used, and there are no motors: add them by [`Model::add_joint_force`]. Joints that mimic others follow
     /// them by springs.
     ///
     /// # Errors
-    /// If `shape` is not the robot's, or a link weighs nothing and yet should move. The world is then as it was.
+    /// If `shape` is not the robot's, or a link weighs nothing and yet should move. The model is then as it was.
     pub fn add_articulated_robot(
         &mut self,
         robot: &KinematicTree,
@@ -57,7 +57,7 @@ impl World {
         Ok(bodies)
     }
 
-    /// [`World::add_articulated_robot`], which on an error leaves a part behind.
+    /// [`Model::add_articulated_robot`], which on an error leaves a part behind.
     fn insert_robot(
         &mut self,
         robot: &KinematicTree,

@@ -15,5 +15,5 @@ mod shapes;
 // The scenes name these as `crate::…`.
 use prehend_sim::{
     Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
-    KelvinVoigt, Law, RigidBody, State, Surface, World, fields,
+    KelvinVoigt, Law, Model, RigidBody, State, Surface, fields,
 };

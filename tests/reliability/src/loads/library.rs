@@ -18,14 +18,14 @@ use crate::scene::body_over_floor;
 /// Where a body of `points` contact points is after `steps` steps, thrown onto a floor with a velocity of `push`.
 fn slid<S: Scalar>(points: usize, steps: usize, push: [S; 3]) -> Result<Vector3<S>> {
     // A body of n segments has n²/2 vertices, about.
-    let world = body_over_floor((2 * points).isqrt() + 1)?;
+    let model = body_over_floor((2 * points).isqrt() + 1)?;
     let mut start: BodyState<S> =
         BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.051)).cast();
     start.linear = Vector3::from(push);
     let still = BodyState::at_rest(Isometry3::identity()).cast();
     let time_steps = TimeSteps { dt: 5e-5, steps };
     let euler = SemiImplicitEuler;
-    let end = world.cast().simulate_with(&euler, &State::new([still, start]), time_steps)?;
+    let end = model.cast().simulate_with(&euler, &State::new([still, start]), time_steps)?;
     Ok(end.states[1].pose.translation.vector)
 }
 

@@ -1,4 +1,4 @@
-//! Loads: long films, many frames, large meshes, images and worlds. Results must be right, and memory must not grow with time.
+//! Loads: long films, many frames, large meshes, images and models. Results must be right, and memory must not grow with time.
 
 mod commands;
 mod library;

@@ -8,8 +8,8 @@ use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
     BackwardEuler, Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics,
-    DynContactLaw, GapSmoothing, Integrator, SemiImplicitEuler, SimulationError, State, Step,
-    SubStepped, Surface, World,
+    DynContactLaw, GapSmoothing, Integrator, Model, SemiImplicitEuler, SimulationError, State,
+    Step, SubStepped, Surface,
 };
 
 use super::grasper::Grasper;
@@ -41,8 +41,8 @@ pub(super) struct Touch {
 /// One hand and one object, at one moment.
 pub(super) struct Simulation<'a> {
     pub(super) grasper: &'a Grasper<'a>,
-    world: World,
-    /// States of the world's bodies.
+    model: Model,
+    /// States of the model's bodies.
     states: State,
     object: BodyId,
     /// Links with a shape, in the order of their bodies.
@@ -76,7 +76,7 @@ impl<'a> Simulation<'a> {
     ) -> Result<Self, SimulationError> {
         let Grasper { robot, body: rigid, .. } = grasper;
         let poses = robot.tree.forward_kinematics(joints);
-        let mut world = World::new(Vector3::zeros());
+        let mut model = Model::new(Vector3::zeros());
         let (mut links, mut fields, mut states) = (Vec::new(), Vec::new(), Vec::new());
         for (link, shape) in robot.shape.links().iter().enumerate() {
             let Some(grid) = shape.grid() else { continue };
@@ -87,16 +87,16 @@ impl<'a> Simulation<'a> {
                 ))
             };
             let body = Body::fixed(&robot.tree.links()[link].name).with_field(shape.clone());
-            fields.push(world.add(body));
+            fields.push(model.add(body));
             states.push(BodyState::at_rest(poses[link]));
             let (shape, corners) = (shape.clone(), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
         }
-        let object = world.add(Body::dynamic("object", *rigid));
+        let object = model.add(Body::dynamic("object", *rigid));
         states.push(rigid.at_rest(t_hand_object));
         let mut new = Self {
             grasper,
-            world,
+            model,
             states: State::new(states),
             object,
             links,
@@ -109,13 +109,13 @@ impl<'a> Simulation<'a> {
         new.update_broad_phase()?;
         for field in fields {
             let bodies = ContactBodies { samples: object, field };
-            new.world.add_contact(bodies, Arc::clone(&grasper.law), GapSmoothing::Hard)?;
+            new.model.add_contact(bodies, Arc::clone(&grasper.law), GapSmoothing::Hard)?;
         }
         Ok(new)
     }
 
     pub(super) fn t_hand_object(&self) -> Isometry3<f64> {
-        self.grasper.body.model_pose(&self.states[self.object].pose)
+        self.grasper.body.body_pose(&self.states[self.object].pose)
     }
 
     /// Speed of the object's center of mass \[m/s\] and its angular speed \[rad/s\].
@@ -146,7 +146,7 @@ impl<'a> Simulation<'a> {
         self.poses = poses;
         let state = self.states[self.object];
         let mut load = Vector6::zeros();
-        self.world.gravity = gravity.unwrap_or_default();
+        self.model.gravity = gravity.unwrap_or_default();
         if gravity.is_none() {
             let rate = 1.0 / (settings.damping_time + dt);
             let inertia = rigid.world_inertia(&state.pose.rotation);
@@ -154,7 +154,7 @@ impl<'a> Simulation<'a> {
             load.fixed_rows_mut::<3>(0).copy_from(&drag);
             load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
         }
-        self.world.bodies[self.object].external_wrench = load;
+        self.model.bodies[self.object].external_wrench = load;
         self.update_broad_phase()?;
         self.states = self.stepped()?;
         self.steps += 1;
@@ -169,12 +169,12 @@ impl<'a> Simulation<'a> {
         let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };
         let explicit = SubStepped { integrator: SemiImplicitEuler, max_substeps: EXPLICIT_PARTS };
         let unsolved = |done: &Result<_, _>| matches!(done, Err(SimulationError::Unsolved { .. }));
-        let mut done = implicit.step(&self.world, &self.states, step);
+        let mut done = implicit.step(&self.model, &self.states, step);
         if unsolved(&done) {
             self.set_friction_law(&grasper.soft_law);
-            done = implicit.step(&self.world, &self.states, step);
+            done = implicit.step(&self.model, &self.states, step);
             if unsolved(&done) {
-                done = explicit.step(&self.world, &self.states, step);
+                done = explicit.step(&self.model, &self.states, step);
             }
             self.set_friction_law(&grasper.law);
         }
@@ -182,7 +182,7 @@ impl<'a> Simulation<'a> {
     }
 
     fn set_friction_law(&mut self, law: &Arc<dyn DynContactLaw>) {
-        self.world.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(law)));
+        self.model.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(law)));
     }
 
     /// Keeps the samples that may touch before the next look.
@@ -214,7 +214,7 @@ impl<'a> Simulation<'a> {
         }
         let surface = Surface::new(&kept, &vec![self.grasper.area; kept.len()])
             .map_err(|error| BuildError::Body { body: "object".to_owned(), error })?;
-        self.world.bodies[self.object].surface = Some(Arc::new(surface));
+        self.model.bodies[self.object].surface = Some(Arc::new(surface));
         Ok(())
     }
 
@@ -223,7 +223,7 @@ impl<'a> Simulation<'a> {
         let state = &self.states[self.object];
         let t_hand_object = self.t_hand_object();
         let mut touches = Vec::new();
-        let Some(surface) = &self.world.bodies[self.object].surface else { return touches };
+        let Some(surface) = &self.model.bodies[self.object].surface else { return touches };
         let law = &self.grasper.law;
         let stiffness = law.params()[0];
         for sample in surface.points() {

@@ -12,7 +12,7 @@ use crate::contact::range::ParameterRange;
 /// Friction with the coefficient μ of `along` along the unit direction a, and r·μ across it. The direction is fixed to the
 /// body with the field: it is along the axes of that body and turns with it.
 ///
-/// Under symmetric contact ([`World::add_symmetric_contact`](crate::World::add_symmetric_contact)), a is along the axes of
+/// Under symmetric contact ([`Model::add_symmetric_contact`](crate::Model::add_symmetric_contact)), a is along the axes of
 /// each direction's own field.
 ///
 /// f_t = −f_n·P M u/√(|u|² + v_s²) with the friction tensor M = μ·(a aᵀ + r (I − a aᵀ)) and P the projection
@@ -190,12 +190,12 @@ mod tests {
         let rigid = RigidBody::new(0.2, Matrix3::identity(), Point3::origin()).unwrap();
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
         let runner = Body::dynamic("runner", rigid).with_surface(surface);
-        let world = on_ground(Vector3::zeros(), floor(), runner, Arc::new(law), GapSmoothing::Hard);
+        let model = on_ground(Vector3::zeros(), floor(), runner, Arc::new(law), GapSmoothing::Hard);
         let friction = |degrees: f64, slip: Vector3<f64>| {
             let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());
             let mut sliding = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
             sliding.linear = slip;
-            let wrench = world.wrenches(&State::new([BodyState::at_rest(turn), sliding]), 0)[1];
+            let wrench = model.wrenches(&State::new([BodyState::at_rest(turn), sliding]), 0)[1];
             assert!(wrench.z > 0.5);
             wrench.fixed_rows::<3>(0) / wrench.z - Vector3::z()
         };

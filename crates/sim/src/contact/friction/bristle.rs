@@ -97,15 +97,15 @@ mod tests {
     use crate::contact::law_checks::{Claims, check_law};
     use crate::scenes::{floor, on_ground, sticking};
     use crate::{
-        Body, BodyState, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State,
-        Surface, TimeSteps, World,
+        Body, BodyState, Coulomb, GapSmoothing, HuntCrossley, KelvinVoigt, Law, Model, RigidBody,
+        State, Surface, TimeSteps,
     };
 
     const FRICTION: BristleFriction<Coulomb> =
         BristleFriction { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 
     /// 200 g on four feet that rest on the floor.
-    fn stool(gravity: Vector3<f64>) -> (World, State) {
+    fn stool(gravity: Vector3<f64>) -> (Model, State) {
         let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin()).unwrap();
         let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
             .map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.01));
@@ -113,9 +113,9 @@ mod tests {
             Body::dynamic("stool", rigid).with_surface(Surface::uniform(&feet, 4e-4).unwrap());
         let law = Arc::new(sticking(1e7, 1e5, 0.5, 1e-2));
         let smoothing = GapSmoothing::Softplus { width: 5e-5 };
-        let world = on_ground(gravity, floor(), stool, law, smoothing);
+        let model = on_ground(gravity, floor(), stool, law, smoothing);
         let state = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.0095));
-        (world, State::new([BodyState::at_rest(Isometry3::identity()), state]))
+        (model, State::new([BodyState::at_rest(Isometry3::identity()), state]))
     }
 
     #[test]
@@ -132,48 +132,48 @@ mod tests {
     #[test]
     fn neither_force_nor_torque_below_friction_moves_a_body_for_long() {
         // Friction holds 0.98 N, and 0.042 of it times that as a torque.
-        let (mut world, start) = stool(Vector3::new(0.0, 0.0, -9.81));
-        world.bodies[1].external_wrench[0] = 0.4;
-        world.bodies[1].external_wrench[5] = 0.012;
-        let run = world.rollout(&start, TimeSteps { dt: 0.5, steps: 10 }).unwrap();
+        let (mut model, start) = stool(Vector3::new(0.0, 0.0, -9.81));
+        model.bodies[1].external_wrench[0] = 0.4;
+        model.bodies[1].external_wrench[5] = 0.012;
+        let run = model.rollout(&start, TimeSteps { dt: 0.5, steps: 10 }).unwrap();
         let [settled, end] = [1, 10].map(|i: usize| run[i][1].pose);
         assert!((end.translation.vector - settled.translation.vector).norm() < 1e-9);
         assert!(end.rotation.angle_to(&settled.rotation) < 1e-8);
         // It gave way a little, then held.
         assert!((1e-6..1e-3).contains(&end.translation.x) && end.rotation.angle() > 1e-5);
-        world.bodies[1].external_wrench[0] = 1.1;
-        world.bodies[1].external_wrench[5] = 0.0;
-        let moved = world.simulate(&start, 1.0).unwrap()[1].pose.translation.x;
+        model.bodies[1].external_wrench[0] = 1.1;
+        model.bodies[1].external_wrench[5] = 0.0;
+        let moved = model.simulate(&start, 1.0).unwrap()[1].pose.translation.x;
         assert!((moved - 0.5 * (1.1 - 0.5 * 0.2 * 9.81) / 0.2).abs() < 0.03, "{moved}");
     }
 
     #[test]
     fn simulations_go_on_with_their_deflections() {
-        let (world, start) = stool(Vector3::new(2.0, 0.0, -9.81));
-        let half = world.simulate(&start, 0.5).unwrap();
+        let (model, start) = stool(Vector3::new(2.0, 0.0, -9.81));
+        let half = model.simulate(&start, 0.5).unwrap();
         assert_eq!((start.rows().len(), half.rows().len()), (2, 3));
-        let whole = world.simulate(&start, 1.0).unwrap();
+        let whole = model.simulate(&start, 1.0).unwrap();
         let place = |states: &State| states[1].pose.translation.x;
-        assert!((place(&world.simulate(&half, 0.5).unwrap()) - place(&whole)).abs() < 1e-9);
+        assert!((place(&model.simulate(&half, 0.5).unwrap()) - place(&whole)).abs() < 1e-9);
         // Without them it starts anew, and gives way once more.
-        let anew = world.simulate(&State::new(half.bodies()), 0.5).unwrap();
+        let anew = model.simulate(&State::new(half.bodies()), 0.5).unwrap();
         assert!((place(&anew) - place(&whole)).abs() > 1e-6);
     }
 
     #[test]
     fn shaking_below_friction_leaves_a_body_where_it_is() {
-        let (mut world, start) = stool(Vector3::new(0.0, 0.0, -9.81));
-        let shake = |force: f64, periods: usize, world: &mut World| {
+        let (mut model, start) = stool(Vector3::new(0.0, 0.0, -9.81));
+        let shake = |force: f64, periods: usize, model: &mut Model| {
             let time_steps = TimeSteps { dt: 2.5e-3, steps: 40 * periods };
-            let control = |step: crate::Step, world: &mut World, _: &mut State| {
+            let control = |step: crate::Step, model: &mut Model, _: &mut State| {
                 let phase = std::f64::consts::TAU * step.start / 0.1;
-                world.bodies[1].external_wrench[0] = force * phase.sin();
+                model.bodies[1].external_wrench[0] = force * phase.sin();
             };
             let adaptive = crate::Adaptive::default();
-            let end = world.simulate_controlled(&adaptive, &start, time_steps, control).unwrap();
+            let end = model.simulate_controlled(&adaptive, &start, time_steps, control).unwrap();
             end[1].pose.translation.x
         };
-        let [early, late] = [10, 40].map(|periods| shake(0.5, periods, &mut world));
+        let [early, late] = [10, 40].map(|periods| shake(0.5, periods, &mut model));
         assert!((late - early).abs() < 2e-6, "{early} {late}");
     }
 }

@@ -13,7 +13,7 @@ law_part! {
     ///
     /// A sticking contact creeps: a tangential force s μ f_n, s < 1, takes the slip v_s s/√(1 − s²). Choose v_s as the tolerable
     /// creep: a hundredth of the speeds that matter, often 1 cm/s for impacts and 0.1 mm/s for grasps. Fixed steps must be
-    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) takes such steps. To
+    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`Model::simulate`](crate::Model::simulate) takes such steps. To
     /// hold for seconds, a contact needs [`BristleFriction`](super::bristle::BristleFriction) around it.
     pub struct Coulomb: "Coulomb friction" {
         friction [""] NotNegative "friction coefficient";

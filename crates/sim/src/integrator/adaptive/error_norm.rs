@@ -11,12 +11,12 @@ use crate::body_state::{BodyState, Rows};
 use crate::contact::bristles::Bristles;
 use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
-use crate::world::World;
-use crate::world::contact_pair::ContactPair;
+use crate::model::Model;
+use crate::model::contact_pair::ContactPair;
 
 /// Part of the fastest body's speed that counts for all: what is at rest may be hit by it.
 const SLOW: f64 = 0.1;
-/// Speed of a world in which nothing moves \[m/s\].
+/// Speed of a model in which nothing moves \[m/s\].
 const SLOWEST: f64 = 1e-9;
 
 /// Part of the largest sensitivity that those of velocities are compared with at least.
@@ -84,13 +84,13 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
 
 impl ErrorNorm {
     /// Error norm of a step from `states`.
-    pub(super) fn new(settings: &Adaptive, world: &World, states: &Rows) -> Self {
-        let wrenches = LazyCell::new(|| world.wrenches_of(states, 0));
+    pub(super) fn new(settings: &Adaptive, model: &Model, states: &Rows) -> Self {
+        let wrenches = LazyCell::new(|| model.wrenches_of(states, 0));
         let scale = |body: BodyId| {
-            let rigid = world.bodies[body].rigid()?;
+            let rigid = model.bodies[body].rigid()?;
             let length = rigid.gyration_radius();
             let force = |wrench: &Vector6<f64>| wrench.fixed_rows::<3>(0).norm() / rigid.mass();
-            let constant = world.gravity.norm() + force(&world.bodies[body].external_wrench);
+            let constant = model.gravity.norm() + force(&model.bodies[body].external_wrench);
             // Without gravity, what is pushed by contacts alone.
             let acceleration = if constant > 0.0 { constant } else { force(&wrenches[body]) };
             let speed = (acceleration * length).sqrt().max(SLOWEST);
@@ -98,16 +98,16 @@ impl ErrorNorm {
             Some((body.index(), Scale { mass, length, speed, per_meter, has }))
         };
         let mut scales: Vec<(usize, Scale)> =
-            world.free_bodies().into_iter().filter_map(scale).collect();
-        scales.extend(world.joint_places().zip(joint_scales(world, states, &wrenches)));
+            model.free_bodies().into_iter().filter_map(scale).collect();
+        scales.extend(model.joint_places().zip(joint_scales(model, states, &wrenches)));
         let Adaptive { tolerance, sensitivity_tolerance, .. } = *settings;
         let length = |(pair, _): (&ContactPair, Bristles)| {
             let bodies = [pair.bodies.samples, pair.bodies.field];
-            let lengths = bodies.map(|body| world.gyration_radius(body)).into_iter();
+            let lengths = bodies.map(|body| model.gyration_radius(body)).into_iter();
             lengths.filter(|length| *length > 0.0).fold(f64::INFINITY, f64::min)
         };
-        let deflections = world.bristle_contacts().map(length).collect();
-        let bodies = world.bodies.len();
+        let deflections = model.bristle_contacts().map(length).collect();
+        let bodies = model.bodies.len();
         Self { tolerance, sensitivity_tolerance, bodies, scales, deflections }
     }
 
@@ -121,15 +121,15 @@ impl ErrorNorm {
     }
 
     /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.
-    pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Tangent>]) -> f64 {
+    pub(super) fn first_step(&self, model: &Model, wrenches: &[Vector6<Tangent>]) -> f64 {
         let time = |(place, scale): &(usize, Scale)| {
             let (Scale { mass, length, speed, .. }, wrench) =
                 (*scale, wrenches[*place].map(|w| w.value));
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-            if *place >= world.bodies.len() {
+            if *place >= model.bodies.len() {
                 return 0.1 * speed / force.norm().max(torque.norm() * length);
             }
-            let linear = (world.gravity + force / mass).norm();
+            let linear = (model.gravity + force / mass).norm();
             0.1 * speed / linear.max(torque.norm() / (mass * length))
         };
         self.scales.iter().map(time).fold(f64::INFINITY, f64::min)
@@ -190,20 +190,20 @@ impl ErrorNorm {
 /// For each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
 /// the joint itself.
 fn joint_scales<'a>(
-    world: &'a World,
+    model: &'a Model,
     states: &'a Rows,
     wrenches: &'a LazyCell<Vec<Vector6<f64>>, impl FnOnce() -> Vec<Vector6<f64>>>,
 ) -> impl Iterator<Item = Scale> + 'a {
-    let all = world.articulated(states).flat_map(|(own, joints)| {
+    let all = model.articulated(states).flat_map(|(own, joints)| {
         let [q, v] = own.coordinates(joints);
         let radii = own.tree.kinematics(&q, &v).radii();
         own.tree.links().iter().map(|link| &link.joint).zip(radii).collect::<Vec<_>>()
     });
-    all.zip(world.joint_places()).map(move |((joint, radius), place)| {
+    all.zip(model.joint_places()).map(move |((joint, radius), place)| {
         let radius = if radius > 0.0 { radius } else { 1.0 };
         let angle = !matches!(joint, Joint::Prismatic(_) | Joint::Floating);
         let (length, per_meter) = if angle { (1.0, 1.0 / radius) } else { (radius, 1.0) };
-        let acceleration = match world.gravity.norm() {
+        let acceleration = match model.gravity.norm() {
             0.0 => wrenches[place].norm() / per_meter,
             gravity => gravity,
         };

@@ -4,9 +4,9 @@ use prehend_autodiff::Scalar;
 
 use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
-use crate::world::World;
-use crate::world::broad_phase::CandidateContact;
-use crate::world::contact_pair::{ContactBodies, ContactPair};
+use crate::model::Model;
+use crate::model::broad_phase::CandidateContact;
+use crate::model::contact_pair::{ContactBodies, ContactPair};
 
 /// Bodies that are linked by contacts or joints, and what they touch that no force moves. What happens to them depends on no others.
 #[derive(Default)]
@@ -30,26 +30,26 @@ pub(super) struct Links {
 }
 
 impl Island {
-    /// The islands of the bodies of `world` with these contacts, in the order of their first free bodies.
-    pub(super) fn all(world: &World, contacts: &[ContactPair]) -> Vec<Self> {
-        let mut roots: Vec<usize> = (0..world.bodies.len()).collect();
+    /// The islands of the bodies of `model` with these contacts, in the order of their first free bodies.
+    pub(super) fn all(model: &Model, contacts: &[ContactPair]) -> Vec<Self> {
+        let mut roots: Vec<usize> = (0..model.bodies.len()).collect();
         for ContactPair { bodies, .. } in contacts {
             let ends = [bodies.samples, bodies.field];
-            if ends.iter().all(|id| world.bodies[*id].feels_forces()) {
+            if ends.iter().all(|id| model.bodies[*id].feels_forces()) {
                 join(&mut roots, ends);
             }
         }
-        for articulation in &world.articulations {
+        for articulation in &model.articulations {
             articulation.bodies().windows(2).for_each(|pair| join(&mut roots, [pair[0], pair[1]]));
         }
-        for bushing in &world.bushings {
-            if bushing.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
+        for bushing in &model.bushings {
+            if bushing.bodies.iter().all(|id| model.bodies[*id].feels_forces()) {
                 join(&mut roots, bushing.bodies);
             }
         }
-        let mut place = vec![None; world.bodies.len()];
+        let mut place = vec![None; model.bodies.len()];
         let mut islands: Vec<Self> = Vec::new();
-        for id in world.moved_bodies() {
+        for id in model.moved_bodies() {
             let root = root_of(&mut roots, id.index());
             let place = *place[root].get_or_insert_with(|| {
                 islands.push(Self::default());
@@ -57,30 +57,30 @@ impl Island {
             });
             islands[place].bodies.push(id);
         }
-        for (index, articulation) in world.articulations.iter().enumerate() {
+        for (index, articulation) in model.articulations.iter().enumerate() {
             let body = articulation.bodies().first();
             if let Some(place) = body.and_then(|id| place[root_of(&mut roots, id.index())]) {
                 islands[place].articulations.push(index);
-                islands[place].joints.extend(world.joint_range(index));
+                islands[place].joints.extend(model.joint_range(index));
             }
         }
-        let mut deflection = world.joint_places().end;
+        let mut deflection = model.joint_places().end;
         for (index, pair) in contacts.iter().enumerate() {
             let ends = [pair.bodies.samples, pair.bodies.field];
-            let free = ends.into_iter().find(|id| world.bodies[*id].feels_forces());
+            let free = ends.into_iter().find(|id| model.bodies[*id].feels_forces());
             let sticks = pair.law().bristles().is_some();
             if let Some(place) = free.and_then(|id| place[root_of(&mut roots, id.index())]) {
                 let island = &mut islands[place];
                 island.contacts.push(index);
                 island.deflections.extend(sticks.then_some(deflection));
-                let fixed = ends.into_iter().filter(|id| !world.bodies[*id].feels_forces());
+                let fixed = ends.into_iter().filter(|id| !model.bodies[*id].feels_forces());
                 island.bodies.extend(fixed);
             }
             deflection += usize::from(sticks);
         }
-        for bushing in &world.bushings {
+        for bushing in &model.bushings {
             let (moved, fixed): (Vec<BodyId>, Vec<BodyId>) =
-                bushing.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
+                bushing.bodies.iter().partition(|id| model.bodies[**id].feels_forces());
             let root = moved.first().map(|id| root_of(&mut roots, id.index()));
             if let Some(place) = root.and_then(|root| place[root]) {
                 islands[place].bodies.extend(fixed);
@@ -101,13 +101,13 @@ impl Island {
         Links { bodies: self.bodies.clone(), contacts }
     }
 
-    /// Its bodies and contacts as a world, each body at its place among [`bodies`](Self::bodies); `contacts` are those that
+    /// Its bodies and contacts as a model, each body at its place among [`bodies`](Self::bodies); `contacts` are those that
     /// it was found by.
-    pub(super) fn world<S: Scalar>(
+    pub(super) fn model<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         contacts: &[ContactPair<S>],
-    ) -> World<S> {
+    ) -> Model<S> {
         let body = |id: BodyId| BodyId(self.bodies.partition_point(|own| *own < id));
         let contact = |index: &usize| {
             let mut pair = contacts[*index].clone();
@@ -115,34 +115,34 @@ impl Island {
             pair.bodies = ContactBodies { samples: body(samples), field: body(field) };
             pair
         };
-        World {
-            bodies: self.bodies.iter().map(|id| world.bodies[*id].clone()).collect(),
+        Model {
+            bodies: self.bodies.iter().map(|id| model.bodies[*id].clone()).collect(),
             contacts: self.contacts.iter().map(contact).collect(),
             contact_groups: Vec::new(),
             articulations: self
                 .articulations
                 .iter()
-                .map(|index| world.articulations[*index].with_bodies(body))
+                .map(|index| model.articulations[*index].with_bodies(body))
                 .collect(),
-            joint_forces: world
+            joint_forces: model
                 .joint_forces
                 .iter()
                 .filter(|force| force.axes.iter().all(|(axis, _)| self.has(axis.link)))
                 .map(|force| force.with_bodies(body))
                 .collect(),
-            bushings: world
+            bushings: model
                 .bushings
                 .iter()
                 .filter(|bushing| bushing.bodies.iter().all(|id| self.has(*id)))
-                .filter(|bushing| bushing.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
+                .filter(|bushing| bushing.bodies.iter().any(|id| model.bodies[*id].feels_forces()))
                 .map(|bushing| bushing.with_bodies(body))
                 .collect(),
-            transmissions: world.transmissions.with_bodies(|id| self.has(id), body),
-            gravity: world.gravity,
+            transmissions: model.transmissions.with_bodies(|id| self.has(id), body),
+            gravity: model.gravity,
         }
     }
 
-    /// Places of its states, in the order of its world, among those of all.
+    /// Places of its states, in the order of its model, among those of all.
     pub(super) fn places(&self) -> impl Iterator<Item = usize> {
         let bodies = self.bodies.iter().map(|id| id.index());
         bodies.chain(self.joints.iter().copied()).chain(self.deflections.iter().copied())

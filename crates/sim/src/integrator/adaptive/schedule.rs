@@ -12,9 +12,9 @@ use crate::error::Result;
 use crate::handle::BodyId;
 use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
 /// The substeps of a step, found by values alone.
 pub(super) struct Schedule {
@@ -32,14 +32,14 @@ impl Schedule {
     /// The substeps of `step` from `states`; `next_substep` \[s\] is that of the step before.
     pub(super) fn find(
         settings: &Adaptive,
-        world: World,
+        model: Model,
         states: Vec<BodyState<Tangent>>,
         step: Step,
         next_substep: Option<f64>,
         watched: &[BodyId],
     ) -> Result<Self> {
         let mut substep_controller =
-            SubstepController::new(settings, world, states, step, next_substep);
+            SubstepController::new(settings, model, states, step, next_substep);
         let mut substeps = Vec::new();
         let mut watched: Vec<Watched> =
             watched.iter().map(|id| Watched::new(*id, substep_controller.state(*id))).collect();
@@ -65,21 +65,21 @@ impl Schedule {
 pub(super) struct Substeps(Arc<[Step]>);
 
 impl Substeps {
-    /// The states to which they lead in `world` from `states` in which `step` starts.
+    /// The states to which they lead in `model` from `states` in which `step` starts.
     pub(super) fn follow<S: Scalar>(
         &self,
-        world: &World<S>,
+        model: &Model<S>,
         states: &Rows<S>,
         step: Step,
     ) -> Vec<BodyState<S>> {
         let mut states = states.to_vec();
-        let mut wrenches = world.wrenches_of(&states, step.index);
+        let mut wrenches = model.wrenches_of(&states, step.index);
         for &substep in self.0.iter() {
-            let mut trial = dormand_prince::step(world, &states, &wrenches, substep);
+            let mut trial = dormand_prince::step(model, &states, &wrenches, substep);
             states = trial.stages.pop().unwrap_or(states);
             wrenches = match substep.index {
                 // Leaks of the first substep are not of the next one.
-                0 => world.wrenches_of(&states, 1),
+                0 => model.wrenches_of(&states, 1),
                 _ => trial.wrenches,
             };
         }
@@ -88,8 +88,8 @@ impl Substeps {
 }
 
 impl Integrator for Substeps {
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
-        Ok(state.with(self.follow(world, state.rows(), step), step.end()))
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        Ok(state.with(self.follow(model, state.rows(), step), step.end()))
     }
 }
 

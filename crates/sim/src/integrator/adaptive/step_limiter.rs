@@ -6,9 +6,9 @@ use super::sensitivity::Tangent;
 use super::touch_time;
 use crate::body_state::{BodyState, Rows};
 use crate::contact::contact_query::ContactQuery;
-use crate::world::World;
-use crate::world::body::Motion;
-use crate::world::contact_pair::ContactPair;
+use crate::model::Model;
+use crate::model::body::Motion;
+use crate::model::contact_pair::ContactPair;
 
 /// Part of a body's size by which its samples may always move.
 const FREE_TRAVEL: f64 = 0.2;
@@ -45,11 +45,11 @@ struct Limit {
 }
 
 impl StepLimiter {
-    pub(super) fn new(world: &World) -> Self {
+    pub(super) fn new(model: &Model) -> Self {
         let limit = |pair: &ContactPair| {
             let ends = [pair.bodies.samples, pair.bodies.field];
-            let [body, other] = ends.map(|id| &world.bodies[id]);
-            let [gyration, other_gyration] = ends.map(|id| world.gyration_radius(id));
+            let [body, other] = ends.map(|id| &model.bodies[id]);
+            let [gyration, other_gyration] = ends.map(|id| model.gyration_radius(id));
             // Bodies that no force moves need not feel each other.
             (body.feels_forces() || other.feels_forces()).then_some(())?;
             let surface = body.surface.as_ref()?;
@@ -66,14 +66,14 @@ impl StepLimiter {
             let free = if driven { short } else { free };
             Some(Limit { radius, size, free, short, thin: thickness.is_finite(), driven })
         };
-        Self(world.contacts.iter().map(limit).collect())
+        Self(model.contacts.iter().map(limit).collect())
     }
 
     fn limits<'a>(
         &'a self,
-        world: &'a World,
+        model: &'a Model,
     ) -> impl Iterator<Item = (&'a ContactPair, &'a Limit)> {
-        let limited = world.contacts.iter().zip(&self.0);
+        let limited = model.contacts.iter().zip(&self.0);
         limited.filter_map(|(pair, limit)| Some((pair, limit.as_ref()?)))
     }
 
@@ -81,23 +81,23 @@ impl StepLimiter {
     /// trajectories say, could not pass over a contact: no sample moves by more than its clearance and a small part of its
     /// body's size. Of a trajectory that does not go on as it moves, a yet smaller substep counts, for all that it touches may be
     /// at rest.
-    pub(super) fn longest(&self, world: &World, states: &Rows, time: f64, mut dt: f64) -> f64 {
+    pub(super) fn longest(&self, model: &Model, states: &Rows, time: f64, mut dt: f64) -> f64 {
         // Both may fall, but not away from each other faster than one does.
-        let fall = 0.5 * world.gravity.norm();
-        for (pair, limit) in self.limits(world) {
-            let state = world.relative_value(pair, states);
+        let fall = 0.5 * model.gravity.norm();
+        for (pair, limit) in self.limits(model) {
+            let state = model.relative_value(pair, states);
             let speed = state.speed_within(limit.radius);
             if limit.driven {
                 dt = dt.min(LOOK * LOOKS as f64);
             }
-            let deviations = limit.deviations(world, pair, states, time, dt);
+            let deviations = limit.deviations(model, pair, states, time, dt);
             let passes_over = |dt: f64| {
                 // The largest of those within the substep, which ascend.
                 let looks = deviations.len().min((dt / LOOK) as usize);
                 let deviation = deviations[..looks].last().copied().unwrap_or(0.0);
                 let travel = dt * (speed + dt * fall) + deviation;
                 (travel > limit.free || deviation > FREE_DEVIATION * limit.short)
-                    && limit.is_near(world, pair, state, (travel - limit.free).max(0.0))
+                    && limit.is_near(model, pair, state, (travel - limit.free).max(0.0))
             };
             while passes_over(dt) {
                 dt *= 0.5;
@@ -109,21 +109,21 @@ impl StepLimiter {
     /// A contact whose samples have gone from `before` to `after` through the middle of what they touch.
     pub(super) fn crossed<'a>(
         &'a self,
-        world: &'a World,
+        model: &'a Model,
         before: &Rows<Tangent>,
         after: &Rows<Tangent>,
     ) -> Option<&'a ContactPair> {
-        let mut thin = self.limits(world).filter(|(_, limit)| limit.thin).map(|(pair, _)| pair);
+        let mut thin = self.limits(model).filter(|(_, limit)| limit.thin).map(|(pair, _)| pair);
         thin.find(|pair| {
-            let [from, to] = [before, after].map(|states| world.relative_value(pair, states));
-            world.contact_query(pair, to).is_some_and(|query| query.has_crossed(from))
+            let [from, to] = [before, after].map(|states| model.relative_value(pair, states));
+            model.contact_query(pair, to).is_some_and(|query| query.has_crossed(from))
         })
     }
 
     /// True if a step of `dt` \[s\] from `states` through `stages` may have passed over a contact.
     pub(super) fn passes_over(
         &self,
-        world: &World,
+        model: &Model,
         states: &Rows,
         stages: &[Vec<BodyState<Tangent>>],
         dt: f64,
@@ -131,31 +131,31 @@ impl StepLimiter {
         let end = LazyCell::new(|| -> Vec<BodyState> {
             stages.last().into_iter().flatten().map(BodyState::value).collect()
         });
-        self.limits(world).any(|(pair, limit)| {
-            let state = world.relative_value(pair, states);
+        self.limits(model).any(|(pair, limit)| {
+            let state = model.relative_value(pair, states);
             let speed = |state: BodyState| state.speed_within(limit.radius);
-            let speeds = stages.iter().map(|stage| speed(world.relative_value(pair, stage)));
+            let speeds = stages.iter().map(|stage| speed(model.relative_value(pair, stage)));
             let travel = dt * speeds.fold(speed(state), f64::max);
             travel > limit.short
-                && (travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
-                    || touch_time::dips(world, pair, [states, &end], dt, GRAZING * limit.size))
+                && (travel > limit.free && limit.is_near(model, pair, state, travel - limit.free)
+                    || touch_time::dips(model, pair, [states, &end], dt, GRAZING * limit.size))
         })
     }
 }
 
 impl Limit {
     /// True if samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
-    fn is_near(&self, world: &World, pair: &ContactPair, state: BodyState, travel: f64) -> bool {
+    fn is_near(&self, model: &Model, pair: &ContactPair, state: BodyState, travel: f64) -> bool {
         let near =
             |query: ContactQuery<'_>| query.each_near(pair.law().cutoff(), travel).next().is_some();
-        world.contact_query(pair, state).is_some_and(near)
+        model.contact_query(pair, state).is_some_and(near)
     }
 
     /// Largest distance \[m\] of the samples of `pair` from where they would be if kinematic bodies went on as in `states`,
     /// or if they stayed there, whichever is less, as that of a belt is: at each look from `time` on for `dt` \[s\].
     fn deviations(
         &self,
-        world: &World,
+        model: &Model,
         pair: &ContactPair,
         states: &Rows,
         time: f64,
@@ -170,13 +170,13 @@ impl Limit {
         let deviation = |look: usize| {
             let elapsed = LOOK * (look + 1) as f64;
             for body in [pair.bodies.samples, pair.bodies.field] {
-                let Motion::Kinematic(trajectory) = &world.bodies[body].motion else { continue };
+                let Motion::Kinematic(trajectory) = &model.bodies[body].motion else { continue };
                 there[body] = trajectory.state(time + elapsed);
                 uniform[body] = states[body].drifted(elapsed);
             }
-            let place = world.relative_value(pair, &there).pose;
+            let place = model.relative_value(pair, &there).pose;
             let from = [&uniform[..], states].map(|states| {
-                let other = world.relative_value(pair, states).pose;
+                let other = model.relative_value(pair, states).pose;
                 let moved = place.translation.vector - other.translation.vector;
                 moved.norm() + self.radius * place.rotation.angle_to(&other.rotation)
             });

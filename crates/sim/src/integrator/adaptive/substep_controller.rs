@@ -10,8 +10,8 @@ use crate::body_state::BodyState;
 use crate::error::Result;
 use crate::handle::BodyId;
 use crate::integrator::runge_kutta::dormand_prince;
+use crate::model::Model;
 use crate::time::Step;
-use crate::world::World;
 
 /// The exponent by which the length of a step follows from its error, for an estimate of fourth order.
 const EXPONENT: f64 = -0.2;
@@ -52,8 +52,8 @@ impl Kink {
 /// Takes the substeps of a step one after the other, over values and one sensitivity.
 pub(super) struct SubstepController {
     settings: Adaptive,
-    world: World<Tangent>,
-    plain: World,
+    model: Model<Tangent>,
+    plain: Model,
     whole: Step,
     norm: ErrorNorm,
     limiter: StepLimiter,
@@ -73,7 +73,7 @@ impl SubstepController {
     /// Controller of a step from `states`, which carry the sensitivity; its first substep is about `first` \[s\] long, if that is known.
     pub(super) fn new(
         settings: &Adaptive,
-        plain: World,
+        plain: Model,
         states: Vec<BodyState<Tangent>>,
         whole: Step,
         first: Option<f64>,
@@ -87,7 +87,7 @@ impl SubstepController {
         Self {
             settings: *settings,
             limiter: StepLimiter::new(&plain),
-            world: lifted,
+            model: lifted,
             plain,
             whole,
             norm,
@@ -139,7 +139,7 @@ impl SubstepController {
             let index = if self.substeps == 0 { self.whole.index } else { self.whole.index.max(1) };
             let substep = Step { index, start: self.time, dt };
             let (mut trial, estimate) =
-                dormand_prince::estimated(&self.world, &self.states, &self.wrenches, substep);
+                dormand_prince::estimated(&self.model, &self.states, &self.wrenches, substep);
             if self.limiter.passes_over(&self.plain, &values, &trial.stages, dt) {
                 self.dt = 0.5 * dt;
                 continue;

@@ -5,34 +5,34 @@ use prehend_geometry::FieldSample;
 use crate::body_state::{BodyState, Rows};
 use crate::contact::contact_query::ContactQuery;
 use crate::contact::gap_smoothing::GapSmoothing;
+use crate::model::Model;
+use crate::model::contact_pair::ContactPair;
 use crate::surface::SurfacePoint;
-use crate::world::World;
-use crate::world::contact_pair::ContactPair;
 
 /// Time into a step of `dt` \[s\] from `start` to `end` at which the first sample enters or leaves the reach of its
 /// contact's law without smoothing, but not before `earliest` \[s\].
 pub(super) fn first(
-    world: &World,
+    model: &Model,
     start: &Rows,
     end: &Rows,
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
     let hard = |pair: &&ContactPair| !matches!(pair.smoothing, GapSmoothing::Softplus { .. });
-    let times = world.contacts.iter().filter(hard);
-    let times = times.filter_map(|pair| first_of(world, pair, [start, end], dt, earliest));
+    let times = model.contacts.iter().filter(hard);
+    let times = times.filter_map(|pair| first_of(model, pair, [start, end], dt, earliest));
     times.min_by(f64::total_cmp)
 }
 
 fn first_of(
-    world: &World,
+    model: &Model,
     pair: &ContactPair,
     ends: [&Rows; 2],
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
     let reach = pair.law().cutoff();
-    let passage = Passage::new(world, pair, ends, dt)?;
+    let passage = Passage::new(model, pair, ends, dt)?;
     let times = passage.each_near(reach).filter_map(|(point, _)| {
         let [from, to] = passage.gaps(point, reach);
         crossing(from?, to?, dt).filter(|time| *time > earliest)
@@ -42,14 +42,14 @@ fn first_of(
 
 /// True if a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
 pub(super) fn dips(
-    world: &World,
+    model: &Model,
     pair: &ContactPair,
     ends: [&Rows; 2],
     dt: f64,
     depth: f64,
 ) -> bool {
     let reach = pair.law().cutoff() + pair.smoothing.force_band();
-    let Some(passage) = Passage::new(world, pair, ends, dt) else { return false };
+    let Some(passage) = Passage::new(model, pair, ends, dt) else { return false };
     passage.each_near(reach).any(|(point, distance)| {
         // Most of those that are asked about touch.
         if distance - point.radius <= reach {
@@ -71,9 +71,9 @@ struct Passage<'a> {
 
 impl<'a> Passage<'a> {
     /// Samples of `pair` beside its field at both `ends` of a step of `dt` \[s\].
-    fn new(world: &'a World, pair: &'a ContactPair, ends: [&Rows; 2], dt: f64) -> Option<Self> {
-        let ends = ends.map(|states| world.relative_value(pair, states));
-        let query = world.contact_query(pair, ends[0])?;
+    fn new(model: &'a Model, pair: &'a ContactPair, ends: [&Rows; 2], dt: f64) -> Option<Self> {
+        let ends = ends.map(|states| model.relative_value(pair, states));
+        let query = model.contact_query(pair, ends[0])?;
         let radius = query.surface.radius_about(&query.com);
         let travel = dt * ends[0].speed_within(radius).max(ends[1].speed_within(radius));
         Some(Self { query, ends, travel })
@@ -152,14 +152,14 @@ mod tests {
     fn only_what_gets_deep_enough_dips() {
         let (dt, speed, depth) = (0.01, 0.4, 1e-4);
         let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin()).unwrap();
-        let mut world = World::new(Vector3::zeros());
-        let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+        let mut model = Model::new(Vector3::zeros());
+        let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
         let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let samples = world.add(Body::dynamic("foot", rigid).with_surface(surface));
+        let samples = model.add(Body::dynamic("foot", rigid).with_surface(surface));
         let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
         let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 }).unwrap();
         let bodies = ContactBodies { samples, field };
-        world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard).unwrap();
+        model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard).unwrap();
         for (least, expected) in [(5e-5, false), (-5e-5, false), (-2e-4, true)] {
             let height = 0.25 * speed * dt + least;
             let ends = [-speed, speed].map(|speed| {
@@ -168,7 +168,7 @@ mod tests {
                 [BodyState::at_rest(Isometry3::identity()), foot]
             });
             let [start, end] = &ends;
-            let found = dips(&world, &world.contacts[0], [start, end], dt, depth);
+            let found = dips(&model, &model.contacts[0], [start, end], dt, depth);
             assert_eq!(found, expected, "{least}");
         }
     }

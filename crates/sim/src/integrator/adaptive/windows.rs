@@ -14,12 +14,12 @@ use super::substep_controller::SHORTEST;
 use crate::body_state::{BodyState, Rows};
 use crate::error::Result;
 use crate::handle::BodyId;
+use crate::integrator::model_template::ModelTemplate;
 use crate::integrator::step_checkpointed::{OneStep, with_moved};
-use crate::integrator::world_template::WorldTemplate;
+use crate::model::Model;
+use crate::model::broad_phase::{BroadPhase, CandidateContact};
+use crate::model::contact_pair::ContactPair;
 use crate::time::Step;
-use crate::world::World;
-use crate::world::broad_phase::{BroadPhase, CandidateContact};
-use crate::world::contact_pair::ContactPair;
 
 /// Distance that the fastest body goes in a window, in fractions of its size.
 const TRAVEL: f64 = 0.35;
@@ -35,11 +35,11 @@ const MARGIN: f64 = 1.25;
 /// bodies which no contact links are islands, each with substeps of its own. Without groups of contacts the whole step is one window.
 pub(super) fn step<S: Scalar>(
     settings: &Adaptive,
-    world: &World<S>,
+    model: &Model<S>,
     states: &Rows<S>,
     whole: Step,
 ) -> Result<Vec<BodyState<S>>> {
-    let plain = world.to_f64();
+    let plain = model.to_f64();
     let driving = plain.cast::<Tangent>();
     let search = BroadPhase::new(&plain);
     let mut states = states.to_vec();
@@ -47,7 +47,7 @@ pub(super) fn step<S: Scalar>(
     let mut tangents =
         sensitivity::seeded(&values, ErrorNorm::new(settings, &plain, &values).units());
     driving.forward_kinematics(&mut tangents);
-    let mut next_substeps = vec![None; world.bodies.len()];
+    let mut next_substeps = vec![None; model.bodies.len()];
     let mut window = whole;
     for windows in 0.. {
         let left = whole.end() - window.start;
@@ -64,7 +64,7 @@ pub(super) fn step<S: Scalar>(
             Window::find(settings, &search, &tangents, window, &next_substeps)?;
         let after = match S::ORDER {
             0 => Vec::new(),
-            _ => followed(world, &world.contacts_with(&candidates), &states, &islands, window)?,
+            _ => followed(model, &model.contacts_with(&candidates), &states, &islands, window)?,
         };
         for (i, (island, schedule)) in islands.iter().enumerate() {
             for (k, (place, tangent)) in island.places().zip(&schedule.states).enumerate() {
@@ -84,7 +84,7 @@ pub(super) fn step<S: Scalar>(
         }
         let start = window.end();
         driving.place_bodies(&mut tangents, start);
-        world.place_bodies(&mut states, start);
+        model.place_bodies(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
     Ok(states)
@@ -95,38 +95,38 @@ pub(super) fn step<S: Scalar>(
 /// One node is recorded for all islands, which the sweep goes through side by side: it keeps the states that a window begins
 /// with, and the substeps.
 fn followed<S: Scalar>(
-    world: &World<S>,
+    model: &Model<S>,
     contacts: &[ContactPair<S>],
     states: &Rows<S>,
     islands: &[(Island, Schedule)],
     window: Step,
 ) -> Result<Vec<Vec<BodyState<S>>>> {
     let island = |(island, schedule): &(Island, Schedule)| {
-        (island.world(world, contacts), island.states(states), schedule.substeps.clone())
+        (island.model(model, contacts), island.states(states), schedule.substeps.clone())
     };
-    let worlds: Vec<_> = islands.iter().map(island).collect();
-    let follow = |(own, states, substeps): &(World<S>, Vec<BodyState<S>>, Substeps)| {
+    let parts: Vec<_> = islands.iter().map(island).collect();
+    let follow = |(own, states, substeps): &(Model<S>, Vec<BodyState<S>>, Substeps)| {
         substeps.follow(own, states, window)
     };
     if !S::RECORDED {
-        return Ok(worlds.par_iter().map(follow).collect());
+        return Ok(parts.par_iter().map(follow).collect());
     }
     // Of a single window the caller knows better what to keep; trajectories with derivatives are no numbers that a node could keep.
-    if world.contact_groups.is_empty() || world.check_trajectories().is_err() {
-        return Ok(worlds.iter().map(follow).collect());
+    if model.contact_groups.is_empty() || model.check_trajectories().is_err() {
+        return Ok(parts.iter().map(follow).collect());
     }
-    let node = |(own, states, substeps): &(World<S>, Vec<BodyState<S>>, Substeps)| {
-        let template = WorldTemplate::new(substeps.clone(), own)?;
+    let node = |(own, states, substeps): &(Model<S>, Vec<BodyState<S>>, Substeps)| {
+        let template = ModelTemplate::new(substeps.clone(), own)?;
         Ok(OneStep::new(&template, own, states, window))
     };
-    let nodes = worlds.iter().map(node).collect::<Result<Vec<_>>>()?;
-    let after = worlds.iter().zip(S::recompute_each(nodes));
+    let nodes = parts.iter().map(node).collect::<Result<Vec<_>>>()?;
+    let after = parts.iter().zip(S::recompute_each(nodes));
     after.map(|((own, states, _), moved)| Ok(with_moved(own, states, &moved?))).collect()
 }
 
 /// In what time the fastest body of a group goes as far as in a window \[s\], infinite without any.
 fn length(search: &BroadPhase<'_, f64>, states: &Rows<Tangent>) -> f64 {
-    let gravity = search.world().gravity.norm();
+    let gravity = search.model().gravity.norm();
     let time = |(id, size): (BodyId, f64)| {
         TRAVEL * size / (states[id].value().linear.norm() + (gravity * size).sqrt())
     };
@@ -150,14 +150,14 @@ impl Window {
         step: Step,
         next_substeps: &[Option<f64>],
     ) -> Result<Self> {
-        let world = search.world();
+        let model = search.model();
         let states: Vec<BodyState> = tangents.iter().map(BodyState::value).collect();
         let free: Vec<BodyId> = search.free().map(|(id, _)| id).collect();
         let mut deviations = search.deviations(step, SLACK);
         let mut known: HashMap<Links, Schedule> = HashMap::new();
         loop {
             let candidates = search.find(&states, &deviations, step.dt);
-            let contacts = world.contacts_with(&candidates);
+            let contacts = model.contacts_with(&candidates);
             let watched = |island: &Island| {
                 let free = |id: &BodyId| free.binary_search(id).is_ok();
                 let bodies = island.bodies.iter().enumerate().filter(|(_, id)| free(id));
@@ -169,12 +169,12 @@ impl Window {
                 }
                 let first = island.bodies.iter().filter_map(|id| next_substeps[id.index()]);
                 let first = first.min_by(f64::total_cmp);
-                let own = island.world(world, &contacts);
+                let own = island.model(model, &contacts);
                 let watched: Vec<BodyId> = watched(island).iter().map(|(own, _)| *own).collect();
                 Schedule::find(settings, own, island.states(tangents), step, first, &watched)
             };
-            let islands = Island::all(world, &contacts);
-            let links = |island: &Island| island.links(world.contacts.len(), &candidates);
+            let islands = Island::all(model, &contacts);
+            let links = |island: &Island| island.links(model.contacts.len(), &candidates);
             let known_before: Vec<_> = islands.iter().map(|i| known.remove(&links(i))).collect();
             let found = islands.iter().zip(known_before);
             // A few are not worth the threads.

@@ -12,8 +12,8 @@ use crate::body::RigidBody;
 use crate::body_state::{BodyState, Rows};
 use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
+use crate::model::Model;
 use crate::time::Step;
-use crate::world::World;
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
 pub(super) fn arrived<S: Scalar>(state: &BodyState<S>, velocity: &[S; 6], dt: f64) -> BodyState<S> {
@@ -25,14 +25,14 @@ pub(super) fn arrived<S: Scalar>(state: &BodyState<S>, velocity: &[S; 6], dt: f6
 /// `velocity` at the end of the step less what momentum and `wrench` there make it.
 pub(super) fn excess<S: Scalar>(
     body: &RigidBody<S>,
-    world: &World<S>,
+    model: &Model<S>,
     state: &BodyState<S>,
     velocity: &[S; 6],
     wrench: &Vector6<S>,
     dt: f64,
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
-    let (linear, momentum) = body.apply_impulse(state, wrench, &world.gravity, S::constant(dt));
+    let (linear, momentum) = body.apply_impulse(state, wrench, &model.gravity, S::constant(dt));
     let rotation = turned(&state.pose.rotation, &Vector3::new(wx, wy, wz).map(|w| w.times(dt)));
     let angular = body.angular(&rotation, &momentum);
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
@@ -42,8 +42,8 @@ pub(super) fn excess<S: Scalar>(
 
 /// The equations of a step, for the velocities of the free bodies, one after the other.
 pub(super) struct ImplicitStep<'a> {
-    pub(super) world: &'a World,
-    pub(super) lifted: &'a World<Fwd<12>>,
+    pub(super) model: &'a Model,
+    pub(super) lifted: &'a Model<Fwd<12>>,
     pub(super) states: &'a Rows,
     /// The states at the end, right for the bodies that are not free.
     pub(super) at_end: Vec<BodyState>,
@@ -61,7 +61,7 @@ impl ImplicitStep<'_> {
         let start = |flight: f64| {
             let velocity = |&body: &BodyId| {
                 let BodyState { linear, angular, .. } = self.states[body];
-                let linear = linear + self.world.gravity * flight;
+                let linear = linear + self.model.gravity * flight;
                 [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
             };
             DVector::from_vec(self.free.iter().flat_map(velocity).collect())
@@ -78,9 +78,9 @@ impl ImplicitStep<'_> {
     fn excesses(&self, x: &DVector<f64>, wrenches: &[Vector6<f64>]) -> DVector<f64> {
         let mut excesses = DVector::zeros(x.len());
         for (slot, &body) in self.free.iter().enumerate() {
-            let Some(rigid) = self.world.bodies[body].rigid() else { continue };
+            let Some(rigid) = self.model.bodies[body].rigid() else { continue };
             let (state, velocity) = (&self.states[body], velocity_at(x, slot));
-            let excess = excess(rigid, self.world, state, &velocity, &wrenches[body], self.step.dt);
+            let excess = excess(rigid, self.model, state, &velocity, &wrenches[body], self.step.dt);
             excesses.fixed_rows_mut::<6>(6 * slot).copy_from_slice(&excess);
         }
         excesses
@@ -126,14 +126,14 @@ impl ImplicitStep<'_> {
 
     pub(super) fn unsolved(&self, residual: f64, iterations: usize) -> SimulationError {
         let (step, time) = (self.step.index, self.step.start);
-        let (body, contact) = self.world.most_accelerated(self.states);
+        let (body, contact) = self.model.most_accelerated(self.states);
         SimulationError::Unsolved { step, time, body, contact, residual, iterations }
     }
 }
 
 impl Equations for ImplicitStep<'_> {
     fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
-        let wrenches = self.world.wrenches_of(&self.ends(x), self.step.index);
+        let wrenches = self.model.wrenches_of(&self.ends(x), self.step.index);
         self.excesses(x, &wrenches)
     }
 
@@ -143,10 +143,10 @@ impl Equations for ImplicitStep<'_> {
         let mut slots = vec![None; ends.len()];
         self.free.iter().enumerate().for_each(|(slot, &body)| slots[body] = Some(slot));
         let mut wrenches: Vec<Vector6<f64>> =
-            self.world.bodies.iter().map(|body| body.external_wrench).collect();
+            self.model.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
         let mut states: Vec<BodyState<Fwd<12>>> = ends.iter().map(BodyState::cast).collect();
-        let mut deflections = ends[self.world.bodies.len()..].iter().map(BodyState::cast);
+        let mut deflections = ends[self.model.bodies.len()..].iter().map(BodyState::cast);
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
             let bodies = [pair.bodies.samples, pair.bodies.field];
@@ -180,7 +180,7 @@ impl Equations for ImplicitStep<'_> {
     /// The velocity of equal kinetic energy of 1 kg \[m/s\].
     fn norm(&self, velocities: &DVector<f64>) -> Option<f64> {
         let energy = |(slot, &body): (usize, &BodyId)| {
-            let rigid = self.world.bodies[body].rigid()?;
+            let rigid = self.model.bodies[body].rigid()?;
             let at = Vector6::from(velocity_at(velocities, slot));
             let (linear, angular) = (at.fixed_rows::<3>(0), at.fixed_rows::<3>(3));
             let rotation = &self.states[body].pose.rotation;

@@ -5,9 +5,9 @@ use prehend_autodiff::Scalar;
 use super::Stages;
 use crate::error::Result;
 use crate::integrator::Integrator;
+use crate::model::Model;
 use crate::state::State;
 use crate::time::Step;
-use crate::world::World;
 
 /// The classic Runge–Kutta method, fourth order on smooth forces, four evaluations of them a step.
 ///
@@ -17,9 +17,9 @@ use crate::world::World;
 pub struct RungeKutta4;
 
 impl Integrator for RungeKutta4 {
-    fn step<S: Scalar>(&self, world: &World<S>, state: &State<S>, step: Step) -> Result<State<S>> {
-        let wrenches = world.wrenches_of(state.rows(), step.index);
-        let mut stages = Stages::new(world, state.rows(), &wrenches, step, 4);
+    fn step<S: Scalar>(&self, model: &Model<S>, state: &State<S>, step: Step) -> Result<State<S>> {
+        let wrenches = model.wrenches_of(state.rows(), step.index);
+        let mut stages = Stages::new(model, state.rows(), &wrenches, step, 4);
         stages.stage(0.5, &[0.5]);
         stages.stage(0.5, &[0.0, 0.5]);
         stages.stage(1.0, &[0.0, 0.0, 1.0]);

@@ -5,8 +5,8 @@ use prehend_autodiff::Scalar;
 
 use super::{Change, Stages};
 use crate::body_state::{BodyState, Rows};
+use crate::model::Model;
 use crate::time::Step;
-use crate::world::World;
 
 /// Fractions of the step and weights of the slopes before, of the second stage to the last, which is the end of the step
 /// (J. R. Dormand and P. J. Prince, "A family of embedded Runge–Kutta formulae", J. Comput. Appl. Math. 6, 1980).
@@ -64,22 +64,22 @@ pub(in crate::integrator) struct Estimate<S: Scalar> {
 
 /// A step from `states` with `wrenches` on them.
 pub(in crate::integrator) fn step<S: Scalar>(
-    world: &World<S>,
+    model: &Model<S>,
     states: &Rows<S>,
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> Trial<S> {
-    visit(&mut Stages::new(world, states, wrenches, step, 1 + STAGES.len()))
+    visit(&mut Stages::new(model, states, wrenches, step, 1 + STAGES.len()))
 }
 
 /// [`step`], and how far off it may be.
 pub(in crate::integrator) fn estimated<S: Scalar>(
-    world: &World<S>,
+    model: &Model<S>,
     states: &Rows<S>,
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> (Trial<S>, Estimate<S>) {
-    let mut stages = Stages::new(world, states, wrenches, step, 1 + STAGES.len());
+    let mut stages = Stages::new(model, states, wrenches, step, 1 + STAGES.len());
     let trial = visit(&mut stages);
     let estimate = Estimate {
         orders: stages.combined(&ERROR),

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use prehend_geometry::mjcf::{self, Actuator, Dynamics, JointKind, Model, Transmission};
+use prehend_geometry::mjcf::{
+    self, Actuator, Dynamics, JointKind, Model as MjcfModel, Transmission,
+};
 
 use super::MjcfError;
 use super::forces::Forces;
@@ -27,7 +29,7 @@ impl Forces<'_> {
         }
         let bound = match actuator.transmission {
             Transmission::Tendon(index) => {
-                let bound = self.model.tendons[index].actuator_force_range;
+                let bound = self.mjcf.tendons[index].actuator_force_range;
                 bound.map(|(low, high)| (index, [low, high]))
             }
             _ => None,
@@ -60,19 +62,19 @@ impl Forces<'_> {
                     Arc::new(AffineActuator { gain, bias, control_range, rate_range, ..affine })
                 }
             };
-            controlled = Some(self.world.add_coupled_force(&[(link.into(), 1.0)], state)?);
+            controlled = Some(self.model.add_coupled_force(&[(link.into(), 1.0)], state)?);
         }
         let law: Arc<dyn DynJointLaw> = match &actuator.muscle {
             Some(muscle) => Arc::new(self.muscle(muscle, &along)),
             None => Arc::new(AffineActuator {
                 control_range: if activation.is_some() { EVERYTHING } else { control_range },
                 force_range: range(actuator.force_range),
-                period: period(actuator, self.model),
+                period: period(actuator, self.mjcf),
                 ..affine
             }),
         };
         let Some(id) = self.add(&along, law)? else { return Ok(()) };
-        let force = self.world.joint_force_mut(id);
+        let force = self.model.joint_force_mut(id);
         force.is_actuator = true;
         force.input = activation.map(|link| (link.into(), actuator.ahead));
         force.bound = bound;
@@ -92,10 +94,10 @@ impl Forces<'_> {
 }
 
 /// Once around in the length of a servo that turns something; zero of others.
-fn period(actuator: &Actuator, model: &Model) -> f64 {
+fn period(actuator: &Actuator, mjcf: &MjcfModel) -> f64 {
     let [a, b, c, u, v, w] = actuator.gear;
     let torque = match &actuator.transmission {
-        Transmission::Joint { joint, .. } if model.joint(*joint).kind == JointKind::Ball => {
+        Transmission::Joint { joint, .. } if mjcf.joint(*joint).kind == JointKind::Ball => {
             [a, b, c]
         }
         Transmission::Site { reference: Some(_), .. } if [a, b, c] == [0.0; 3] => [u, v, w],

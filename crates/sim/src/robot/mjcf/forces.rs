@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3};
 use prehend_geometry::mjcf::{
-    EqualityKind, Joint, JointIndex, JointKind, Model, SolverParameters, Tendon,
+    EqualityKind, Joint, JointIndex, JointKind, Model as MjcfModel, SolverParameters, Tendon,
 };
 
 use super::super::constraints::{Mobility, limits, losses};
@@ -16,15 +16,15 @@ use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::polynomial::{PolynomialDamper, PolynomialSpring};
 use crate::joint_law::slack_spring::SlackSpring;
 use crate::joint_law::spring::JointSpring;
-use crate::world::World;
-use crate::world::joint_force::JointAxis;
-use crate::world::path::{Path, PathPart};
-use crate::world::transmission::Rotor;
+use crate::model::Model;
+use crate::model::joint_force::JointAxis;
+use crate::model::path::{Path, PathPart};
+use crate::model::transmission::Rotor;
 
 /// Adds forces along joints.
 pub(super) struct Forces<'a> {
-    pub(super) world: &'a mut World,
-    pub(super) model: &'a Model,
+    pub(super) model: &'a mut Model,
+    pub(super) mjcf: &'a MjcfModel,
     pub(super) lengths: Lengths<'a>,
     /// The first link.
     pub(super) link: BodyId,
@@ -43,8 +43,8 @@ pub(super) struct Forces<'a> {
 
 impl Forces<'_> {
     pub(super) fn add_all(&mut self) -> Result<(), MjcfError> {
-        let model = self.model;
-        for tendon in model.tendons.iter().filter(|tendon| tendon.armature > 0.0) {
+        let mjcf = self.mjcf;
+        for tendon in mjcf.tendons.iter().filter(|tendon| tendon.armature > 0.0) {
             let along = self.lengths.of_tendon(tendon, 1.0);
             self.rotors.push((tendon.armature, self.length(&along, &self.references[0]).1));
             let (axes, path) = match along {
@@ -52,18 +52,18 @@ impl Forces<'_> {
                 Along::Path(path) => (Vec::new(), Some(path)),
             };
             let (link, inertia) = (self.link, tendon.armature);
-            self.world.transmissions.rotors.push(Rotor { link, axes, path, inertia });
+            self.model.transmissions.rotors.push(Rotor { link, axes, path, inertia });
         }
-        for (place, index) in model.joint_indices().enumerate() {
+        for (place, index) in mjcf.joint_indices().enumerate() {
             let (_, axis, link) = self.lengths.axes[place];
-            self.add_joint(index, model.joint(index), axis, link)?;
+            self.add_joint(index, mjcf.joint(index), axis, link)?;
         }
-        for tendon in &model.tendons {
+        for tendon in &mjcf.tendons {
             self.add_tendon(tendon)?;
         }
-        for equality in model.equalities.iter().filter(|equality| equality.active) {
+        for equality in mjcf.equalities.iter().filter(|equality| equality.active) {
             let joint = |own| Along::Joints(vec![(self.lengths.axis(own).0, 1.0)]);
-            let tendon = |own: usize| self.lengths.of_tendon(&model.tendons[own], 1.0);
+            let tendon = |own: usize| self.lengths.of_tendon(&mjcf.tendons[own], 1.0);
             let (first, second, polynomial) = match &equality.kind {
                 EqualityKind::Joint { joints: (first, second), polynomial } => {
                     (joint(*first), second.map(joint), polynomial)
@@ -75,7 +75,7 @@ impl Forces<'_> {
             };
             self.couple(first, second, polynomial, &equality.solver)?;
         }
-        for (index, actuator) in model.actuators.iter().enumerate() {
+        for (index, actuator) in mjcf.actuators.iter().enumerate() {
             self.add_actuator(actuator, self.activations[index])?;
         }
         Ok(())
@@ -88,22 +88,22 @@ impl Forces<'_> {
     ) -> Result<Option<JointForceId>, MjcfError> {
         Ok(match along {
             Along::Joints(axes) if axes.is_empty() => None,
-            Along::Joints(axes) => Some(self.world.add_coupled_force(axes, law)?),
+            Along::Joints(axes) => Some(self.model.add_coupled_force(axes, law)?),
             Along::Path(path) => {
-                Some(self.world.add_path_force(self.link, Arc::clone(path), law)?)
+                Some(self.model.add_path_force(self.link, Arc::clone(path), law)?)
             }
         })
     }
 
     /// A length with the joints at coordinates `q`, and its slopes by all degrees of freedom.
     pub(super) fn length(&self, along: &Along, q: &[f64]) -> (f64, DMatrix<f64>) {
-        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let tree = &self.model.articulations[self.model.articulations.len() - 1].tree;
         let n = tree.nv();
         match along {
             Along::Joints(axes) => {
-                let slopes = self.world.slopes_along(axes, n);
+                let slopes = self.model.slopes_along(axes, n);
                 let position = |(axis, factor): &(JointAxis, f64)| {
-                    let (_, link) = self.world.link_of(axis.link).ok()?;
+                    let (_, link) = self.model.link_of(axis.link).ok()?;
                     Some(factor * q[tree.range(link)[0].start + axis.index])
                 };
                 (axes.iter().filter_map(position).sum(), slopes)
@@ -117,9 +117,9 @@ impl Forces<'_> {
 
     /// The parts of a way of this length.
     fn parts(&self, along: Along) -> Vec<PathPart> {
-        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let tree = &self.model.articulations[self.model.articulations.len() - 1].tree;
         let part = |(JointAxis { link, index }, factor)| {
-            let (_, own) = self.world.link_of(link).ok()?;
+            let (_, own) = self.model.link_of(link).ok()?;
             let [coordinates, dofs] = tree.range(own);
             let (coordinate, dof) = (coordinates.start + index, dofs.start + index);
             Some(PathPart::Axis { coordinate, dof, factor })
@@ -157,7 +157,7 @@ impl Forces<'_> {
         let Some([time, ratio]) = joint.spring_damper else {
             return [joint.stiffness, joint.damping];
         };
-        let tree = &self.world.articulations[self.world.articulations.len() - 1].tree;
+        let tree = &self.model.articulations[self.model.articulations.len() - 1].tree;
         let [_, dofs] = tree.range(link);
         let count = dofs.len() as f64;
         let mobility = dofs.map(|dof| {
@@ -190,7 +190,7 @@ impl Forces<'_> {
         self.add_losses(&along, (damping, joint.higher_damping), joint.friction_loss)?;
         if let Some((low, high)) = joint.actuator_force_range {
             let bound = (first, [low, high], joint.carries_by_actuator);
-            self.world.transmissions.bounds.push(bound);
+            self.model.transmissions.bounds.push(bound);
         }
         if let Some(range) = joint.range {
             self.add_limits(&Along::Joints(vec![(first, 1.0)]), range, &joint.limit_solver)?;
@@ -208,7 +208,7 @@ impl Forces<'_> {
         let is_free = joint.kind == JointKind::Free;
         let [stiffness, damping] = self.spring_and_damper(joint, link);
         let reference = match is_free {
-            true => self.model.bodies[index.body].t_parent_body,
+            true => self.mjcf.bodies[index.body].t_parent_body,
             false => Isometry3::identity(),
         };
         let bends = joint.higher_stiffness != [0.0; 2];

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use prehend_geometry::mjcf::{
-    Actuator, JointIndex, JointKind, Model, PlacedFrame, Tendon, TendonPart, Transmission,
+    Actuator, JointIndex, JointKind, Model as MjcfModel, PlacedFrame, Tendon, TendonPart,
+    Transmission,
 };
 
-use crate::world::joint_force::JointAxis;
-use crate::world::path::{Anchor, Frame, Obstacle, Path, PathPart};
+use crate::model::joint_force::JointAxis;
+use crate::model::path::{Anchor, Frame, Obstacle, Path, PathPart};
 
 /// A length.
 #[derive(Clone, Debug)]
@@ -18,12 +19,12 @@ pub(super) enum Along {
 
 /// Lengths along the joints and tendons of a model.
 pub(super) struct Lengths<'a> {
-    pub(super) model: &'a Model,
+    pub(super) mjcf: &'a MjcfModel,
     /// The link that each body is.
     pub(super) bodies: &'a [usize],
     /// Axis and link of each joint of the model, in ascending order.
     pub(super) axes: &'a [(JointIndex, JointAxis, usize)],
-    pub(super) t_world_model: nalgebra::Isometry3<f64>,
+    pub(super) t_world_mjcf: nalgebra::Isometry3<f64>,
 }
 
 impl Lengths<'_> {
@@ -36,7 +37,7 @@ impl Lengths<'_> {
     fn frame(&self, PlacedFrame { body, t_body_frame }: &PlacedFrame) -> Frame {
         let link = body.map(|body| self.bodies[body]);
         let t_link_frame =
-            if link.is_some() { *t_body_frame } else { self.t_world_model * t_body_frame };
+            if link.is_some() { *t_body_frame } else { self.t_world_mjcf * t_body_frame };
         Frame { link, t_link_frame }
     }
 
@@ -92,7 +93,7 @@ impl Lengths<'_> {
         match &actuator.transmission {
             Transmission::Joint { joint, in_parent } => {
                 let (axis, link) = self.axis(*joint);
-                match self.model.joint(*joint).kind {
+                match self.mjcf.joint(*joint).kind {
                     JointKind::Hinge | JointKind::Slide => Along::Joints(vec![(axis, gear[0])]),
                     kind => {
                         let (is_free, in_parent) = (kind == JointKind::Free, *in_parent);
@@ -101,7 +102,7 @@ impl Lengths<'_> {
                     }
                 }
             }
-            Transmission::Tendon(index) => self.of_tendon(&self.model.tendons[*index], gear[0]),
+            Transmission::Tendon(index) => self.of_tendon(&self.mjcf.tendons[*index], gear[0]),
             Transmission::Site { site, reference } => {
                 let frame = self.frame(site);
                 path(match reference {

@@ -1,7 +1,7 @@
 //! The links that bodies with their joints are.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
-use prehend_geometry::mjcf::{Body, Joint as MjcfJoint, JointKind, Model};
+use prehend_geometry::mjcf::{Body, Joint as MjcfJoint, JointKind, Model as MjcfModel};
 
 use super::MjcfOptions;
 use crate::articulated::{Joint, Link};
@@ -26,20 +26,20 @@ pub(super) struct ChainJoint {
 }
 
 impl Chain {
-    pub(super) fn new(model: &Model, options: &MjcfOptions) -> Self {
+    pub(super) fn new(mjcf: &MjcfModel, options: &MjcfOptions) -> Self {
         let mut chain = Self::default();
-        for body in &model.bodies {
+        for body in &mjcf.bodies {
             chain.add(body, options);
         }
         chain
     }
 
-    fn add(&mut self, body: &Body, MjcfOptions { t_world_model, base, .. }: &MjcfOptions) {
+    fn add(&mut self, body: &Body, MjcfOptions { t_world_mjcf, base, .. }: &MjcfOptions) {
         let mut parent = body.parent.map(|parent| self.bodies[parent]);
         // From what the next link hangs on to where it is while its joint is at its reference.
         let mut place = match parent {
             Some(_) => body.t_parent_body,
-            None => t_world_model * body.t_parent_body,
+            None => t_world_mjcf * body.t_parent_body,
         };
         for (number, joint) in body.joints.iter().enumerate() {
             let anchor = Translation3::from(joint.anchor.coords);
@@ -53,9 +53,9 @@ impl Chain {
                     (Joint::Prismatic(joint.axis), Isometry3::from(back))
                 }
                 JointKind::Ball => (Joint::Spherical, Isometry3::from(anchor)),
-                // Its position is one in the world.
+                // Its position is one in the model.
                 JointKind::Free => {
-                    place = *t_world_model;
+                    place = *t_world_mjcf;
                     (Joint::Floating, Isometry3::identity())
                 }
             };

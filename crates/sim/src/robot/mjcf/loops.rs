@@ -1,60 +1,60 @@
 //! Loops and couplings of a model.
 
 use nalgebra::{DMatrix, Isometry3, Point3};
-use prehend_geometry::mjcf::{EqualityKind, Model, SolverParameters};
+use prehend_geometry::mjcf::{EqualityKind, Model as MjcfModel, SolverParameters};
 
 use super::super::constraints::Mobility;
 use super::forces::stiffness;
 use super::{MjcfError, MjcfOptions, MjcfRobot};
 use crate::handle::BodyId;
-use crate::world::World;
-use crate::world::body::Body;
-use crate::world::bushing::{Bushing, BushingStiffness};
+use crate::model::Model;
+use crate::model::body::Body;
+use crate::model::bushing::{Bushing, BushingStiffness};
 
 /// Mobility that counts, as part of that of the most mobile direction.
 const LEAST_MOBILITY: f64 = 1e-2;
 
-/// Frames at anchors, of the model's world where that is what holds.
+/// Frames at anchors, of the file's world where that is what holds.
 fn placed(
     anchors: &[Point3<f64>; 2],
     fixed: [bool; 2],
-    t_world_model: &Isometry3<f64>,
+    t_world_mjcf: &Isometry3<f64>,
 ) -> [Isometry3<f64>; 2] {
     std::array::from_fn(|end| {
         let frame = Isometry3::from(anchors[end].coords);
-        if fixed[end] { t_world_model * frame } else { frame }
+        if fixed[end] { t_world_mjcf * frame } else { frame }
     })
 }
 
-impl World {
+impl Model {
     /// Adds the equality constraints of a model that act from the beginning, with stiffness by its mobility at coordinates, both of which are `at`.
     pub(super) fn add_loops(
         &mut self,
-        model: &Model,
+        mjcf: &MjcfModel,
         robot: &MjcfRobot,
         options: &MjcfOptions,
         at: (&Mobility, &[f64]),
     ) -> Result<(), MjcfError> {
         let ground = std::cell::OnceCell::new();
-        for equality in model.equalities.iter().filter(|equality| equality.active) {
-            let ends = |world: &mut Self, bodies: &[Option<usize>; 2]| {
+        for equality in mjcf.equalities.iter().filter(|equality| equality.active) {
+            let ends = |model: &mut Self, bodies: &[Option<usize>; 2]| {
                 bodies.map(|body| match body {
                     Some(body) => robot.bodies[body],
-                    None => *ground.get_or_init(|| world.add(Body::fixed("model's world"))),
+                    None => *ground.get_or_init(|| model.add(Body::fixed("world"))),
                 })
             };
             match &equality.kind {
                 EqualityKind::Connect { bodies, anchors } => {
                     let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
-                    let frames = placed(anchors, fixed, &options.t_world_model);
+                    let frames = placed(anchors, fixed, &options.t_world_mjcf);
                     let held = self.held(bodies, &frames, at, &equality.solver, options.softness);
                     self.add_bushing(Bushing { bodies, frames, stiffness: bushing(held, 0.0) })?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
                     let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
-                    let mut frames = placed(anchors, fixed, &options.t_world_model);
+                    let mut frames = placed(anchors, fixed, &options.t_world_mjcf);
                     // Axes of the second body as the first has them.
                     frames[0].rotation *= *rotation;
                     let held = self.held(bodies, &frames, at, &equality.solver, options.softness);

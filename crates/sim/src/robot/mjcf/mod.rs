@@ -10,25 +10,25 @@ mod sensors;
 mod shapes;
 
 use nalgebra::Isometry3;
-use prehend_geometry::mjcf::{Dynamics, JointKind, Model, Transmission};
+use prehend_geometry::mjcf::{Dynamics, JointKind, Model as MjcfModel, Transmission};
 use thiserror::Error;
 
 use crate::articulated::Joint;
 use crate::error::{BuildError, SimulationError};
 use crate::handle::BodyId;
 use crate::handle::JointForceId;
+use crate::model::Model;
+use crate::model::joint_force::JointAxis;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
 use crate::state::State;
-use crate::world::World;
-use crate::world::joint_force::JointAxis;
 
 /// Options of reading a robot in MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfOptions {
-    /// Model's world → world.
-    pub t_world_model: Isometry3<f64>,
-    /// How bodies that would be fixed to the model's world hang on it instead: on a slide that lifts a gripper, for instance.
+    /// World of the file → world.
+    pub t_world_mjcf: Isometry3<f64>,
+    /// How bodies that would be fixed to the file's world hang on it instead: on a slide that lifts a gripper, for instance.
     pub base: Joint,
     /// True if bodies get the shapes that collide, as samples and fields; contacts are up to the caller. Meshes are their convex hulls, as in MuJoCo.
     pub shapes: bool,
@@ -44,13 +44,13 @@ pub struct MjcfOptions {
 impl Default for MjcfOptions {
     /// At the world's origin, with shapes, time constants of loops a fifth of the file's.
     fn default() -> Self {
-        let (t_world_model, shape_options) = (Isometry3::identity(), ShapeOptions::default());
+        let (t_world_mjcf, shape_options) = (Isometry3::identity(), ShapeOptions::default());
         let (base, partial) = (Joint::Fixed, false);
-        Self { t_world_model, base, shapes: true, shape_options, softness: 0.2, partial }
+        Self { t_world_mjcf, base, shapes: true, shape_options, softness: 0.2, partial }
     }
 }
 
-/// A robot in a world.
+/// A robot in a model.
 #[derive(Clone, Debug)]
 pub struct MjcfRobot {
     /// The body of each body of the model, in its order. Its frame is the body's.
@@ -81,23 +81,23 @@ impl MjcfRobot {
         Some(self.joints.iter().find(|(own, _)| own == name)?.1)
     }
 
-    /// Puts a mocap body at `t_world_body`, as MuJoCo's `mocap_pos` and `mocap_quat` do: between steps, for it has no velocity.
+    /// Puts a mocap body at `t_world_mjcf`, as MuJoCo's `mocap_pos` and `mocap_quat` do: between steps, for it has no velocity.
     ///
     /// # Errors
-    /// If the model has no such mocap body, or it is no state of the world.
+    /// If the model has no such mocap body, or it is no state of the model.
     pub fn set_mocap(
         &self,
-        world: &mut World,
+        model: &mut Model,
         state: &mut State,
         name: &str,
-        t_world_body: &Isometry3<f64>,
+        t_world_mjcf: &Isometry3<f64>,
     ) -> Result<(), MjcfError> {
         let none = || MjcfError::NoMocap { name: name.to_owned() };
         let body = self.body(name).filter(|body| self.mocaps.contains(body)).ok_or_else(none)?;
-        world.joint_place(state.rows(), body)?;
-        let (articulation, link) = world.link_of(body)?;
-        world.articulations[articulation].tree.links_mut()[link].t_parent_joint = *t_world_body;
-        world.forward_kinematics(state.rows_mut());
+        model.joint_place(state.rows(), body)?;
+        let (articulation, link) = model.link_of(body)?;
+        model.articulations[articulation].tree.links_mut()[link].t_parent_joint = *t_world_mjcf;
+        model.forward_kinematics(state.rows_mut());
         Ok(())
     }
 
@@ -107,7 +107,7 @@ impl MjcfRobot {
     }
 }
 
-/// Why a robot in MJCF cannot become part of a world.
+/// Why a robot in MJCF cannot become part of a model.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum MjcfError {
     /// A shape cannot be.
@@ -120,7 +120,7 @@ pub enum MjcfError {
     },
     /// Its bodies are no articulation, or a force does not fit.
     #[error(transparent)]
-    World(#[from] BuildError),
+    Model(#[from] BuildError),
     /// A state does not fit.
     #[error(transparent)]
     State(#[from] SimulationError),
@@ -146,54 +146,54 @@ pub enum MjcfError {
         /// Its name.
         name: String,
     },
-    /// Something that changes how the model moves, and that a world has no counterpart of.
+    /// Something that changes how the model moves, and that a model has no counterpart of.
     #[error("{what}: there is no counterpart (with `partial`, it is left out)")]
     NoCounterpart {
-        /// Name of the element, and its part that a world cannot represent.
+        /// Name of the element, and its part that a model cannot represent.
         what: String,
     },
 }
 
-impl World {
+impl Model {
     /// Adds the bodies of a model as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops. Geoms
-    /// of the model's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
+    /// of the file's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
     /// [`Model::reference_positions`] puts it where the file has it.
     ///
-    /// Contacts are the caller's to add, with [`World::add_contacts_between`].
+    /// Contacts are the caller's to add, with [`Model::add_contacts_between`].
     ///
     /// # Errors
-    /// If a body weighs nothing and yet should move by itself, or a shape cannot be. The world is then as it was.
+    /// If a body weighs nothing and yet should move by itself, or a shape cannot be. The model is then as it was.
     pub fn add_mjcf(
         &mut self,
-        model: &Model,
+        mjcf: &MjcfModel,
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
         let mut grown = self.clone();
-        let robot = grown.insert_mjcf(model, options)?;
+        let robot = grown.insert_mjcf(mjcf, options)?;
         *self = grown;
         Ok(robot)
     }
 
-    /// [`World::add_mjcf`], which on an error leaves a part behind.
+    /// [`Model::add_mjcf`], which on an error leaves a part behind.
     fn insert_mjcf(
         &mut self,
-        model: &Model,
+        mjcf: &MjcfModel,
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
-        let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
-        for (what, changes) in left_out(model, options) {
+        let mut warnings: Vec<String> = mjcf.warnings.iter().map(ToString::to_string).collect();
+        for (what, changes) in left_out(mjcf, options) {
             if changes && !options.partial {
                 return Err(MjcfError::NoCounterpart { what });
             }
             warnings.push(what);
         }
-        let mut chain = links::Chain::new(model, options);
-        let activated = model.actuators.iter().filter(|own| own.dynamics != Dynamics::Direct);
+        let mut chain = links::Chain::new(mjcf, options);
+        let activated = mjcf.actuators.iter().filter(|own| own.dynamics != Dynamics::Direct);
         let first = chain.links.len();
         chain.links.extend(activated.map(|own| links::activation(&own.name)));
         let links = self.add_articulation(chain.links)?;
         let mut states = links[first..].iter().copied();
-        let activations = model.actuators.iter().map(|own| match own.dynamics {
+        let activations = mjcf.actuators.iter().map(|own| match own.dynamics {
             Dynamics::Direct => None,
             _ => states.next(),
         });
@@ -204,35 +204,35 @@ impl World {
             actuators: Vec::new(),
             warnings,
             activations: links[first..].to_vec(),
-            names: model.bodies.iter().map(|body| body.name.clone()).collect(),
+            names: mjcf.bodies.iter().map(|body| body.name.clone()).collect(),
             sensors: sensors::Sensors::default(),
             mocaps: chain.mocaps.iter().map(|link| links[*link]).collect(),
             moved: chain.joints.iter().map(|joint| (joint.kind, links[joint.link])).collect(),
         };
         if options.shapes {
-            self.add_shapes(model, &robot, options)?;
+            self.add_shapes(mjcf, &robot, options)?;
         }
-        for (body, id) in model.bodies.iter().zip(&robot.bodies) {
+        for (body, id) in mjcf.bodies.iter().zip(&robot.bodies) {
             if body.gravity_compensation != 0.0 {
                 self.transmissions.carried.push((*id, body.gravity_compensation));
             }
         }
         let Some(link) = links.first().copied() else { return Ok(robot) };
-        let joints = model.joint_indices().zip(&chain.joints);
+        let joints = mjcf.joint_indices().zip(&chain.joints);
         let axes: Vec<_> =
             joints.map(|(index, own)| (index, links[own.link].into(), own.link)).collect();
         let lengths = lengths::Lengths {
-            model,
+            mjcf,
             bodies: &chain.bodies,
             axes: &axes,
-            t_world_model: options.t_world_model,
+            t_world_mjcf: options.t_world_mjcf,
         };
         let sensors = sensors::Sensors::new(&lengths);
-        let references = self.reference_coordinates(model, &robot)?;
+        let references = self.reference_coordinates(mjcf, &robot)?;
         let mobility = self.mobility(&references[0]);
         let mut forces = forces::Forces {
-            world: self,
-            model,
+            model: self,
+            mjcf,
             lengths,
             link,
             activations,
@@ -244,14 +244,14 @@ impl World {
         };
         forces.add_all()?;
         let actuators = forces.actuators;
-        self.add_loops(model, &robot, options, (&mobility, &references[0]))?;
+        self.add_loops(mjcf, &robot, options, (&mobility, &references[0]))?;
         Ok(MjcfRobot { actuators, sensors, ..robot })
     }
 }
 
 /// Parts of the model without a counterpart, and whether they change how it moves.
-fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (String, bool)> {
-    let joints = model.joint_indices().map(|index| model.joint(index));
+fn left_out(mjcf: &MjcfModel, options: &MjcfOptions) -> impl Iterator<Item = (String, bool)> {
+    let joints = mjcf.joint_indices().map(|index| mjcf.joint(index));
     let joints = joints.flat_map(|joint| {
         let bends = joint.kind == JointKind::Free && joint.higher_stiffness != [0.0; 2];
         let left = [
@@ -262,18 +262,18 @@ fn left_out(model: &Model, options: &MjcfOptions) -> impl Iterator<Item = (Strin
         let left = left.into_iter().filter(|(is, ..)| *is);
         left.map(move |(_, what, changes)| (format!("joint '{name}': {what}"), changes))
     });
-    let bounded = model.actuators.iter().filter(|own| {
+    let bounded = mjcf.actuators.iter().filter(|own| {
         own.muscle.is_some() && (own.force_range.is_some() || own.activation_range.is_some())
     });
     let bounded = bounded.map(|own| (format!("actuator '{}': bounds of a muscle", own.name), true));
-    let actuators = model.actuators.iter().filter_map(|own| match own.transmission {
+    let actuators = mjcf.actuators.iter().filter_map(|own| match own.transmission {
         Transmission::Adhesion(_) if options.shapes => {
             Some((format!("actuator '{}': its hold on what touches a body", own.name), true))
         }
         _ => None,
     });
-    let of_bodies = model.bodies.iter().flat_map(|body| &body.geoms).map(|geom| (geom, true));
-    let geoms = model.world_geoms.iter().map(|geom| (geom, false)).chain(of_bodies);
+    let of_bodies = mjcf.bodies.iter().flat_map(|body| &body.geoms).map(|geom| (geom, true));
+    let geoms = mjcf.world_geoms.iter().map(|geom| (geom, false)).chain(of_bodies);
     let terrain =
         geoms.filter(|(geom, _)| options.shapes && geom.collides() && shapes::is_terrain(geom));
     let terrain = terrain.map(|(geom, of_body)| {

@@ -1,12 +1,12 @@
 //! Positions, velocities and accelerations of all joints in MuJoCo's order and axes.
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, Unit, Vector3};
-use prehend_geometry::mjcf::{JointKind, Model};
+use prehend_geometry::mjcf::{JointKind, Model as MjcfModel};
 
 use super::{MjcfError, MjcfRobot};
 use crate::body_state::BodyState;
+use crate::model::Model;
 use crate::state::State;
-use crate::world::World;
 
 /// Checks the count of numbers.
 fn check(what: &'static str, numbers: &[f64], expected: usize) -> Result<(), MjcfError> {
@@ -18,10 +18,10 @@ impl MjcfRobot {
     /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
     ///
     /// # Errors
-    /// If they are too few or too many, or it is no state of the world.
+    /// If they are too few or too many, or it is no state of the model.
     pub fn set_positions(
         &self,
-        world: &World,
+        model: &Model,
         state: &mut State,
         positions: &[f64],
     ) -> Result<(), MjcfError> {
@@ -40,20 +40,20 @@ impl MjcfRobot {
                 JointKind::Ball => turned(own).to_vec(),
                 JointKind::Free => own[..3].iter().copied().chain(turned(&own[3..])).collect(),
             };
-            world.write_joint(state.rows_mut(), *link, &position, &vec![0.0; kind.velocities()])?;
+            model.write_joint(state.rows_mut(), *link, &position, &vec![0.0; kind.velocities()])?;
         }
-        world.forward_kinematics(state.rows_mut());
+        model.forward_kinematics(state.rows_mut());
         Ok(())
     }
 
-    /// Sets the velocities of all joints in MuJoCo's order and axes, its `qvel`: a free joint's velocity is along the axes of the model's world, its
+    /// Sets the velocities of all joints in MuJoCo's order and axes, its `qvel`: a free joint's velocity is along the axes of the file's world, its
     /// angular velocity along the body's.
     ///
     /// # Errors
-    /// If they are too few or too many, or it is no state of the world.
+    /// If they are too few or too many, or it is no state of the model.
     pub fn set_velocities(
         &self,
-        world: &World,
+        model: &Model,
         state: &mut State,
         velocities: &[f64],
     ) -> Result<(), MjcfError> {
@@ -63,32 +63,32 @@ impl MjcfRobot {
         for (kind, link) in &self.moved {
             let (own, after) = rest.split_at(kind.velocities());
             rest = after;
-            let joint = world.joint(state, *link)?;
+            let joint = model.joint(state, *link)?;
             let mut velocity = own.to_vec();
             if *kind == JointKind::Free {
                 let along =
                     axes(&joint.position).transpose() * Vector3::from_column_slice(&own[..3]);
                 velocity[..3].copy_from_slice(along.as_slice());
             }
-            world.write_joint(state.rows_mut(), *link, &joint.position, &velocity)?;
+            model.write_joint(state.rows_mut(), *link, &joint.position, &velocity)?;
         }
-        world.forward_kinematics(state.rows_mut());
+        model.forward_kinematics(state.rows_mut());
         Ok(())
     }
 
     /// Sets the states of actuators that have one, MuJoCo's `act`.
     ///
     /// # Errors
-    /// If they are too few or too many, or it is no state of the world.
+    /// If they are too few or too many, or it is no state of the model.
     pub fn set_activations(
         &self,
-        world: &World,
+        model: &Model,
         state: &mut State,
         activations: &[f64],
     ) -> Result<(), MjcfError> {
         check("activations", activations, self.activations.len())?;
         for (link, activation) in self.activations.iter().zip(activations) {
-            world.write_joint(state.rows_mut(), *link, &[0.0], &[*activation])?;
+            model.write_joint(state.rows_mut(), *link, &[0.0], &[*activation])?;
         }
         Ok(())
     }
@@ -96,13 +96,13 @@ impl MjcfRobot {
     /// Accelerations of all joints in MuJoCo's order and axes, its `qacc`.
     ///
     /// # Panics
-    /// If it is no state of the world.
-    pub fn accelerations(&self, world: &World, state: &State) -> Vec<f64> {
+    /// If it is no state of the model.
+    pub fn accelerations(&self, model: &Model, state: &State) -> Vec<f64> {
         let states = state.rows();
-        let wrenches = world.wrenches_of(states, 0);
+        let wrenches = model.wrenches_of(states, 0);
         let mut all = Vec::new();
         for (kind, link) in &self.moved {
-            let Ok((place, joint)) = world.joint_place(states, *link) else { continue };
+            let Ok((place, joint)) = model.joint_place(states, *link) else { continue };
             let mut own = joint.accelerations(&wrenches[place]);
             if *kind == JointKind::Free {
                 let BodyState { pose, linear, angular } = &states[place];
@@ -117,23 +117,23 @@ impl MjcfRobot {
     /// The mass matrix in MuJoCo's order and axes, with the armature of joints and tendons.
     ///
     /// # Panics
-    /// If it is no state of the world.
-    pub fn mass_matrix(&self, world: &World, state: &State) -> DMatrix<f64> {
-        let Some(Ok((articulation, _))) = self.moved.first().map(|(_, link)| world.link_of(*link))
+    /// If it is no state of the model.
+    pub fn mass_matrix(&self, model: &Model, state: &State) -> DMatrix<f64> {
+        let Some(Ok((articulation, _))) = self.moved.first().map(|(_, link)| model.link_of(*link))
         else {
             return DMatrix::zeros(0, 0);
         };
-        let own = world.mass_matrix(articulation, state.rows());
+        let own = model.mass_matrix(articulation, state.rows());
         let count = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
         // Velocities of the articulation by MuJoCo's.
         let mut turned = DMatrix::zeros(own.nrows(), count);
         let mut column = 0;
         for (kind, link) in &self.moved {
-            let Ok((_, link_index)) = world.link_of(*link) else { continue };
-            let [_, dofs] = world.articulations[articulation].tree.range(link_index);
+            let Ok((_, link_index)) = model.link_of(*link) else { continue };
+            let [_, dofs] = model.articulations[articulation].tree.range(link_index);
             let n = kind.velocities();
             turned.view_mut((dofs.start, column), (n, n)).fill_with_identity();
-            if let (JointKind::Free, Ok(joint)) = (kind, world.joint(state, *link)) {
+            if let (JointKind::Free, Ok(joint)) = (kind, model.joint(state, *link)) {
                 let axes = axes(&joint.position).transpose();
                 turned.view_mut((dofs.start, column), (3, 3)).copy_from(&axes);
             }
@@ -143,17 +143,17 @@ impl MjcfRobot {
     }
 }
 
-impl World {
+impl Model {
     /// Coordinates of the last articulation, which is `robot`'s, with all joints at their references and at those of their springs.
     pub(super) fn reference_coordinates(
         &self,
-        model: &Model,
+        mjcf: &MjcfModel,
         robot: &MjcfRobot,
     ) -> Result<[Vec<f64>; 2], MjcfError> {
-        let reference = model.reference_positions();
+        let reference = mjcf.reference_positions();
         let mut slack = reference.clone();
         let mut at = 0;
-        for joint in model.joint_indices().map(|index| model.joint(index)) {
+        for joint in mjcf.joint_indices().map(|index| mjcf.joint(index)) {
             if matches!(joint.kind, JointKind::Hinge | JointKind::Slide) {
                 slack[at] = joint.spring_reference;
             }

@@ -10,10 +10,10 @@ use super::lengths::{Along, Lengths};
 use super::{MjcfError, MjcfRobot};
 use crate::body_state::BodyState;
 use crate::handle::BodyId;
+use crate::model::Model;
 use crate::state::State;
-use crate::world::World;
 
-/// Quantities that sensors measure, with the bodies and lengths in a world.
+/// Quantities that sensors measure, with the bodies and lengths in a model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sensors {
     all: Vec<Sensor>,
@@ -23,20 +23,20 @@ pub(super) struct Sensors {
     actuators: Vec<Along>,
     /// Each body's parent, mass \[kg\], center of mass and inertia.
     inertials: Vec<(Option<usize>, Option<Inertial>)>,
-    t_world_model: Isometry3<f64>,
+    t_world_mjcf: Isometry3<f64>,
 }
 
 impl Sensors {
     pub(super) fn new(lengths: &Lengths<'_>) -> Self {
-        let (model, t_world_model) = (lengths.model, lengths.t_world_model);
-        let inertials = model.bodies.iter().map(|body| (body.parent, body.inertial));
+        let (mjcf, t_world_mjcf) = (lengths.mjcf, lengths.t_world_mjcf);
+        let inertials = mjcf.bodies.iter().map(|body| (body.parent, body.inertial));
         Self {
-            all: model.sensors.clone(),
+            all: mjcf.sensors.clone(),
             joints: lengths.axes.iter().map(|(joint, axis, _)| (*joint, axis.link)).collect(),
-            tendons: model.tendons.iter().map(|own| lengths.of_tendon(own, 1.0)).collect(),
-            actuators: model.actuators.iter().map(|own| lengths.of_actuator(own)).collect(),
+            tendons: mjcf.tendons.iter().map(|own| lengths.of_tendon(own, 1.0)).collect(),
+            actuators: mjcf.actuators.iter().map(|own| lengths.of_actuator(own)).collect(),
             inertials: inertials.collect(),
-            t_world_model,
+            t_world_mjcf,
         }
     }
 }
@@ -57,45 +57,45 @@ impl MjcfRobot {
     /// The reading of a sensor, in MuJoCo's order and units, without noise: see [`Quantity`].
     ///
     /// # Errors
-    /// If there is no such sensor, an accelerometer is on what nothing moves, or it is no state of the world.
-    pub fn sensor(&self, world: &World, state: &State, name: &str) -> Result<Vec<f64>, MjcfError> {
+    /// If there is no such sensor, an accelerometer is on what nothing moves, or it is no state of the model.
+    pub fn sensor(&self, model: &Model, state: &State, name: &str) -> Result<Vec<f64>, MjcfError> {
         let sensor = self.sensors.all.iter().find(|own| own.name == name);
         let sensor = sensor.ok_or_else(|| MjcfError::NoSensor { name: name.to_owned() })?;
-        let state = world.sensed(state)?;
-        let mut numbers = self.measured(world, &state, &sensor.quantity)?;
+        let state = model.sensed(state)?;
+        let mut numbers = self.measured(model, &state, &sensor.quantity)?;
         numbers.iter_mut().for_each(|x| *x = x.clamp(-sensor.cutoff, sensor.cutoff));
         Ok(numbers)
     }
 
     fn measured(
         &self,
-        world: &World,
+        model: &Model,
         state: &State,
         quantity: &Quantity,
     ) -> Result<Vec<f64>, MjcfError> {
         let three = |v: Vector3<f64>| Ok(v.as_slice().to_vec());
         match quantity {
             Quantity::JointPosition(joint) => {
-                let position = world.joint(state, self.sensors.joints[joint])?.position;
+                let position = model.joint(state, self.sensors.joints[joint])?.position;
                 Ok(match position[..] {
                     [i, j, k, w] => vec![w, i, j, k],
                     _ => position,
                 })
             }
             Quantity::JointVelocity(joint) => {
-                Ok(world.joint(state, self.sensors.joints[joint])?.velocity)
+                Ok(model.joint(state, self.sensors.joints[joint])?.velocity)
             }
             Quantity::TendonLength(k) => {
-                Ok(self.along(world, state, &self.sensors.tendons[*k])?[..1].to_vec())
+                Ok(self.along(model, state, &self.sensors.tendons[*k])?[..1].to_vec())
             }
             Quantity::TendonVelocity(k) => {
-                Ok(self.along(world, state, &self.sensors.tendons[*k])?[1..].to_vec())
+                Ok(self.along(model, state, &self.sensors.tendons[*k])?[1..].to_vec())
             }
             Quantity::ActuatorLength(k) => {
-                Ok(self.along(world, state, &self.sensors.actuators[*k])?[..1].to_vec())
+                Ok(self.along(model, state, &self.sensors.actuators[*k])?[..1].to_vec())
             }
             Quantity::ActuatorVelocity(k) => {
-                Ok(self.along(world, state, &self.sensors.actuators[*k])?[1..].to_vec())
+                Ok(self.along(model, state, &self.sensors.actuators[*k])?[1..].to_vec())
             }
             Quantity::Frame { part, frame, reference } => {
                 let own = self.moving(state, frame);
@@ -111,13 +111,13 @@ impl MjcfRobot {
                 three(own.pose.rotation.inverse() * own.angular)
             }
             Quantity::Accelerometer(PlacedFrame { body, t_body_frame }) => {
-                // Nothing moves the world.
+                // Nothing moves the model.
                 let Some(body) = body else {
-                    let turn = self.sensors.t_world_model.rotation * t_body_frame.rotation;
-                    return three(turn.inverse() * -world.gravity);
+                    let turn = self.sensors.t_world_mjcf.rotation * t_body_frame.rotation;
+                    return three(turn.inverse() * -model.gravity);
                 };
                 let point = t_body_frame.translation.vector.into();
-                let felt = world.accelerometer(self.bodies[*body], &point, state)?;
+                let felt = model.accelerometer(self.bodies[*body], &point, state)?;
                 three(t_body_frame.rotation.inverse() * felt)
             }
             Quantity::SubtreeCenter(body) => three(self.subtree(state, *body)[0]),
@@ -127,19 +127,19 @@ impl MjcfRobot {
     }
 
     /// A length and its rate.
-    fn along(&self, world: &World, state: &State, along: &Along) -> Result<[f64; 2], MjcfError> {
+    fn along(&self, model: &Model, state: &State, along: &Along) -> Result<[f64; 2], MjcfError> {
         let mut sum = [0.0; 2];
         match along {
             Along::Joints(axes) => {
                 for (axis, factor) in axes {
-                    let motion = world.joint_motion(state, *axis)?;
+                    let motion = model.joint_motion(state, *axis)?;
                     sum = [0, 1].map(|k| sum[k] + factor * motion[k]);
                 }
             }
             Along::Path(path) => {
-                let (articulation, _) = world.link_of(self.bodies[0])?;
-                let own = &world.articulations[articulation];
-                let [q, v] = own.coordinates(&state.rows()[world.joint_range(articulation)]);
+                let (articulation, _) = model.link_of(self.bodies[0])?;
+                let own = &model.articulations[articulation];
+                let [q, v] = own.coordinates(&state.rows()[model.joint_range(articulation)]);
                 let length = path.length(&own.tree.kinematics(&q, &v), &q, false);
                 let rate = length.slopes.iter().zip(&v).map(|(slope, v)| slope * v).sum();
                 sum = [length.value, rate];
@@ -150,7 +150,7 @@ impl MjcfRobot {
 
     fn moving(&self, state: &State, PlacedFrame { body, t_body_frame }: &PlacedFrame) -> Moving {
         let Some(body) = body else {
-            let pose = self.sensors.t_world_model * t_body_frame;
+            let pose = self.sensors.t_world_mjcf * t_body_frame;
             return Moving { pose, linear: Vector3::zeros(), angular: Vector3::zeros() };
         };
         let BodyState { pose, linear, angular } = state[self.bodies[*body]];
@@ -187,7 +187,7 @@ impl MjcfRobot {
     }
 }
 
-/// A part of a frame's pose or velocity, in another or in the world.
+/// A part of a frame's pose or velocity, in another or in the model.
 fn part_of(part: FramePart, own: &Moving, base: Option<&Moving>) -> Vec<f64> {
     let still =
         Moving { pose: Isometry3::identity(), linear: Vector3::zeros(), angular: Vector3::zeros() };

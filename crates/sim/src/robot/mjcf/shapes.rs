@@ -7,32 +7,34 @@ use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::shape::{
     Ball, Capsule, Compound, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, SharedShape,
 };
-use prehend_geometry::mjcf::{Geom, HeightField as Terrain, Model, Shape as MjcfShape};
+use prehend_geometry::mjcf::{
+    Geom, HeightField as Terrain, Model as MjcfModel, Shape as MjcfShape,
+};
 use prehend_geometry::sdf::HeightSpline;
 
 use super::{MjcfError, MjcfOptions, MjcfRobot};
 use crate::fields::{HalfSpace as Below, Placed};
+use crate::model::Model;
+use crate::model::body::Body;
 use crate::shape::Shape;
 use crate::shape::error::ShapeError;
 use crate::shape::height_field::HeightField;
 use crate::shape::options::ShapeOptions;
-use crate::world::World;
-use crate::world::body::Body;
 
 /// Corners of an ellipsoid's hull along each angle.
 const ELLIPSOID: usize = 12;
 
-impl World {
-    /// Gives the robot's bodies the shapes of their geoms that collide, and adds the fixed ones of the model's world.
+impl Model {
+    /// Gives the robot's bodies the shapes of their geoms that collide, and adds the fixed ones of the file's world.
     pub(super) fn add_shapes(
         &mut self,
-        model: &Model,
+        mjcf: &MjcfModel,
         robot: &MjcfRobot,
         options: &MjcfOptions,
     ) -> Result<(), MjcfError> {
         // Bodies of the same geoms share their shape.
         let mut made: Vec<(&[Geom], Option<Shape>)> = Vec::new();
-        for (body, id) in model.bodies.iter().zip(&robot.bodies) {
+        for (body, id) in mjcf.bodies.iter().zip(&robot.bodies) {
             let wrong = |error| MjcfError::Shape { body: body.name.clone(), error };
             let known = made.iter().find(|(geoms, _)| same(geoms, &body.geoms));
             let shape = match known {
@@ -49,13 +51,13 @@ impl World {
                 own.field = Some(shape.field().clone());
             }
         }
-        for geom in model.world_geoms.iter().filter(|geom| geom.collides()) {
+        for geom in mjcf.world_geoms.iter().filter(|geom| geom.collides()) {
             let wrong = |error| MjcfError::Shape { body: geom.name.clone(), error };
             let shape = match geom.shape {
                 MjcfShape::Plane { .. } => {
-                    let turned = options.t_world_model.rotation * geom.t_body_geom.rotation;
+                    let turned = options.t_world_mjcf.rotation * geom.t_body_geom.rotation;
                     let normal = turned * nalgebra::Vector3::z();
-                    let place = options.t_world_model * geom.t_body_geom.translation.vector;
+                    let place = options.t_world_mjcf * geom.t_body_geom.translation.vector;
                     let field = Below {
                         normal: nalgebra::Unit::new_normalize(normal),
                         height: normal.dot(&place),
@@ -66,13 +68,13 @@ impl World {
                 }
                 MjcfShape::HeightField(ref terrain) => {
                     let field = ground(terrain).ok_or(ShapeError::Heights).map_err(wrong)?;
-                    let pose = options.t_world_model * geom.t_body_geom * field.pose;
+                    let pose = options.t_world_mjcf * geom.t_body_geom * field.pose;
                     let body = Body::fixed(&geom.name);
                     self.add(body.with_field(Arc::new(Placed { pose, ..field })));
                     continue;
                 }
                 _ => {
-                    let t_body_geom = options.t_world_model * geom.t_body_geom;
+                    let t_body_geom = options.t_world_mjcf * geom.t_body_geom;
                     let placed = Geom { t_body_geom, ..geom.clone() };
                     shape(std::slice::from_ref(&placed), &options.shape_options).map_err(wrong)?
                 }

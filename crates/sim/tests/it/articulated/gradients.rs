@@ -2,43 +2,43 @@
 
 use prehend_autodiff::{Fwd, Scalar, gradient};
 use prehend_geometry::SplitMix64;
-use prehend_sim::{Integrator, SemiImplicitEuler, State, StepCheckpointed, TimeSteps, World};
+use prehend_sim::{Integrator, Model, SemiImplicitEuler, State, StepCheckpointed, TimeSteps};
 
 use super::scenes::random_scene;
 
 const STEPS: TimeSteps = TimeSteps { dt: 2e-4, steps: 6 };
 
 /// Whether contacts push at the start.
-fn touches((world, states): &(World, State)) -> bool {
-    let mut world = world.clone();
-    world.bushings.clear();
-    world.bodies.iter().zip(world.wrenches(states, 0)).any(|(_, wrench)| wrench.norm() > 0.1)
+fn touches((model, states): &(Model, State)) -> bool {
+    let mut model = model.clone();
+    model.bushings.clear();
+    model.bodies.iter().zip(model.wrenches(states, 0)).any(|(_, wrench)| wrench.norm() > 0.1)
 }
 
-/// Every number of a world and of the joints' and the ball's states, moved by `x`, to a weighted sum of the states in the end.
+/// Every number of a model and of the joints' and the ball's states, moved by `x`, to a weighted sum of the states in the end.
 fn weighed<S: Scalar>(
-    (world, states): &(World, State),
+    (model, states): &(Model, State),
     integrator: &impl Integrator,
     x: &[S],
 ) -> S {
-    let parameters = world.parameters();
+    let parameters = model.parameters();
     let moved: Vec<S> = parameters.iter().zip(x).map(|(p, x)| x.plus(*p)).collect();
-    let world = world.with_parameters(&moved).unwrap();
+    let model = model.with_parameters(&moved).unwrap();
     let mut rest = x[parameters.len()..].iter().copied();
     let mut next = || rest.next().unwrap();
     let mut start: State<S> = states.cast();
     start[1] = states[1].retract(&std::array::from_fn(|_| next()));
-    let links = world.articulations[0].bodies().to_vec();
-    for (link, body) in world.articulations[0].tree.links().iter().zip(links) {
-        let at = world.joint(&start, body).unwrap();
+    let links = model.articulations[0].bodies().to_vec();
+    for (link, body) in model.articulations[0].tree.links().iter().zip(links) {
+        let at = model.joint(&start, body).unwrap();
         let dofs = link.joint.nv();
         let velocity: Vec<S> = at.velocity.iter().map(|v| *v + next()).collect();
         // Along coordinates, quaternions too: they are normalized where they are read.
         let position: Vec<S> = at.position.iter().map(|q| *q + next()).collect();
         assert_eq!(velocity.len(), dofs);
-        world.set_joint(&mut start, body, &position, &velocity).unwrap();
+        model.set_joint(&mut start, body, &position, &velocity).unwrap();
     }
-    let end = world.simulate_with(integrator, &start, STEPS).unwrap().states;
+    let end = model.simulate_with(integrator, &start, STEPS).unwrap().states;
     let all = end.rows().iter().skip(1).flat_map(|state| {
         let [a, b, c] =
             [state.pose.translation.vector, state.linear, state.angular].map(<[S; 3]>::from);
@@ -51,14 +51,14 @@ fn weighed<S: Scalar>(
     all.zip(weights).fold(S::zero(), |sum, (x, weight)| sum + x.times(weight))
 }
 
-fn inputs((world, _): &(World, State)) -> usize {
-    let joints = world.articulations[0].tree.links().iter().map(|link| &link.joint);
+fn inputs((model, _): &(Model, State)) -> usize {
+    let joints = model.articulations[0].tree.links().iter().map(|link| &link.joint);
     let joints = joints.map(|joint| joint.nq() + joint.nv());
-    world.parameters().len() + 12 + joints.sum::<usize>()
+    model.parameters().len() + 12 + joints.sum::<usize>()
 }
 
 /// A direction in which every number moves by a part of its size.
-fn direction(scene: &(World, State), random: &mut SplitMix64) -> Vec<f64> {
+fn direction(scene: &(Model, State), random: &mut SplitMix64) -> Vec<f64> {
     let mut size = scene.0.parameters();
     size.iter_mut().for_each(|x| *x = 0.1 * x.abs());
     // The center of mass of the free ball, after the floor's wrench and its own mass and inertia.

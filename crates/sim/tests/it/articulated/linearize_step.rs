@@ -4,19 +4,19 @@ use nalgebra::DMatrix;
 use prehend_autodiff::Fwd;
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::Joint;
-use prehend_sim::{SemiImplicitEuler, State, Step, World};
+use prehend_sim::{Model, SemiImplicitEuler, State, Step};
 
 use super::scenes::random_scene;
 
 /// Derivatives of the velocities of bodies and joints, and of places, by initial velocities and coordinates, by forward mode.
-fn by_velocities(world: &World, states: &State, step: Step) -> DMatrix<f64> {
+fn by_velocities(model: &Model, states: &State, step: Step) -> DMatrix<f64> {
     let free = 1;
-    let links = world.articulations[0].bodies();
+    let links = model.articulations[0].bodies();
     let joints: Vec<&Joint> =
-        world.articulations[0].tree.links().iter().map(|link| &link.joint).collect();
+        model.articulations[0].tree.links().iter().map(|link| &link.joint).collect();
     let n = 6 + joints.iter().map(|joint| joint.nv()).sum::<usize>();
     let mut all = DMatrix::zeros(n, n);
-    let lifted = world.cast::<Fwd<1>>();
+    let lifted = model.cast::<Fwd<1>>();
     for column in 0..n {
         let mut start: State<Fwd<1>> = states.cast();
         if column < 6 {
@@ -51,25 +51,25 @@ fn by_velocities(world: &World, states: &State, step: Step) -> DMatrix<f64> {
 fn the_closed_form_is_forward_mode() {
     let (mut closed, mut forward) = (0, 0);
     for seed in 0..200 {
-        let (mut world, states) = random_scene(seed);
+        let (mut model, states) = random_scene(seed);
         let has = |kind: fn(&Joint) -> bool| {
-            world.articulations[0].tree.links().iter().any(|link| kind(&link.joint))
+            model.articulations[0].tree.links().iter().any(|link| kind(&link.joint))
         };
         let custom = has(|joint| matches!(joint, Joint::Custom(_)));
         // Laws along their axes have no closed form.
         if has(|joint| matches!(joint, Joint::Spherical)) {
-            world.joint_forces.clear();
+            model.joint_forces.clear();
         }
-        let sticks = world.contacts.iter().any(|pair| pair.law().bristles().is_some());
+        let sticks = model.contacts.iter().any(|pair| pair.law().bristles().is_some());
         let step = Step::new(0, 1e-3);
-        let found = world.linearize_step(&states, step).unwrap();
+        let found = model.linearize_step(&states, step).unwrap();
         let n = found.by_force.ncols();
-        let end = world.step(&SemiImplicitEuler, &states, step).unwrap();
+        let end = model.step(&SemiImplicitEuler, &states, step).unwrap();
         for (a, b) in found.state.rows().iter().zip(end.rows()) {
             assert!((a.pose.to_homogeneous() - b.pose.to_homogeneous()).norm() < 1e-12);
             assert!((a.linear - b.linear).norm() + (a.angular - b.angular).norm() < 1e-10);
         }
-        let expected = by_velocities(&world, &states, step);
+        let expected = by_velocities(&model, &states, step);
         let off = (found.by_state.view((n, n), (n, n)) - &expected).amax() / expected.amax();
         assert!(off < 1e-11, "{seed}: {off}");
         if custom || sticks {
@@ -77,7 +77,7 @@ fn the_closed_form_is_forward_mode() {
             continue;
         }
         closed += 1;
-        let reference = world.linearize_step_by_forward_mode(&states, step).unwrap();
+        let reference = model.linearize_step_by_forward_mode(&states, step).unwrap();
         for (name, a, b) in [
             ("state", &found.by_state, &reference.by_state),
             ("force", &found.by_force, &reference.by_force),
@@ -92,18 +92,18 @@ fn the_closed_form_is_forward_mode() {
 #[test]
 fn displacements_lead_from_one_state_to_another() {
     for seed in 0..40 {
-        let (world, state) = random_scene(seed);
+        let (model, state) = random_scene(seed);
         let mut random = SplitMix64::new(seed);
         let by: Vec<f64> =
-            (0..2 * world.degrees_of_freedom()).map(|_| random.uniform() - 0.5).collect();
-        let displaced = world.displaced(&state, &by);
-        let found = world.displacement(&state, &displaced);
+            (0..2 * model.degrees_of_freedom()).map(|_| random.uniform() - 0.5).collect();
+        let displaced = model.displaced(&state, &by);
+        let found = model.displacement(&state, &displaced);
         for (found, by) in found.iter().zip(&by) {
             assert!((found - by).abs() < 1e-12, "{seed}: {found} {by}");
         }
         // Its derivatives at the state itself are the directions.
-        let lifted = world.displaced(&state, &Fwd::<1>::variables([0.0]).repeat(by.len()));
-        let found = world.displacement(&state, &lifted);
+        let lifted = model.displaced(&state, &Fwd::<1>::variables([0.0]).repeat(by.len()));
+        let found = model.displacement(&state, &lifted);
         assert!(
             found.iter().all(|x| x.value.abs() < 1e-15 && (x.derivative[0] - 1.0).abs() < 1e-12)
         );
@@ -113,26 +113,26 @@ fn displacements_lead_from_one_state_to_another() {
 #[test]
 fn generalized_coordinates_are_set_and_read() {
     for seed in 0..40 {
-        let (world, state) = random_scene(seed);
+        let (model, state) = random_scene(seed);
         let mut random = SplitMix64::new(seed);
         let by: Vec<f64> =
-            (0..2 * world.degrees_of_freedom()).map(|_| random.uniform() - 0.5).collect();
-        let displaced = world.displaced(&state, &by);
-        let all = world.generalized_coordinates(&displaced);
-        assert_eq!(all.velocity.len(), world.degrees_of_freedom());
+            (0..2 * model.degrees_of_freedom()).map(|_| random.uniform() - 0.5).collect();
+        let displaced = model.displaced(&state, &by);
+        let all = model.generalized_coordinates(&displaced);
+        assert_eq!(all.velocity.len(), model.degrees_of_freedom());
         let mut set = state.clone();
-        world.set_generalized_coordinates(&mut set, &all.position, &all.velocity).unwrap();
+        model.set_generalized_coordinates(&mut set, &all.position, &all.velocity).unwrap();
         let difference =
-            world.displacement(&displaced, &set).into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            model.displacement(&displaced, &set).into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         assert!(difference < 1e-12, "{seed}: {difference}");
         for (a, b) in set.bodies().iter().zip(displaced.bodies()) {
             assert!((a.pose.to_homogeneous() - b.pose.to_homogeneous()).amax() < 1e-12);
         }
         let before = set.clone();
-        let short = world.set_generalized_coordinates(&mut set, &all.position[1..], &all.velocity);
+        let short = model.set_generalized_coordinates(&mut set, &all.position[1..], &all.velocity);
         assert!(short.unwrap_err().to_string().contains("the world has"));
         let zeros = vec![0.0; all.position.len()];
-        let none = world.set_generalized_coordinates(&mut set, &zeros, &all.velocity);
+        let none = model.set_generalized_coordinates(&mut set, &zeros, &all.velocity);
         let turns = all.position.len() > all.velocity.len();
         assert_eq!(none.is_err(), turns);
         assert!(!turns || set == before);

@@ -1,4 +1,4 @@
-//! Articulations as parts of a world.
+//! Articulations as parts of a model.
 
 mod free_body;
 mod golden;

@@ -12,7 +12,7 @@ use prehend_sim::joint_law::{
 };
 use prehend_sim::{
     Body, BristleFriction, Bushing, BushingStiffness, ContactBodies, Coulomb, DynContactLaw,
-    GapSmoothing, KelvinVoigt, Law, RigidBody, State, Surface, World,
+    GapSmoothing, KelvinVoigt, Law, Model, RigidBody, State, Surface,
 };
 
 /// A nut on a thread.
@@ -67,59 +67,59 @@ pub(super) fn coulomb_law() -> (Arc<dyn DynContactLaw>, GapSmoothing) {
 }
 
 /// A tree whose links are balls, low over a floor, beside a free ball; everything is pressed together and moves.
-pub(super) fn random_scene(seed: u64) -> (World, State) {
+pub(super) fn random_scene(seed: u64) -> (Model, State) {
     let mut random = SplitMix64::new(seed);
     let count = 1 + seed as usize % 6;
     let links = (0..count).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
     let links: Vec<Link> = links.collect();
-    let mut world = World::new(Vector3::new(0.1, -0.2, -9.81));
+    let mut model = Model::new(Vector3::new(0.1, -0.2, -9.81));
     let floor = Body::fixed("floor")
         .with_field(Arc::new(HalfSpace { height: -0.02, ..HalfSpace::floor() }));
-    let floor = world.add(floor);
-    let ball = |world: &mut World, body, radius: f64| {
-        let body: &mut Body = &mut world.bodies[body];
+    let floor = model.add(floor);
+    let ball = |model: &mut Model, body, radius: f64| {
+        let body: &mut Body = &mut model.bodies[body];
         body.surface = Some(Arc::new(Surface::ball(radius).unwrap()));
         body.field = Some(Arc::new(Sphere { center: Point3::origin(), radius }));
     };
-    let free = world.add(Body::dynamic("ball", RigidBody::ball(0.3, 0.06).unwrap()));
-    ball(&mut world, free, 0.06);
-    let bodies = world.add_articulation(links).unwrap();
-    bodies.iter().for_each(|body| ball(&mut world, *body, 0.08));
+    let free = model.add(Body::dynamic("ball", RigidBody::ball(0.3, 0.06).unwrap()));
+    ball(&mut model, free, 0.06);
+    let bodies = model.add_articulation(links).unwrap();
+    bodies.iter().for_each(|body| ball(&mut model, *body, 0.08));
     let (slides, smoothing) = coulomb_law();
     let holds = BristleFriction { friction: FRICTION, deflection: 1e-3 };
     let holds: Arc<dyn DynContactLaw> = Arc::new(Law::new(SPRING, holds).unwrap());
     for (index, &samples) in bodies.iter().enumerate() {
         let field = if index % 2 == 0 { floor } else { free };
         let law = if index % 3 == 2 { holds.clone() } else { slides.clone() };
-        world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
-        let moves = world.articulations[0].tree.links()[index].joint.nv();
-        if moves == 0 || matches!(world.articulations[0].tree.links()[index].joint, Joint::Floating)
+        model.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
+        let moves = model.articulations[0].tree.links()[index].joint.nv();
+        if moves == 0 || matches!(model.articulations[0].tree.links()[index].joint, Joint::Floating)
         {
             continue;
         }
-        world.add_joint_force(samples, JointDamper { damping: 0.05 }).unwrap();
+        model.add_joint_force(samples, JointDamper { damping: 0.05 }).unwrap();
         match index % 3 {
             0 => {
-                world.add_joint_force(samples, JointSpring { stiffness: 2.0, rest: 0.1 }).unwrap();
+                model.add_joint_force(samples, JointSpring { stiffness: 2.0, rest: 0.1 }).unwrap();
                 let friction = JointFriction { friction: 0.1, velocity_scale: 0.1 };
-                world.add_joint_force(samples, friction).unwrap();
+                model.add_joint_force(samples, friction).unwrap();
             }
             1 => {
                 let servo =
                     PositionServo { target: 0.3, stiffness: 5.0, damping: 0.1, max_effort: 50.0 };
-                world.add_joint_force(samples, servo).unwrap();
+                model.add_joint_force(samples, servo).unwrap();
             }
             _ => {
                 let servo = VelocityServo { target: 1.0, damping: 0.3, max_effort: 50.0 };
-                world.add_joint_force(samples, servo).unwrap();
+                model.add_joint_force(samples, servo).unwrap();
                 let limits =
                     JointLimits { lower: -0.01, upper: 0.01, stiffness: 50.0, damping: 0.2 };
-                world.add_joint_force(samples, limits).unwrap();
+                model.add_joint_force(samples, limits).unwrap();
             }
         }
     }
     if let [a, .., b] = bodies.as_slice() {
-        world.add_symmetric_contact(*a, *b, slides, smoothing).unwrap();
+        model.add_symmetric_contact(*a, *b, slides, smoothing).unwrap();
     }
     if seed % 5 < 2 {
         let frames = [
@@ -130,19 +130,19 @@ pub(super) fn random_scene(seed: u64) -> (World, State) {
         let inertia = if seed.is_multiple_of(2) { 1e-3 } else { 0.0 };
         let stiffness = BushingStiffness::critical(0.03, inertia, 0.05);
         let bodies = [last, others[seed as usize % 5]];
-        world.add_bushing(Bushing { bodies, frames, stiffness }).unwrap();
+        model.add_bushing(Bushing { bodies, frames, stiffness }).unwrap();
     }
-    let mut states = world.neutral_state();
+    let mut states = model.neutral_state();
     states[free].pose.translation.vector = Vector3::new(0.05, 0.02, 0.03);
     states[free].linear = Vector3::new(0.1, -0.3, -0.2);
     for (index, &link) in bodies.iter().enumerate() {
-        let joint = world.articulations[0].tree.links()[index].joint.clone();
+        let joint = model.articulations[0].tree.links()[index].joint.clone();
         let mut numbers = |n: usize| (0..n).map(|_| 0.3 * random.normal()).collect::<Vec<f64>>();
         let mut q: Vec<f64> = joint.neutral().to_vec();
         let change = numbers(q.len());
         q.iter_mut().zip(change).for_each(|(q, x)| *q += 0.3 * x);
         let v = numbers(joint.nv());
-        world.set_joint(&mut states, link, &q, &v).unwrap();
+        model.set_joint(&mut states, link, &q, &v).unwrap();
     }
-    (world, states)
+    (model, states)
 }

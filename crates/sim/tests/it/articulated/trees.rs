@@ -4,44 +4,44 @@ use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::Energy;
 use prehend_sim::{
-    Adaptive, Batch, ContactBodies, Integrator, RungeKutta4, SemiImplicitEuler, State,
-    StepCheckpointed, TimeSteps, World,
+    Adaptive, Batch, ContactBodies, Integrator, Model, RungeKutta4, SemiImplicitEuler, State,
+    StepCheckpointed, TimeSteps,
 };
 
 use super::scenes::{coulomb_law, random_link, random_scene};
 
 /// A tree of 12 links in free motion; every third floats.
-fn free_tree(seed: u64) -> (World, State) {
+fn free_tree(seed: u64) -> (Model, State) {
     let mut random = SplitMix64::new(seed);
-    let mut world = World::new(nalgebra::Vector3::new(0.1, -0.2, -9.81));
+    let mut model = Model::new(nalgebra::Vector3::new(0.1, -0.2, -9.81));
     let links = (0..12).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
-    let bodies = world.add_articulation(links.collect()).unwrap();
-    let mut states = world.neutral_state();
+    let bodies = model.add_articulation(links.collect()).unwrap();
+    let mut states = model.neutral_state();
     for link in bodies {
-        let mut joint = world.joint(&states, link).unwrap();
+        let mut joint = model.joint(&states, link).unwrap();
         joint.velocity.iter_mut().for_each(|v| *v = random.normal());
-        world.set_joint(&mut states, link, &joint.position, &joint.velocity).unwrap();
+        model.set_joint(&mut states, link, &joint.position, &joint.velocity).unwrap();
     }
-    (world, states)
+    (model, states)
 }
 
-fn energy(world: &World, states: &State) -> f64 {
+fn energy(model: &Model, states: &State) -> f64 {
     let [mut q, mut v] = [Vec::new(), Vec::new()];
-    for link in world.articulations[0].bodies() {
-        let joint = world.joint(states, *link).unwrap();
+    for link in model.articulations[0].bodies() {
+        let joint = model.joint(states, *link).unwrap();
         q.extend(joint.position);
         v.extend(joint.velocity);
     }
-    let at = world.articulations[0].tree.kinematics(&q, &v).under(world.gravity);
+    let at = model.articulations[0].tree.kinematics(&q, &v).under(model.gravity);
     let Energy { kinetic, potential } = at.energy(&v);
     kinetic + potential
 }
 
 fn lost(seed: u64, integrator: &impl Integrator, steps: usize) -> f64 {
-    let (world, start) = free_tree(seed);
+    let (model, start) = free_tree(seed);
     let time_steps = TimeSteps { dt: 0.1 / steps as f64, steps };
-    let end = world.simulate_with(integrator, &start, time_steps).unwrap().states;
-    (energy(&world, &end) - energy(&world, &start)).abs()
+    let end = model.simulate_with(integrator, &start, time_steps).unwrap().states;
+    (energy(&model, &end) - energy(&model, &start)).abs()
 }
 
 #[test]
@@ -58,26 +58,26 @@ fn large_trees_keep_energy_to_the_order_of_the_integrator() {
 
 /// The place of the last link, by gravity and by the first velocity.
 fn end_by_two<S: Scalar>(
-    (world, states): &(World, State),
+    (model, states): &(Model, State),
     [gravity, velocity]: [S; 2],
-) -> (World<S>, State<S>) {
-    let mut world = world.cast::<S>();
-    world.gravity.z = gravity;
+) -> (Model<S>, State<S>) {
+    let mut model = model.cast::<S>();
+    model.gravity.z = gravity;
     let mut states: State<S> = states.cast();
-    let link = world.articulations[0].bodies()[0];
-    let mut joint = world.joint(&states, link).unwrap();
+    let link = model.articulations[0].bodies()[0];
+    let mut joint = model.joint(&states, link).unwrap();
     if let Some(first) = joint.velocity.first_mut() {
         *first = velocity;
     }
-    world.set_joint(&mut states, link, &joint.position, &joint.velocity).unwrap();
-    (world, states)
+    model.set_joint(&mut states, link, &joint.position, &joint.velocity).unwrap();
+    (model, states)
 }
 
 const X: [f64; 2] = [-9.0, 0.4];
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 2e-3, steps: 5 };
 
-fn height<S: Scalar>(world: &World<S>, end: &State<S>) -> S {
-    end[world.bodies.len() - 1].pose.translation.z
+fn height<S: Scalar>(model: &Model<S>, end: &State<S>) -> S {
+    end[model.bodies.len() - 1].pose.translation.z
 }
 
 #[test]
@@ -85,19 +85,19 @@ fn error_control_records_what_forward_mode_carries() {
     for seed in 0..24 {
         let scene = random_scene(seed);
         let tight = Adaptive { sensitivity_tolerance: 1e-6, ..Adaptive::default() };
-        let (world, start) = end_by_two(&scene, Fwd::<2>::variables(X));
-        let end = world.simulate_with(&tight, &start, TIME_STEPS).unwrap().states;
-        let forward = height(&world, &end);
+        let (model, start) = end_by_two(&scene, Fwd::<2>::variables(X));
+        let end = model.simulate_with(&tight, &start, TIME_STEPS).unwrap().states;
+        let forward = height(&model, &end);
         let checkpointed = StepCheckpointed::new(tight, &scene.0).unwrap();
         let reverse = |kept: bool| {
             let recording = Recording::start();
             let x = recording.variables(X);
-            let (world, start) = end_by_two(&scene, x);
+            let (model, start) = end_by_two(&scene, x);
             let end = match kept {
-                true => world.simulate_with(&tight, &start, TIME_STEPS),
-                false => world.simulate_with(&checkpointed, &start, TIME_STEPS),
+                true => model.simulate_with(&tight, &start, TIME_STEPS),
+                false => model.simulate_with(&checkpointed, &start, TIME_STEPS),
             };
-            let end = height(&world, &end.unwrap().states);
+            let end = height(&model, &end.unwrap().states);
             let adjoints = recording.gradient(end);
             (end.value(), x.map(|x| adjoints.wrt(x)))
         };
@@ -111,8 +111,8 @@ fn error_control_records_what_forward_mode_carries() {
     }
 }
 
-fn heights_of_five<S: Scalar>(ends: impl Iterator<Item = State<S>>, world: &World) -> S {
-    let lifted = world.cast();
+fn heights_of_five<S: Scalar>(ends: impl Iterator<Item = State<S>>, model: &Model) -> S {
+    let lifted = model.cast();
     ends.fold(S::constant(0.0), |sum, end| sum + height(&lifted, &end))
 }
 
@@ -122,8 +122,8 @@ fn side_by_side<I: Integrator + Copy + Send + 'static>(integrator: I) {
     let numbers = |x: [f64; 2]| (0..5).map(move |i| [x[0] + f64::from(i), x[1]]);
     let alone: Vec<State> = numbers(X)
         .map(|x| {
-            let (world, start) = end_by_two(&scene, x);
-            world.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
+            let (model, start) = end_by_two(&scene, x);
+            model.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
         })
         .collect();
     let together = batch.simulate(numbers(X).map(|x| end_by_two(&scene, x)), TIME_STEPS);
@@ -132,8 +132,8 @@ fn side_by_side<I: Integrator + Copy + Send + 'static>(integrator: I) {
 
     let forward = (0..5).map(|i| {
         let x: [Fwd<2>; 2] = Fwd::variables(X);
-        let (world, start) = end_by_two(&scene, [x[0].plus(f64::from(i)), x[1]]);
-        world.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
+        let (model, start) = end_by_two(&scene, [x[0].plus(f64::from(i)), x[1]]);
+        model.simulate_with(&integrator, &start, TIME_STEPS).unwrap().states
     });
     let expected = heights_of_five(forward, &scene.0).derivative;
     let recording = Recording::start();
@@ -173,9 +173,9 @@ fn groups_of_links_do_as_contacts_one_by_one() {
                     .unwrap();
             }
         }
-        let [a, b] = [&grouped, &named].map(|world| {
+        let [a, b] = [&grouped, &named].map(|model| {
             let steps = TimeSteps { dt: 2e-4, steps: 20 };
-            world.simulate_with(&SemiImplicitEuler, &start, steps).unwrap().states
+            model.simulate_with(&SemiImplicitEuler, &start, steps).unwrap().states
         });
         let mut moved = 0.0_f64;
         for ((a, b), start) in a.rows().iter().zip(b.rows()).zip(start.rows()) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_sim::fields::Sphere;
-use prehend_sim::{Body, BodyState, DynContactLaw, GapSmoothing, State, Surface, TimeSteps, World};
+use prehend_sim::{Body, BodyState, DynContactLaw, GapSmoothing, Model, State, Surface, TimeSteps};
 
 use super::integrators::{INPUTS, Scheme};
 use super::laws::{G, Law, Spec};
@@ -29,20 +29,20 @@ fn two_balls(
     spec: &Spec,
     smoothing: GapSmoothing,
     points: [&[Point3<f64>]; 2],
-) -> World {
-    let mut world = World::new(Vector3::zeros());
+) -> Model {
+    let mut model = Model::new(Vector3::zeros());
     let inertia = 0.4 * MASS * RADIUS * RADIUS;
     let [a, b] = points.map(|points| {
         let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
         let ball = Body::dynamic("ball", rigid(MASS, inertia));
-        world.add(
+        model.add(
             ball.with_surface(surface)
                 .with_field(Arc::new(Sphere { center: Point3::origin(), radius: RADIUS })),
         )
     });
     let law: Arc<dyn DynContactLaw> = (law.build)(spec);
-    world.add_symmetric_contact(a, b, law, smoothing).unwrap();
-    world
+    model.add_symmetric_contact(a, b, law, smoothing).unwrap();
+    model
 }
 
 fn ball_at(position: Vector3<f64>, linear: Vector3<f64>) -> BodyState {
@@ -58,7 +58,7 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
     };
     let points: Vec<Point3<f64>> = (0..150).map(point).collect();
     let spec = Spec { damping: 0.3, ..elastic(5e-3, 4, 0.5) };
-    let world = two_balls(law, &spec, GapSmoothing::Hard, [&points, &points]);
+    let model = two_balls(law, &spec, GapSmoothing::Hard, [&points, &points]);
     let mut start = State::new([
         ball_at(Vector3::new(-0.021, 0.0, 0.005), Vector3::new(0.5, 0.1, 0.0)),
         ball_at(Vector3::new(0.021, 0.01, 0.0), Vector3::new(-0.3, 0.0, 0.2)),
@@ -75,7 +75,7 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
         ]
     };
     let time_steps = TimeSteps { dt: 5e-5, steps: 1000 };
-    let end = scheme.end(&world, &start, time_steps);
+    let end = scheme.end(&model, &start, time_steps);
     let ([p0, l0], [p1, l1]) = (momenta(&start), momenta(&end));
     let hit = (end[0].linear - start[0].linear).norm() > 0.05;
     let lost = |a: Vector3<f64>, b: Vector3<f64>| if hit { (a - b).norm() } else { f64::NAN };
@@ -104,12 +104,12 @@ pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let smoothing = GapSmoothing::Softplus { width: 1.3 * dt };
     let spec = elastic(duration, 1, 0.0);
     let point = [Point3::origin()];
-    let world = on_floor(law, &spec, smoothing, Vector3::zeros(), &point, 1e-3);
+    let model = on_floor(law, &spec, smoothing, Vector3::zeros(), &point, 1e-3);
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
     let bounces = (0..20).map(|phase| {
         let start = above_floor(1.0 + dt * f64::from(phase) / 20.0, -Vector3::z());
         let start = State::new([start[0].cast(), varied(&start[BODY], &[(2, 0), (8, 1)])]);
-        let end = scheme.method.differentiate(&world, &start, time_steps).unwrap()[BODY];
+        let end = scheme.method.differentiate(&model, &start, time_steps).unwrap()[BODY];
         let [by_height, by_speed, ..] = end.pose.translation.z.derivative;
         let speed = if scheme.keeps_energy { 1.0 } else { end.linear.z.value };
         [by_height, by_speed, speed]
@@ -138,7 +138,7 @@ pub(crate) fn exchange(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let dt = duration / 20.0;
     let smoothing = GapSmoothing::Softplus { width: 1.3 * dt };
     let poles = [Point3::new(RADIUS, 0.0, 0.0), Point3::new(-RADIUS, 0.0, 0.0)];
-    let world = two_balls(law, &elastic(duration, 1, 0.0), smoothing, [&poles[..1], &poles[1..]]);
+    let model = two_balls(law, &elastic(duration, 1, 0.0), smoothing, [&poles[..1], &poles[1..]]);
     let start = [
         ball_at(Vector3::new(-0.5, 0.0, 0.0), Vector3::x()),
         ball_at(Vector3::zeros(), Vector3::zeros()),
@@ -146,7 +146,7 @@ pub(crate) fn exchange(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let varied =
         State::new([varied(&start[0], &[(0, 0), (6, 2)]), varied(&start[1], &[(0, 1), (6, 3)])]);
     let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
-    let end = scheme.method.differentiate(&world, &varied, time_steps).unwrap();
+    let end = scheme.method.differentiate(&model, &varied, time_steps).unwrap();
     let second = end[1].pose.translation.x.derivative;
     let [slow, fast] = [0, 1].map(|ball: usize| end[ball].linear.x.value);
     let e = if scheme.keeps_energy { 1.0 } else { fast - slow };

@@ -1,7 +1,7 @@
 //! Bodies that touch nothing.
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use prehend_sim::{Body, BodyState, RigidBody, State, TimeSteps, World};
+use prehend_sim::{Body, BodyState, Model, RigidBody, State, TimeSteps};
 
 use super::integrators::Scheme;
 use super::laws::G;
@@ -10,11 +10,11 @@ use super::scene::{down, rigid};
 
 /// Velocity −n g dt, and the scheme's own sum of it.
 pub(crate) fn free_fall(scheme: &Scheme) -> Vec<Row> {
-    let mut world = World::new(down());
-    world.add(Body::dynamic("body", rigid(0.3, 1e-3)));
+    let mut model = Model::new(down());
+    model.add(Body::dynamic("body", rigid(0.3, 1e-3)));
     let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
     let end =
-        scheme.end(&world, &State::new([BodyState::at_rest(Isometry3::identity())]), time_steps)[0];
+        scheme.end(&model, &State::new([BodyState::at_rest(Isometry3::identity())]), time_steps)[0];
     let (dt, n) = (time_steps.dt, time_steps.steps as f64);
     let height = -G * dt * dt * n * (n + scheme.fall_lead) / 2.0;
     vec![
@@ -27,26 +27,26 @@ fn spinning(
     inertia: Vector3<f64>,
     tilt: UnitQuaternion<f64>,
     spin: Vector3<f64>,
-) -> (World, BodyState) {
-    let mut world = World::new(Vector3::zeros());
+) -> (Model, BodyState) {
+    let mut model = Model::new(Vector3::zeros());
     let inertia = Matrix3::from_diagonal(&inertia);
-    world.add(Body::dynamic("top", RigidBody::new(0.3, inertia, Point3::origin()).unwrap()));
+    model.add(Body::dynamic("top", RigidBody::new(0.3, inertia, Point3::origin()).unwrap()));
     let pose = Isometry3::from_parts(nalgebra::Translation3::identity(), tilt);
-    (world, BodyState { angular: tilt * spin, ..BodyState::at_rest(pose) })
+    (model, BodyState { angular: tilt * spin, ..BodyState::at_rest(pose) })
 }
 
-fn angular_momentum(world: &World, state: &BodyState) -> Vector3<f64> {
-    world.bodies[0].rigid().unwrap().world_inertia(&state.pose.rotation) * state.angular
+fn angular_momentum(model: &Model, state: &BodyState) -> Vector3<f64> {
+    model.bodies[0].rigid().unwrap().world_inertia(&state.pose.rotation) * state.angular
 }
 
 /// A symmetric top's axis turns about the angular momentum at L/I₁ (Landau and Lifshitz, Mechanics, §33).
 pub(crate) fn precession(scheme: &Scheme) -> Vec<Row> {
     let tilt = UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5);
     let spin = Vector3::new(1.2, 0.0, 5.0);
-    let (world, start) = spinning(Vector3::new(2e-3, 2e-3, 1e-3), tilt, spin);
-    let momentum = angular_momentum(&world, &start);
+    let (model, start) = spinning(Vector3::new(2e-3, 2e-3, 1e-3), tilt, spin);
+    let momentum = angular_momentum(&model, &start);
     let time_steps = TimeSteps { dt: 1e-4, steps: 8000 };
-    let end = scheme.end(&world, &State::new([start]), time_steps)[0];
+    let end = scheme.end(&model, &State::new([start]), time_steps)[0];
     let across = |state: &BodyState| {
         let axis = state.pose.rotation * Vector3::z();
         axis - momentum * (axis.dot(&momentum) / momentum.norm_squared())
@@ -56,7 +56,7 @@ pub(crate) fn precession(scheme: &Scheme) -> Vec<Row> {
     let expected = momentum.norm() / 2e-3 * 0.8;
     let mut rows = vec![Row::new("angle L t/I₁ [rad]", turned, expected, 2e-3)];
     if scheme.keeps_angular_momentum {
-        let kept = angular_momentum(&world, &end);
+        let kept = angular_momentum(&model, &end);
         let lost = (kept - momentum).norm() / momentum.norm();
         rows.push(Row::new("angular momentum lost, relative", lost, 0.0, 1e-10));
     }
@@ -68,7 +68,7 @@ pub(crate) fn precession(scheme: &Scheme) -> Vec<Row> {
 pub(crate) fn flip(scheme: &Scheme) -> Vec<Row> {
     let [i1, i2, i3] = [1e-3, 2e-3, 3e-3];
     let (fast, slight) = (10.0, 2.0);
-    let (world, start) = spinning(
+    let (model, start) = spinning(
         Vector3::new(i1, i2, i3),
         UnitQuaternion::identity(),
         Vector3::new(0.0, fast, slight),
@@ -80,7 +80,7 @@ pub(crate) fn flip(scheme: &Scheme) -> Vec<Row> {
         (i2 - i1) * (energy2 * i3 - momentum2) / ((i3 - i2) * (momentum2 - energy2 * i1));
     let expected = 2.0 * complete_elliptic(modulus2) / rate;
     let time_steps = TimeSteps { dt: 1e-5, steps: 140_000 };
-    let course = scheme.course(&world, &State::new([start]), time_steps, 0);
+    let course = scheme.course(&model, &State::new([start]), time_steps, 0);
     let middle = |s: &BodyState| s.pose.rotation.inverse_transform_vector(&s.angular).y;
     // Moments at which the spin about the middle axis passes zero.
     let mut turns = course.windows(2).enumerate().filter_map(|(i, pair)| {

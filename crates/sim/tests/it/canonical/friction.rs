@@ -18,10 +18,10 @@ fn slide(
     time_steps: TimeSteps,
 ) -> Vec<BodyState> {
     let gravity = Vector3::new(G * theta.sin(), 0.0, -G * theta.cos());
-    let world = slab(law, &spec, gravity);
-    let height = carrying_height(&world, spec.mass * G * theta.cos(), -spec.depth * 1.01, 0.0);
+    let model = slab(law, &spec, gravity);
+    let height = carrying_height(&model, spec.mass * G * theta.cos(), -spec.depth * 1.01, 0.0);
     let start = above_floor(height, Vector3::new(speed, 0.0, 0.0));
-    scheme.course(&world, &start, time_steps, BODY)
+    scheme.course(&model, &start, time_steps, BODY)
 }
 
 /// Below the friction angle regularized friction creeps at a constant speed.

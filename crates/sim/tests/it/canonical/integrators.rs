@@ -4,8 +4,8 @@ use std::f64::consts::SQRT_2;
 
 use prehend_autodiff::Fwd;
 use prehend_sim::{
-    BackwardEuler, BodyState, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State,
-    TimeSteps, World,
+    BackwardEuler, BodyState, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError,
+    State, TimeSteps,
 };
 
 /// An integrator.
@@ -57,14 +57,14 @@ pub(crate) const INPUTS: usize = 4;
 pub(crate) trait Method: Sync {
     fn rollout(
         &self,
-        world: &World,
+        model: &Model,
         start: &State,
         time_steps: TimeSteps,
     ) -> Result<Vec<State>, SimulationError>;
 
     fn differentiate(
         &self,
-        world: &World,
+        model: &Model,
         start: &State<Fwd<INPUTS>>,
         time_steps: TimeSteps,
     ) -> Result<State<Fwd<INPUTS>>, SimulationError>;
@@ -73,38 +73,38 @@ pub(crate) trait Method: Sync {
 impl<I: Integrator> Method for I {
     fn rollout(
         &self,
-        world: &World,
+        model: &Model,
         start: &State,
         time_steps: TimeSteps,
     ) -> Result<Vec<State>, SimulationError> {
-        world.rollout_with(self, start, time_steps).map(|run| run.states)
+        model.rollout_with(self, start, time_steps).map(|run| run.states)
     }
 
     fn differentiate(
         &self,
-        world: &World,
+        model: &Model,
         start: &State<Fwd<INPUTS>>,
         time_steps: TimeSteps,
     ) -> Result<State<Fwd<INPUTS>>, SimulationError> {
-        world.cast().simulate_with(self, start, time_steps).map(|run| run.states)
+        model.cast().simulate_with(self, start, time_steps).map(|run| run.states)
     }
 }
 
 impl Scheme {
     /// The states after `time_steps`.
-    pub(crate) fn end(&self, world: &World, start: &State, time_steps: TimeSteps) -> State {
-        self.method.rollout(world, start, time_steps).unwrap().pop().unwrap()
+    pub(crate) fn end(&self, model: &Model, start: &State, time_steps: TimeSteps) -> State {
+        self.method.rollout(model, start, time_steps).unwrap().pop().unwrap()
     }
 
     /// The states of body `body` at 0, dt, ….
     pub(crate) fn course(
         &self,
-        world: &World,
+        model: &Model,
         start: &State,
         time_steps: TimeSteps,
         body: usize,
     ) -> Vec<BodyState> {
-        let run = self.method.rollout(world, start, time_steps).unwrap();
+        let run = self.method.rollout(model, start, time_steps).unwrap();
         run.iter().map(|state| state[body]).collect()
     }
 }

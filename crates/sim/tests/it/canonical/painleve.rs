@@ -10,7 +10,7 @@
 //! whatever the elastic law.
 
 use nalgebra::{Point3, Vector3};
-use prehend_sim::{BodyState, GapSmoothing, State, TimeSteps, World};
+use prehend_sim::{BodyState, GapSmoothing, Model, State, TimeSteps};
 
 use super::integrators::Scheme;
 use super::laws::{G, Law, Spec};
@@ -36,7 +36,7 @@ fn responses(friction: f64) -> [f64; 3] {
 }
 
 /// A rod whose tip would carry its weight at 10 nm: stiff enough that gravity does little during an impact.
-fn rod(law: &Law, friction: f64) -> World {
+fn rod(law: &Law, friction: f64) -> Model {
     let spec = Spec {
         mass: MASS,
         depth: 1e-8,
@@ -65,9 +65,9 @@ fn tip_motion(state: &BodyState) -> (Vector3<f64>, Vector3<f64>) {
 pub(crate) fn jam(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let friction = 2.0;
     let [p, q, stick] = responses(friction);
-    let (world, start) = (rod(law, friction), sliding(0.0));
+    let (model, start) = (rod(law, friction), sliding(0.0));
     let time_steps = TimeSteps { dt: 2e-8, steps: 50_000 };
-    let course = scheme.course(&world, &start, time_steps, BODY);
+    let course = scheme.course(&model, &start, time_steps, BODY);
     let motion: Vec<_> = course.iter().map(tip_motion).collect();
     let touched = motion.iter().position(|(x, _)| x.z < 0.0).unwrap_or(motion.len());
     let leaves = motion[touched..].iter().find(|(x, _)| x.z > 0.0);
@@ -84,12 +84,12 @@ pub(crate) fn jam(scheme: &Scheme, law: &Law) -> Vec<Row> {
 pub(crate) fn slide(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let friction = 1.0;
     let [p, ..] = responses(friction);
-    let world = rod(law, friction);
+    let model = rod(law, friction);
     let touching = -tip().z;
-    let height = carrying_height(&world, MASS * G / p, touching - 1e-6, touching);
+    let height = carrying_height(&model, MASS * G / p, touching - 1e-6, touching);
     let start = sliding(height - touching);
     let time_steps = TimeSteps { dt: 1e-7, steps: 2000 };
-    let end = scheme.end(&world, &start, time_steps);
-    let force = world.wrenches(&end, time_steps.steps)[BODY].z;
+    let end = scheme.end(&model, &start, time_steps);
+    let force = model.wrenches(&end, time_steps.steps)[BODY].z;
     vec![Row::relative("normal force m g/p [N]", force, MASS * G / p, 0.01)]
 }

@@ -31,11 +31,11 @@ pub(crate) fn bowling_ball(scheme: &Scheme, law: &Law) -> Vec<Row> {
     };
     let smoothing = GapSmoothing::Softplus { width: 1e-5 };
     let inertia = 0.4 * mass * RADIUS * RADIUS;
-    let world = on_floor(law, &spec, smoothing, down(), &points, inertia);
-    let height = carrying_height(&world, mass * G, 0.99 * RADIUS, 1.01 * RADIUS);
+    let model = on_floor(law, &spec, smoothing, down(), &points, inertia);
+    let height = carrying_height(&model, mass * G, 0.99 * RADIUS, 1.01 * RADIUS);
     let start = above_floor(height, Vector3::new(speed, 0.0, 0.0));
     let time_steps = TimeSteps { dt: 2e-5, steps: 5000 };
-    let course = scheme.course(&world, &start, time_steps, BODY);
+    let course = scheme.course(&model, &start, time_steps, BODY);
     // Slip falls linearly from v₀: its last hundredth, which regularized friction blurs, is extrapolated.
     let slipping = course.iter().take_while(|s| s.linear.x - s.angular.y * RADIUS > 0.01 * speed);
     let rolls = slipping.count() as f64 * time_steps.dt / 0.99;

@@ -1,10 +1,10 @@
-//! Fields and worlds that the problems share.
+//! Fields and models that the problems share.
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::fields::HalfSpace;
-use prehend_sim::{Body, BodyState, ContactBodies, GapSmoothing, RigidBody, State, Surface, World};
+use prehend_sim::{Body, BodyState, ContactBodies, GapSmoothing, Model, RigidBody, State, Surface};
 
 use super::laws::{G, Law, Spec};
 
@@ -19,15 +19,15 @@ pub(crate) fn on_floor(
     gravity: Vector3<f64>,
     points: &[Point3<f64>],
     inertia: f64,
-) -> World {
-    let mut world = World::new(gravity);
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+) -> Model {
+    let mut model = Model::new(gravity);
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = rigid(spec.mass, inertia);
     let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
-    let samples = world.add(Body::dynamic("body", rigid).with_surface(surface));
+    let samples = model.add(Body::dynamic("body", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
-    world.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
-    world
+    model.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
+    model
 }
 
 /// A body of isotropic inertia \[kg m²\] about the origin.
@@ -36,7 +36,7 @@ pub(crate) fn rigid(mass: f64, inertia: f64) -> RigidBody {
 }
 
 /// Four feet in the plane of the center of mass, so that friction tips nothing.
-pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> World {
+pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> Model {
     let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     let feet = feet.map(|(x, y)| Point3::new(0.05 * x, 0.05 * y, 0.0));
     on_floor(law, spec, GapSmoothing::Hard, gravity, &feet, 1e-3)
@@ -66,8 +66,8 @@ pub(crate) fn above_floor(height: f64, linear: Vector3<f64>) -> State {
 
 /// Height at which a body from [`on_floor`] at rest carries `load` \[N\], between `lowest`, where it
 /// carries more, and `highest`.
-pub(crate) fn carrying_height(world: &World, load: f64, lowest: f64, highest: f64) -> f64 {
-    let carried = |height: f64| world.wrenches(&above_floor(height, Vector3::zeros()), 0)[BODY].z;
+pub(crate) fn carrying_height(model: &Model, load: f64, lowest: f64, highest: f64) -> f64 {
+    let carried = |height: f64| model.wrenches(&above_floor(height, Vector3::zeros()), 0)[BODY].z;
     let (mut low, mut high) = (lowest, highest);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);

@@ -8,8 +8,8 @@ use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Body, BodyState, ContactBodies, ContactKinematics, GapSmoothing, RigidBody, State, Surface,
-    World,
+    Body, BodyState, ContactBodies, ContactKinematics, GapSmoothing, Model, RigidBody, State,
+    Surface,
 };
 
 use super::laws::{Law, Spec};
@@ -34,18 +34,18 @@ pub(crate) fn finite(law: &Law) -> Vec<Row> {
         let leaky = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
         let smoothings = [GapSmoothing::Hard, GapSmoothing::Softplus { width: 1e-4 }, leaky];
         let not_finite = |smoothing: GapSmoothing| {
-            let mut world = World::new(Vector3::zeros());
-            let field = world.add(Body::fixed("field").with_field(Arc::clone(field)));
+            let mut model = Model::new(Vector3::zeros());
+            let field = model.add(Body::fixed("field").with_field(Arc::clone(field)));
             let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
-            let samples = world.add(Body::dynamic("sample", rigid).with_surface(surface));
+            let samples = model.add(Body::dynamic("sample", rigid).with_surface(surface));
             let bodies = ContactBodies { samples, field };
-            world.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
+            model.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
             let rest = BodyState::at_rest(Isometry3::translation(0.0, 0.0, height));
             let state = BodyState { linear, ..rest };
             let fixed = BodyState::at_rest(Isometry3::identity()).cast();
             let by_state =
-                world.cast().wrenches(&State::new([fixed, state.variables()]), 1)[samples];
-            let mut varied = world.cast::<Fwd<12>>();
+                model.cast().wrenches(&State::new([fixed, state.variables()]), 1)[samples];
+            let mut varied = model.cast::<Fwd<12>>();
             for (k, p) in varied.contacts[0].params_mut().iter_mut().enumerate() {
                 p.derivative[k] = 1.0;
             }

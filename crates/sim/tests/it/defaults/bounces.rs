@@ -8,7 +8,7 @@ use prehend_sim::contact::Bounce;
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
     Adaptive, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
-    Law, State, Surface, TimeSteps, World,
+    Law, Model, State, Surface, TimeSteps,
 };
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ const AREA: f64 = 1e-4;
 const THROWS: [f64; 8] = [0.5, 0.58, 0.74, 0.96, 1.04, 1.1, 1.18, 1.22];
 
 /// A ball that rests `penetration` \[m\] deep, half a meter above the floor.
-fn ball(penetration: f64, damped_by: &str) -> (World, State) {
+fn ball(penetration: f64, damped_by: &str) -> (Model, State) {
     let target = ContactCalibration { mass: MASS, gravity: 9.81, penetration, contact_area: AREA };
     let friction = Coulomb { friction: 0.3, slip_scale: 1e-2 };
     let bounce = Bounce { restitution: 0.7, impact_speed: 3.0 };
@@ -45,16 +45,16 @@ fn ball(penetration: f64, damped_by: &str) -> (World, State) {
 }
 
 /// How fast it rises after 0.45 s, if thrown down with `speed` \[m/s\].
-fn rise<S: Scalar>((world, start): &(World, State), speed: S, integrator: &Adaptive) -> S {
+fn rise<S: Scalar>((model, start): &(Model, State), speed: S, integrator: &Adaptive) -> S {
     let mut start: State<S> = start.cast();
     start[1].linear.z = -speed;
     let once = TimeSteps { dt: 0.45, steps: 1 };
-    let run = world.cast().simulate_with(integrator, &start, once).unwrap();
+    let run = model.cast().simulate_with(integrator, &start, once).unwrap();
     run.states[1].linear.z
 }
 
 /// Errors of value and derivative, as parts of them.
-fn errors(scene: &(World, State), speed: f64) -> [f64; 2] {
+fn errors(scene: &(Model, State), speed: f64) -> [f64; 2] {
     let found = rise(scene, Fwd::<1>::variable(speed, 0), &Adaptive::default());
     let [low, value, high] = [-1e-5, 0.0, 1e-5].map(|h| rise(scene, speed + h, &CONVERGED));
     let slope = (high - low) / 2e-5;

@@ -8,8 +8,8 @@ use prehend_sim::contact::Bounce;
 use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
     Adaptive, Body, BodyId, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
-    DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, RigidBody, State, TimeSteps,
-    World,
+    DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt, Law, Model, RigidBody, State,
+    TimeSteps,
 };
 
 use super::CONVERGED;
@@ -45,8 +45,8 @@ fn at(x: f64, y: f64, z: f64) -> BodyState {
 }
 
 /// How far the corners of `bodies` move in ten seconds after one \[m\].
-fn creep(world: &World, start: &State, bodies: &[BodyId]) -> f64 {
-    let run = world.rollout(start, TimeSteps { dt: 0.5, steps: 22 }).unwrap();
+fn creep(model: &Model, start: &State, bodies: &[BodyId]) -> f64 {
+    let run = model.rollout(start, TimeSteps { dt: 0.5, steps: 22 }).unwrap();
     let moved = |body: BodyId, now: &State| {
         let [from, to] = [&run[2], now].map(|states| states[body].pose);
         corners([HALF; 3]).iter().map(|p| (to * p - from * p).norm()).fold(0.0, f64::max)
@@ -57,28 +57,28 @@ fn creep(world: &World, start: &State, bodies: &[BodyId]) -> f64 {
 
 #[test]
 fn a_stack_of_three_boxes_stays() {
-    let mut world = World::new(down());
+    let mut model = Model::new(down());
     // A slope of 6°: what does not hold slides.
-    world.gravity.x = 0.1 * 9.81;
-    let table = world.add(cube(Body::fixed("table"), LARGE));
+    model.gravity.x = 0.1 * 9.81;
+    let table = model.add(cube(Body::fixed("table"), LARGE));
     let mut start = vec![at(0.0, 0.0, -LARGE)];
     let mut stack = vec![table];
     for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
-        let body = world.add(free_cube(name));
+        let body = model.add(free_cube(name));
         let offset = Vector3::new(-1e-3, 0.0, 2.02 * HALF) * f64::from(level);
         let turn = Vector3::z() * 0.05 * f64::from(level);
         start.push(BodyState::at_rest(Isometry3::new(offset + Vector3::z() * 1.01 * HALF, turn)));
         let below = stack[stack.len() - 1];
-        world.add_symmetric_contact(body, below, sticking(), SMOOTH).unwrap();
+        model.add_symmetric_contact(body, below, sticking(), SMOOTH).unwrap();
         stack.push(body);
     }
-    let moved = creep(&world, &State::new(start), &stack[1..]);
+    let moved = creep(&model, &State::new(start), &stack[1..]);
     println!("a stack of three boxes creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);
 }
 
 /// A point of 0.2 kg just above the floor, moving along it and down, on which `BristleFriction` has a deflection of 0.1 mm.
-fn skipping(smoothing: GapSmoothing) -> (World, State) {
+fn skipping(smoothing: GapSmoothing) -> (Model, State) {
     let target =
         ContactCalibration { mass: 0.2, gravity: 9.81, penetration: 1e-5, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.8, impact_speed: 0.05 };
@@ -94,18 +94,18 @@ fn skipping(smoothing: GapSmoothing) -> (World, State) {
 #[test]
 fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
     for smoothing in [GapSmoothing::Hard, SMOOTH] {
-        let (world, start) = skipping(smoothing);
+        let (model, start) = skipping(smoothing);
         for time in [0.02, 0.03, 0.05] {
             let once = TimeSteps { dt: time, steps: 1 };
             let slides = |speed: f64, integrator: &Adaptive| {
                 let mut start = start.clone();
                 start[1].linear.z = speed;
-                let run = world.simulate_with(integrator, &start, once).unwrap();
+                let run = model.simulate_with(integrator, &start, once).unwrap();
                 [1, 2].map(|row: usize| run.states.rows()[row].linear.x)
             };
             let mut lifted: State<Fwd<1>> = start.cast();
             lifted[1].linear.z = Fwd::variable(-0.05, 0);
-            let end = world.cast().simulate(&lifted, time).unwrap();
+            let end = model.cast().simulate(&lifted, time).unwrap();
             let [low, high] = [-1e-6, 1e-6].map(|h| slides(-0.05 + h, &CONVERGED));
             for (k, found) in
                 [1, 2].map(|row: usize| end.rows()[row].linear.x).into_iter().enumerate()
@@ -123,17 +123,17 @@ fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
 
 #[test]
 fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
-    let mut world = World::new(Vector3::new(0.09 * 9.81, 0.0, -9.81));
-    let mut below = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(Vector3::new(0.09 * 9.81, 0.0, -9.81));
+    let mut below = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let mut start = vec![at(0.0, 0.0, 0.0)];
     let cuboid = Cuboid { half_extents: Vector3::repeat(HALF), rounding: ROUNDING };
     for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
         let rigid = RigidBody::cuboid(MASS, [HALF; 3]).unwrap();
-        let body = world.add(Body::dynamic(name, rigid).with_cuboid(cuboid, 0.01).unwrap());
+        let body = model.add(Body::dynamic(name, rigid).with_cuboid(cuboid, 0.01).unwrap());
         let (samples, field) = (body, below);
         match level {
-            0 => world.add_contact(ContactBodies { samples, field }, sticking(), SMOOTH),
-            _ => world.add_symmetric_contact(body, below, sticking(), SMOOTH),
+            0 => model.add_contact(ContactBodies { samples, field }, sticking(), SMOOTH),
+            _ => model.add_symmetric_contact(body, below, sticking(), SMOOTH),
         }
         .unwrap();
         start.push(at(0.0, 0.0, HALF * f64::from(2 * level + 1)));
@@ -142,7 +142,7 @@ fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
     // With samples where the flat part of the other box ends it is more than ten times as many.
     let few = Adaptive { max_substeps: 10_000, ..Adaptive::default() };
     let second = TimeSteps { dt: 1.0, steps: 1 };
-    let end = world.simulate_with(&few, &State::new(start), second).unwrap().states;
+    let end = model.simulate_with(&few, &State::new(start), second).unwrap().states;
     assert!(end.bodies()[1..4].iter().all(|state| state.linear.norm() < 1e-4), "{end:?}");
 }
 
@@ -155,7 +155,7 @@ fn ease(time: f64, from: f64, to: f64) -> [f64; 2] {
 
 #[test]
 fn a_gripper_holds() {
-    let mut world = World::new(down());
+    let mut model = Model::new(down());
     let finger = |sign: f64| {
         move |time: f64| {
             // They close on it, then lift it by 5 cm.
@@ -167,17 +167,17 @@ fn a_gripper_holds() {
         }
     };
     let fingers = [("left", -1.0), ("right", 1.0)]
-        .map(|(name, sign)| world.add(cube(Body::kinematic(name, finger(sign)), LARGE)));
-    let table = world.add(cube(Body::fixed("table"), LARGE));
-    let object = world.add(free_cube("object"));
+        .map(|(name, sign)| model.add(cube(Body::kinematic(name, finger(sign)), LARGE)));
+    let table = model.add(cube(Body::fixed("table"), LARGE));
+    let object = model.add(free_cube("object"));
     for other in fingers.into_iter().chain([table]) {
-        world.add_symmetric_contact(object, other, sticking(), SMOOTH).unwrap();
+        model.add_symmetric_contact(object, other, sticking(), SMOOTH).unwrap();
     }
     let origin = at(0.0, 0.0, 0.0);
     let start = State::new([origin, origin, at(0.0, 0.0, -HALF - LARGE), origin]);
-    let moved = creep(&world, &start, &[object]);
+    let moved = creep(&model, &start, &[object]);
     println!("an object in a gripper creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);
-    let lifted = world.simulate(&start, 1.0).unwrap()[object].pose.translation.z;
+    let lifted = model.simulate(&start, 1.0).unwrap()[object].pose.translation.z;
     assert!((lifted - 0.05).abs() < 2e-4, "{lifted}");
 }

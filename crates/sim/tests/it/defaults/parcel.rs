@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::fields::{Cuboid, HalfSpace};
 use prehend_sim::{
     Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    KelvinVoigt, Law, RigidBody, State, Surface, World,
+    KelvinVoigt, Law, Model, RigidBody, State, Surface,
 };
 
 use super::scenes::{HARD, down};
@@ -29,7 +29,7 @@ fn plunger(time: f64) -> BodyState {
 }
 
 /// Table, parcel and plunger; the parcel is number 1, its friction parameter 2 of contact 0.
-pub(crate) fn tipped() -> (World, State) {
+pub(crate) fn tipped() -> (Model, State) {
     let mass = 0.65;
     let [a, b, c] = HALF.map(|half| mass * half * half / 3.0);
     let inertia = Vector3::new(b + c, a + c, mass * 0.0259 * 0.0259);
@@ -45,25 +45,25 @@ pub(crate) fn tipped() -> (World, State) {
     let tip_area = 1e-4;
     let tip = Surface::uniform(&[Point3::origin()], tip_area).unwrap().rounded(TIP).unwrap();
 
-    let mut world = World::new(down());
-    let table = world.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let mut model = Model::new(down());
+    let table = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
     let parcel = Body::dynamic("parcel", rigid).with_field(Arc::new(sides));
-    let parcel = world.add(parcel.with_surface(Surface::uniform(&bottom, area).unwrap()));
-    let plunger = world.add(Body::kinematic("plunger", plunger).with_surface(tip));
+    let parcel = model.add(parcel.with_surface(Surface::uniform(&bottom, area).unwrap()));
+    let plunger = model.add(Body::kinematic("plunger", plunger).with_surface(tip));
     let target =
         ContactCalibration { mass: 0.4, gravity: 9.81, penetration: DEPTH, contact_area: area };
     let floor = KelvinVoigt::from_target(&target, 0.3).unwrap();
     let law = Law::new(floor, Coulomb { friction: 0.432, slip_scale: 5e-3 }).unwrap();
     let smoothing = GapSmoothing::Softplus { width: 0.1 * DEPTH };
     let bodies = ContactBodies { samples: parcel, field: table };
-    world.add_contact(bodies, Arc::new(law), smoothing).unwrap();
+    model.add_contact(bodies, Arc::new(law), smoothing).unwrap();
     // The tip is a roller: no friction.
     let spring = HuntCrossley { stiffness: 1500.0 / tip_area, damping: 0.1, exponent: 1.0 };
     let law = Law::new(spring, Coulomb { friction: 0.0, slip_scale: 5e-3 }).unwrap();
     let bodies = ContactBodies { samples: plunger, field: parcel };
-    world.add_contact(bodies, Arc::new(law), HARD).unwrap();
+    model.add_contact(bodies, Arc::new(law), HARD).unwrap();
 
     let still = BodyState::at_rest(Isometry3::identity());
     let start = rigid.at_rest(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH));
-    (world, State::new([still, start, still]))
+    (model, State::new([still, start, still]))
 }

@@ -1,7 +1,7 @@
 //! A scene, what it is differentiated by, and what is looked at in the end.
 
 use prehend_autodiff::Scalar;
-use prehend_sim::{Integrator, Simulation, SimulationError, State, TimeSteps, World};
+use prehend_sim::{Integrator, Model, Simulation, SimulationError, State, TimeSteps};
 
 /// A number of the scene.
 #[derive(Clone, Copy)]
@@ -25,7 +25,7 @@ pub(crate) enum Output {
 
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
-    pub(crate) world: World,
+    pub(crate) model: Model,
     pub(crate) start: State,
     /// How long it takes \[s\].
     pub(crate) time: f64,
@@ -45,7 +45,7 @@ impl Scene {
         steps: usize,
         change: S,
     ) -> Result<Simulation<S>, SimulationError> {
-        let mut world = self.world.cast::<S>();
+        let mut model = self.model.cast::<S>();
         let mut start: State<S> = self.start.cast();
         match self.input {
             Input::Start(body, coordinate) => {
@@ -54,12 +54,12 @@ impl Scene {
                 start[body] = self.start[body].retract(&tangent);
             }
             Input::Law(contact, parameter) => {
-                world.contacts[contact].params_mut()[parameter] += change;
+                model.contacts[contact].params_mut()[parameter] += change;
             }
         }
         let time_steps = TimeSteps { dt: self.time / steps as f64, steps };
         let Simulation { states, resolution } =
-            world.simulate_with(integrator, &start, time_steps)?;
+            model.simulate_with(integrator, &start, time_steps)?;
         let states = match self.output {
             Output::Position(body, axis) => states[body].pose.translation.vector[axis],
             Output::Velocity(body, axis) => states[body].linear[axis],

@@ -10,7 +10,7 @@ use prehend_sim::fields::{HalfSpace, Sphere, SphereCavity};
 use prehend_sim::{
     Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, ContactForce,
     ContactKinematics, ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
-    Law, RigidBody, State, Surface, World,
+    Law, Model, RigidBody, State, Surface,
 };
 
 use super::parcel;
@@ -100,13 +100,13 @@ pub(crate) fn on(
     body: Body,
     (law, smoothing): (Arc<dyn DynContactLaw>, GapSmoothing),
     start: BodyState,
-) -> (World, State) {
-    let mut world = World::new(gravity);
-    let ground = world.add(Body::fixed("ground").with_field(Arc::new(field)));
-    let samples = world.add(body);
+) -> (Model, State) {
+    let mut model = Model::new(gravity);
+    let ground = model.add(Body::fixed("ground").with_field(Arc::new(field)));
+    let samples = model.add(body);
     let bodies = ContactBodies { samples, field: ground };
-    world.add_contact(bodies, law, smoothing).unwrap();
-    (world, State::new([BodyState::at_rest(Isometry3::identity()), start]))
+    model.add_contact(bodies, law, smoothing).unwrap();
+    (model, State::new([BodyState::at_rest(Isometry3::identity()), start]))
 }
 
 pub(crate) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
@@ -116,16 +116,16 @@ pub(crate) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 /// A scene that goes on for `time` \[s\], differentiated by `input`; nudges of 1e-5 suit most.
 fn scene(
     name: &'static str,
-    (world, start): (World, State),
+    (model, start): (Model, State),
     time: f64,
     (output, input): (Output, Input),
     bad_step: f64,
 ) -> Scene {
     let nudge = match input {
         Start(..) => 1e-5,
-        ByLaw(contact, parameter) => 1e-3 * world.contacts[contact].params()[parameter],
+        ByLaw(contact, parameter) => 1e-3 * model.contacts[contact].params()[parameter],
     };
-    Scene { name, world, start, time, input, output, nudge, bad_step }
+    Scene { name, model, start, time, input, output, nudge, bad_step }
 }
 
 /// All of them.
@@ -198,9 +198,9 @@ fn sliding() -> Vec<Scene> {
         )
     };
     let conveyor = || {
-        let (world, mut start) = stool(kelvin_voigt(0.5, 1e-3), SMOOTH);
+        let (model, mut start) = stool(kelvin_voigt(0.5, 1e-3), SMOOTH);
         start[0].linear.y = 0.5;
-        (world, start)
+        (model, start)
     };
     let spinning = || {
         let coin = body("coin", 0.1, 2e-5, &ellipsoid(80, [0.02, 0.02, 0.004]), 4e-4);
@@ -366,39 +366,39 @@ fn several() -> Vec<Scene> {
             .with_field(Arc::new(Sphere { center: Point3::origin(), radius: 0.02 }))
     };
     let collision = || {
-        let mut world = World::new(Vector3::zeros());
-        let (a, b) = (world.add(ball("red")), world.add(ball("white")));
-        world.add_symmetric_contact(a, b, kelvin_voigt(0.3, 1e-2), SMOOTH).unwrap();
+        let mut model = Model::new(Vector3::zeros());
+        let (a, b) = (model.add(ball("red")), model.add(ball("white")));
+        model.add_symmetric_contact(a, b, kelvin_voigt(0.3, 1e-2), SMOOTH).unwrap();
         let start = State::new([
             state(at(-0.1, 0.005, 0.0), [1.0, 0.0, 0.0], [0.0; 3]),
             BodyState::at_rest(Isometry3::identity()),
         ]);
-        (world, start)
+        (model, start)
     };
     let pushed = || {
-        let mut world = World::new(down());
-        let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
-        let block = world.add(cube());
+        let mut model = Model::new(down());
+        let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+        let block = model.add(cube());
         let pusher = Sphere { center: Point3::new(-0.08, 0.01, 0.05), radius: 0.02 };
         let arm = |time: f64| {
             let mut state = BodyState::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
             state.linear.x = 0.1;
             state
         };
-        let arm = world.add(Body::kinematic("pusher", arm).with_field(Arc::new(pusher)));
+        let arm = model.add(Body::kinematic("pusher", arm).with_field(Arc::new(pusher)));
         let lattice: Vec<Point3<f64>> = (0..441)
             .map(|i| {
                 Point3::new(-0.05, (i % 21) as f64 * 5e-3 - 0.05, (i / 21) as f64 * 5e-3 - 0.05)
             })
             .chain(corners([0.05; 3]))
             .collect();
-        world.bodies[block] = body("block", 0.37, 6e-4, &lattice, 0.01);
+        model.bodies[block] = body("block", 0.37, 6e-4, &lattice, 0.01);
         for field in [floor, arm] {
             let bodies = ContactBodies { samples: block, field };
-            world.add_contact(bodies, kelvin_voigt(0.4, 1e-2), SMOOTH).unwrap();
+            model.add_contact(bodies, kelvin_voigt(0.4, 1e-2), SMOOTH).unwrap();
         }
         let still = BodyState::at_rest(Isometry3::identity());
-        (world, State::new([still, state(at(0.0, 0.0, 0.05), [0.0; 3], [0.0; 3]), still]))
+        (model, State::new([still, state(at(0.0, 0.0, 0.05), [0.0; 3], [0.0; 3]), still]))
     };
     vec![
         scene("two balls collide", collision(), 0.3, (Position(1, 1), Start(0, 1)), 4e-3),

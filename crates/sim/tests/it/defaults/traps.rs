@@ -10,8 +10,8 @@ use prehend_autodiff::{Recording, Scalar};
 use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
     Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
-    DynContactLaw, GapSmoothing, RigidBody, RungeKutta4, SemiImplicitEuler, Shape, SimulationError,
-    State, StepCheckpointed, Surface, TimeSteps, World,
+    DynContactLaw, GapSmoothing, Model, RigidBody, RungeKutta4, SemiImplicitEuler, Shape,
+    SimulationError, State, StepCheckpointed, Surface, TimeSteps,
 };
 
 use super::scenes::{
@@ -36,14 +36,14 @@ fn a_finger_that_starts_from_rest_does_not_pass_through() {
         }
     };
     for duration in [0.2, 0.5, 1.0, 2.0] {
-        let mut world = World::new(Vector3::zeros());
+        let mut model = Model::new(Vector3::zeros());
         let tip = Arc::new(Sphere { center: Point3::origin(), radius: 0.03 });
-        let field = world.add(Body::kinematic("finger", finger(duration)).with_field(tip));
-        let samples = world.add(pebble());
+        let field = model.add(Body::kinematic("finger", finger(duration)).with_field(tip));
+        let samples = model.add(pebble());
         let bodies = ContactBodies { samples, field };
-        world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
+        model.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
         let start = State::new([BodyState::at_rest(Isometry3::identity()); 2]);
-        let end = world.simulate(&start, duration).unwrap();
+        let end = model.simulate(&start, duration).unwrap();
         assert!(end[samples].linear.x > 1.0 / duration, "{duration}: {}", end[samples].linear.x);
     }
 }
@@ -71,16 +71,16 @@ fn a_paddle_that_waits_is_not_passed_over() {
     // A ball that floats 2 mm above it; one that rests on it, on which a tenth of a millimeter is enough.
     for (gravity, height, stroke) in [(0.0, 2e-3, 5e-3), (-9.81, -2.07e-4, 1e-4)] {
         for duration in [0.2, 0.05, 0.02, 0.005] {
-            let mut world = World::new(Vector3::new(0.0, 0.0, gravity));
+            let mut model = Model::new(Vector3::new(0.0, 0.0, gravity));
             let paddle = Body::kinematic("paddle", tapping(stroke, duration));
-            let field = world.add(paddle.with_field(Arc::new(HalfSpace::floor())));
-            let samples = world.add(ball());
+            let field = model.add(paddle.with_field(Arc::new(HalfSpace::floor())));
+            let samples = model.add(ball());
             let bodies = ContactBodies { samples, field };
-            world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), SMOOTH).unwrap();
+            model.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), SMOOTH).unwrap();
             let above = BodyState::at_rest(at(0.0, 0.0, radius + height));
             let start = State::new([BodyState::at_rest(Isometry3::identity()), above]);
-            let end = world.simulate(&start, 1.0).unwrap()[samples];
-            let run = world.rollout(&start, TimeSteps { dt: 1e-3, steps: 1000 }).unwrap();
+            let end = model.simulate(&start, 1.0).unwrap()[samples];
+            let run = model.rollout(&start, TimeSteps { dt: 1e-3, steps: 1000 }).unwrap();
             let fine = run[1000][samples];
             let speed = run.iter().map(|states| states[samples].linear.z.abs());
             let speed = speed.fold(0.0, f64::max);
@@ -96,15 +96,15 @@ fn what_is_pushed_does_not_pass_through() {
         let ball =
             Sphere { center: Point3::new(0.5 + 0.01 * f64::from(place), 0.0, 0.0), radius: 0.02 };
         let law = (hunt_crossley(0.1, 0.3, 1e-2), HARD);
-        let (mut world, start) = on(
+        let (mut model, start) = on(
             ball,
             Vector3::zeros(),
             pebble(),
             law,
             state(at(0.0, 1e-3, 0.0), [0.0; 3], [0.0; 3]),
         );
-        world.bodies[1].external_wrench.x = 1.0;
-        let end = world.simulate(&start, 0.5).unwrap()[1];
+        model.bodies[1].external_wrench.x = 1.0;
+        let end = model.simulate(&start, 0.5).unwrap()[1];
         let reached = end.pose.translation.vector;
         assert!(reached.x < ball.center.x || reached.y > 0.01, "{place}: {reached:?}");
     }
@@ -121,10 +121,10 @@ fn thin_bodies_are_not_passed_over() {
     let plate = body("plate", 1.0, 0.1, &plate, 4e-4);
     let pin = Sphere { center: Point3::origin(), radius: 4e-3 };
     for place in (0..20).map(|i| 1e-3 * f64::from(i)) {
-        let fallen = |(mut world, mut start): (World, State)| {
-            world.gravity = Vector3::zeros();
+        let fallen = |(mut model, mut start): (Model, State)| {
+            model.gravity = Vector3::zeros();
             start[1].linear.z = -1.0;
-            world.simulate(&start, 0.5).unwrap()[1].linear.z
+            model.simulate(&start, 0.5).unwrap()[1].linear.z
         };
         for half in [2.5e-4, 1e-3] {
             let rises = fallen(on(wall(half), down(), cube(), stiff(), down_at(place)));
@@ -146,9 +146,9 @@ fn what_contacts_cannot_stop_is_told_to_pass_through() {
         [(0.0, 0.3, false), (0.0, 10.0, true), (0.01, 1.0, false), (0.01, 20.0, true)]
     {
         let start = state(at(0.0, 0.0, 0.1), [0.0, 0.0, -speed], [0.0; 3]);
-        let (world, start) =
+        let (model, start) =
             on(plate, down(), ball(radius), (kelvin_voigt(0.3, 1e-2), SMOOTH), start);
-        let run = world.simulate(&start, 0.2);
+        let run = model.simulate(&start, 0.2);
         match passes {
             false => assert!(run.unwrap()[1].pose.translation.z > 0.0),
             true => assert!(
@@ -163,15 +163,15 @@ fn fixed_steps_tell_what_passed_through() {
     let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 1e-3), rounding: 1e-4 };
     let fly = |speed: f64, dt: f64, grouped: bool| {
         let start = state(at(0.0, 0.0, 0.11), [0.0, 0.0, -speed], [0.0; 3]);
-        let (mut world, start) =
+        let (mut model, start) =
             on(plate, down(), pebble(), (hunt_crossley(5e4, 0.3, 1e-2), HARD), start);
         if grouped {
-            let all: Vec<_> = world.body_ids().collect();
-            world.contacts.clear();
-            world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+            let all: Vec<_> = model.body_ids().collect();
+            model.contacts.clear();
+            model.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
         }
         let time_steps = TimeSteps { dt, steps: (0.15 / (speed * dt)).round() as usize };
-        let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
+        let run = model.simulate_with(&SemiImplicitEuler, &start, time_steps);
         run.map(|run| run.resolution)
     };
     for grouped in [false, true] {
@@ -188,18 +188,18 @@ fn fixed_steps_tell_what_passed_through() {
 #[test]
 fn a_plate_that_is_driven_through_a_body_is_told() {
     let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 1e-3), rounding: 1e-4 };
-    let mut world = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::zeros());
     let fly = |time: f64| {
         let mut state = BodyState::at_rest(at(0.0, 0.0, -0.11 + 20.0 * time));
         state.linear.z = 20.0;
         state
     };
-    let plate = world.add(Body::kinematic("plate", fly).with_field(Arc::new(plate)));
-    let pebble = world.add(pebble());
-    world.add_contacts_between(&[plate], &[pebble], hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
-    let start = world.neutral_state();
+    let plate = model.add(Body::kinematic("plate", fly).with_field(Arc::new(plate)));
+    let pebble = model.add(pebble());
+    model.add_contacts_between(&[plate], &[pebble], hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+    let start = model.neutral_state();
     let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
+    let run = model.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert_eq!(run.resolution.passed.unwrap().0, "pebble");
 }
 
@@ -208,17 +208,17 @@ fn what_leaves_a_wall_for_the_next_has_not_passed_through() {
     // Two walls with a slot of 4 cm between them, from one to the middle of which it flies within a step.
     let wall = |x: f64| (Pose::translation(x, 0.0, 0.0), SharedShape::cuboid(0.01, 0.1, 0.1));
     let slot = Shape::from_parry(&Compound::new(vec![wall(-0.03), wall(0.03)])).unwrap();
-    let mut world = World::new(Vector3::zeros());
-    world.add(Body::fixed_from_shape("slot", &slot));
-    let pebble = world.add(pebble());
-    let all: Vec<_> = world.body_ids().collect();
-    world.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
+    let mut model = Model::new(Vector3::zeros());
+    model.add(Body::fixed_from_shape("slot", &slot));
+    let pebble = model.add(pebble());
+    let all: Vec<_> = model.body_ids().collect();
+    model.add_contacts_between(&all, &all, hunt_crossley(5e4, 0.3, 1e-2), HARD).unwrap();
     let start = State::new([
         BodyState::at_rest(Isometry3::identity()),
         state(at(-0.0201, 0.0, 0.0), [30.0, 0.0, 0.0], [0.0; 3]),
     ]);
     let once = TimeSteps { dt: 1e-3, steps: 1 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, once).unwrap();
+    let run = model.simulate_with(&SemiImplicitEuler, &start, once).unwrap();
     assert!(run.states[pebble].pose.translation.x > 0.0);
     assert_eq!(run.resolution.passed, None);
 }
@@ -243,21 +243,21 @@ impl ContactLaw for Belt {
 fn energy_from_nowhere_is_an_error_by_default() {
     let start = state(at(0.0, 0.0, -2.5e-4), [0.1, 0.0, 0.0], [0.0; 3]);
     let law = (Arc::new(Belt([1e7, 0.5])) as Arc<dyn DynContactLaw>, HARD);
-    let (world, start) = on(HalfSpace::floor(), down(), pebble(), law, start);
+    let (model, start) = on(HalfSpace::floor(), down(), pebble(), law, start);
     let made = |error| matches!(error, SimulationError::Energy { .. });
-    assert!(made(world.simulate(&start, 1.0).unwrap_err()));
-    assert!(made(world.rollout(&start, TimeSteps { dt: 0.1, steps: 10 }).unwrap_err()));
+    assert!(made(model.simulate(&start, 1.0).unwrap_err()));
+    assert!(made(model.rollout(&start, TimeSteps { dt: 0.1, steps: 10 }).unwrap_err()));
 }
 
 #[test]
 fn energy_of_a_free_rotation_is_no_fault_of_contacts() {
-    let mut world = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::zeros());
     let rigid = RigidBody::cuboid(1.0, [0.1, 0.05, 0.02]).unwrap();
-    let brick = world.add(Body::dynamic("brick", rigid));
+    let brick = model.add(Body::dynamic("brick", rigid));
     let mut start = State::new([rigid.at_rest(&Isometry3::identity())]);
     start[brick].angular = Vector3::new(0.1, 20.0, 0.1);
     let time_steps = TimeSteps { dt: 1e-2, steps: 400 };
-    let made = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
+    let made = model.simulate_with(&SemiImplicitEuler, &start, time_steps);
     let made = made.unwrap_err().to_string();
     assert!(made.starts_with("the motion has made"), "{made}");
 }
@@ -265,12 +265,12 @@ fn energy_of_a_free_rotation_is_no_fault_of_contacts() {
 #[test]
 fn bad_settings_and_bad_states_are_told_as_such() {
     let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
-    let (world, start) =
+    let (model, start) =
         on(HalfSpace::floor(), down(), pebble(), (hunt_crossley(0.1, 0.3, 1e-2), HARD), start);
     let once = TimeSteps { dt: 0.1, steps: 1 };
     for value in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
         let loose = Adaptive { sensitivity_tolerance: value, ..Adaptive::default() };
-        let refused = world.simulate_with(&loose, &start, once).unwrap_err();
+        let refused = model.simulate_with(&loose, &start, once).unwrap_err();
         let refused = refused.to_string();
         assert!(
             refused.starts_with("Adaptive::sensitivity_tolerance must be positive"),
@@ -280,25 +280,25 @@ fn bad_settings_and_bad_states_are_told_as_such() {
     let mut lost = start.clone();
     lost[1].linear.x = f64::NAN;
     let step = prehend_sim::Step::new(15, 0.1);
-    let refused = world.step(&Adaptive::default(), &lost, step).unwrap_err();
+    let refused = model.step(&Adaptive::default(), &lost, step).unwrap_err();
     assert!(matches!(refused, SimulationError::NotFinite { time, .. } if time == 1.5));
 }
 
 #[test]
 fn forces_that_jump_are_refused_before_anything_is_recorded() {
     let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
-    let (world, start) =
+    let (model, start) =
         on(HalfSpace::floor(), down(), pebble(), (kelvin_voigt(0.3, 1e-2), HARD), start);
-    assert!(world.simulate(&start, 0.2).is_ok());
+    assert!(model.simulate(&start, 0.2).is_ok());
     let recording = Recording::start();
     let mut lifted = start.cast();
     lifted[1].linear.x = recording.variable(0.0);
-    let world = world.cast();
+    let model = model.cast();
     let (adaptive, once) = (Adaptive::default(), TimeSteps { dt: 0.2, steps: 1 });
-    let compact = StepCheckpointed::new(adaptive, &world).unwrap();
+    let compact = StepCheckpointed::new(adaptive, &model).unwrap();
     let refused = [
-        world.simulate(&lifted, 0.2).unwrap_err(),
-        world.simulate_with(&compact, &lifted, once).unwrap_err(),
+        model.simulate(&lifted, 0.2).unwrap_err(),
+        model.simulate_with(&compact, &lifted, once).unwrap_err(),
     ];
     assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
 }
@@ -309,9 +309,9 @@ fn smooth_contacts_may_give_back_what_they_stored() {
         for (gravity, width) in [(Vector3::zeros(), 5e-5), (down(), 1e-3)] {
             let law = (kelvin_voigt(0.0, 1e-2), GapSmoothing::Softplus { width });
             let start = state(at(0.0, 0.0, height), [0.0; 3], [0.0; 3]);
-            let (world, start) = on(HalfSpace::floor(), gravity, pebble(), law, start);
+            let (model, start) = on(HalfSpace::floor(), gravity, pebble(), law, start);
             let time_steps = TimeSteps { dt: 1e-5, steps: 3000 };
-            world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
+            model.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
         }
     }
 }
@@ -320,14 +320,14 @@ fn smooth_contacts_may_give_back_what_they_stored() {
 fn without_contacts_nothing_is_rough() {
     let law = || (kelvin_voigt(0.3, 1e-2), SMOOTH);
     let falling = state(at(0.0, 0.0, 100.0), [0.0; 3], [0.0; 3]);
-    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), falling);
+    let (model, start) = on(HalfSpace::floor(), down(), cube(), law(), falling);
     let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
+    let run = model.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert_eq!((run.resolution.roughness, run.resolution.roughest), (Some(0.0), None));
     let tumbling = state(at(0.0, 0.0, 100.0), [0.0; 3], [5.0, 1.0, 0.0]);
-    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), tumbling);
+    let (model, start) = on(HalfSpace::floor(), down(), cube(), law(), tumbling);
     let time_steps = TimeSteps { dt: 1e-2, steps: 100 };
-    let run = world.simulate_with(&RungeKutta4, &start, time_steps).unwrap();
+    let run = model.simulate_with(&RungeKutta4, &start, time_steps).unwrap();
     assert_eq!(run.resolution.roughness, Some(0.0));
 }
 
@@ -338,19 +338,19 @@ fn a_short_run_that_begins_in_contact_may_be_fine() {
     // Four feet of 1 cm² carry it 0.7 mm deep.
     let depth = 0.3 * 9.81 / (4e-4 * 1e7);
     let resting = state(at(0.0, 0.0, 0.05 - depth), [0.0; 3], [0.0; 3]);
-    let (world, start) =
+    let (model, start) =
         on(HalfSpace::floor(), down(), block, (kelvin_voigt(0.3, 1e-2), HARD), resting);
     let time_steps = TimeSteps { dt: 1e-5, steps: 50 };
-    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
+    let run = model.simulate_with(&SemiImplicitEuler, &start, time_steps).unwrap();
     assert!(run.resolution.is_fine(), "{}", run.resolution);
 }
 
 #[test]
 fn too_many_parts_are_told_as_such() {
     let start = state(at(0.0, 0.0, 0.05), [0.3, 0.0, 0.0], [0.0; 3]);
-    let (world, start) =
+    let (model, start) =
         on(HalfSpace::floor(), down(), cube(), (kelvin_voigt(0.3, 1e-5), SMOOTH), start);
     let few = Adaptive { max_substeps: 50, ..Adaptive::default() };
-    let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 });
+    let run = model.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 });
     assert!(matches!(run, Err(SimulationError::TooManySubsteps { max_substeps: 50, .. })));
 }

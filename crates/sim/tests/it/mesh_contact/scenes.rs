@@ -9,8 +9,8 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::{Mug, cuboid};
 use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Shape,
-    ShapeOptions, State, World,
+    Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model,
+    Shape, ShapeOptions, State,
 };
 
 use super::meshes::{ROD, Thread, bolt, hook, nut};
@@ -18,7 +18,7 @@ use super::meshes::{ROD, Thread, bolt, hook, nut};
 /// A body that moves, what it touches, and how long it is looked at.
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
-    pub(crate) world: World,
+    pub(crate) model: Model,
     pub(crate) start: State,
     /// Meshes of the bodies.
     #[allow(dead_code)] // the example mesh_contacts draws them
@@ -81,23 +81,23 @@ struct Pair {
 
 impl Pair {
     fn scene(self, name: &'static str) -> anyhow::Result<Scene> {
-        let mut world = World::new(Vector3::z() * -9.81);
+        let mut model = Model::new(Vector3::z() * -9.81);
         let (mesh, lengths, pose) = self.fixed;
-        let other = world.add(Body::fixed_from_shape("fixed", &shape(&mesh, lengths)?));
+        let other = model.add(Body::fixed_from_shape("fixed", &shape(&mesh, lengths)?));
         let fixed = BodyState::at_rest(pose);
         let (moving_mesh, shape, pose) = self.moving;
         let meshes = [mesh, moving_mesh];
         let body = Body::from_shape("moving", &shape, self.density)?;
         let rigid = *body.rigid().ok_or_else(|| anyhow::anyhow!("no mass"))?;
         let start = State::new([fixed, rigid.at_rest(&pose)]);
-        let moving = world.add(body);
+        let moving = model.add(body);
         let [area, depth, friction] = self.contact;
         let law = Arc::new(law(rigid.mass(), area, depth, friction)?);
         let smoothing = GapSmoothing::Softplus { width: 0.05 * depth };
-        world.add_symmetric_contact(moving, other, law, smoothing)?;
+        model.add_symmetric_contact(moving, other, law, smoothing)?;
         let mark = self.mark - rigid.com();
         let Self { dimension, time, .. } = self;
-        Ok(Scene { name, world, start, meshes, moving, dimension, time, mark })
+        Ok(Scene { name, model, start, meshes, moving, dimension, time, mark })
     }
 }
 

@@ -36,23 +36,23 @@ impl Scene {
         integrator: &impl Integrator,
         changes: &[S; INPUTS],
     ) -> Result<Vector3<S>, SimulationError> {
-        let mut world = self.world.cast::<S>();
+        let mut model = self.model.cast::<S>();
         let mut start: State<S> = self.start.cast();
         let tangent = std::array::from_fn(|i| changes[i]);
         start[self.moving] = self.start[self.moving].retract(&tangent);
         for (name, change) in LAW.into_iter().zip(&changes[12..15]) {
-            for pair in &mut world.contacts {
+            for pair in &mut model.contacts {
                 *pair.param_mut(name)? *= change.exp();
             }
         }
         if let Some(name) = self.dimension {
-            let body = &mut world.bodies[self.moving];
+            let body = &mut model.bodies[self.moving];
             let dimensions = body.shape().map(|shape| shape.dimensions()).unwrap_or_default();
             let (_, value) = dimensions.into_iter().find(|(own, _)| own == name).unwrap();
             body.set_dimension(name, value + changes[15]).unwrap();
         }
         let once = TimeSteps { dt: self.time, steps: 1 };
-        let end = world.simulate_with(integrator, &start, once)?.states;
+        let end = model.simulate_with(integrator, &start, once)?.states;
         let pose = end[self.moving].pose;
         Ok(pose.translation.vector + pose.rotation * self.mark.map(S::constant))
     }

@@ -1,10 +1,10 @@
 //! A model with joints of every kind, several on a body, anchors and references. Poses and efforts against gravity are MuJoCo's.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::mjcf::Model;
+use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::{MjcfError, MjcfOptions};
-use prehend_sim::{BodyId, JointAxis, ShapeOptions, TimeSteps, World};
+use prehend_sim::{BodyId, JointAxis, Model, ShapeOptions, TimeSteps};
 
 const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
     <geom name="ground" type="plane" size="1 1 .1"/>
@@ -63,11 +63,11 @@ const EFFORTS: [f64; 6] = [
 
 #[test]
 fn joints_of_every_kind_are_where_mujoco_has_them() {
-    let model = Model::from_str(MODEL, None).unwrap();
-    let mut world = World::new(model.gravity);
-    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
-    let mut states = world.neutral_state();
-    robot.set_positions(&world, &mut states, &POSITIONS).unwrap();
+    let mjcf = MjcfModel::from_str(MODEL, None).unwrap();
+    let mut model = Model::new(mjcf.gravity);
+    let robot = model.add_mjcf(&mjcf, &MjcfOptions::default()).unwrap();
+    let mut states = model.neutral_state();
+    robot.set_positions(&model, &mut states, &POSITIONS).unwrap();
     for (name, place, [w, i, j, k]) in POSES {
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
         let expected = Isometry3::from_parts(Translation3::from(place), turn);
@@ -75,30 +75,30 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
         let off = (found.to_homogeneous() - expected.to_homogeneous()).amax();
         assert!(off < 1e-12, "{name}: {off}");
     }
-    let own = &world.articulations[0];
-    let [q, v] = super::coordinates(&world, &states);
-    let at = own.tree.kinematics(&q, &v).under(world.gravity);
+    let own = &model.articulations[0];
+    let [q, v] = super::coordinates(&model, &states);
+    let at = own.tree.kinematics(&q, &v).under(model.gravity);
     let effort = at.inverse_dynamics(&vec![0.0; v.len()]);
     for (found, expected) in effort.iter().zip(EFFORTS) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
     // The ground is there, and shapes touch it.
-    let ground: BodyId = world.body_named("ground").unwrap();
-    assert!(world.bodies[ground].field.is_some());
-    assert!(world.bodies[robot.body("free").unwrap()].surface.is_some());
+    let ground: BodyId = model.body_named("ground").unwrap();
+    assert!(model.bodies[ground].field.is_some());
+    assert!(model.bodies[robot.body("free").unwrap()].surface.is_some());
     // The free ball falls.
     let time_steps = TimeSteps { dt: 0.1, steps: 1 };
-    let end = &world.rollout(&states, time_steps).unwrap()[1];
+    let end = &model.rollout(&states, time_steps).unwrap()[1];
     let fallen = 0.7 - end[robot.body("free").unwrap()].pose.translation.z;
     assert!((fallen - 0.5 * 9.81 * 0.01).abs() < 1e-6, "{fallen}");
 
-    // A model that is placed takes its world with it.
+    // A model that is placed takes its model with it.
     let options = MjcfOptions {
-        t_world_model: Isometry3::translation(5.0, 0.0, 2.0),
+        t_world_mjcf: Isometry3::translation(5.0, 0.0, 2.0),
         ..MjcfOptions::default()
     };
-    let mut moved = World::new(model.gravity);
-    let robot_there = moved.add_mjcf(&model, &options).unwrap();
+    let mut moved = Model::new(mjcf.gravity);
+    let robot_there = moved.add_mjcf(&mjcf, &options).unwrap();
     let mut there = moved.neutral_state();
     robot_there.set_positions(&moved, &mut there, &POSITIONS).unwrap();
     for (here, other) in robot.bodies.iter().zip(&robot_there.bodies) {
@@ -106,56 +106,56 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
         assert!((by - Vector3::new(5.0, 0.0, 2.0)).norm() < 1e-12);
     }
 
-    let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
+    let refused = robot.set_positions(&model, &mut states, &POSITIONS[1..]);
     assert_eq!(refused, Err(MjcfError::Count { what: "positions", given: 13, expected: 14 }));
 }
 
 #[test]
 fn a_body_of_several_joints_is_one_with_one_mass() {
-    let model = r#"<mujoco><worldbody>
+    let mjcf = r#"<mujoco><worldbody>
         <body name="bob"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
             <joint name="turn" type="hinge"/><geom type="sphere" size="0.1" mass="0.3"/></body>
         <body name="tail" pos="1 0 0"><joint name="lead" type="hinge"/><geom type="sphere" size="0.1" mass="1"/></body>
         </worldbody></mujoco>"#;
-    let model = Model::from_str(model, None).unwrap();
-    let mut world = World::new(Vector3::zeros());
-    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
-    let mass = |world: &World, name: &str| {
-        let place = world.parameter_names().iter().position(|own| own == name).unwrap();
-        world.parameters()[place]
+    let mjcf = MjcfModel::from_str(mjcf, None).unwrap();
+    let mut model = Model::new(Vector3::zeros());
+    let robot = model.add_mjcf(&mjcf, &MjcfOptions::default()).unwrap();
+    let mass = |model: &Model, name: &str| {
+        let place = model.parameter_names().iter().position(|own| own == name).unwrap();
+        model.parameters()[place]
     };
-    assert_eq!([mass(&world, "bob.mass"), mass(&world, "tail.mass")], [0.3, 1.0]);
-    assert_eq!(world.body_named("bob"), robot.body("bob"));
+    assert_eq!([mass(&model, "bob.mass"), mass(&model, "tail.mass")], [0.3, 1.0]);
+    assert_eq!(model.body_named("bob"), robot.body("bob"));
     let joints: Vec<&str> = robot.joints.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(joints, ["bob:0", "bob:1", "turn", "lead"]);
-    let names: Vec<&str> = world.bodies.iter().map(|body| body.name.as_str()).collect();
+    let names: Vec<&str> = model.bodies.iter().map(|body| body.name.as_str()).collect();
     assert_eq!(names, ["bob:0", "bob:1", "bob", "tail"]);
 }
 
 #[test]
 fn a_model_hangs_on_the_joint_that_is_asked_for_and_has_shapes_if_wanted() {
-    let model = Model::from_str(MODEL, None).unwrap();
-    let mut world = World::new(model.gravity);
+    let mjcf = MjcfModel::from_str(MODEL, None).unwrap();
+    let mut model = Model::new(mjcf.gravity);
     let options = MjcfOptions {
         base: Joint::Prismatic(nalgebra::Vector3::x_axis()),
         shapes: false,
         ..MjcfOptions::default()
     };
-    let robot = world.add_mjcf(&model, &options).unwrap();
-    assert!(world.body_named("ground").is_none());
-    assert!(world.bodies.iter().all(|body| body.surface.is_none() && body.field.is_none()));
-    let mut states = world.neutral_state();
+    let robot = model.add_mjcf(&mjcf, &options).unwrap();
+    assert!(model.body_named("ground").is_none());
+    assert!(model.bodies.iter().all(|body| body.surface.is_none() && body.field.is_none()));
+    let mut states = model.neutral_state();
     let base = robot.body("base").unwrap();
     let before = states[base].pose;
-    world.set_joint(&mut states, base, &[0.25], &[0.0]).unwrap();
+    model.set_joint(&mut states, base, &[0.25], &[0.0]).unwrap();
     let by = states[base].pose.translation.vector - before.translation.vector;
     // Along the axis of the base's own frame, which the file turns.
     let along = before.rotation * nalgebra::Vector3::x() * 0.25;
     assert!((by - along).norm() < 1e-12, "{by}");
     // Positions of the file do not name that slide.
-    robot.set_positions(&world, &mut states, &POSITIONS).unwrap();
+    robot.set_positions(&model, &mut states, &POSITIONS).unwrap();
     let slide: JointAxis = base.into();
-    let [position, _] = world.joint_motion(&states, slide).unwrap();
+    let [position, _] = model.joint_motion(&states, slide).unwrap();
     assert_eq!(position, 0.25);
     // What flies does not hang on it.
     let free = states[robot.body("free").unwrap()].pose.translation.vector;
@@ -167,13 +167,13 @@ fn a_model_that_cannot_be_leaves_the_world_as_it_was() {
     let flawed = r#"<mujoco><worldbody><body name="light"><joint name="hinge" type="hinge"/>
         <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>
         <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"#;
-    let model = Model::from_str(flawed, None).unwrap();
-    let mut world = World::new(model.gravity);
+    let mjcf = MjcfModel::from_str(flawed, None).unwrap();
+    let mut model = Model::new(mjcf.gravity);
     // Edges rounder than the box is wide.
     let shape_options = ShapeOptions { rounding: Some(1.0), ..ShapeOptions::default() };
     let options = MjcfOptions { shape_options, ..MjcfOptions::default() };
-    let error = world.add_mjcf(&model, &options).unwrap_err();
+    let error = model.add_mjcf(&mjcf, &options).unwrap_err();
     assert!(matches!(&error, MjcfError::Shape { body, .. } if body == "light"), "{error}");
-    assert!(world.bodies.is_empty() && world.articulations.is_empty());
-    assert!(world.joint_forces.is_empty());
+    assert!(model.bodies.is_empty() && model.articulations.is_empty());
+    assert!(model.joint_forces.is_empty());
 }

@@ -1,11 +1,11 @@
 //! Kinematics and dynamics, made by `benches/peers/sim/robot_golden.py`.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::mjcf::Model;
+use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::articulated::Articulation;
 use prehend_sim::robot::{MjcfOptions, UrdfOptions};
-use prehend_sim::{BodyId, State, World};
+use prehend_sim::{BodyId, Model, State};
 use serde_json::Value;
 
 use super::data_folder;
@@ -23,51 +23,51 @@ fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     }
 }
 
-/// A robot in a world: the link of each joint of the golden values, in their order, and the body of each name.
+/// A robot in a model: the link of each joint of the golden values, in their order, and the body of each name.
 struct Robot {
-    world: World,
+    model: Model,
     joints: Vec<BodyId>,
     bodies: Vec<(String, BodyId)>,
 }
 
 fn mjcf(golden: &Value) -> Robot {
     let file = data_folder().join(golden["file"].as_str().unwrap());
-    let model = Model::from_file(file).unwrap();
-    let mut world = World::new(model.gravity);
+    let mjcf = MjcfModel::from_file(file).unwrap();
+    let mut model = Model::new(mjcf.gravity);
     let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
-    let robot = world.add_mjcf(&model, &options).unwrap();
+    let robot = model.add_mjcf(&mjcf, &options).unwrap();
     let names = golden["joints"].as_array().unwrap();
     let joints = names.iter().map(|name| robot.joint(name.as_str().unwrap()).unwrap().link);
-    let bodies = model.bodies.iter().map(|body| body.name.clone()).zip(robot.bodies.clone());
-    Robot { joints: joints.collect(), bodies: bodies.collect(), world }
+    let bodies = mjcf.bodies.iter().map(|body| body.name.clone()).zip(robot.bodies.clone());
+    Robot { joints: joints.collect(), bodies: bodies.collect(), model }
 }
 
 fn urdf(golden: &Value) -> Robot {
     let file = data_folder().join(golden["file"].as_str().unwrap());
     let tree = KinematicTree::from_urdf_file(file).unwrap();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let bodies = world.add_articulated_robot(&tree, None, &UrdfOptions::default()).unwrap();
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let bodies = model.add_articulated_robot(&tree, None, &UrdfOptions::default()).unwrap();
     let link = |name: &Value| {
         let joint = tree.joints().iter().find(|joint| joint.name == name.as_str().unwrap());
         bodies[joint.unwrap().child]
     };
     let joints = golden["joints"].as_array().unwrap().iter().map(link).collect();
     let names = tree.links().iter().map(|link| link.name.clone());
-    Robot { joints, bodies: names.zip(bodies.clone()).collect(), world }
+    Robot { joints, bodies: names.zip(bodies.clone()).collect(), model }
 }
 
 /// Degree of freedom of each joint of the golden values.
-fn velocity_places(world: &World, joints: &[BodyId]) -> Vec<usize> {
-    let own = &world.articulations[0];
+fn velocity_places(model: &Model, joints: &[BodyId]) -> Vec<usize> {
+    let own = &model.articulations[0];
     let place = |body: &BodyId| own.bodies().iter().position(|link| link == body).unwrap();
     joints.iter().map(|body| own.tree.range(place(body))[1].start).collect()
 }
 
-fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) {
+fn compare(name: &str, golden: &Value, Robot { model, joints, bodies }: &Robot) {
     let [q, v, a] = ["q", "v", "a"].map(|key| numbers(&golden[key]));
-    let mut states: State = world.neutral_state();
+    let mut states: State = model.neutral_state();
     for ((link, q), v) in joints.iter().zip(&q).zip(&v) {
-        world.set_joint(&mut states, *link, &[*q], &[*v]).unwrap();
+        model.set_joint(&mut states, *link, &[*q], &[*v]).unwrap();
     }
     let mut compared = 0;
     for (body, id) in bodies {
@@ -80,9 +80,9 @@ fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) 
         compared += 1;
     }
     assert!(compared >= joints.len() && compared + 2 >= golden["poses"].as_object().unwrap().len());
-    let order = velocity_places(world, joints);
+    let order = velocity_places(model, joints);
     let n = order.len();
-    let tree: &Articulation = &world.articulations[0].tree;
+    let tree: &Articulation = &model.articulations[0].tree;
     let ordered = |x: &[f64]| {
         let mut own = vec![0.0; n];
         order.iter().zip(x).for_each(|(place, x)| own[*place] = *x);
@@ -93,7 +93,7 @@ fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) 
         let rows = order.iter().flat_map(|row| order.iter().map(move |column| m[(*row, *column)]));
         rows.collect::<Vec<f64>>()
     };
-    let at = tree.kinematics(&ordered(&q), &ordered(&v)).under(world.gravity);
+    let at = tree.kinematics(&ordered(&q), &ordered(&v)).under(model.gravity);
     let a = ordered(&a);
     let effort = at.inverse_dynamics(&a);
     let check = |found: &[f64], key: &str| {

@@ -1,8 +1,8 @@
 //! A gripper with closed loops beside MuJoCo: `benches/peers/sim/gripper_golden.py` has made its motion.
 
-use prehend_geometry::mjcf::Model;
+use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_sim::robot::MjcfOptions;
-use prehend_sim::{Adaptive, State, TimeSteps, World};
+use prehend_sim::{Adaptive, Model, State, TimeSteps};
 use serde_json::Value;
 
 use super::data_folder;
@@ -15,10 +15,10 @@ fn numbers(value: &Value) -> Vec<f64> {
 #[ignore = "reads PREHEND_DATA"]
 fn data_loops_of_a_gripper_move_as_in_mujoco() {
     let golden: Value = serde_json::from_str(include_str!("../golden/gripper.json")).unwrap();
-    let model = Model::from_file(data_folder().join("robots/robotiq_2f85/2f85.xml")).unwrap();
-    let mut world = World::new(model.gravity);
+    let mjcf = MjcfModel::from_file(data_folder().join("robots/robotiq_2f85/2f85.xml")).unwrap();
+    let mut model = Model::new(mjcf.gravity);
     let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
-    let robot = world.add_mjcf(&model, &options).unwrap();
+    let robot = model.add_mjcf(&mjcf, &options).unwrap();
     let names = golden["joints"].as_array().unwrap();
     let links: Vec<_> =
         names.iter().map(|name| robot.joint(name.as_str().unwrap()).unwrap().link).collect();
@@ -27,14 +27,14 @@ fn data_loops_of_a_gripper_move_as_in_mujoco() {
     let controls = numbers(&golden["controls"]);
     let time_steps = TimeSteps { dt: golden["every"].as_f64().unwrap(), steps: run.len() - 1 };
     let mut found: Vec<Vec<f64>> = Vec::new();
-    let control = |step: prehend_sim::Step, world: &mut World, states: &mut State| {
+    let control = |step: prehend_sim::Step, model: &mut Model, states: &mut State| {
         let half = usize::from(2 * step.index >= time_steps.steps);
-        world.joint_force_mut(actuator).set_param("control", controls[half]).unwrap();
-        let position = |link| world.joint(states, link).unwrap().position[0];
+        model.joint_force_mut(actuator).set_param("control", controls[half]).unwrap();
+        let position = |link| model.joint(states, link).unwrap().position[0];
         found.push(links.iter().map(|link| position(*link)).collect());
     };
-    let start = world.neutral_state();
-    world.simulate_controlled(&Adaptive::default(), &start, time_steps, control).unwrap();
+    let start = model.neutral_state();
+    model.simulate_controlled(&Adaptive::default(), &start, time_steps, control).unwrap();
     let travel = run.iter().map(|at| numbers(at)[0]).fold(0.0, f64::max);
     let mut worst = 0.0_f64;
     for (at, expected) in found.iter().zip(run) {

@@ -1,16 +1,16 @@
 //! A small model of each kind that is read. Masses, poses and accelerations are MuJoCo 4.0's, those of URDF Pinocchio 4.1's, written by `benches/peers/files/kinds.py`.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::mjcf::Model;
+use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::robot::{MjcfError, MjcfOptions, MjcfRobot, UrdfOptions};
-use prehend_sim::{RungeKutta4, State, TimeSteps, World};
+use prehend_sim::{Model, RungeKutta4, State, TimeSteps};
 use serde_json::Value;
 
 use super::golden::numbers;
 
 /// The model of golden values, without limits.
-fn read(name: &str, golden: &Value) -> Model {
+fn read(name: &str, golden: &Value) -> MjcfModel {
     let folder =
         std::env::temp_dir().join(format!("prehend_{}_{}", std::process::id(), name.len()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -18,11 +18,11 @@ fn read(name: &str, golden: &Value) -> Model {
         let file = if file.is_empty() { "model.xml" } else { file };
         std::fs::write(folder.join(file), text.as_str().unwrap()).unwrap();
     }
-    let model = Model::from_file(folder.join("model.xml"));
+    let mjcf = MjcfModel::from_file(folder.join("model.xml"));
     std::fs::remove_dir_all(&folder).unwrap();
-    let mut model = model.unwrap_or_else(|error| panic!("{name}: {error}"));
-    model.bodies.iter_mut().flat_map(|b| &mut b.joints).for_each(|joint| joint.range = None);
-    model
+    let mut mjcf = mjcf.unwrap_or_else(|error| panic!("{name}: {error}"));
+    mjcf.bodies.iter_mut().flat_map(|b| &mut b.joints).for_each(|joint| joint.range = None);
+    mjcf
 }
 
 fn near(what: &str, found: &[f64], expected: &[f64], tolerance: f64) {
@@ -34,16 +34,16 @@ fn near(what: &str, found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-fn start(world: &mut World, robot: &MjcfRobot, state: &Value) -> State {
+fn start(model: &mut Model, robot: &MjcfRobot, state: &Value) -> State {
     let [qpos, qvel, ctrl, act] = ["qpos", "qvel", "ctrl", "act"].map(|key| numbers(&state[key]));
     for ((_, id), control) in robot.actuators.iter().zip(&ctrl) {
-        world.joint_force_mut(*id).set_param("control", *control).unwrap();
+        model.joint_force_mut(*id).set_param("control", *control).unwrap();
     }
     assert_eq!(robot.actuators.len(), ctrl.len());
-    let mut states = world.neutral_state();
-    robot.set_positions(world, &mut states, &qpos).unwrap();
-    robot.set_velocities(world, &mut states, &qvel).unwrap();
-    robot.set_activations(world, &mut states, &act).unwrap();
+    let mut states = model.neutral_state();
+    robot.set_positions(model, &mut states, &qpos).unwrap();
+    robot.set_velocities(model, &mut states, &qvel).unwrap();
+    robot.set_activations(model, &mut states, &act).unwrap();
     states
 }
 
@@ -56,8 +56,8 @@ fn places(robot: &MjcfRobot, states: &State) -> Vec<f64> {
 fn each_kind_is_as_mujoco_has_it() {
     let golden: Value = serde_json::from_str(include_str!("../golden/mjcf_kinds.json")).unwrap();
     for (name, golden) in golden.as_object().unwrap() {
-        let model = read(name, golden);
-        let found = model.bodies.iter().map(|body| {
+        let mjcf = read(name, golden);
+        let found = mjcf.bodies.iter().map(|body| {
             let own = body.inertial.map(|i| {
                 [vec![i.mass], i.com.coords.as_slice().to_vec(), i.inertia.as_slice().to_vec()]
             });
@@ -71,10 +71,10 @@ fn each_kind_is_as_mujoco_has_it() {
             near(&format!("{name}: body {k}"), found, expected, 1e-6);
         }
         for (k, state) in golden["states"].as_array().unwrap().iter().enumerate() {
-            let mut world = World::new(model.gravity);
+            let mut model = Model::new(mjcf.gravity);
             let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
-            let robot = world.add_mjcf(&model, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
-            let states = start(&mut world, &robot, state);
+            let robot = model.add_mjcf(&mjcf, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let states = start(&mut model, &robot, state);
             let what = format!("{name}, state {k}");
             near(
                 &format!("{what}: places"),
@@ -83,7 +83,7 @@ fn each_kind_is_as_mujoco_has_it() {
                 1e-9,
             );
             for (sensor, expected) in state["sensors"].as_object().unwrap() {
-                let mut found = robot.sensor(&world, &states, sensor).unwrap();
+                let mut found = robot.sensor(&model, &states, sensor).unwrap();
                 let expected = numbers(expected);
                 // Two quaternions are one rotation.
                 if sensor.contains("quat") && found[0] * expected[0] < 0.0 {
@@ -91,11 +91,11 @@ fn each_kind_is_as_mujoco_has_it() {
                 }
                 near(&format!("{what}: sensor {sensor}"), &found, &expected, 1e-6);
             }
-            let found = robot.accelerations(&world, &states);
+            let found = robot.accelerations(&model, &states);
             near(&format!("{what}: accelerations"), &found, &numbers(&state["qacc"]), 1e-6);
             if state["end"].is_object() {
-                let time_steps = TimeSteps { dt: model.time_step, steps: 1000 };
-                let run = world.rollout_with(&RungeKutta4, &states, time_steps).unwrap();
+                let time_steps = TimeSteps { dt: mjcf.time_step, steps: 1000 };
+                let run = model.rollout_with(&RungeKutta4, &states, time_steps).unwrap();
                 let end = run.states.last().unwrap();
                 let expected = numbers(&state["end"]["xpos"]);
                 near(&format!("{name}: after a second"), &places(&robot, end), &expected, 1e-4);
@@ -119,21 +119,21 @@ fn tendons_follow_each_other() {
             "<mujoco><worldbody>{bodies}</worldbody><tendon>{tendons}</tendon>
             <equality><tendon tendon1='a' tendon2='b' polycoef='{polynomial}'/></equality></mujoco>"
         );
-        let model = Model::from_str(&xml, None).unwrap();
-        let mut world = World::new(model.gravity);
+        let mjcf = MjcfModel::from_str(&xml, None).unwrap();
+        let mut model = Model::new(mjcf.gravity);
         let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
-        world.add_mjcf(&model, &options).map(|robot| (world, robot))
+        model.add_mjcf(&mjcf, &options).map(|robot| (model, robot))
     };
     for tendons in [&cables, sums] {
-        let (world, robot) = scene(tendons, "0.1 0.5").unwrap();
-        let [a, b] = ends(&world, &robot);
+        let (model, robot) = scene(tendons, "0.1 0.5").unwrap();
+        let [a, b] = ends(&model, &robot);
         assert!(b < -0.1 && (-a - (0.1 - 0.5 * b)).abs() < 2e-3, "{a} {b}");
     }
     // By higher powers, and a cable by a sum of joints.
     let mixed = cable("a", "u", "a") + "<fixed name='b'><joint joint='b' coef='-1'/></fixed>";
     for tendons in [&cables, sums, &mixed] {
-        let (world, robot) = scene(tendons, "0.1 0.5 2 -1").unwrap();
-        let [a, b] = ends(&world, &robot);
+        let (model, robot) = scene(tendons, "0.1 0.5 2 -1").unwrap();
+        let [a, b] = ends(&model, &robot);
         assert!(
             b < -0.1 && (-a - (0.1 - 0.5 * b + 2.0 * b * b + b * b * b)).abs() < 4e-3,
             "{a} {b}"
@@ -147,31 +147,31 @@ fn joints_follow_polynomials_of_others() {
     let xml = "<mujoco><compiler angle='radian'/><worldbody><body name='a'><joint name='a' axis='0 1 0' ref='.2' damping='.1'/><geom size='.1' pos='.2 0 0'/></body>
         <body name='b'><joint name='b' axis='0 1 0' ref='-.1'/><geom size='.1' pos='.4 0 0'/></body></worldbody>
         <equality><joint joint1='a' joint2='b' polycoef='.05 .5 -.3 .2 .1'/></equality></mujoco>";
-    let model = Model::from_str(xml, None).unwrap();
-    let mut world = World::new(model.gravity);
+    let mjcf = MjcfModel::from_str(xml, None).unwrap();
+    let mut model = Model::new(mjcf.gravity);
     let options = MjcfOptions { shapes: false, ..MjcfOptions::default() };
-    let robot = world.add_mjcf(&model, &options).unwrap();
-    let [a, b] = ends(&world, &robot);
+    let robot = model.add_mjcf(&mjcf, &options).unwrap();
+    let [a, b] = ends(&model, &robot);
     let x = b + 0.1;
     let follows = 0.05 + x * (0.5 + x * (-0.3 + x * (0.2 + x * 0.1)));
     assert!(x > 0.3 && (a - 0.2 - follows).abs() < 4e-3, "{a} {b}");
 }
 
 /// Positions of the joints a and b after a while.
-fn ends(world: &World, robot: &MjcfRobot) -> [f64; 2] {
-    let end = world.simulate(&world.neutral_state(), 0.2).unwrap();
-    ["a", "b"].map(|joint| world.joint_motion(&end, robot.joint(joint).unwrap()).unwrap()[0])
+fn ends(model: &Model, robot: &MjcfRobot) -> [f64; 2] {
+    let end = model.simulate(&model.neutral_state(), 0.2).unwrap();
+    ["a", "b"].map(|joint| model.joint_motion(&end, robot.joint(joint).unwrap()).unwrap()[0])
 }
 
 #[test]
 fn terrain_is_where_mujoco_has_it() {
     let xml = "<mujoco><asset><hfield name='h' nrow='3' ncol='4' size='.6 .4 .3 .1' elevation='0 1 2 3 2 3 4 5 4 5 6 7'/></asset>
         <worldbody><geom name='ground' type='hfield' hfield='h' pos='.1 -.2 .05' euler='5 -10 30'/></worldbody></mujoco>";
-    let mut world = World::new(Vector3::zeros());
-    let model = Model::from_str(xml, None).unwrap();
-    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
+    let mut model = Model::new(Vector3::zeros());
+    let mjcf = MjcfModel::from_str(xml, None).unwrap();
+    let robot = model.add_mjcf(&mjcf, &MjcfOptions::default()).unwrap();
     assert_eq!(robot.warnings, ["geom 'ground': its field's border"]);
-    let ground = world.bodies.iter().find(|body| body.name == "ground").unwrap();
+    let ground = model.bodies.iter().find(|body| body.name == "ground").unwrap();
     let field = ground.field.as_ref().unwrap();
     // Where rays from above meet it.
     for place in [
@@ -190,9 +190,9 @@ fn terrain_is_where_mujoco_has_it() {
         "<geom name",
         "<body><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/><geom name",
     );
-    let model =
-        Model::from_str(&moved.replace("</worldbody>", "</body></worldbody>"), None).unwrap();
-    let refused = World::new(Vector3::zeros()).add_mjcf(&model, &MjcfOptions::default());
+    let mjcf =
+        MjcfModel::from_str(&moved.replace("</worldbody>", "</body></worldbody>"), None).unwrap();
+    let refused = Model::new(Vector3::zeros()).add_mjcf(&mjcf, &MjcfOptions::default());
     assert!(matches!(refused, Err(MjcfError::NoCounterpart { .. })));
 }
 
@@ -201,21 +201,21 @@ fn mocap_bodies_lead() {
     let xml = "<mujoco><worldbody><body name='hand' mocap='true' pos='0 0 1'><geom size='.1' contype='0' conaffinity='0'/></body>
         <body name='thing' pos='0 0 1'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody>
         <equality><weld body1='hand' body2='thing'/></equality></mujoco>";
-    let model = Model::from_str(xml, None).unwrap();
-    let mut world = World::new(Vector3::zeros());
-    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
-    let mut states = world.neutral_state();
-    robot.set_positions(&world, &mut states, &model.reference_positions()).unwrap();
+    let mjcf = MjcfModel::from_str(xml, None).unwrap();
+    let mut model = Model::new(Vector3::zeros());
+    let robot = model.add_mjcf(&mjcf, &MjcfOptions::default()).unwrap();
+    let mut states = model.neutral_state();
+    robot.set_positions(&model, &mut states, &mjcf.reference_positions()).unwrap();
     let pose = Isometry3::new(Vector3::new(0.05, -0.02, 1.1), Vector3::new(0.1, 0.0, 0.2));
-    robot.set_mocap(&mut world, &mut states, "hand", &pose).unwrap();
+    robot.set_mocap(&mut model, &mut states, "hand", &pose).unwrap();
     let apart = |states: &State, name: &str| {
         let found = states[robot.body(name).unwrap()].pose;
         (found.to_homogeneous() - pose.to_homogeneous()).amax()
     };
     assert!(apart(&states, "hand") < 1e-12);
-    let end = world.simulate(&states, 0.3).unwrap();
+    let end = model.simulate(&states, 0.3).unwrap();
     assert!(apart(&end, "thing") < 5e-3, "{}", apart(&end, "thing"));
-    let wrong = robot.set_mocap(&mut world, &mut states, "thing", &pose);
+    let wrong = robot.set_mocap(&mut model, &mut states, "thing", &pose);
     assert_eq!(wrong, Err(MjcfError::NoMocap { name: "thing".to_owned() }));
 }
 
@@ -226,12 +226,12 @@ fn urdf_is_as_pinocchio_has_it() {
         let tree = KinematicTree::from_urdf_str(golden["urdf"].as_str().unwrap(), None).unwrap();
         assert_eq!(tree.warnings().is_empty(), name == "strict");
         assert_eq!(serde_json::json!(tree.joint_names()), golden["joints"]);
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        world.add_articulated_robot(&tree, None, &UrdfOptions::default()).unwrap();
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+        model.add_articulated_robot(&tree, None, &UrdfOptions::default()).unwrap();
         for state in golden["states"].as_array().unwrap() {
             let q = numbers(&state["q"]);
-            let own = &world.articulations[0].tree;
-            let at = own.kinematics(&q, &vec![0.0; q.len()]).under(world.gravity);
+            let own = &model.articulations[0].tree;
+            let at = own.kinematics(&q, &vec![0.0; q.len()]).under(model.gravity);
             near(name, at.mass_matrix().as_slice(), &numbers(&state["mass"]), 1e-12);
             let effort = at.inverse_dynamics(&vec![0.0; q.len()]);
             near(name, effort.as_slice(), &numbers(&state["effort"]), 1e-12);

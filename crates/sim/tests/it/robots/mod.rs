@@ -8,7 +8,7 @@ mod urdf;
 
 use std::path::PathBuf;
 
-use prehend_sim::{State, World};
+use prehend_sim::{Model, State};
 
 /// The folder with data that are not part of this repository.
 fn data_folder() -> PathBuf {
@@ -17,9 +17,9 @@ fn data_folder() -> PathBuf {
 }
 
 /// Positions and velocities of the first articulation's joints, in the order of its links.
-fn coordinates(world: &World, states: &State) -> [Vec<f64>; 2] {
+fn coordinates(model: &Model, states: &State) -> [Vec<f64>; 2] {
     let joints =
-        world.articulations[0].bodies().iter().map(|link| world.joint(states, *link).unwrap());
+        model.articulations[0].bodies().iter().map(|link| model.joint(states, *link).unwrap());
     let (q, v): (Vec<_>, Vec<_>) = joints.map(|joint| (joint.position, joint.velocity)).unzip();
     [q.concat(), v.concat()]
 }

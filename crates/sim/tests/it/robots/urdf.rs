@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::UrdfOptions;
-use prehend_sim::{BodyId, State, World};
+use prehend_sim::{BodyId, Model, State};
 
 /// The links are not in the order of the tree.
 const ARM: &str = r#"<robot name="arm">
@@ -23,13 +23,13 @@ const ARM: &str = r#"<robot name="arm">
     <joint name="marked" type="fixed"><parent link="upper"/><child link="mark"/><origin xyz="0.05 0 0.01"/></joint>
     </robot>"#;
 
-fn arm(gravity: f64) -> (KinematicTree, World, Vec<BodyId>) {
+fn arm(gravity: f64) -> (KinematicTree, Model, Vec<BodyId>) {
     let tree = KinematicTree::from_urdf_str(ARM, None).unwrap();
-    let mut world = World::new(Vector3::new(0.0, 0.0, -gravity));
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -gravity));
     let t_world_base = Isometry3::translation(1.0, 2.0, 3.0);
     let options = UrdfOptions { t_world_base, ..UrdfOptions::default() };
-    let bodies = world.add_articulated_robot(&tree, None, &options).unwrap();
-    (tree, world, bodies)
+    let bodies = model.add_articulated_robot(&tree, None, &options).unwrap();
+    (tree, model, bodies)
 }
 
 fn body(tree: &KinematicTree, bodies: &[BodyId], name: &str) -> BodyId {
@@ -38,41 +38,41 @@ fn body(tree: &KinematicTree, bodies: &[BodyId], name: &str) -> BodyId {
 
 /// Position and velocity of shoulder and slide after `time` seconds, the shoulder beginning at `from`.
 fn moved(gravity: f64, from: [f64; 2], time: f64) -> [[f64; 2]; 2] {
-    let (tree, world, bodies) = arm(gravity);
+    let (tree, model, bodies) = arm(gravity);
     let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
-    let mut states: State = world.neutral_state();
-    world.set_joint(&mut states, upper, &[from[0]], &[from[1]]).unwrap();
+    let mut states: State = model.neutral_state();
+    model.set_joint(&mut states, upper, &[from[0]], &[from[1]]).unwrap();
     let follow = [0.1 * from[0] + 0.02, 0.1 * from[1]];
-    world.set_joint(&mut states, finger, &[follow[0]], &[follow[1]]).unwrap();
-    let end = world.simulate(&states, time).unwrap();
+    model.set_joint(&mut states, finger, &[follow[0]], &[follow[1]]).unwrap();
+    let end = model.simulate(&states, time).unwrap();
     [upper, finger].map(|link| {
-        let joint = world.joint(&end, link).unwrap();
+        let joint = model.joint(&end, link).unwrap();
         [joint.position[0], joint.velocity[0]]
     })
 }
 
 #[test]
 fn what_mimics_is_set_with_its_leader() {
-    let (tree, world, bodies) = arm(9.81);
+    let (tree, model, bodies) = arm(9.81);
     let [upper, finger] = ["upper", "finger"].map(|name| body(&tree, &bodies, name));
-    let mut states: State = world.neutral_state();
-    assert_eq!(world.joint(&states, finger).unwrap().position, [0.02]);
-    world.set_joint(&mut states, upper, &[0.4], &[0.7]).unwrap();
-    let slide = world.joint(&states, finger).unwrap();
+    let mut states: State = model.neutral_state();
+    assert_eq!(model.joint(&states, finger).unwrap().position, [0.02]);
+    model.set_joint(&mut states, upper, &[0.4], &[0.7]).unwrap();
+    let slide = model.joint(&states, finger).unwrap();
     assert!((slide.position[0] - 0.06).abs() < 1e-15 && (slide.velocity[0] - 0.07).abs() < 1e-15);
     // It may be pulled away from there.
-    world.set_joint(&mut states, finger, &[0.1], &[0.0]).unwrap();
-    assert_eq!(world.joint(&states, finger).unwrap().position, [0.1]);
-    assert_eq!(world.joint(&states, upper).unwrap().position, [0.4]);
+    model.set_joint(&mut states, finger, &[0.1], &[0.0]).unwrap();
+    assert_eq!(model.joint(&states, finger).unwrap().position, [0.1]);
+    assert_eq!(model.joint(&states, upper).unwrap().position, [0.4]);
 }
 
 #[test]
 fn links_are_where_kinematics_has_them() {
-    let (tree, world, bodies) = arm(9.81);
+    let (tree, model, bodies) = arm(9.81);
     assert_eq!(bodies.len(), 4);
-    let mut states: State = world.neutral_state();
-    world.set_joint(&mut states, body(&tree, &bodies, "upper"), &[0.4], &[0.0]).unwrap();
-    world.set_joint(&mut states, body(&tree, &bodies, "finger"), &[0.06], &[0.0]).unwrap();
+    let mut states: State = model.neutral_state();
+    model.set_joint(&mut states, body(&tree, &bodies, "upper"), &[0.4], &[0.0]).unwrap();
+    model.set_joint(&mut states, body(&tree, &bodies, "finger"), &[0.06], &[0.0]).unwrap();
     assert_eq!(tree.joint_names(), ["shoulder"]);
     let poses = tree.forward_kinematics(&[0.4]);
     for (body, pose) in bodies.iter().zip(poses) {
@@ -81,10 +81,10 @@ fn links_are_where_kinematics_has_them() {
         assert!((found.to_homogeneous() - expected.to_homogeneous()).amax() < 1e-12, "{found}");
     }
     // What holds the shoulder against gravity.
-    let own = &world.articulations[0];
+    let own = &model.articulations[0];
     assert_eq!(own.tree.nv(), 2);
-    let [q, v] = super::coordinates(&world, &states);
-    let at = own.tree.kinematics(&q, &v).under(world.gravity);
+    let [q, v] = super::coordinates(&model, &states);
+    let at = own.tree.kinematics(&q, &v).under(model.gravity);
     let efforts = at.inverse_dynamics(&[0.0; 2]);
     let [upper, finger] = ["upper", "finger"].map(|name| {
         let link = own.bodies().iter().position(|b| *b == body(&tree, &bodies, name)).unwrap();
@@ -119,7 +119,7 @@ fn inertias_that_no_body_has_matter_where_joints_feel_them() {
         let tree = KinematicTree::from_urdf_str(&xml, None).unwrap();
         assert_eq!(tree.warnings(), ["link 'finger': no body has its inertia"]);
         let options = UrdfOptions { base: joint, ..UrdfOptions::default() };
-        World::new(Vector3::zeros()).add_articulated_robot(&tree, None, &options).map(|_| ())
+        Model::new(Vector3::zeros()).add_articulated_robot(&tree, None, &options).map(|_| ())
     };
     assert!(added(r#"<axis xyz="0 1 0"/>"#, Joint::Fixed).is_ok());
     // The base's makes good for it.

@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_sim::fields::HalfSpace;
 use prehend_sim::{
-    Adaptive, Batch, Body, BodyState, ContactBodies, GapSmoothing, Integrator, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
+    Adaptive, Batch, Body, BodyState, ContactBodies, GapSmoothing, Integrator, Model, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Surface, TimeSteps,
 };
 
 use crate::scenes::penalty;
@@ -17,31 +17,31 @@ const WORLDS: usize = 13;
 const BROKEN: usize = 4;
 
 /// A ball thrown at a floor.
-fn throw() -> (World, State) {
-    let mut world = World::new(Vector3::z() * -9.81);
-    let field = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+fn throw() -> (Model, State) {
+    let mut model = Model::new(Vector3::z() * -9.81);
+    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::ball(0.1, 0.03).unwrap();
     let samples =
-        world.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(0.03).unwrap()));
+        model.add(Body::dynamic("ball", rigid).with_surface(Surface::ball(0.03).unwrap()));
     let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
     let smoothing = GapSmoothing::Softplus { width: 1e-5 };
-    world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
+    model.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
     let mut ball = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.04));
     ball.linear = Vector3::new(0.5, 0.1, -0.3);
-    (world, State::new([BodyState::at_rest(Isometry3::identity()), ball]))
+    (model, State::new([BodyState::at_rest(Isometry3::identity()), ball]))
 }
 
 /// Variant `index` of a throw, with friction and speed that follow from two numbers.
 fn variant<S: Scalar>(
-    (world, states): &(World, State),
+    (model, states): &(Model, State),
     index: usize,
     x: [S; 2],
-) -> (World<S>, State<S>) {
-    let (mut world, mut states) = (world.cast::<S>(), states.cast());
+) -> (Model<S>, State<S>) {
+    let (mut model, mut states) = (model.cast::<S>(), states.cast());
     let share = index as f64 / WORLDS as f64;
-    world.contacts[0].params_mut()[2] = if index == BROKEN { -x[0] } else { x[0].plus(share) };
+    model.contacts[0].params_mut()[2] = if index == BROKEN { -x[0] } else { x[0].plus(share) };
     states[1].linear.x = x[1].times(1.0 + share);
-    (world, states)
+    (model, states)
 }
 
 type Ends<S> = Vec<Result<State<S>, SimulationError>>;
@@ -68,8 +68,8 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
     let throw = throw();
     let alone: Ends<Fwd<2>> = (0..WORLDS)
         .map(|index| {
-            let (world, states) = variant(&throw, index, Fwd::variables(X));
-            Ok(world.simulate_with(&integrator, &states, time_steps)?.states)
+            let (model, states) = variant(&throw, index, Fwd::variables(X));
+            Ok(model.simulate_with(&integrator, &states, time_steps)?.states)
         })
         .collect();
     let expected = loss(&alone);
@@ -112,14 +112,14 @@ fn worlds_side_by_side_are_as_each_alone_in_adaptive_steps() {
 
 #[test]
 fn what_is_not_of_the_batch_is_refused_alone() {
-    let (world, states) = throw();
-    let batch = Batch::new(&world).unwrap();
-    let mut other = world.clone();
+    let (model, states) = throw();
+    let batch = Batch::new(&model).unwrap();
+    let mut other = model.clone();
     other.add(Body::fixed("wall"));
     let time_steps = TimeSteps { dt: 0.01, steps: 1 };
-    let variants = [(other, states.clone()), (world.clone(), states), (world, State::new([]))];
+    let variants = [(other, states.clone()), (model.clone(), states), (model, State::new([]))];
     let ends = batch.simulate(variants, time_steps);
-    assert_eq!(ends[0], Err(SimulationError::AnotherWorld));
+    assert_eq!(ends[0], Err(SimulationError::AnotherModel));
     assert!(ends[1].is_ok());
     assert!(matches!(ends[2], Err(SimulationError::States { .. })), "{:?}", ends[2]);
     assert!(batch.simulate::<f64>([], time_steps).is_empty());

@@ -10,8 +10,8 @@ use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
     Adaptive, BackwardEuler, Batch, Body, BodyState, BuildError, ContactBodies, GapSmoothing,
-    Integrator, Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
-    StepCheckpointed, SubStepped, Surface, TimeSteps, Trajectory, World,
+    Integrator, Model, Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State,
+    Step, StepCheckpointed, SubStepped, Surface, TimeSteps, Trajectory,
 };
 
 use super::gradients::coordinates;
@@ -42,23 +42,23 @@ fn course<S: Scalar>([speed, x, y, turn]: [S; 4]) -> impl Trajectory<S> {
 }
 
 /// A block on the floor and a ball that will push it off its center, and where they are at the start.
-fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, State<S>) {
+fn scene<S: Scalar>(inputs: [S; 4]) -> (Model<S>, State<S>) {
     let inertia = Matrix3::from_diagonal(&Vector3::new(5e-5, 6e-5, 7e-5));
     let rigid = RigidBody::new(0.2, inertia, Point3::new(1e-3, 0.0, -2e-3)).unwrap();
     let surface = Surface::cuboid([0.02; 3], 5e-3).unwrap();
     let ball = Arc::new(Sphere { center: Point3::new(-0.031, 5e-3, 0.02), radius: 0.01 });
-    let mut world = World::new(Vector3::z() * -9.81);
-    let ground = world.add(Body::fixed("floor").with_field(floor()));
-    let samples = world.add(Body::dynamic("block", rigid).with_surface(surface));
-    let pusher = world.add(Body::kinematic("pusher", course(INPUTS)).with_field(ball));
+    let mut model = Model::new(Vector3::z() * -9.81);
+    let ground = model.add(Body::fixed("floor").with_field(floor()));
+    let samples = model.add(Body::dynamic("block", rigid).with_surface(surface));
+    let pusher = model.add(Body::kinematic("pusher", course(INPUTS)).with_field(ball));
     for (field, stiffness) in [(ground, 2e6), (pusher, 5e7)] {
         let law = Arc::new(sticking(stiffness, 1e-3 * stiffness, 0.4, 3e-2));
         let smoothing = GapSmoothing::Softplus { width: 2e-4 };
-        world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
+        model.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
     }
     let still = BodyState::at_rest(Isometry3::identity());
     let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.0194));
-    let mut lifted = world.cast();
+    let mut lifted = model.cast();
     lifted.bodies[pusher].motion = Motion::Kinematic(Arc::new(course(inputs)));
     (lifted, State::new([still, stands, still]).cast())
 }
@@ -66,9 +66,9 @@ fn scene<S: Scalar>(inputs: [S; 4]) -> (World<S>, State<S>) {
 /// Where the block ends, by changes of the inputs.
 fn pushed<S: Scalar>(integrator: &impl Integrator, dt: f64, change: &[S]) -> Vec<S> {
     let input = |i: usize| change[i].times(UNITS[i]).plus(INPUTS[i]);
-    let (world, start) = scene(std::array::from_fn(input));
+    let (model, start) = scene(std::array::from_fn(input));
     let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
-    let end = world.simulate_with(integrator, &start, time_steps).unwrap().states;
+    let end = model.simulate_with(integrator, &start, time_steps).unwrap().states;
     coordinates(&end[1])
 }
 
@@ -109,18 +109,18 @@ fn a_push_by_speed_and_waypoint_of_what_pushes() {
 #[test]
 fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
     let recording = Recording::start();
-    let (world, start) = scene(INPUTS);
+    let (model, start) = scene(INPUTS);
     let (carrying, lifted_start) = scene(recording.variables(INPUTS));
     let time_steps = TimeSteps { dt: 1e-4, steps: 3 };
     let error: SimulationError =
         BuildError::TrajectoryDerivatives { body: "pusher".to_owned() }.into();
-    let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
+    let compact = StepCheckpointed::new(SemiImplicitEuler, &model).unwrap();
     let run = carrying.simulate_with(&compact, &lifted_start, time_steps);
     assert_eq!(run.unwrap_err(), error);
     assert_eq!(StepCheckpointed::new(SemiImplicitEuler, &carrying).unwrap_err(), error);
     // A plain one, lifted, is known again.
-    let run = world.cast().simulate_with(&compact, &lifted_start, time_steps);
-    let expected = world.simulate_with(&SemiImplicitEuler, &start, time_steps);
+    let run = model.cast().simulate_with(&compact, &lifted_start, time_steps);
+    let expected = model.simulate_with(&SemiImplicitEuler, &start, time_steps);
     let values = run.unwrap().states.value();
     assert_eq!(values, expected.unwrap().states);
 }
@@ -128,18 +128,18 @@ fn checkpoints_refuse_a_trajectory_that_carries_derivatives() {
 #[test]
 fn runs_go_on_from_the_time_of_their_state() {
     fn check(integrator: &(impl Integrator + Clone + Send + 'static), tolerance: f64) {
-        let (world, start) = scene(INPUTS);
+        let (model, start) = scene(INPUTS);
         let time_steps = |steps| TimeSteps { dt: 2e-4, steps };
         let run = |from: &State, steps| {
-            world.simulate_with(integrator, from, time_steps(steps)).unwrap().states
+            model.simulate_with(integrator, from, time_steps(steps)).unwrap().states
         };
         let (whole, half) = (run(&start, 300), run(&start, 150));
         assert!((half.time - 0.5 * TIME).abs() < 1e-12, "{}", half.time);
         let mut seen = Vec::new();
-        let look = |_, _: &mut World, state: &mut State| seen.push(state.time);
-        let controlled = world.simulate_controlled(integrator, &half, time_steps(150), look);
-        let batch = Batch::with_integrator(integrator.clone(), &world).unwrap();
-        let mut of_batch = batch.simulate([(world.clone(), half.clone())], time_steps(150));
+        let look = |_, _: &mut Model, state: &mut State| seen.push(state.time);
+        let controlled = model.simulate_controlled(integrator, &half, time_steps(150), look);
+        let batch = Batch::with_integrator(integrator.clone(), &model).unwrap();
+        let mut of_batch = batch.simulate([(model.clone(), half.clone())], time_steps(150));
         let ends = [run(&half, 150), controlled.unwrap(), of_batch.remove(0).unwrap()];
         for end in ends {
             assert!((end.time - TIME).abs() < 1e-12, "{}", end.time);
@@ -159,29 +159,29 @@ fn runs_go_on_from_the_time_of_their_state() {
 
 #[test]
 fn errors_tell_the_time_of_a_late_start() {
-    let (world, mut state) = scene(INPUTS);
+    let (model, mut state) = scene(INPUTS);
     state.time = 5.0;
     state[1].linear.z = -1e160;
-    let late = world.simulate_with(&SemiImplicitEuler, &state, TimeSteps { dt: 1e-3, steps: 1 });
+    let late = model.simulate_with(&SemiImplicitEuler, &state, TimeSteps { dt: 1e-3, steps: 1 });
     let late = late.unwrap_err().to_string();
     assert!(late.contains("at 5.00"), "{late}");
     state.time = f64::NAN;
-    let never = world.simulate(&state, 1e-3).unwrap_err().to_string();
+    let never = model.simulate(&state, 1e-3).unwrap_err().to_string();
     assert!(never.contains("time of a state"), "{never}");
 }
 
 #[test]
 fn states_of_other_worlds_are_refused() {
-    let mut world = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::zeros());
     let rod =
         Link::new("rod", Joint::Revolute(Vector3::y_axis()), &RigidBody::ball(1.0, 0.1).unwrap());
-    world.add_articulation(vec![rod]).unwrap();
-    assert!(world.simulate(&world.neutral_state(), 1e-3).is_ok());
+    model.add_articulation(vec![rod]).unwrap();
+    assert!(model.simulate(&model.neutral_state(), 1e-3).is_ok());
     // As many rows as a link and its joint.
     let bodies = State::new([BodyState::at_rest(Isometry3::identity()); 2]);
-    let refused = world.simulate(&bodies, 1e-3).unwrap_err();
+    let refused = model.simulate(&bodies, 1e-3).unwrap_err();
     assert!(matches!(refused, SimulationError::States { .. }), "{refused}");
     let step = Step::new(0, 1e-3);
-    assert!(world.step(&SemiImplicitEuler, &bodies, step).is_err());
-    assert!(world.linearize_step(&bodies, step).is_err());
+    assert!(model.step(&SemiImplicitEuler, &bodies, step).is_err());
+    assert!(model.linearize_step(&bodies, step).is_err());
 }

@@ -12,9 +12,9 @@ use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::joint_law::{JointFriction, JointLimits, JointSpring};
 use prehend_sim::{
     Adaptive, BackwardEuler, Body, BodyState, BristleFriction, ContactBodies, ContactCalibration,
-    Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, RigidBody,
-    RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
-    Step, SubStepped, Surface, TimeSteps, World,
+    Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, Model,
+    RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape,
+    SimulationError, State, Step, SubStepped, Surface, TimeSteps,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -25,11 +25,11 @@ use super::gradients::coordinates;
 type Lanes = Fwd<8>;
 
 /// States with their pose and two directions of their velocity as variables.
-fn variables(world: &World, states: &State) -> State<Lanes> {
+fn variables(model: &Model, states: &State) -> State<Lanes> {
     let mut tangent = [Lanes::constant(0.0); 12];
     tangent[..8].copy_from_slice(&Lanes::variables([0.0; 8]));
     let rows = states.rows().iter().map(|state| state.retract(&tangent)).collect();
-    world.cast().state_of_rows(rows, states.time).unwrap()
+    model.cast().state_of_rows(rows, states.time).unwrap()
 }
 
 /// The numbers of `states` with their derivatives.
@@ -38,61 +38,61 @@ fn numbers(states: &State<Lanes>) -> Vec<f64> {
     all.flat_map(|x| std::iter::once(x.value).chain(x.derivative)).collect()
 }
 
-/// Finite numbers, or an error about a body of `world`.
-fn assert_told(what: &str, world: &World, result: Result<Vec<f64>, SimulationError>) {
+/// Finite numbers, or an error about a body of `model`.
+fn assert_told(what: &str, model: &Model, result: Result<Vec<f64>, SimulationError>) {
     match result {
         Ok(numbers) => assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {numbers:?}"),
         Err(SimulationError::TimeStep(_) | SimulationError::Joints { .. }) => {}
         Err(error) => {
-            let named = world.bodies.iter().any(|b| error.to_string().contains(&b.name));
+            let named = model.bodies.iter().any(|b| error.to_string().contains(&b.name));
             assert!(named, "{what}: {error}");
         }
     }
 }
 
 /// A few steps of `integrator` in both modes.
-fn assert_steps(what: &str, integrator: &impl Integrator, world: &World, states: &State, t: f64) {
+fn assert_steps(what: &str, integrator: &impl Integrator, model: &Model, states: &State, t: f64) {
     let time_steps = TimeSteps { dt: t / 4.0, steps: 4 };
-    let forward = world.cast().simulate_with(integrator, &variables(world, states), time_steps);
-    assert_told(what, world, forward.map(|run| numbers(&run.states)));
-    let run = world.simulate_with(integrator, states, time_steps);
+    let forward = model.cast().simulate_with(integrator, &variables(model, states), time_steps);
+    assert_told(what, model, forward.map(|run| numbers(&run.states)));
+    let run = model.simulate_with(integrator, states, time_steps);
     let of_run = |run: prehend_sim::Simulation<State>| {
         run.states.rows().iter().flat_map(coordinates).chain(run.resolution.roughness).collect()
     };
-    assert_told(what, world, run.map(of_run));
+    assert_told(what, model, run.map(of_run));
 }
 
-/// Everything that is asked of a world.
-fn assert_all(what: &str, world: &World, states: &State, time: f64) {
+/// Everything that is asked of a model.
+fn assert_all(what: &str, model: &Model, states: &State, time: f64) {
     let adaptive = Adaptive { max_substeps: 60, ..Adaptive::default() };
-    let wrenches = world.cast().wrenches(&variables(world, states), 0);
+    let wrenches = model.cast().wrenches(&variables(model, states), 0);
     let of_wrench =
         |w: &Vector6<Lanes>| w.iter().flat_map(|x| [x.value, x.derivative[0]]).collect();
     let wrenches: Vec<Vec<f64>> = wrenches.iter().map(of_wrench).collect();
     assert!(wrenches.iter().flatten().all(|x| x.is_finite()), "{what}: {wrenches:?}");
-    assert!(!world.contact_frequency(states).is_nan(), "{what}");
-    assert_steps(what, &adaptive, world, states, time);
-    assert_steps(what, &SemiImplicitEuler, world, states, time);
-    assert_steps(what, &RungeKutta4, world, states, time);
-    assert_steps(what, &BackwardEuler, world, states, time);
+    assert!(!model.contact_frequency(states).is_nan(), "{what}");
+    assert_steps(what, &adaptive, model, states, time);
+    assert_steps(what, &SemiImplicitEuler, model, states, time);
+    assert_steps(what, &RungeKutta4, model, states, time);
+    assert_steps(what, &BackwardEuler, model, states, time);
     let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: 16 };
-    assert_steps(what, &divided, world, states, time);
-    assert_told(what, world, backward(world, states, time));
-    let linear = world.linearize_step(states, Step::new(0, time));
+    assert_steps(what, &divided, model, states, time);
+    assert_told(what, model, backward(model, states, time));
+    let linear = model.linearize_step(states, Step::new(0, time));
     let of_step = |s: prehend_sim::LinearizedStep| {
         s.by_state.iter().chain(s.by_force.iter()).copied().collect()
     };
-    assert_told(what, world, linear.map(of_step));
+    assert_told(what, model, linear.map(of_step));
 }
 
 /// Derivatives by all states and parameters in reverse mode.
-fn backward(world: &World, states: &State, time: f64) -> Result<Vec<f64>, SimulationError> {
-    let names = world.parameter_names();
+fn backward(model: &Model, states: &State, time: f64) -> Result<Vec<f64>, SimulationError> {
+    let names = model.parameter_names();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let steps = TimeSteps { dt: time / 2.0, steps: 2 };
-    let function = RolloutFunction::with_integrator(SemiImplicitEuler, world, steps, &names, &[])?;
+    let function = RolloutFunction::with_integrator(SemiImplicitEuler, model, steps, &names, &[])?;
     let (states, parameters) =
-        (states.rows().iter().flat_map(coordinates).collect::<Vec<f64>>(), world.parameters());
+        (states.rows().iter().flat_map(coordinates).collect::<Vec<f64>>(), model.parameters());
     let inputs = RolloutInputs { states: &states, parameters: &parameters, controls: &[] };
     let mut run = function.evaluate(inputs)?;
     let gradient = function.vjp(inputs, &run, &vec![1.0; run.len()])?;
@@ -129,9 +129,9 @@ fn pair(
     mass: f64,
     gravity: f64,
     apart: f64,
-) -> (World, State) {
-    let mut world = World::new(Vector3::new(0.0, 0.0, -gravity));
-    let floor = world.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
+) -> (Model, State) {
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -gravity));
+    let floor = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::cuboid(mass, [0.02; 3]).unwrap();
     let ball = Arc::new(Sphere { center: Point3::origin(), radius: 0.02 });
     let cuboid =
@@ -147,26 +147,26 @@ fn pair(
                 .with_field(capsule.field().clone()),
         }
     };
-    let ids = ["lower", "upper"].map(|name| world.add(body(name)));
-    world.add_symmetric_contact(ids[0], ids[1], law.clone(), SOFT).unwrap();
+    let ids = ["lower", "upper"].map(|name| model.add(body(name)));
+    model.add_symmetric_contact(ids[0], ids[1], law.clone(), SOFT).unwrap();
     for samples in ids {
-        world.add_contact(ContactBodies { samples, field: floor }, law.clone(), SOFT).unwrap();
+        model.add_contact(ContactBodies { samples, field: floor }, law.clone(), SOFT).unwrap();
     }
     let at = |z| rigid.at_rest(&Isometry3::translation(0.0, 0.0, z));
     let states =
         State::new([BodyState::at_rest(Isometry3::identity()), at(0.02), at(0.02 + apart)]);
-    (world, states)
+    (model, states)
 }
 
 #[test]
 fn bodies_in_and_on_each_other_at_rest() {
     for kind in 0..4 {
         for (shape, apart) in [(0, 0.0), (0, 0.04), (1, 0.0), (1, 0.04), (2, 0.0), (2, 1e-9)] {
-            let (world, states) = pair(shape, &law(kind, 1e7), 0.1, 9.81, apart);
-            assert_all(&format!("law {kind}, shape {shape}, {apart} m"), &world, &states, 1e-3);
+            let (model, states) = pair(shape, &law(kind, 1e7), 0.1, 9.81, apart);
+            assert_all(&format!("law {kind}, shape {shape}, {apart} m"), &model, &states, 1e-3);
             // None of this is beyond a short step.
             let time_steps = TimeSteps { dt: 1e-5, steps: 4 };
-            let run = world.simulate_with(&SemiImplicitEuler, &states, time_steps);
+            let run = model.simulate_with(&SemiImplicitEuler, &states, time_steps);
             assert!(run.is_ok(), "law {kind}, shape {shape}, {apart} m: {:?}", run.err());
         }
     }
@@ -184,13 +184,13 @@ fn extremes_of_every_number() {
     let run = runner.run(&case, |((mass, stiffness, time, apart), (shape, kind, falls, way), spin)| {
         let [mass, stiffness, time, apart, spin] = [mass, stiffness, time, apart, spin].map(|p: i32| 10f64.powi(p));
         let gravity = if falls { 9.81 } else { 0.0 };
-        let (world, mut states) = pair(shape, &law(kind, stiffness), mass, gravity, apart);
+        let (model, mut states) = pair(shape, &law(kind, stiffness), mass, gravity, apart);
         let way = Vector3::from(way);
         states[1].angular = way * spin;
         states[2].linear = way * spin.sqrt();
         states[2].pose.translation.vector.x = apart * way.x;
         let what = format!("{mass} kg, {stiffness} N/m³, {time} s, {apart} m, {spin} rad/s, {shape} {kind} {falls}");
-        assert_all(&what, &world, &states, time);
+        assert_all(&what, &model, &states, time);
         Ok(())
     });
     run.unwrap();
@@ -198,7 +198,7 @@ fn extremes_of_every_number() {
 
 #[test]
 fn worlds_of_nothing_and_times_of_nothing() {
-    let empty = World::new(Vector3::zeros());
+    let empty = Model::new(Vector3::zeros());
     assert_all("empty", &empty, &State::new([]), 1e4);
     let mut still = empty.clone();
     let stone = RigidBody::ball(1e-12, 1e-9).unwrap();
@@ -228,29 +228,29 @@ fn chains_at_their_singular_places() {
         (rod, Joint::Spherical),
         (speck, Joint::Floating),
     ] {
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
         let link = |name, joint| Link::new(name, joint, &body);
         let below = Isometry3::translation(0.0, 0.0, -1.0);
         let links = vec![link("first", joint.clone()), link("second", joint.clone()).on(0, below)];
-        let first = world.add_articulation(links).unwrap()[0];
-        let mut states = world.neutral_state();
-        assert_all(&format!("{joint:?}"), &world, &states, 1e-2);
+        let first = model.add_articulation(links).unwrap()[0];
+        let mut states = model.neutral_state();
+        assert_all(&format!("{joint:?}"), &model, &states, 1e-2);
         if matches!(joint, Joint::Revolute(_) | Joint::Prismatic(_)) {
             let limits = JointLimits { lower: 0.0, upper: 0.0, stiffness: 1e3, damping: 1.0 };
-            world.add_joint_force(first, limits).unwrap();
-            world
+            model.add_joint_force(first, limits).unwrap();
+            model
                 .add_joint_force(first, JointFriction { friction: 1.0, velocity_scale: 1e-2 })
                 .unwrap();
-            world.add_joint_force(first, JointSpring { stiffness: 1e12, rest: 0.0 }).unwrap();
-            assert_all(&format!("laws along {joint:?}"), &world, &states, 1e-2);
-            world.set_joint(&mut states, first, &[0.3], &[1e4]).unwrap();
-            assert_all(&format!("fast {joint:?}"), &world, &states, 1e-3);
+            model.add_joint_force(first, JointSpring { stiffness: 1e12, rest: 0.0 }).unwrap();
+            assert_all(&format!("laws along {joint:?}"), &model, &states, 1e-2);
+            model.set_joint(&mut states, first, &[0.3], &[1e4]).unwrap();
+            assert_all(&format!("fast {joint:?}"), &model, &states, 1e-3);
         }
     }
-    let mut world = World::new(Vector3::zeros());
-    let links = world.add_articulation(vec![Link::new("ball", Joint::Spherical, &rod)]).unwrap();
-    let mut states = world.neutral_state();
-    let error = world.set_joint(&mut states, links[0], &[0.0; 4], &[0.0; 3]).unwrap_err();
+    let mut model = Model::new(Vector3::zeros());
+    let links = model.add_articulation(vec![Link::new("ball", Joint::Spherical, &rod)]).unwrap();
+    let mut states = model.neutral_state();
+    let error = model.set_joint(&mut states, links[0], &[0.0; 4], &[0.0; 3]).unwrap_err();
     assert_eq!(error, SimulationError::Rotation { body: "ball".to_owned(), norm: 0.0 });
     let pin = Link { mass: 1.0, ..Link::massless("pin", Joint::Revolute(axis)) };
     let inverse = Link { inertia: -Matrix3::identity(), ..pin.clone() };
@@ -301,8 +301,8 @@ fn laws_of_all_sizes() {
             Law::new(spring, held).ok().map(|law| Arc::new(law) as _),
         ];
         for law in laws.iter().flatten() {
-            let (world, states) = pair(0, law, 0.1, 9.81, 0.039);
-            assert_all(&format!("parameter {x}"), &world, &states, 1e-3);
+            let (model, states) = pair(0, law, 0.1, 9.81, 0.039);
+            assert_all(&format!("parameter {x}"), &model, &states, 1e-3);
         }
         let target =
             ContactCalibration { mass: 0.3, gravity: 9.81, penetration: x, contact_area: x };

@@ -2,8 +2,8 @@
 
 use prehend_autodiff::{Fwd, Recording, Scalar};
 use prehend_sim::{
-    Adaptive, GapSmoothing, Integrator, RolloutFunction, RolloutInputs, SemiImplicitEuler,
-    SimulationError, State, StepCheckpointed, TimeSteps, World,
+    Adaptive, GapSmoothing, Integrator, Model, RolloutFunction, RolloutInputs, SemiImplicitEuler,
+    SimulationError, State, StepCheckpointed, TimeSteps,
 };
 
 use crate::scenes::{bowl, egg_on};
@@ -18,18 +18,18 @@ fn numbers<S: Scalar>(states: &State<S>) -> Vec<S> {
     rows.collect()
 }
 
-fn scene() -> (World, State) {
-    let (world, mut states) = egg_on(bowl(), GapSmoothing::Softplus { width: 1e-4 });
+fn scene() -> (Model, State) {
+    let (model, mut states) = egg_on(bowl(), GapSmoothing::Softplus { width: 1e-4 });
     states[1].linear.x = 0.3;
     states[1].pose.translation.z -= 5e-4;
-    (world, states)
+    (model, states)
 }
 
 fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeSteps) {
-    let (world, states) = scene();
+    let (model, states) = scene();
     let names = ["egg/ground.friction", "egg.mass"];
     let function =
-        RolloutFunction::with_integrator(integrator, &world, time_steps, &names, &["egg.force_y"])
+        RolloutFunction::with_integrator(integrator, &model, time_steps, &names, &["egg.force_y"])
             .unwrap();
     assert_eq!((function.inputs(), function.width()), ([2, 1], 26));
     let (start, parameters) = (numbers(&states), [0.4, 0.21]);
@@ -42,10 +42,10 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
 
     // The same by hand, on one tape.
     let recording = Recording::start();
-    let mut lifted = world.cast();
+    let mut lifted = model.cast();
     let parameters = recording.variables(parameters);
     lifted.contacts[0].params_mut()[2] = parameters[0];
-    let rigid = *world.bodies[1].rigid().unwrap();
+    let rigid = *model.bodies[1].rigid().unwrap();
     let rigid = prehend_sim::RigidBody::new(
         parameters[1],
         rigid.inertia().map(Scalar::constant),
@@ -63,10 +63,10 @@ fn check<I: Integrator + Copy + Send + 'static>(integrator: I, time_steps: TimeS
         state
     }));
     let pushes = recording.variables_of(&controls);
-    let control = |step: prehend_sim::Step, world: &mut World<_>, _: &mut State<_>| {
-        world.bodies[1].external_wrench.y = pushes[step.index];
+    let control = |step: prehend_sim::Step, model: &mut Model<_>, _: &mut State<_>| {
+        model.bodies[1].external_wrench.y = pushes[step.index];
     };
-    let checkpointed = StepCheckpointed::new(integrator, &world).unwrap();
+    let checkpointed = StepCheckpointed::new(integrator, &model).unwrap();
     let by_hand = lifted.rollout_controlled(&checkpointed, &initial, time_steps, control).unwrap();
     let seeds: Vec<_> = by_hand.iter().flat_map(numbers).zip(adjoints.iter().copied()).collect();
     assert!(seeds.iter().zip(&run).all(|((own, _), run)| own.value() == *run));
@@ -116,13 +116,13 @@ fn a_rollout_function_has_the_derivatives_of_the_tape() {
 
 #[test]
 fn without_controls_it_is_a_rollout() {
-    let (world, states) = scene();
+    let (model, states) = scene();
     let time_steps = TimeSteps { dt: 5e-3, steps: 4 };
-    let function = RolloutFunction::new(&world, time_steps, &[], &[]).unwrap();
+    let function = RolloutFunction::new(&model, time_steps, &[], &[]).unwrap();
     let start = numbers(&states);
     let inputs = RolloutInputs { states: &start, parameters: &[], controls: &[] };
     let expected: Vec<f64> =
-        world.rollout(&states, time_steps).unwrap().iter().flat_map(numbers).collect();
+        model.rollout(&states, time_steps).unwrap().iter().flat_map(numbers).collect();
     assert_eq!(function.evaluate(inputs).unwrap(), expected);
     let lifted: Vec<Fwd<1>> = start.iter().map(|x| Fwd::constant(*x)).collect();
     let inputs = RolloutInputs { states: &lifted, parameters: &[], controls: &[] };
@@ -132,15 +132,15 @@ fn without_controls_it_is_a_rollout() {
 
 #[test]
 fn what_is_no_input_is_refused() {
-    let (world, states) = scene();
+    let (model, states) = scene();
     let time_steps = TimeSteps { dt: 1e-3, steps: 2 };
     let new = |parameters: &[&str], controls: &[&str]| {
-        RolloutFunction::new(&world, time_steps, parameters, controls)
+        RolloutFunction::new(&model, time_steps, parameters, controls)
     };
     let unknown = |name: &str| SimulationError::NoParameter { name: name.to_owned() };
     assert_eq!(new(&["egg.weight"], &[]).unwrap_err(), unknown("egg.weight"));
     assert_eq!(new(&["egg.mass"], &["egg.mass"]).unwrap_err(), unknown("egg.mass"));
-    let none = RolloutFunction::new(&world, TimeSteps { dt: 1e-3, steps: 0 }, &[], &[]);
+    let none = RolloutFunction::new(&model, TimeSteps { dt: 1e-3, steps: 0 }, &[], &[]);
     assert!(matches!(none, Err(SimulationError::Inputs { what: "steps", .. })));
     let function = new(&["egg.mass"], &["egg.force_x"]).unwrap();
     let start = numbers(&states);
@@ -156,7 +156,7 @@ fn what_is_no_input_is_refused() {
     let refused = function.evaluate(inputs).unwrap_err();
     assert!(matches!(refused, SimulationError::Quaternion { row: 1, .. }), "{refused}");
     let long =
-        RolloutFunction::new(&world, TimeSteps { dt: 1e-3, steps: 1 << 60 }, &[], &[]).unwrap();
+        RolloutFunction::new(&model, TimeSteps { dt: 1e-3, steps: 1 << 60 }, &[], &[]).unwrap();
     let inputs = RolloutInputs { states: &start, parameters: &[], controls: &[] };
     assert_eq!(long.evaluate(inputs), Err(SimulationError::Memory { steps: 1 << 60 }));
     let inputs = RolloutInputs { states: &start, parameters: &[0.2], controls: &[0.0; 2] };

@@ -13,8 +13,8 @@ use prehend_sim::contact::{LeakSteps, regularized_coulomb};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
     Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
-    ContactPair, DynContactLaw, GapSmoothing, Integrator, Motion, RigidBody, SemiImplicitEuler,
-    SimulationError, State, Step, StepCheckpointed, Surface, TimeSteps, World,
+    ContactPair, DynContactLaw, GapSmoothing, Integrator, Model, Motion, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Step, StepCheckpointed, Surface, TimeSteps,
 };
 use proptest::prelude::*;
 
@@ -46,9 +46,9 @@ impl ContactLaw for Powers {
 
 const TIME_STEPS: TimeSteps = TimeSteps { dt: 5e-4, steps: 20 };
 
-/// A world in which nothing moves but free bodies, and what is measured at its end.
+/// A model in which nothing moves but free bodies, and what is measured at its end.
 struct Scene {
-    world: World,
+    model: Model,
     states: State,
     weights: Vec<f64>,
 }
@@ -94,9 +94,9 @@ impl Scene {
     /// A box or ellipsoid near or in contact with one of three grounds; or two balls that also touch each other.
     fn random(kind: [usize; 3], dice: &[f64]) -> Self {
         let mut dice = Dice(dice.iter());
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81) + dice.vector());
+        let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81) + dice.vector());
         let ground = [floor(), bowl(), sphere(Point3::new(0.0, 0.0, -0.05), 0.05)][kind[0]].clone();
-        let field = world.add(Body::fixed("ground").with_field(Arc::clone(&ground)));
+        let field = model.add(Body::fixed("ground").with_field(Arc::clone(&ground)));
         let mut states = vec![BodyState::at_rest(Isometry3::identity())];
         let law: Arc<dyn DynContactLaw> = if kind[2] == 1 {
             let stiffness = dice.between(2e6, 6e6);
@@ -136,7 +136,7 @@ impl Scene {
                     pose.translation.vector.z += gap - lowest;
                 }
             } else {
-                let first = world.bodies[1].rigid().unwrap().model_pose(&states[1].pose);
+                let first = model.bodies[1].rigid().unwrap().body_pose(&states[1].pose);
                 let aside = (dice.vector() + Vector3::z() * 2.0).normalize();
                 pose.translation.vector = first.translation.vector + aside * (0.04 + gap);
             }
@@ -147,30 +147,30 @@ impl Scene {
             }
             body.external_wrench =
                 Vector6::from_fn(|i, _| if i < 3 { 0.2 } else { 1e-3 } * dice.roll());
-            let samples = world.add(body);
+            let samples = model.add(body);
             balls.push(samples);
             let bodies = ContactBodies { samples, field };
-            world.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
+            model.add_contact(bodies, Arc::clone(&law), smoothing).unwrap();
             let mut state = rigid.at_rest(&pose);
             (state.linear, state.angular) = (dice.vector() * 0.1, dice.vector() * 2.0);
             states.push(state);
         }
         if let &[a, b] = balls.as_slice() {
-            world.add_symmetric_contact(a, b, law, smoothing).unwrap();
+            model.add_symmetric_contact(a, b, law, smoothing).unwrap();
         }
         let weights = (0..26).map(|_| dice.roll()).collect();
-        Self { world, states: State::new(states), weights }
+        Self { model, states: State::new(states), weights }
     }
 
     /// How many inputs are of one kind: twists, velocities, a mass, an inertia, a center of mass, loads, gravity, parameters, the swing.
     fn groups(&self) -> Vec<usize> {
         let mut groups = vec![3; 4 * (self.states.bodies().len() - 1)];
-        for body in &self.world.bodies {
+        for body in &self.model.bodies {
             groups.extend(body.rigid().map_or(vec![], |_| vec![1, 6, 3]));
             groups.extend([3, 3]);
         }
         groups.push(3);
-        groups.extend(self.world.contacts.iter().flat_map(|pair| vec![1; pair.params().len()]));
+        groups.extend(self.model.contacts.iter().flat_map(|pair| vec![1; pair.params().len()]));
         groups.extend([3, 3]);
         groups
     }
@@ -179,9 +179,9 @@ impl Scene {
         self.groups().iter().sum()
     }
 
-    /// World and states moved by `x`: tangents of the free bodies' states, then the world's numbers, each in units of
+    /// Model and states moved by `x`: tangents of the free bodies' states, then the model's numbers, each in units of
     /// its own size.
-    fn set_up<S: Scalar>(&self, x: &[S]) -> (World<S>, State<S>) {
+    fn set_up<S: Scalar>(&self, x: &[S]) -> (Model<S>, State<S>) {
         let units = [[1e-3; 3], [1e-2; 3], [2e-2; 3], [1.0; 3]];
         let (tangents, rest) = x.split_at(12 * (self.states.bodies().len() - 1));
         let mut states: State<S> = self.states.cast();
@@ -190,7 +190,7 @@ impl Scene {
             states[body] = self.states[body].retract(&tangent);
         }
         let mut sizes = Vec::new();
-        for body in &self.world.bodies {
+        for body in &self.model.bodies {
             if let Some(rigid) = body.rigid() {
                 sizes.push(rigid.mass());
                 sizes.extend([1e-5; 6]);
@@ -199,15 +199,15 @@ impl Scene {
             sizes.extend([0.1, 0.1, 0.1, 1e-3, 1e-3, 1e-3]);
         }
         sizes.extend([1.0; 3]);
-        sizes.extend(self.world.contacts.iter().flat_map(|pair| pair.params()));
-        let numbers = self.world.parameters();
+        sizes.extend(self.model.contacts.iter().flat_map(|pair| pair.params()));
+        let numbers = self.model.parameters();
         let numbers: Vec<S> = numbers
             .iter()
             .zip(&sizes)
             .zip(rest)
             .map(|((&n, &size), &x)| x.times(size).plus(n))
             .collect();
-        (self.world.with_parameters(&numbers).unwrap(), states)
+        (self.model.with_parameters(&numbers).unwrap(), states)
     }
 
     fn measure<S: Scalar>(&self, states: &State<S>) -> S {
@@ -223,21 +223,21 @@ impl Scene {
 
     /// Scalar function of the last states.
     fn last<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
-        let (world, states) = self.set_up(x);
-        self.measure(&world.simulate_with(integrator, &states, TIME_STEPS).unwrap().states)
+        let (model, states) = self.set_up(x);
+        self.measure(&model.simulate_with(integrator, &states, TIME_STEPS).unwrap().states)
     }
 
     /// Mean measure over all steps, while a load swings whose six amplitudes are the last of `x`.
     fn all<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
-        let (mut world, mut states) = self.set_up(x);
-        let load = world.bodies[1].external_wrench;
+        let (mut model, mut states) = self.set_up(x);
+        let load = model.bodies[1].external_wrench;
         let mut sum = S::zero();
         for index in 0..TIME_STEPS.steps {
             let swing = (0.7 * index as f64).sin();
-            world.bodies[1].external_wrench = Vector6::from_fn(|i, _| {
+            model.bodies[1].external_wrench = Vector6::from_fn(|i, _| {
                 load[i] + x[x.len() - 6 + i].times(swing * if i < 3 { 0.1 } else { 1e-3 })
             });
-            states = world.step(integrator, &states, Step::new(index, TIME_STEPS.dt)).unwrap();
+            states = model.step(integrator, &states, Step::new(index, TIME_STEPS.dt)).unwrap();
             sum += self.measure(&states).times(1.0 / TIME_STEPS.steps as f64);
         }
         sum
@@ -272,7 +272,7 @@ fn check(
 ) {
     let inputs = scene.inputs();
     let zeros = vec![0.0; inputs];
-    let compact = StepCheckpointed::new(integrator, &scene.world).unwrap();
+    let compact = StepCheckpointed::new(integrator, &scene.model).unwrap();
 
     let exact = forward(|x| scene.all(&integrator, x), inputs);
     let differences = finite_difference_gradient(|x| scene.all(tight, x), &zeros, 1e-2);
@@ -294,7 +294,7 @@ fn check(
     // The first contact is felt.
     let params =
         |pairs: &[ContactPair]| pairs.iter().map(|pair| pair.params().len()).sum::<usize>();
-    let (all, first) = (params(&scene.world.contacts), params(&scene.world.contacts[..1]));
+    let (all, first) = (params(&scene.model.contacts), params(&scene.model.contacts[..1]));
     assert!(exact[inputs - 6 - all..][..first].iter().all(|x| *x != 0.0));
 
     let exact = forward(|x| scene.last(&integrator, x), inputs);
@@ -335,20 +335,20 @@ proptest! {
 /// Where the model of an egg is and how it moves after a bounce, by the three coordinates of its center of mass: let go with the
 /// model at one pose.
 fn bounced<S: Scalar>(law: Arc<dyn DynContactLaw>, change: &[S]) -> Vec<S> {
-    let (mut world, states) = egg_on(floor(), GapSmoothing::Softplus { width: 3e-4 });
-    world.contacts[0].set_law(law);
-    let rigid = *world.bodies[1].rigid().unwrap();
-    let t_world_model = rigid.model_pose(&states[1].pose);
-    let mut world = world.cast::<S>();
+    let (mut model, states) = egg_on(floor(), GapSmoothing::Softplus { width: 3e-4 });
+    model.contacts[0].set_law(law);
+    let rigid = *model.bodies[1].rigid().unwrap();
+    let t_world_body = rigid.body_pose(&states[1].pose);
+    let mut model = model.cast::<S>();
     let rigid: RigidBody<S> = rigid.cast();
     let com = rigid.com() + Vector3::new(change[0], change[1], change[2]);
     let rigid = RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap();
-    world.bodies[1].motion = Motion::Dynamic(rigid);
-    let mut egg = rigid.at_rest(&lift(&t_world_model));
+    model.bodies[1].motion = Motion::Dynamic(rigid);
+    let mut egg = rigid.at_rest(&lift(&t_world_body));
     egg.linear.z = S::constant(-0.5);
-    let end = world.simulate(&State::new([states[0].cast(), egg]), 0.03).unwrap()[1];
+    let end = model.simulate(&State::new([states[0].cast(), egg]), 0.03).unwrap()[1];
     assert!(end.linear.z.value() > 0.1);
-    coordinates(&BodyState { pose: rigid.model_pose(&end.pose), ..end })
+    coordinates(&BodyState { pose: rigid.body_pose(&end.pose), ..end })
 }
 
 #[test]
@@ -371,13 +371,13 @@ fn a_bounce_by_the_center_of_mass_of_a_model_at_one_pose() {
 }
 
 /// The egg at rest on the floor, with one sample at gap zero and without slip.
-fn at_rest_on(field: Arc<dyn DistanceField>, smoothing: GapSmoothing) -> (World, State) {
-    let (world, mut states) = egg_on(field, smoothing);
-    let rigid = world.bodies[1].rigid().unwrap();
-    let lowest = world.bodies[1].surface.as_ref().unwrap().points().iter();
+fn at_rest_on(field: Arc<dyn DistanceField>, smoothing: GapSmoothing) -> (Model, State) {
+    let (model, mut states) = egg_on(field, smoothing);
+    let rigid = model.bodies[1].rigid().unwrap();
+    let lowest = model.bodies[1].surface.as_ref().unwrap().points().iter();
     let lowest = lowest.map(|p| p.position.z).fold(f64::INFINITY, f64::min);
     states[1] = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -lowest));
-    (world, states)
+    (model, states)
 }
 
 #[test]
@@ -393,9 +393,9 @@ fn singular_points_are_finite_all_the_way() {
     let leaky = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
     for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 1e-4 }, leaky] {
         for field in [floor(), bowl(), Arc::new(Flat) as Arc<dyn DistanceField>] {
-            let (world, states) = at_rest_on(field, smoothing);
-            let scene = Scene { world, states, weights: vec![1.0; 26] };
-            let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.world).unwrap();
+            let (model, states) = at_rest_on(field, smoothing);
+            let scene = Scene { model, states, weights: vec![1.0; 26] };
+            let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.model).unwrap();
             let exact = forward(|x| scene.all(&SemiImplicitEuler, x), scene.inputs());
             assert!(exact.iter().all(|x| x.is_finite()), "{smoothing:?}");
             let zeros = vec![0.0; scene.inputs()];
@@ -405,12 +405,12 @@ fn singular_points_are_finite_all_the_way() {
 }
 
 /// Bytes of the recording, and of what its nodes saved, for each step of `integrator`.
-fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, world: bool) -> usize {
+fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, model: bool) -> usize {
     let recording = Recording::start();
     let x = recording.variables_of(&vec![0.0; scene.inputs()]);
     let (mut lifted, states) = scene.set_up(&x);
-    if !world {
-        lifted = scene.world.cast();
+    if !model {
+        lifted = scene.model.cast();
     }
     // Past the chunk in which a tape grows.
     let time_steps = TimeSteps { dt: 1e-5, steps: 4000 };
@@ -421,9 +421,9 @@ fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, world
 
 #[test]
 fn a_step_takes_little_memory() {
-    let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
-    let scene = Scene { world, states, weights: vec![1.0; 26] };
-    let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.world).unwrap();
+    let (model, states) = egg_on(bowl(), GapSmoothing::Hard);
+    let scene = Scene { model, states, weights: vec![1.0; 26] };
+    let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.model).unwrap();
     // Numbers of two states and places of 13 that vary, as the node saves them, and its two boxes and owner.
     let by_state = bytes_a_step(&scene, &compact, 26 * 8 + 13 * 4 + 96, false);
     let by_all = bytes_a_step(&scene, &compact, 54 * 8 + (13 + 2 * 28) * 4 + 96, true);
@@ -436,33 +436,33 @@ fn a_step_takes_little_memory() {
 
 #[test]
 fn compact_steps_refuse_another_world_and_pass_errors_on() {
-    let (world, states) = egg_on(floor(), GapSmoothing::Hard);
+    let (model, states) = egg_on(floor(), GapSmoothing::Hard);
     let (other, _) = egg_on(floor(), GapSmoothing::Hard);
     let compact = StepCheckpointed::new(SemiImplicitEuler, &other).unwrap();
     let lifted: State<Var> = states.cast();
-    let error = world.cast().simulate_with(&compact, &lifted, TIME_STEPS).unwrap_err();
-    assert_eq!(error, SimulationError::AnotherWorld);
+    let error = model.cast().simulate_with(&compact, &lifted, TIME_STEPS).unwrap_err();
+    assert_eq!(error, SimulationError::AnotherModel);
 
     let recording = Recording::start();
     let mut wild = lifted.clone();
     wild[1].linear = Vector3::repeat(recording.variable(1e308));
     let long = TimeSteps { dt: 1.0, steps: 10 };
-    let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
-    let world = world.cast::<Var>();
-    let blown_up = world.simulate_with(&compact, &wild, long).unwrap_err();
+    let compact = StepCheckpointed::new(SemiImplicitEuler, &model).unwrap();
+    let model = model.cast::<Var>();
+    let blown_up = model.simulate_with(&compact, &wild, long).unwrap_err();
     assert!(matches!(blown_up, SimulationError::NotFinite { .. }));
 }
 
 #[test]
 fn driven_bodies_keep_to_their_trajectory_in_every_mode() {
-    let (mut world, states) = egg_on(floor(), GapSmoothing::Softplus { width: 3e-4 });
+    let (mut model, states) = egg_on(floor(), GapSmoothing::Softplus { width: 3e-4 });
     let lift = |time: f64| BodyState {
         linear: Vector3::z() * 0.2,
         ..BodyState::at_rest(Isometry3::translation(0.0, 0.0, 0.2 * time))
     };
-    world.bodies[0].motion = Motion::Kinematic(Arc::new(lift));
-    let scene = Scene { world, states, weights: vec![1.0; 26] };
-    let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.world).unwrap();
+    model.bodies[0].motion = Motion::Kinematic(Arc::new(lift));
+    let scene = Scene { model, states, weights: vec![1.0; 26] };
+    let compact = StepCheckpointed::new(SemiImplicitEuler, &scene.model).unwrap();
     let exact = forward(|x| scene.last(&SemiImplicitEuler, x), scene.inputs());
     let zeros = vec![0.0; scene.inputs()];
     assert_close("compact", &gradient(|x| scene.last(&compact, x), &zeros).1, &exact, 1e-10);

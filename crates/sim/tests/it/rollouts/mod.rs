@@ -1,4 +1,4 @@
-//! Rollouts of whole worlds: what every integrator must do, and gradients over random scenes.
+//! Rollouts of whole models: what every integrator must do, and gradients over random scenes.
 
 mod batch;
 mod driven;

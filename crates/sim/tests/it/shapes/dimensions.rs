@@ -12,8 +12,8 @@ use prehend_geometry::SplitMix64;
 use prehend_sim::contact::{GraspD, GraspDParameters};
 use prehend_sim::{
     Adaptive, Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw,
-    GapSmoothing, HuntCrossley, KelvinVoigt, Law, SemiImplicitEuler, Shape, ShapeOptions, State,
-    Step, StepCheckpointed, TimeSteps, World,
+    GapSmoothing, HuntCrossley, KelvinVoigt, Law, Model, SemiImplicitEuler, Shape, ShapeOptions,
+    State, Step, StepCheckpointed, TimeSteps,
 };
 
 use super::catalog::{ROUND, SHARP, vector};
@@ -35,27 +35,27 @@ fn laws() -> [Arc<dyn DynContactLaw>; 3] {
 }
 
 /// Wrenches, then rates of deflections.
-fn numbers<S: Scalar>(world: &World<S>, state: &State<S>) -> impl Iterator<Item = S> {
+fn numbers<S: Scalar>(model: &Model<S>, state: &State<S>) -> impl Iterator<Item = S> {
     let step = Step::new(0, 1e-3);
-    let next = world.step(&SemiImplicitEuler, state, step).unwrap();
-    let after = next.rows().to_vec().into_iter().skip(world.bodies.len());
-    let before = state.rows().to_vec().into_iter().skip(world.bodies.len());
+    let next = model.step(&SemiImplicitEuler, state, step).unwrap();
+    let after = next.rows().to_vec().into_iter().skip(model.bodies.len());
+    let before = state.rows().to_vec().into_iter().skip(model.bodies.len());
     let rates = after.zip(before).flat_map(move |(after, before)| {
         let halves = [after.linear - before.linear, after.angular - before.angular];
         halves.map(|half| half.map(|x| x.times(1.0 / step.dt)))
     });
-    let wrenches = world.wrenches(state, 0).into_iter().flat_map(<[S; 6]>::from);
+    let wrenches = model.wrenches(state, 0).into_iter().flat_map(<[S; 6]>::from);
     wrenches.chain(rates.flat_map(<[S; 3]>::from))
 }
 
 /// Wrenches, and rates of deflections, as functions of a dimension of the second body: the value, the derivative and differences.
-fn by_dimension(world: &World, states: &State, name: &str) -> [Vec<f64>; 2] {
-    let dimensions = world.bodies[1].shape().unwrap().dimensions();
+fn by_dimension(model: &Model, states: &State, name: &str) -> [Vec<f64>; 2] {
+    let dimensions = model.bodies[1].shape().unwrap().dimensions();
     let (_, value) = dimensions.into_iter().find(|(own, _)| own == name).unwrap();
     let at = |value: f64| {
-        let mut world = world.clone();
-        world.bodies[1].set_dimension(name, value).unwrap();
-        numbers(&world, states).collect::<Vec<f64>>()
+        let mut model = model.clone();
+        model.bodies[1].set_dimension(name, value).unwrap();
+        numbers(&model, states).collect::<Vec<f64>>()
     };
     // Of fourth order: rates of deflections are solutions of equations of a high condition, and tell small changes badly.
     let step = 1e-6;
@@ -65,7 +65,7 @@ fn by_dimension(world: &World, states: &State, name: &str) -> [Vec<f64>; 2] {
     });
     let differences = one.into_iter().zip(two);
     let differences = differences.map(|(one, two)| (8.0 * one - two) / (12.0 * step)).collect();
-    let mut lifted = world.cast::<Fwd<1>>();
+    let mut lifted = model.cast::<Fwd<1>>();
     lifted.bodies[1].set_dimension(name, Fwd::variable(value, 0)).unwrap();
     let constants: State<Fwd<1>> = states.cast();
     let exact = numbers(&lifted, &constants).map(|x| x.derivative[0]).collect();
@@ -83,15 +83,15 @@ fn random_state(random: &mut SplitMix64, pose: Isometry3<f64>) -> BodyState {
 /// The largest errors of wrenches and of rates of deflections over all dimensions of `shape`, relative to the largest derivative, as
 /// samples on a half-space and as the field under a ball.
 fn worst(shape: &Shape, random: &mut SplitMix64, law: &Arc<dyn DynContactLaw>) -> [f64; 2] {
-    let mut world = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::zeros());
     let ground = Shape::from_parry(&HalfSpace::new(Vector::Y)).unwrap();
     let ball = Shape::from_parry(&Ball::new(5e-3)).unwrap();
-    let floor = world.add(Body::fixed_from_shape("ground", &ground));
-    let body = world.add(Body::from_shape("body", shape, 1e3).unwrap());
-    let ball = world.add(Body::from_shape("ball", &ball, 1e3).unwrap());
+    let floor = model.add(Body::fixed_from_shape("ground", &ground));
+    let body = model.add(Body::from_shape("body", shape, 1e3).unwrap());
+    let ball = model.add(Body::from_shape("ball", &ball, 1e3).unwrap());
     let smoothing = GapSmoothing::Softplus { width: 1e-4 };
     for (samples, field) in [(body, floor), (ball, body)] {
-        world.add_contact(ContactBodies { samples, field }, Arc::clone(law), smoothing).unwrap();
+        model.add_contact(ContactBodies { samples, field }, Arc::clone(law), smoothing).unwrap();
     }
     let axis = vector(random);
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(axis.x, axis.y, axis.z) * 2.0);
@@ -99,7 +99,7 @@ fn worst(shape: &Shape, random: &mut SplitMix64, law: &Arc<dyn DynContactLaw>) -
     let lowest = surface.points().iter().map(|p| (turn * p.position).y - p.radius);
     let lowest = lowest.fold(f64::INFINITY, f64::min);
     let pose = Isometry3::from_parts(Translation3::new(0.0, -lowest - DEPTH, 0.0), turn);
-    let rigid = *world.bodies[body].rigid().unwrap();
+    let rigid = *model.bodies[body].rigid().unwrap();
     // The ball comes from anywhere.
     let from = vector(random).normalize() * 0.2;
     let from = Point3::new(from.x, from.y, from.z);
@@ -118,19 +118,19 @@ fn worst(shape: &Shape, random: &mut SplitMix64, law: &Arc<dyn DynContactLaw>) -
             state
         };
         let rows = states.rows().iter().copied().chain((0..2).map(deflection));
-        states = world.state_of_rows(rows.collect(), 0.0).unwrap();
+        states = model.state_of_rows(rows.collect(), 0.0).unwrap();
     }
     let names: Vec<String> = shape.dimensions().into_iter().map(|(name, _)| name).collect();
     let mut worst = [0.0_f64; 2];
     for name in names.iter().take(12) {
-        let [exact, differences] = by_dimension(&world, &states, name);
+        let [exact, differences] = by_dimension(&model, &states, name);
         // Force, torque and the halves of a deflection's rate.
         let chunks = exact.chunks(3).zip(differences.chunks(3)).enumerate();
         for (chunk, (exact, differences)) in chunks {
             let largest = differences.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             let off = exact.iter().zip(differences).map(|(a, b)| (a - b).abs());
             let off = off.fold(0.0, f64::max) / (largest + 1.0);
-            let what = &mut worst[usize::from(chunk >= 2 * world.bodies.len())];
+            let what = &mut worst[usize::from(chunk >= 2 * model.bodies.len())];
             *what = what.max(off);
         }
     }
@@ -170,8 +170,8 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     let plate = Cuboid::new(Vector::new(0.2, 0.01, 0.2));
     let plate =
         Shape::from_parry(&RoundCuboid { inner_shape: plate, border_radius: 2e-3 }).unwrap();
-    let mut world = World::new(Vector3::new(0.5, -9.81, 0.2)).cast::<S>();
-    let mut plain = World::new(Vector3::zeros());
+    let mut model = Model::new(Vector3::new(0.5, -9.81, 0.2)).cast::<S>();
+    let mut plain = Model::new(Vector3::zeros());
     let field = plain.add(Body::fixed_from_shape("plate", &plate));
     let samples = plain.add(Body::from_shape("body", &shape, 1e3).unwrap());
     let spring = HuntCrossley { stiffness: 3e8, damping: 0.3, exponent: 1.0 };
@@ -179,17 +179,17 @@ fn end<S: Scalar>(parry: &dyn ParryShape, name: &str, body: usize, change: S) ->
     let smoothing = GapSmoothing::Softplus { width: 2e-5 };
     plain.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
     let lifted = plain.cast::<S>();
-    (world.bodies, world.contacts) = (lifted.bodies, lifted.contacts);
-    let dimensions = world.bodies[body].shape().unwrap().dimensions();
+    (model.bodies, model.contacts) = (lifted.bodies, lifted.contacts);
+    let dimensions = model.bodies[body].shape().unwrap().dimensions();
     let (_, value) = dimensions.into_iter().find(|(own, _)| own == name).unwrap();
-    world.bodies[body].set_dimension(name, value + change).unwrap();
+    model.bodies[body].set_dimension(name, value + change).unwrap();
     let turn = UnitQuaternion::from_euler_angles(0.3, 0.2, 0.4);
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.07, 0.0), turn);
     let start = State::new([BodyState::at_rest(Isometry3::identity()), BodyState::at_rest(pose)]);
     let start = start.cast::<S>();
     let tight = Adaptive { tolerance: 1e-9, sensitivity_tolerance: 1e-8, ..Adaptive::default() };
     let once = TimeSteps { dt: 0.15, steps: 1 };
-    let end = world.simulate_with(&tight, &start, once).unwrap().states;
+    let end = model.simulate_with(&tight, &start, once).unwrap().states;
     end[1].pose.translation.vector.into()
 }
 
@@ -228,21 +228,21 @@ fn reverse_mode_and_checkpoints_know_dimensions() {
     }
     // One node a step, which keeps dimensions among the parameters.
     let ground = Shape::from_parry(&HalfSpace::new(Vector::Y)).unwrap();
-    let mut world = World::new(Vector3::y() * -9.81);
-    let field = world.add(Body::fixed_from_shape("ground", &ground));
+    let mut model = Model::new(Vector3::y() * -9.81);
+    let field = model.add(Body::fixed_from_shape("ground", &ground));
     let shape = Shape::from_parry(&ball).unwrap();
-    let samples = world.add(Body::from_shape("ball", &shape, 1e3).unwrap());
+    let samples = model.add(Body::from_shape("ball", &shape, 1e3).unwrap());
     let [law, ..] = laws();
-    world
+    model
         .add_contact(ContactBodies { samples, field }, law, GapSmoothing::Softplus { width: 1e-5 })
         .unwrap();
     let start = [Isometry3::identity(), Isometry3::translation(0.0, 0.031, 0.0)];
     let start = State::new(start.map(BodyState::at_rest)).cast::<Var>();
     let radius = recording.variable(0.03);
-    let mut lifted = world.cast::<Var>();
+    let mut lifted = model.cast::<Var>();
     lifted.bodies[samples.index()].set_dimension("radius", radius).unwrap();
     let steps = TimeSteps { dt: 0.01, steps: 5 };
-    let checkpointed = StepCheckpointed::new(Adaptive::default(), &world).unwrap();
+    let checkpointed = StepCheckpointed::new(Adaptive::default(), &model).unwrap();
     let plain = lifted.rollout_with(&Adaptive::default(), &start, steps).unwrap().states;
     let again = lifted.rollout_with(&checkpointed, &start, steps).unwrap().states;
     let by_radius = [plain, again].map(|states| {

@@ -99,13 +99,13 @@ fn a_ball_rolls_down() {
         let ball = Shape::from_parry(&Ball::new(0.02)).unwrap();
         let high = ground.field().distance(&Point3::new(0.0, 1.0, 0.0), f64::INFINITY).unwrap();
         let along = (1.0 + slope * slope).sqrt();
-        let (world, mut start) = on(&ground, &ball, 0.0);
+        let (model, mut start) = on(&ground, &ball, 0.0);
         let normal = Vector3::new(slope, 1.0, 0.0) / along;
         start[1].pose.translation.vector = normal * 0.02;
         let at = start[1].pose.translation.vector.into();
         let gap = ground.field().distance(&at, f64::INFINITY).unwrap() - 0.02;
         start[1].pose.translation.vector -= normal * (gap + 1e-6);
-        let end = world.simulate(&start, 0.3).unwrap();
+        let end = model.simulate(&start, 0.3).unwrap();
         let expected = 5.0 / 7.0 * 9.81 * slope / along * 0.3;
         let found = end[1].linear.norm();
         println!("{found} m/s beside {expected} m/s on a plane, {high}");

@@ -103,10 +103,10 @@ fn a_compound_is_the_nearest_of_its_parts() {
 fn a_dumbbell_stands_on_its_balls_and_a_hull_on_its_face() {
     let ground = Shape::from_parry(&HalfSpace::new(Vector::Y)).unwrap();
     let shape = Shape::from_parry(&dumbbell()).unwrap();
-    let (world, start) = on(&ground, &shape, 0.03 - 1e-5);
+    let (model, start) = on(&ground, &shape, 0.03 - 1e-5);
     let expected = 2.0 * 1e8 * 1e-5 * PI * 9e-4;
-    assert!((world.wrenches(&start, 0)[1].y / expected - 1.0).abs() < 1e-4);
-    let end = world.simulate(&start, 0.1).unwrap();
+    assert!((model.wrenches(&start, 0)[1].y / expected - 1.0).abs() < 1e-4);
+    let end = model.simulate(&start, 0.1).unwrap();
     assert!((end[1].pose.translation.vector - start[1].pose.translation.vector).norm() < 1e-4);
     // A pyramid, whose tip has four faces, and a prism.
     let half = 0.03;
@@ -116,13 +116,13 @@ fn a_dumbbell_stands_on_its_balls_and_a_hull_on_its_face() {
     points.push(Vector::new(0.0, 0.05, 0.0));
     let hull = SharedShape::convex_hull(&points).unwrap();
     let shape = Shape::from_parry(hull.as_ref()).unwrap();
-    let (world, start) = on(&ground, &shape, -1e-5);
+    let (model, start) = on(&ground, &shape, -1e-5);
     let expected = 1e8 * 1e-5 * 4.0 * half * half;
-    let found = world.wrenches(&start, 0)[1];
+    let found = model.wrenches(&start, 0)[1];
     println!("{} of the base's force", found.y / expected);
     assert!((found.y / expected - 1.0).abs() < 0.1);
-    let settled = world.simulate(&start, 0.15).unwrap();
-    let end = world.simulate(&settled, 0.15).unwrap();
+    let settled = model.simulate(&start, 0.15).unwrap();
+    let end = model.simulate(&settled, 0.15).unwrap();
     let moved = end[1].pose.translation.vector - settled[1].pose.translation.vector;
     assert!(moved.norm() < 1e-8, "{moved}");
 }
