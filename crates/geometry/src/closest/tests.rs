@@ -125,7 +125,7 @@ fn seams_and_inverted_faces_do_not_hide_the_inside() {
 }
 
 #[test]
-fn an_open_mesh_uses_the_winding_number_and_says_so() {
+fn an_open_mesh_uses_the_winding_number() {
     let mut mesh = ball(40);
     let closed = ClosestPoints::new(&mesh).unwrap();
     mesh.faces.truncate(mesh.faces.len() - 6);
@@ -140,6 +140,22 @@ fn an_open_mesh_uses_the_winding_number_and_says_so() {
             assert_eq!(open.signed_distance(&p).0 < 0.0, expected < 0.0);
         }
     }
+}
+
+/// The middle of a mesh is the origin of its dipoles: distances in single precision may be anything there, zero included.
+#[test]
+fn the_middle_of_an_open_mesh_is_inside() {
+    let mut mesh = ball(20);
+    mesh.faces.truncate(mesh.faces.len() - 6);
+    let open = ClosestPoints::new(&mesh).unwrap();
+    let middle = Bvh::new(&mesh).center;
+    for exponent in -30..-3 {
+        for digit in [1.0, 2.3, 6.9] {
+            let p = Point3::from(middle + Vector3::x() * (digit * 10f64.powi(exponent)));
+            assert!(open.signed_distance(&p).0 < -0.4, "{digit}e{exponent}");
+        }
+    }
+    assert!(open.signed_distance(&middle.into()).0 < -0.4);
 }
 
 #[test]

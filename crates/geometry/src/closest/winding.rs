@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use wide::{f32x8, f64x4};
 
 use super::bvh::{Bvh, Child, child};
@@ -20,24 +20,28 @@ type Group = (Vector3<f64>, Vector3<f64>, f64);
 struct Dipoles {
     center: [f32x8; 3],
     area_vector: [f32x8; 3],
+    /// Infinite in lanes that are not in use, so that nothing is far from them.
     radius: f32x8,
     /// Lanes in use, one bit each.
     used: u32,
 }
 
+/// Square of a distance \[m²\] below which no group is far: its cube would underflow.
+const LEAST_SQUARED: f32 = 1e-24;
+
 impl Dipoles {
     fn new(groups: &[Group]) -> Self {
-        let column = |number: &dyn Fn(&Group) -> f64| {
-            let mut column = [0.0; LANES];
+        let column = |unused: f32, number: &dyn Fn(&Group) -> f64| {
+            let mut column = [unused; LANES];
             for (x, group) in column.iter_mut().zip(groups) {
                 *x = number(group) as f32;
             }
             f32x8::from(column)
         };
         Self {
-            center: [0, 1, 2].map(|i| column(&|group| group.0[i])),
-            area_vector: [0, 1, 2].map(|i| column(&|group| group.1[i])),
-            radius: column(&|group| group.2),
+            center: [0, 1, 2].map(|i| column(0.0, &|group| group.0[i])),
+            area_vector: [0, 1, 2].map(|i| column(0.0, &|group| group.1[i])),
+            radius: column(f32::INFINITY, &|group| group.2),
             used: (1 << groups.len()) - 1,
         }
     }
@@ -48,7 +52,7 @@ impl Dipoles {
         let r = [self.center[0] - p[0], self.center[1] - p[1], self.center[2] - p[2]];
         let squared = dot3(&r, &r);
         let limit = self.radius * f32x8::splat(far);
-        let is_far = squared.simd_gt(limit * limit);
+        let is_far = squared.simd_gt((limit * limit).max(f32x8::splat(LEAST_SQUARED)));
         let solid_angle = dot3(&self.area_vector, &r) / (squared * squared.sqrt());
         let sum = is_far.select(solid_angle, f32x8::ZERO).reduce_add();
         (sum, !is_far.to_bitmask() & self.used)
@@ -109,6 +113,9 @@ const MOST_ENDS: usize = 1000;
 impl Winding {
     pub(super) fn new(mesh: &TriMesh, bvh: &Bvh) -> Self {
         let mut dipoles = vec![Dipoles::new(&[]); bvh.nodes.len()];
+        // Rounding of a point among the vertices, and of a center, to single precision.
+        let reach = |reach: f64, v: &Point3<f64>| reach.max((v.coords - bvh.center).norm());
+        let slack = 2.0 * f64::from(f32::EPSILON) * mesh.vertices.iter().fold(0.0, reach);
         // (area, area-weighted center, area vector) of each node; children come after their parents.
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {
@@ -132,7 +139,7 @@ impl Winding {
                 sums[n].2 += area_vector;
                 let (middle, reach) = node.ball(lane);
                 let center = if area > 0.0 { weighted / area } else { middle };
-                groups.push((center, area_vector, (center - middle).norm() + reach));
+                groups.push((center, area_vector, (center - middle).norm() + reach + slack));
             }
             dipoles[n] = Dipoles::new(&groups);
         }
@@ -178,10 +185,12 @@ impl Winding {
     /// ∫ dl/(4π|x − p|²) along them, which grows by less than (1 − ρ/r)⁻² within a radius ρ below their distances r. A ball without ends has
     /// no currents, so that the change between two points is that along the line, whatever the path.
     pub(super) fn around(&self, bvh: &Bvh, p: &Vector3<f64>) -> (bool, f64) {
+        let Some(ends) = &self.ends else { return (self.is_inside(bvh, p), 0.0) };
         let number = self.at(bvh, p, FINE).abs();
         let (inside, spare) = (number > 0.5, (number - 0.5).abs() - FINE.certain);
-        let ends = self.ends.as_ref().filter(|_| spare > 0.0);
-        let Some(ends) = ends else { return (inside, 0.0) };
+        if spare <= 0.0 {
+            return (inside, 0.0);
+        }
         let seen: Vec<[f64; 2]> = ends.iter().map(|end| end.seen_from(p)).collect();
         let nearest = seen.iter().fold(f64::INFINITY, |nearest, [r, _]| r.min(nearest));
         let changes_less = |radius: &f64| {

@@ -7,7 +7,7 @@ use super::sides::{Block, add_insides};
 use super::{Lattice, SdfError, SdfGrid};
 use crate::closest::{ClosestPoints, box_distance};
 
-/// Planes of samples along x that one task measures.
+/// Planes of samples along x that one task measures where insides spread from sample to sample.
 const PLANES: usize = 16;
 
 impl SdfGrid {
@@ -32,18 +32,17 @@ impl SdfGrid {
         lattice: Lattice,
     ) -> Self {
         let [_, ny, nz] = lattice.dims();
+        let planes = if meshes.iter().all(ClosestPoints::is_closed) { 1 } else { PLANES };
         let mut values = vec![0.0; lattice.dims().iter().product()];
-        values.par_chunks_mut(PLANES * ny * nz).enumerate().for_each(|(block, values)| {
-            sample(meshes, &Block::new(&lattice, block * PLANES, values.len()), values);
+        values.par_chunks_mut(planes * ny * nz).enumerate().for_each(|(block, values)| {
+            sample(meshes, &Block::new(&lattice, block * planes, values.len()), values);
         });
         Self::from_samples(lattice, &values, bounds)
     }
 
-    /// Samples any signed distance \[m\] of a shape within `bounds` \[m\].
-    ///
-    /// # Errors
-    /// As [`Self::build`].
-    pub fn from_fn(
+    /// Samples of any signed distance \[m\] of a shape within `bounds` \[m\].
+    #[cfg(test)]
+    pub(crate) fn from_fn(
         bounds: (Point3<f64>, Point3<f64>),
         spacing: f64,
         margin: f64,
@@ -99,7 +98,7 @@ fn sample(meshes: &[ClosestPoints], block: &Block, values: &mut [f64]) {
         values[n] = value;
         if is_bounded {
             // A distance changes by at most the length of the step; the rest is rounding.
-            bound = (value.abs() + block.spacing()) * (1.0 + 1e-9);
+            bound = value.abs() * (1.0 + 1e-9) + block.longest_step();
         }
     });
     for part in parts.iter().filter(|part| !part.unsigned.is_empty()) {

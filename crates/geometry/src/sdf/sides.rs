@@ -19,8 +19,11 @@ impl<'a> Block<'a> {
         Self { lattice, first, dims: [count / (ny * nz), ny, nz] }
     }
 
-    pub(super) fn spacing(&self) -> f64 {
-        self.lattice.spacing()
+    /// Bound of the distance of two samples beside each other, as they and distances from them are rounded \[m\].
+    pub(super) fn longest_step(&self) -> f64 {
+        let [first, last] = [[0; 3], self.dims.map(|n| n - 1)].map(|at| self.position(at));
+        let largest = first.coords.amax().max(last.coords.amax());
+        self.lattice.spacing() * (1.0 + 1e-9) + 16.0 * f64::EPSILON * largest
     }
 
     fn number(&self, [i, j, k]: [usize; 3]) -> usize {
@@ -73,7 +76,7 @@ pub(super) fn add_insides(
     unsigned: &[f64],
     values: &mut [f64],
 ) {
-    let step = block.spacing() * (1.0 + 1e-9);
+    let step = block.longest_step();
     let mut known = vec![false; unsigned.len()];
     let mut open = Vec::new();
     let [nx, ny, nz] = block.dims;

@@ -143,6 +143,22 @@ fn insides_of_open_meshes_spread_from_sample_to_sample() {
     }
 }
 
+/// Where neighboring samples are farther apart by rounding than the spacing, too.
+#[test]
+fn grids_far_from_the_origin_are_complete() {
+    for closed in [true, false] {
+        for away in [1e4, 1e5, 1e6] {
+            let mut mesh = crate::volume::tests::icosphere(0.03, 3);
+            mesh.vertices.iter_mut().for_each(|v| v.z += away);
+            let missing = if closed { 0 } else { 20 };
+            mesh.faces.truncate(mesh.faces.len() - missing);
+            let grid = SdfGrid::build(&ClosestPoints::new(&mesh).unwrap(), 0.002, 0.01).unwrap();
+            let middle = grid.sample(&Point3::new(0.0, 0.0, away), 0.0).unwrap().distance;
+            assert!((middle + 0.03).abs() < 1e-3, "{middle} at {away}");
+        }
+    }
+}
+
 #[test]
 fn grids_are_the_same_for_any_number_of_threads() {
     let mesh = ball(true);
