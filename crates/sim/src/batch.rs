@@ -111,7 +111,7 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         model: &Model<S>,
         state: &State<S>,
         time_steps: TimeSteps,
-    ) -> Result<(Run<I>, Vec<S>)> {
+    ) -> Result<(BatchRun<I>, Vec<S>)> {
         model.check_trajectories()?;
         if !self.template.is_of(model) {
             return Err(SimulationError::AnotherModel);
@@ -121,7 +121,7 @@ impl<I: Integrator + Send + 'static> Batch<I> {
         }
         let ParameterDelta { places, values } = self.template.changes(model);
         let numbers = coordinates_of(state.rows()).chain(values).collect();
-        let run = Run {
+        let run = BatchRun {
             template: Arc::clone(&self.template),
             places,
             rows: state.rows().len(),
@@ -136,7 +136,7 @@ impl<I: Integrator + Send + 'static> Batch<I> {
 const FEW: usize = 2000;
 
 /// A simulation as a function of the states' coordinates and of the model's parameters at `places`, to the states at its end.
-struct Run<I> {
+struct BatchRun<I> {
     template: Arc<ModelTemplate<I>>,
     places: Box<[u32]>,
     /// Number of rows that it starts from.
@@ -146,7 +146,7 @@ struct Run<I> {
     time_steps: TimeSteps,
 }
 
-impl<I: Integrator + Send + 'static> Recompute for Run<I> {
+impl<I: Integrator + Send + 'static> Recompute for BatchRun<I> {
     type Error = SimulationError;
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>> {

@@ -36,10 +36,10 @@ use prehend_geometry::{DistanceField, Moments, TriMesh};
 use crate::body::RigidBody;
 use crate::surface::Surface;
 use error::ShapeError;
-use kind::Kind;
+use kind::ShapeKind;
 use lifted::LiftedField;
 use options::ShapeOptions;
-use solid::Sample;
+use solid::RoundSample;
 
 /// The shape of a body, over plain numbers or numbers that carry derivatives: its dimensions, and samples of its surface and a
 /// distance field of their values, which bodies of one shape share.
@@ -78,14 +78,14 @@ pub struct Shape<S: Scalar = f64> {
 
 /// Samples and field that follow from the values of the dimensions.
 struct Built {
-    kind: Arc<Kind>,
+    kind: Arc<ShapeKind>,
     values: Vec<f64>,
     surface: Option<Arc<Surface>>,
     field: Arc<dyn DistanceField>,
 }
 
 impl Built {
-    fn new(kind: Arc<Kind>, values: Vec<f64>) -> Result<Self, ShapeError> {
+    fn new(kind: Arc<ShapeKind>, values: Vec<f64>) -> Result<Self, ShapeError> {
         kind.check(&values)?;
         let samples = kind.samples(&values);
         let surface = match samples.is_empty() {
@@ -172,7 +172,7 @@ impl Shape {
     /// See there, and for lengths that are not positive and finite.
     pub fn from_mesh_with(mesh: &TriMesh, options: &ShapeOptions) -> Result<Self, ShapeError> {
         let ground = mesh::mesh(mesh, options)?;
-        let built = Arc::new(Built::new(Arc::new(Kind::Ground(ground)), Vec::new())?);
+        let built = Arc::new(Built::new(Arc::new(ShapeKind::Ground(ground)), Vec::new())?);
         Ok(Self { built, dimensions: Vec::new() })
     }
 
@@ -248,7 +248,7 @@ impl<S: Scalar> Shape<S> {
     }
 
     /// Its samples with `dimensions` that have its values, in the order of [`SurfacePoint::index`](crate::SurfacePoint).
-    pub(crate) fn lifted_samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    pub(crate) fn lifted_samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         self.built.kind.samples(dimensions)
     }
 

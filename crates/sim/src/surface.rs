@@ -24,7 +24,7 @@ pub struct SurfacePoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     points: Vec<SurfacePoint>,
-    blocks: Vec<Block>,
+    blocks: Vec<Cluster>,
     area: f64,
     /// Largest radius of a sample \[m\].
     rounding: f64,
@@ -32,7 +32,7 @@ pub struct Surface {
 
 /// Neighboring samples and the ball they lie in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Block {
+pub(crate) struct Cluster {
     start: usize,
     end: usize,
     /// Body frame \[m\].
@@ -235,14 +235,18 @@ impl Surface {
 
     /// Some of its samples, as one block that is never left out. The others stay part of the area.
     pub(crate) fn only(&self, points: Vec<SurfacePoint>) -> Self {
-        let all =
-            Block { start: 0, end: points.len(), center: Point3::origin(), radius: f64::INFINITY };
+        let all = Cluster {
+            start: 0,
+            end: points.len(),
+            center: Point3::origin(),
+            radius: f64::INFINITY,
+        };
         Self { blocks: vec![all], points, area: self.area, rounding: self.rounding }
     }
 
     /// The blocks with their samples.
     #[inline]
-    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&Block, &[SurfacePoint])> {
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&Cluster, &[SurfacePoint])> {
         self.blocks.iter().map(|block| (block, &self.points[block.start..block.end]))
     }
 }
@@ -261,7 +265,7 @@ pub(crate) fn check_spacing(half_extents: [f64; 3], spacing: f64) -> Result<(), 
 }
 
 /// Sorts by halves along the longest side of their box until a block is small enough.
-fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<Block>) {
+fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<Cluster>) {
     let first = points[0].position;
     let (lo, hi) = points
         .iter()
@@ -277,7 +281,7 @@ fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<
     }
     let center = nalgebra::center(&lo, &hi);
     let radius = points.iter().map(|p| (p.position - center).norm()).fold(0.0, f64::max);
-    blocks.push(Block { start, end: start + points.len(), center, radius });
+    blocks.push(Cluster { start, end: start + points.len(), center, radius });
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ impl<S: Scalar> CustomMotion<S> {
         }
         const { assert!(S::ORDER <= 1, "joints of one's own have first derivatives only") };
         let (value, jacobian) = model.linearized(values);
-        Self::of(&S::local(&Linear { at: values, value, jacobian }, x))
+        Self::of(&S::local(&LinearizedMotion { at: values, value, jacobian }, x))
     }
 
     /// Motion of numbers in their order.
@@ -120,13 +120,13 @@ impl<S: Scalar> CustomMotion<S> {
 }
 
 /// A motion about where it was linearized.
-struct Linear {
+struct LinearizedMotion {
     at: [f64; 2 * MAX_NV],
     value: [f64; MOTION],
     jacobian: [[f64; 2 * MAX_NV]; MOTION],
 }
 
-impl LocalFunction<{ 2 * MAX_NV }, MOTION> for Linear {
+impl LocalFunction<{ 2 * MAX_NV }, MOTION> for LinearizedMotion {
     fn evaluate<S: Scalar>(&self, x: [S; 2 * MAX_NV]) -> [S; MOTION] {
         std::array::from_fn(|row| {
             let slopes = self.jacobian[row].iter().zip(&x).zip(&self.at);

@@ -7,7 +7,7 @@ use prehend_geometry::{DistanceField, FieldSample};
 use super::gap_smoothing::{GapSmoothing, SmoothedGap};
 use super::point::ContactKinematics;
 use crate::body_state::BodyState;
-use crate::surface::{Block, Surface, SurfacePoint};
+use crate::surface::{Cluster, Surface, SurfacePoint};
 
 /// Below this length a distance gradient has no direction, and the point no contact.
 const MIN_GRADIENT: f64 = 1e-9;
@@ -67,7 +67,7 @@ impl ContactQuery<'_> {
 
     /// True if a point of `block` may be nearer to the field than `reach`.
     #[inline]
-    fn may_touch(&self, block: &Block, reach: f64) -> bool {
+    fn may_touch(&self, block: &Cluster, reach: f64) -> bool {
         let within = reach + self.field.lipschitz_bound() * block.radius;
         block.radius.is_infinite() || self.distance_within(&block.center, within)
     }

@@ -345,8 +345,8 @@ mod tests {
 
     #[test]
     fn singular_points_give_finite_numbers() {
-        struct Flat;
-        impl DistanceField for Flat {
+        struct FlatField;
+        impl DistanceField for FlatField {
             fn sample(&self, _: &Point3<f64>, _: f64) -> Option<FieldSample> {
                 let (gradient, hessian) = (Vector3::zeros(), nalgebra::Matrix3::zeros());
                 Some(FieldSample { distance: -1e-3, gradient, hessian })
@@ -358,7 +358,7 @@ mod tests {
             let jacobian =
                 |query: &ContactQuery<'_>| law.wrench_jacobian(law.params(), query, true);
             // ∇φ = 0 gives no contact; φ = 0 without slip, finite ones.
-            assert_eq!(sample_at(0.0, &Flat, smoothing, jacobian).wrench, Vector6::zeros());
+            assert_eq!(sample_at(0.0, &FlatField, smoothing, jacobian).wrench, Vector6::zeros());
             let rest = |query: &ContactQuery<'_>| {
                 let state = BodyState::at_rest(Isometry3::identity());
                 jacobian(&ContactQuery { state, ..*query })

@@ -15,21 +15,21 @@ const NOISE: f64 = 1e-6;
 
 /// Follows the velocities of free bodies and joints.
 pub(super) struct StepResolution {
-    bodies: Vec<Followed>,
+    bodies: Vec<BodyHistory>,
     joints: Vec<FollowedJoint>,
-    sums: Sums,
+    sums: VelocityChanges,
 }
 
 /// Sums of the squared changes of velocity by contacts, and of the squared changes of these.
 #[derive(Default)]
-struct Sums {
+struct VelocityChanges {
     kicks: f64,
     changes: f64,
     /// The largest of the latter, whose it is, and when \[s\].
     largest: (f64, Option<(BodyId, f64)>),
 }
 
-impl Sums {
+impl VelocityChanges {
     fn add(&mut self, body: BodyId, step: Step, before: Option<Vector6<f64>>, kick: Vector6<f64>) {
         // Nothing is known of what was before the first step.
         let change = before.map_or(0.0, |before| (kick - before).norm_squared());
@@ -48,7 +48,7 @@ fn velocity<S: Scalar>(state: &BodyState<S>) -> Vector6<f64> {
 }
 
 /// A free body and what is known of its last step.
-struct Followed {
+struct BodyHistory {
     body: BodyId,
     rigid: RigidBody,
     /// Radius of gyration \[m\].
@@ -75,7 +75,7 @@ impl StepResolution {
             let rigid = model.bodies[body].rigid()?.map(S::value);
             let state = initial[body].value();
             let wrench = model.bodies[body].external_wrench.map(|x| x.value());
-            Some(Followed {
+            Some(BodyHistory {
                 body,
                 length: rigid.gyration_radius(),
                 pull: model.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / rigid.mass(),
@@ -93,7 +93,7 @@ impl StepResolution {
             FollowedJoint { place, link: *link, velocity, kick: None }
         });
         let joints = joints.collect();
-        Self { bodies, joints, sums: Sums::default() }
+        Self { bodies, joints, sums: VelocityChanges::default() }
     }
 
     /// After `step` has led to `states`.
@@ -123,7 +123,7 @@ impl StepResolution {
 
     /// The ratio of both root mean squares.
     pub(super) fn mean(&self) -> f64 {
-        let Sums { kicks, changes, .. } = self.sums;
+        let VelocityChanges { kicks, changes, .. } = self.sums;
         if kicks > 0.0 { (changes / kicks).sqrt() } else { 0.0 }
     }
 

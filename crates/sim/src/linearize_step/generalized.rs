@@ -10,7 +10,7 @@ use crate::articulated::tree_factor::TreeFactor;
 use crate::body_state::Rows;
 use crate::model::Model;
 use crate::model::articulated_body::ArticulatedBody;
-use crate::model::joint_force::Along;
+use crate::model::joint_force::ForceAxes;
 use crate::spatial::{angular, cross_motion, linear};
 
 /// Forces on free bodies and accelerations of joints, with derivatives by all coordinates.
@@ -31,7 +31,7 @@ impl Generalized {
     /// At `states`, whose links are moved to where their joints put them.
     pub(super) fn new(model: &Model, states: &mut Rows, step: usize) -> Self {
         let trees = trees(model, states);
-        for Tree { own, at, .. } in &trees {
+        for PosedTree { own, at, .. } in &trees {
             let bodies = own.bodies().iter();
             bodies.zip(at.link_states()).for_each(|(body, state)| states[*body] = state);
         }
@@ -52,7 +52,7 @@ impl Generalized {
     pub(super) fn without_forces(model: &Model, states: &Rows) -> Self {
         let trees = trees(model, states);
         let mut all = Self::empty(model, &trees);
-        for Tree { at, first, .. } in &trees {
+        for PosedTree { at, first, .. } in &trees {
             let inverse = at.inverse_mass_matrix();
             let (from, n) = (first - all.joints, inverse.nrows());
             all.by_effort.view_mut((from, from), (n, n)).copy_from(&inverse);
@@ -60,7 +60,7 @@ impl Generalized {
         all
     }
 
-    fn empty(model: &Model, trees: &[Tree<'_>]) -> Self {
+    fn empty(model: &Model, trees: &[PosedTree<'_>]) -> Self {
         let joints = 6 * model.free_bodies().len();
         let count = joints + trees.iter().map(|tree| tree.dofs).sum::<usize>();
         let [by_position, by_velocity] = [(); 2].map(|()| DMatrix::zeros(count, count));
@@ -70,7 +70,7 @@ impl Generalized {
     }
 
     /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
-    fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[Tree<'_>], step: usize) {
+    fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[PosedTree<'_>], step: usize) {
         let contacts = model.contacts.iter();
         let contacts = contacts.filter_map(|pair| Between::contact(model, pair, states, step));
         let bushings =
@@ -84,9 +84,9 @@ impl Generalized {
         for between in contacts.chain(bushings) {
             for body in between.bodies {
                 motions[body].get_or_insert_with(|| match own[body.index()] {
-                    Place::Free(first) => of_free_body(first),
-                    Place::Link(tree, link) => of_link(&trees[tree].at, link, trees[tree].first),
-                    Place::Fixed => Vec::new(),
+                    Dofs::Free(first) => of_free_body(first),
+                    Dofs::Link(tree, link) => of_link(&trees[tree].at, link, trees[tree].first),
+                    Dofs::Fixed => Vec::new(),
                 });
             }
             let ends = between.bodies.map(|body| motions[body].as_deref().unwrap_or(&[]));
@@ -96,7 +96,7 @@ impl Generalized {
                 for (by, moving) in ends.iter().enumerate() {
                     self.add_slopes(&between.by[end][by], ends[end], moving);
                 }
-                if matches!(own[between.bodies[end].index()], Place::Link(..)) {
+                if matches!(own[between.bodies[end].index()], Dofs::Link(..)) {
                     self.add_turns(wrench, ends[end]);
                 }
             }
@@ -131,11 +131,12 @@ impl Generalized {
         &mut self,
         model: &Model,
         states: &Rows,
-        trees: &[Tree<'_>],
+        trees: &[PosedTree<'_>],
     ) -> Vec<Vec<f64>> {
         let mut efforts: Vec<Vec<f64>> = trees.iter().map(|tree| vec![0.0; tree.dofs]).collect();
         for force in &model.joint_forces {
-            let Some(Along { articulation, dofs, position, velocity }) = model.along(force, states)
+            let Some(ForceAxes { articulation, dofs, position, velocity }) =
+                model.along(force, states)
             else {
                 continue;
             };
@@ -155,8 +156,8 @@ impl Generalized {
     }
 
     /// Makes accelerations of the efforts of a tree, and of their derivatives.
-    fn accelerate(&mut self, tree: &Tree<'_>, efforts: &[f64]) -> Vec<f64> {
-        let Tree { own, at, first, .. } = tree;
+    fn accelerate(&mut self, tree: &PosedTree<'_>, efforts: &[f64]) -> Vec<f64> {
+        let PosedTree { own, at, first, .. } = tree;
         let (first, n) = (*first, efforts.len());
         let wrenches: Vec<Vector6<f64>> =
             own.bodies().iter().map(|body| self.wrenches[*body]).collect();
@@ -195,8 +196,8 @@ impl Generalized {
     }
 
     /// Adds the change of the coordinates' share in all wrenches on links as axes turn with those that carry them.
-    fn add_axes_turns(&mut self, tree: &Tree<'_>, wrenches: &[Vector6<f64>]) {
-        let Tree { own, at, first, .. } = tree;
+    fn add_axes_turns(&mut self, tree: &PosedTree<'_>, wrenches: &[Vector6<f64>]) {
+        let PosedTree { own, at, first, .. } = tree;
         let links = own.tree.links();
         let mut sums: Vec<Vector6<f64>> = Vec::with_capacity(links.len());
         sums.extend(wrenches.iter().enumerate().map(|(link, w)| at.about_origin(link, w)));
@@ -220,7 +221,7 @@ impl Generalized {
 }
 
 /// An articulation where it is.
-struct Tree<'a> {
+struct PosedTree<'a> {
     own: &'a ArticulatedBody,
     at: Kinematics<'a>,
     /// The first of its coordinates.
@@ -229,14 +230,14 @@ struct Tree<'a> {
     dofs: usize,
 }
 
-fn trees<'a>(model: &'a Model, states: &Rows) -> Vec<Tree<'a>> {
+fn trees<'a>(model: &'a Model, states: &Rows) -> Vec<PosedTree<'a>> {
     let mut first = 6 * model.free_bodies().len();
     let mut trees = Vec::with_capacity(model.articulations.len());
     for (index, own) in model.articulations.iter().enumerate() {
         let dofs = own.tree.nv();
         let [q, v] = own.coordinates(&states[model.joint_range(index)]);
         let at = own.tree.kinematics(&q, &v).under(model.gravity);
-        trees.push(Tree { own, at, first, dofs });
+        trees.push(PosedTree { own, at, first, dofs });
         first += dofs;
     }
     trees
@@ -244,7 +245,7 @@ fn trees<'a>(model: &'a Model, states: &Rows) -> Vec<Tree<'a>> {
 
 /// Coordinates that move a body.
 #[derive(Clone, Copy)]
-enum Place {
+enum Dofs {
     Fixed,
     /// Its own coordinates, from here on.
     Free(usize),
@@ -252,14 +253,14 @@ enum Place {
     Link(usize, usize),
 }
 
-fn places(model: &Model, trees: &[Tree<'_>]) -> Vec<Place> {
-    let mut places = vec![Place::Fixed; model.bodies.len()];
+fn places(model: &Model, trees: &[PosedTree<'_>]) -> Vec<Dofs> {
+    let mut places = vec![Dofs::Fixed; model.bodies.len()];
     for (slot, body) in model.free_bodies().into_iter().enumerate() {
-        places[body] = Place::Free(6 * slot);
+        places[body] = Dofs::Free(6 * slot);
     }
     for (index, tree) in trees.iter().enumerate() {
         for (link, body) in tree.own.bodies().iter().enumerate() {
-            places[*body] = Place::Link(index, link);
+            places[*body] = Dofs::Link(index, link);
         }
     }
     places

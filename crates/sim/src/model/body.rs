@@ -10,7 +10,7 @@ use super::trajectory::{self, Trajectory};
 use crate::body::RigidBody;
 use crate::body::error::BodyError;
 use crate::fields::Cuboid;
-use crate::shape::matter::Matter;
+use crate::shape::matter::DensityShape;
 use crate::surface::Surface;
 
 /// Body of a model: what moves it, and its surface and field for contact.
@@ -28,7 +28,7 @@ pub struct Body<S: Scalar = f64> {
     /// frame.
     pub external_wrench: Vector6<S>,
     /// Shape and density, where its surface and field come from a shape.
-    pub(crate) matter: Option<Matter<S>>,
+    pub(crate) matter: Option<DensityShape<S>>,
 }
 
 /// Kind of a body's motion.

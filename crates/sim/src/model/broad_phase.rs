@@ -93,13 +93,13 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     pub(crate) fn find(&self, states: &Rows, deviations: &[f64], dt: f64) -> Vec<CandidateContact> {
         let reach = |(id, deviation): (BodyId, &f64)| {
             let free = self.model.bodies[id].feels_forces();
-            Reach {
+            SweptBall {
                 center: states[id].pose.translation.vector,
                 path: if free { states[id].linear * dt } else { Vector3::zeros() },
                 radius: self.radii[id.index()].map(|radius| radius + deviation),
             }
         };
-        let reaches: Vec<Reach> =
+        let reaches: Vec<SweptBall> =
             (0..self.model.bodies.len()).map(BodyId).zip(deviations).map(reach).collect();
         let mut near = Vec::new();
         for (index, group) in self.model.contact_groups.iter().enumerate() {
@@ -122,7 +122,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
     }
 
     /// The bodies of a group whose reaches meet.
-    fn pairs(&self, group: &ContactGroup<S>, reaches: &[Reach]) -> Vec<(BodyId, BodyId)> {
+    fn pairs(&self, group: &ContactGroup<S>, reaches: &[SweptBall]) -> Vec<(BodyId, BodyId)> {
         let margin = reach_of(&group.contact);
         let [a, b] = group.bodies();
         let (bounded, endless): (Vec<BodyId>, Vec<BodyId>) =
@@ -156,7 +156,7 @@ impl<'a, S: Scalar> BroadPhase<'a, S> {
         &self,
         contact: &CandidateContact,
         states: &Rows,
-        reach: &Reach,
+        reach: &SweptBall,
         deviation: f64,
     ) -> bool {
         let ContactBodies { samples, field } = contact.bodies;
@@ -189,13 +189,13 @@ fn radius<S: Scalar>(body: &Body<S>) -> Option<f64> {
 }
 
 /// Swept ball of a body: a radius \[m\] about its center that moves along a path \[m\], or everything.
-struct Reach {
+struct SweptBall {
     center: Vector3<f64>,
     path: Vector3<f64>,
     radius: Option<f64>,
 }
 
-impl Reach {
+impl SweptBall {
     /// The box around it that is larger by `margin` \[m\].
     fn aabb(&self, margin: f64) -> Aabb {
         let [x, y, z] = (self.center + self.path * 0.5).into();

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Point3};
 use prehend_autodiff::Fwd;
 
 use super::Model;
-use super::joint_force::{Along, JointForce};
+use super::joint_force::{ForceAxes, JointForce};
 use crate::body_state::{BodyState, Rows};
 use crate::handle::BodyId;
 use crate::state::State;
@@ -97,7 +97,7 @@ impl Model {
         roots: &[(usize, DMatrix<f64>)],
     ) -> Vec<(usize, DVector<f64>, [f64; 2])> {
         let slopes = |force: &JointForce| {
-            let Along { articulation, dofs, position, velocity } = self.along(force, states)?;
+            let ForceAxes { articulation, dofs, position, velocity } = self.along(force, states)?;
             let (first, root) = &roots[articulation];
             let mut along = DVector::zeros(root.nrows());
             dofs.iter().for_each(|(dof, factor)| along[*dof] += factor);

@@ -116,7 +116,7 @@ impl<S: Scalar> JointForce<S> {
 }
 
 /// Scales down the forces of groups whose sum is out of its bounds.
-fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
+fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, ForceAxes<S>, S)]) {
     let mut sums: BTreeMap<(usize, usize), S> = BTreeMap::new();
     for (force, along, effort) in acting.iter() {
         if let Some((group, _)) = force.bound {
@@ -135,7 +135,7 @@ fn bound_groups<S: Scalar>(acting: &mut [(&JointForce<S>, Along<S>, S)]) {
 }
 
 /// Degrees of freedom that a force acts along.
-pub(crate) struct Along<S> {
+pub(crate) struct ForceAxes<S> {
     pub(crate) articulation: usize,
     /// Degrees of freedom of the articulation, with the derivatives of the position by them.
     pub(crate) dofs: Vec<(usize, S)>,
@@ -290,7 +290,7 @@ impl<S: Scalar> Model<S> {
     }
 
     /// Degrees of freedom that a force acts along.
-    pub(crate) fn along(&self, force: &JointForce<S>, states: &Rows<S>) -> Option<Along<S>> {
+    pub(crate) fn along(&self, force: &JointForce<S>, states: &Rows<S>) -> Option<ForceAxes<S>> {
         let mut places: Vec<_> = self.articulations.iter().map(|_| None).collect();
         self.along_at(force, states, &mut places)
     }
@@ -300,11 +300,11 @@ impl<S: Scalar> Model<S> {
         force: &JointForce<S>,
         states: &Rows<S>,
         places: &mut [Option<Kinematics<'a, S>>],
-    ) -> Option<Along<S>> {
+    ) -> Option<ForceAxes<S>> {
         let (first, _) = force.axes.first()?;
         let (articulation, _) = self.link_of(first.link).ok()?;
         let (own, joints) = (&self.articulations[articulation], self.joint_range(articulation));
-        let mut along = Along {
+        let mut along = ForceAxes {
             articulation,
             dofs: Vec::with_capacity(force.axes.len()),
             position: S::zero(),

@@ -116,7 +116,7 @@ impl LinearContacts {
             }
             outputs.extend(wrench.iter());
         }
-        let node = Node { contacts: self.contacts, states: own };
+        let node = ContactsNode { contacts: self.contacts, states: own };
         const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
         let recorded = S::recorded(&inputs, &outputs, node)
             .unwrap_or_else(|| outputs.iter().map(|&x| S::constant(x)).collect());
@@ -133,13 +133,13 @@ impl LinearContacts {
 }
 
 /// The derivative of [`LinearContacts`].
-struct Node {
+struct ContactsNode {
     contacts: Vec<LinearContact>,
     /// For each body that touches, and where its coordinates begin among the inputs, if they are inputs.
     states: Vec<(BodyState, Option<usize>)>,
 }
 
-impl CustomVjp for Node {
+impl CustomVjp for ContactsNode {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
         for contact in &self.contacts {
             let of = |end: usize| -> [Vector3<f64>; 2] {

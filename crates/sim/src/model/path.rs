@@ -20,7 +20,7 @@ pub(crate) struct Anchor {
 
 /// A frame of a link, or of the model where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Frame {
+pub(crate) struct LinkFrame {
     pub(crate) link: Option<usize>,
     pub(crate) t_link_frame: Isometry3<f64>,
 }
@@ -28,7 +28,7 @@ pub(crate) struct Frame {
 /// A cylinder about the z axis of a frame, or a sphere, that a cable runs around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Obstacle {
-    pub(crate) frame: Frame,
+    pub(crate) frame: LinkFrame,
     pub(crate) radius: f64,
     pub(crate) is_cylinder: bool,
     /// The cable runs on the side of this point, or inside where the point is.
@@ -43,9 +43,9 @@ pub(crate) enum PathPart {
     /// The shortest way around an obstacle, or a straight line that does not meet it.
     Around { ends: [Anchor; 2], obstacle: Obstacle, factor: f64 },
     /// Direction of a force and torque along the axes of a frame: it has a rate, but no length.
-    Twist { frame: Frame, gear: [f64; 6] },
+    Twist { frame: LinkFrame, gear: [f64; 6] },
     /// Place and turn of a frame in another, along the other's axes: links that carry both move neither.
-    Relative { frame: Frame, reference: Frame, gear: [f64; 6] },
+    Relative { frame: LinkFrame, reference: LinkFrame, gear: [f64; 6] },
     /// The turn of a ball joint's or a free joint's link times the first or last three numbers along the link's axes, or, `in_parent`, the
     /// joint's; without a reference, a pose in the joint's frame, it has no length.
     Turn {
@@ -58,7 +58,7 @@ pub(crate) enum PathPart {
     /// The angle of a ball joint's link from where the joint is at its neutral coordinates.
     Angle { link: usize },
     /// A rod from a crank to a slider along the z axis of a frame: how far the slider is.
-    Crank { pin: Anchor, slider: Frame, rod: f64, factor: f64 },
+    Crank { pin: Anchor, slider: LinkFrame, rod: f64, factor: f64 },
     /// The coordinate of a joint of one axis, whose degree of freedom this is.
     Axis { coordinate: usize, dof: usize, factor: f64 },
     /// A polynomial, its lowest power first, of the length of another way less `reference`.
@@ -159,7 +159,7 @@ struct Sum<'a, 'b, S: Scalar> {
 }
 
 impl<S: Scalar> Sum<'_, '_, S> {
-    fn frame(&self, frame: &Frame) -> (Matrix3<S>, Vector3<S>) {
+    fn frame(&self, frame: &LinkFrame) -> (Matrix3<S>, Vector3<S>) {
         let own = frame.t_link_frame.rotation.to_rotation_matrix().into_inner().map(S::constant);
         let place = frame.t_link_frame.translation.vector.map(S::constant);
         match frame.link {
@@ -173,7 +173,7 @@ impl<S: Scalar> Sum<'_, '_, S> {
 
     fn point(&self, anchor: &Anchor) -> Vector3<S> {
         let (link, t_link_frame) = (anchor.link, Isometry3::from(anchor.point.coords));
-        self.frame(&Frame { link, t_link_frame }).1
+        self.frame(&LinkFrame { link, t_link_frame }).1
     }
 
     /// Adds what moves with a force at `place` and a torque on a link, by the degrees of freedom that count.
@@ -223,7 +223,7 @@ impl<S: Scalar> Sum<'_, '_, S> {
         self.add_line([(own, last), (ends[1].link, to)], factor);
     }
 
-    fn add_relative(&mut self, frame: &Frame, reference: &Frame, gear: &[f64; 6]) {
+    fn add_relative(&mut self, frame: &LinkFrame, reference: &LinkFrame, gear: &[f64; 6]) {
         let (rotation, place) = self.frame(frame);
         let (base, origin) = self.frame(reference);
         let [force, torque] = along(&base, gear);
@@ -296,7 +296,7 @@ impl<S: Scalar> Sum<'_, '_, S> {
         self.add_wrench(Some(link), &place, &Vector3::zeros(), &torque, &|k| dofs.contains(&k));
     }
 
-    fn add_crank(&mut self, pin: &Anchor, slider: &Frame, rod: f64, factor: f64) {
+    fn add_crank(&mut self, pin: &Anchor, slider: &LinkFrame, rod: f64, factor: f64) {
         let pin_place = self.point(pin);
         let (rotation, place) = self.frame(slider);
         let axis = rotation.column(2).into_owned();

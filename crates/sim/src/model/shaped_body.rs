@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use super::body::{Body, Motion};
 use crate::shape::Shape;
 use crate::shape::error::ShapeError;
-use crate::shape::matter::Matter;
+use crate::shape::matter::DensityShape;
 
 impl<S: Scalar> Body<S> {
     /// A body of uniform `density` \[kg/m³\] that forces move, with the mass properties, samples and field of `shape`. Its body frame is
@@ -17,15 +17,15 @@ impl<S: Scalar> Body<S> {
     /// If the shape has no mass, as a half-space, or the density is not positive and finite.
     pub fn from_shape(name: &str, shape: &Shape<S>, density: S) -> Result<Self, ShapeError> {
         let body = Self::dynamic(name, shape.rigid(density)?);
-        Ok(body.made_of(Matter { shape: shape.clone(), density: Some(density) }))
+        Ok(body.made_of(DensityShape { shape: shape.clone(), density: Some(density) }))
     }
 
     /// A body that keeps the state it is given, with the samples and the field of `shape`.
     pub fn fixed_from_shape(name: &str, shape: &Shape<S>) -> Self {
-        Self::fixed(name).made_of(Matter { shape: shape.clone(), density: None })
+        Self::fixed(name).made_of(DensityShape { shape: shape.clone(), density: None })
     }
 
-    fn made_of(mut self, Matter { shape, density }: Matter<S>) -> Self {
+    fn made_of(mut self, DensityShape { shape, density }: DensityShape<S>) -> Self {
         self.reshape(shape, density);
         self
     }
@@ -37,7 +37,7 @@ impl<S: Scalar> Body<S> {
     /// # Errors
     /// If the body is not made of a shape, that has no such dimension, or there is no such shape.
     pub fn set_dimension(&mut self, name: &str, value: S) -> Result<(), ShapeError> {
-        let Some(Matter { shape, density }) = &self.matter else {
+        let Some(DensityShape { shape, density }) = &self.matter else {
             return Err(ShapeError::NoShape { body: self.name.clone() });
         };
         let mut shape = shape.clone();
@@ -53,12 +53,12 @@ impl<S: Scalar> Body<S> {
     fn reshape(&mut self, shape: Shape<S>, density: Option<S>) {
         self.surface = shape.surface().cloned();
         self.field = Some(Arc::clone(shape.field()));
-        self.matter = Some(Matter { shape, density });
+        self.matter = Some(DensityShape { shape, density });
     }
 
     /// Sets all dimensions of its shape, as many as it has, and leaves the mass properties as they are.
     pub(crate) fn set_dimensions(&mut self, dimensions: Vec<S>) -> Result<(), ShapeError> {
-        if let Some(Matter { shape, density }) = &self.matter {
+        if let Some(DensityShape { shape, density }) = &self.matter {
             let (shape, density) = (shape.with_dimensions(dimensions)?, *density);
             self.reshape(shape, density);
         }

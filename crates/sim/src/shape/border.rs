@@ -6,7 +6,7 @@ use crate::fields::INSET;
 
 /// Rounding of the edges of a convex solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Border {
+pub(crate) enum Edges {
     /// Within its size, by this radius \[m\]: for contact only, its mass is that of the sharp solid.
     Within(f64),
     /// By a border around the solid, whose width is its last dimension.
@@ -20,7 +20,7 @@ pub(crate) struct Rounding<T> {
     radius: T,
 }
 
-impl Border {
+impl Edges {
     /// With the `dimensions` of the solid.
     pub(crate) fn rounding<T: Scalar>(self, dimensions: &[T]) -> Rounding<T> {
         match self {

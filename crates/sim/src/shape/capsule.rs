@@ -8,7 +8,7 @@ use prehend_geometry::Moments;
 
 use super::round::{Core, Round};
 use super::rows::rows;
-use super::solid::{Sample, Solid};
+use super::solid::{Convex, RoundSample};
 
 /// A capsule along any axis around any center, by the half length of its segment and its radius.
 ///
@@ -20,7 +20,7 @@ pub(crate) struct Capsule {
     pub(crate) spacing: f64,
 }
 
-impl Solid for Capsule {
+impl Convex for Capsule {
     fn names(&self) -> Vec<String> {
         ["half_height", "radius"].map(str::to_owned).into()
     }
@@ -38,7 +38,7 @@ impl Solid for Capsule {
         Round { core: Core::Segment { center, axis, half: dimensions[0] }, border: dimensions[1] }
     }
 
-    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         let [half, radius] = [dimensions[0], dimensions[1]];
         let row = rows([-half, half], [false; 2], 0.0, self.spacing, T::zero());
         let last = row.len() - 1;
@@ -47,7 +47,7 @@ impl Solid for Capsule {
             let cap = if i == 0 || i == last { radius * radius } else { T::zero() };
             let center = self.center.map(T::constant) + self.axis.map(T::constant) * place;
             let area = (radius * width).times(2.0) + cap.times(FRAC_PI_2);
-            Sample { center, radius, area }
+            RoundSample { center, radius, area }
         };
         row.iter().enumerate().map(sample).collect()
     }

@@ -7,20 +7,20 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::lift;
 use prehend_geometry::{DistanceField, FieldSample, Moments};
 
-use super::kind::Kind;
+use super::kind::ShapeKind;
 use super::lifted::LiftedField;
-use super::solid::Sample;
+use super::solid::RoundSample;
 
 /// Shapes that move together and do not overlap. The distance is the least of theirs, and has kinks where two are as near.
 pub(crate) struct Compound {
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<CompoundPart>,
 }
 
 /// A part of a compound.
-pub(crate) struct Part {
+pub(crate) struct CompoundPart {
     /// Its pose.
     pub(crate) pose: Isometry3<f64>,
-    pub(crate) kind: Kind,
+    pub(crate) kind: ShapeKind,
     /// Number of its dimensions.
     pub(crate) dimensions: usize,
 }
@@ -30,7 +30,7 @@ impl Compound {
     pub(super) fn parts<'a, T>(
         &'a self,
         dimensions: &'a [T],
-    ) -> impl Iterator<Item = (&'a Part, &'a [T])> {
+    ) -> impl Iterator<Item = (&'a CompoundPart, &'a [T])> {
         let mut rest = dimensions;
         self.parts.iter().map(move |part| {
             let (own, others) = rest.split_at(part.dimensions);
@@ -40,22 +40,23 @@ impl Compound {
     }
 
     pub(super) fn names(&self) -> Vec<String> {
-        let names = |(i, part): (usize, &Part)| -> Vec<String> {
+        let names = |(i, part): (usize, &CompoundPart)| -> Vec<String> {
             part.kind.names().iter().map(|name| format!("part_{i}_{name}")).collect()
         };
         self.parts.iter().enumerate().flat_map(names).collect()
     }
 
     pub(super) fn moments<T: Scalar>(&self, dimensions: &[T]) -> Option<Moments<T>> {
-        let moments =
-            |(part, own): (&Part, &[T])| Some(part.kind.moments(own)?.moved(&lift(&part.pose)));
+        let moments = |(part, own): (&CompoundPart, &[T])| {
+            Some(part.kind.moments(own)?.moved(&lift(&part.pose)))
+        };
         self.parts(dimensions).map(moments).sum()
     }
 
-    pub(super) fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
-        let samples = |(part, own): (&Part, &[T])| {
+    pub(super) fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
+        let samples = |(part, own): (&CompoundPart, &[T])| {
             let pose = lift::<T>(&part.pose);
-            let moved = |s: Sample<T>| Sample { center: pose * s.center, ..s };
+            let moved = |s: RoundSample<T>| RoundSample { center: pose * s.center, ..s };
             part.kind.samples(own).into_iter().map(moved).collect::<Vec<_>>()
         };
         self.parts(dimensions).flat_map(samples).collect()
@@ -65,20 +66,20 @@ impl Compound {
         &self,
         dimensions: &[T],
     ) -> Vec<(Isometry3<f64>, LiftedField<T>)> {
-        let part = |(part, own): (&Part, &[T])| (part.pose, part.kind.lifted_field(own));
+        let part = |(part, own): (&CompoundPart, &[T])| (part.pose, part.kind.lifted_field(own));
         self.parts(dimensions).map(part).collect()
     }
 
     pub(super) fn field(&self, dimensions: &[f64]) -> Arc<dyn DistanceField> {
-        let field = |(part, own): (&Part, &[f64])| (part.pose, part.kind.field(own));
-        Arc::new(Nearest(self.parts(dimensions).map(field).collect()))
+        let field = |(part, own): (&CompoundPart, &[f64])| (part.pose, part.kind.field(own));
+        Arc::new(NearestField(self.parts(dimensions).map(field).collect()))
     }
 }
 
 /// The nearest of several fields, each where it is.
-struct Nearest(Vec<(Isometry3<f64>, Arc<dyn DistanceField>)>);
+struct NearestField(Vec<(Isometry3<f64>, Arc<dyn DistanceField>)>);
 
-impl DistanceField for Nearest {
+impl DistanceField for NearestField {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         let mut nearest: Option<FieldSample> = None;
         for (pose, field) in &self.0 {
@@ -145,6 +146,6 @@ mod tests {
         };
         let alone = ball(0.02).1.thickness();
         assert!(alone > 0.0 && alone.is_finite());
-        assert_eq!(Nearest(vec![ball(0.1), ball(0.02), ball(0.05)]).thickness(), alone);
+        assert_eq!(NearestField(vec![ball(0.1), ball(0.02), ball(0.05)]).thickness(), alone);
     }
 }

@@ -4,10 +4,10 @@ use nalgebra::{Point3, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::Moments;
 
-use super::border::Border;
+use super::border::Edges;
 use super::round::{Core, Round};
 use super::rows::{parts, rows};
-use super::solid::{Sample, Solid};
+use super::solid::{Convex, RoundSample};
 
 /// A box around the origin along the axes, by its half edges.
 ///
@@ -15,7 +15,7 @@ use super::solid::{Sample, Solid};
 /// width, so that a sample on an edge stands for the same area on both faces: every face presses with its own area, evenly.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundCuboid {
-    pub(crate) border: Border,
+    pub(crate) border: Edges,
     pub(crate) spacing: f64,
     /// Width of the strips next to edges \[m\].
     strip: f64,
@@ -23,7 +23,7 @@ pub(crate) struct RoundCuboid {
 
 impl RoundCuboid {
     /// The strips are as wide as the closest rows of the `dimensions`.
-    pub(crate) fn new(border: Border, spacing: f64, dimensions: &[f64]) -> Self {
+    pub(crate) fn new(border: Edges, spacing: f64, dimensions: &[f64]) -> Self {
         let solid = Self { border, spacing, strip: spacing };
         let flat = solid.half_extents(dimensions, border.rounding(dimensions).inset());
         let step = |half: f64| 2.0 * half / parts(2.0 * half, spacing) as f64;
@@ -36,7 +36,7 @@ impl RoundCuboid {
     }
 }
 
-impl Solid for RoundCuboid {
+impl Convex for RoundCuboid {
     fn names(&self) -> Vec<String> {
         self.border.names(&["half_extent_x", "half_extent_y", "half_extent_z"])
     }
@@ -44,8 +44,8 @@ impl Solid for RoundCuboid {
     fn moments<T: Scalar>(&self, dimensions: &[T]) -> Moments<T> {
         let half = self.half_extents(dimensions, T::zero());
         match self.border {
-            Border::Within(_) => Moments::cuboid(&half),
-            Border::Around => {
+            Edges::Within(_) => Moments::cuboid(&half),
+            Edges::Around => {
                 let (corners, triangles) = surface(&half);
                 Moments::round_convex(&corners, &triangles, dimensions[3])
             }
@@ -58,7 +58,7 @@ impl Solid for RoundCuboid {
         Round { core, border: rounding.border() }
     }
 
-    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         let rounding = self.border.rounding(dimensions);
         let (flat, radius) = (self.half_extents(dimensions, rounding.inset()), rounding.samples());
         let row = |i: usize| rows([-flat[i], flat[i]], [true; 2], self.strip, self.spacing, radius);
@@ -75,7 +75,7 @@ impl Solid for RoundCuboid {
             let width = |i: usize| axes[i][at[i]].1;
             let shares = faces.iter().map(|i| width((i + 1) % 3) * width((i + 2) % 3));
             let sum = shares.fold(T::zero(), |sum, share| sum + share);
-            samples.push(Sample {
+            samples.push(RoundSample {
                 center: Point3::from(Vector3::from_fn(|i, _| axes[i][at[i]].0)),
                 radius,
                 area: sum.times(1.0 / faces.len() as f64),

@@ -7,14 +7,14 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::sdf::HeightSpline;
 
 use super::ball::Ball;
-use super::border::Border;
+use super::border::Edges;
 use super::capsule::Capsule;
-use super::compound::{Compound, Part};
+use super::compound::{Compound, CompoundPart};
 use super::cuboid::RoundCuboid;
 use super::error::ShapeError;
 use super::ground::Ground;
 use super::height_field::HeightField;
-use super::kind::Kind;
+use super::kind::ShapeKind;
 use super::options::ShapeOptions;
 use super::polyhedron::{Polyhedron, flat_faces};
 use super::revolved::{Outline, Revolved};
@@ -24,9 +24,9 @@ use crate::fields::HalfSpace;
 pub(super) fn read(
     shape: &dyn shape::Shape,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     match shape.as_typed_shape() {
-        TypedShape::Ball(ball) => Ok((Kind::Ball(Ball), vec![ball.radius])),
+        TypedShape::Ball(ball) => Ok((ShapeKind::Ball(Ball), vec![ball.radius])),
         TypedShape::Cuboid(cuboid) => self::cuboid(cuboid, None, options),
         TypedShape::RoundCuboid(round) => {
             self::cuboid(&round.inner_shape, Some(round.border_radius), options)
@@ -50,7 +50,7 @@ pub(super) fn read(
             let normal = Unit::try_new(vector(half_space.normal), f64::MIN_POSITIVE)
                 .ok_or(ShapeError::Normal)?;
             let field = HalfSpace { normal, height: 0.0 };
-            Ok((Kind::Ground(Ground::endless("half-space", field)), Vec::new()))
+            Ok((ShapeKind::Ground(Ground::endless("half-space", field)), Vec::new()))
         }
         TypedShape::HeightField(heights) => height_field(heights),
         TypedShape::ConvexPolyhedron(hull) => polyhedron(hull, None, options),
@@ -67,27 +67,27 @@ fn cuboid(
     cuboid: &shape::Cuboid,
     border: Option<f64>,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let half = vector(cuboid.half_extents);
     let mut dimensions: Vec<f64> = half.iter().copied().collect();
     let extents = half.map(|half| 2.0 * (half + border.unwrap_or(0.0)));
     let lengths = options.lengths(extents.as_slice())?;
     dimensions.extend(border);
-    let border = border.map_or(Border::Within(lengths.rounding), |_| Border::Around);
-    Ok((Kind::Cuboid(RoundCuboid::new(border, lengths.spacing, &dimensions)), dimensions))
+    let border = border.map_or(Edges::Within(lengths.rounding), |_| Edges::Around);
+    Ok((ShapeKind::Cuboid(RoundCuboid::new(border, lengths.spacing, &dimensions)), dimensions))
 }
 
 fn capsule(
     capsule: &shape::Capsule,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let [a, b] = [capsule.segment.a, capsule.segment.b].map(vector);
     let (length, width) = ((b - a).norm(), 2.0 * capsule.radius);
     let lengths = options.lengths(&[length + width, width])?;
     let axis = Unit::try_new(b - a, 0.0).unwrap_or_else(Vector3::y_axis);
     let center = Point3::from((a + b) * 0.5);
     let capsule = Capsule { center, axis, spacing: lengths.spacing };
-    Ok((Kind::Capsule(capsule), vec![0.5 * length, 0.5 * width]))
+    Ok((ShapeKind::Capsule(capsule), vec![0.5 * length, 0.5 * width]))
 }
 
 fn revolved(
@@ -95,17 +95,17 @@ fn revolved(
     [half_height, radius]: [f64; 2],
     border: Option<f64>,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let extents = [half_height, radius].map(|half| 2.0 * (half + border.unwrap_or(0.0)));
     let lengths = options.lengths(&extents)?;
     let mut dimensions = vec![half_height, radius];
     dimensions.extend(border);
-    let border = border.map_or(Border::Within(lengths.rounding), |_| Border::Around);
+    let border = border.map_or(Edges::Within(lengths.rounding), |_| Edges::Around);
     let solid = Revolved::new(outline, border, lengths.spacing, &dimensions);
-    Ok((Kind::Revolved(solid), dimensions))
+    Ok((ShapeKind::Revolved(solid), dimensions))
 }
 
-fn height_field(field: &shape::HeightField) -> Result<(Kind, Vec<f64>), ShapeError> {
+fn height_field(field: &shape::HeightField) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let (heights, scale) = (field.heights(), field.scale());
     let removed = HeightFieldCellStatus::LEFT_TRIANGLE_REMOVED
         | HeightFieldCellStatus::RIGHT_TRIANGLE_REMOVED;
@@ -120,45 +120,48 @@ fn height_field(field: &shape::HeightField) -> Result<(Kind, Vec<f64>), ShapeErr
     let all: Vec<f64> = (0..dims[0]).flat_map(column).collect();
     let spline = HeightSpline::new(&all, dims, origin, spacing).ok_or(ShapeError::Heights)?;
     let ground = Ground::endless("height field", HeightField::new(spline));
-    Ok((Kind::Ground(ground), Vec::new()))
+    Ok((ShapeKind::Ground(ground), Vec::new()))
 }
 
 fn polyhedron(
     hull: &shape::ConvexPolyhedron,
     border: Option<f64>,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let vertices: Vec<Point3<f64>> = hull.points().iter().map(|p| vector(*p).into()).collect();
     let faces = flat_faces(&vertices).ok_or(ShapeError::NotConvex)?;
     let lengths = options.lengths(extents(&vertices, border.unwrap_or(0.0)).as_slice())?;
     let mut dimensions: Vec<f64> = vertices.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     dimensions.extend(border);
-    let border = border.map_or(Border::Within(lengths.rounding), |_| Border::Around);
+    let border = border.map_or(Edges::Within(lengths.rounding), |_| Edges::Around);
     let vertices = vertices.len();
     let solid = Polyhedron { border, spacing: lengths.spacing, faces, vertices };
-    Ok((Kind::Polyhedron(solid), dimensions))
+    Ok((ShapeKind::Polyhedron(solid), dimensions))
 }
 
-fn mesh(mesh: &shape::TriMesh, options: &ShapeOptions) -> Result<(Kind, Vec<f64>), ShapeError> {
+fn mesh(
+    mesh: &shape::TriMesh,
+    options: &ShapeOptions,
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(|p| vector(*p).into()).collect();
     let mesh = TriMesh::new(vertices, mesh.indices().to_vec());
-    Ok((Kind::Ground(super::mesh::mesh(&mesh, options)?), Vec::new()))
+    Ok((ShapeKind::Ground(super::mesh::mesh(&mesh, options)?), Vec::new()))
 }
 
 fn compound(
     compound: &shape::Compound,
     options: &ShapeOptions,
-) -> Result<(Kind, Vec<f64>), ShapeError> {
+) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let (mut parts, mut dimensions) = (Vec::new(), Vec::new());
     for (pose, part) in compound.shapes() {
         let (kind, own) = read(part.as_ref(), options)?;
         let [x, y, z, w] = pose.rotation.to_array();
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Isometry3::from_parts(vector(pose.translation).into(), rotation);
-        parts.push(Part { pose, kind, dimensions: own.len() });
+        parts.push(CompoundPart { pose, kind, dimensions: own.len() });
         dimensions.extend(own);
     }
-    Ok((Kind::Compound(Compound { parts }), dimensions))
+    Ok((ShapeKind::Compound(Compound { parts }), dimensions))
 }
 
 /// Edges of the box around `points`, with a border.

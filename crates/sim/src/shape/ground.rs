@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use prehend_geometry::{DistanceField, Moments};
 
-use super::solid::Sample;
+use super::solid::RoundSample;
 
 /// A shape without dimensions: a half-space, a height field, a mesh.
 #[derive(Clone)]
@@ -12,7 +12,7 @@ pub(crate) struct Ground {
     /// Its name.
     pub(crate) kind: &'static str,
     pub(crate) field: Arc<dyn DistanceField>,
-    pub(crate) samples: Vec<Sample<f64>>,
+    pub(crate) samples: Vec<RoundSample<f64>>,
     /// None of what has no inside or no end.
     pub(crate) moments: Option<Moments>,
 }

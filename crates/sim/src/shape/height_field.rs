@@ -23,7 +23,7 @@ pub(crate) struct HeightField {
 }
 
 /// The closest point of the ground.
-struct Foot {
+struct GroundPoint {
     place: Vector2<f64>,
     ground: HeightSample,
     /// Derivative of the equations by the place.
@@ -41,7 +41,7 @@ impl HeightField {
 
     /// Foot of the normal from `point` to the ground; none if that is farther than `reach`, for certain.
     #[inline]
-    fn foot(&self, point: &Point3<f64>, reach: f64) -> Option<Foot> {
+    fn foot(&self, point: &Point3<f64>, reach: f64) -> Option<GroundPoint> {
         let target = Vector2::new(point.x, point.z);
         let mut ground = self.heights.at(point.x, point.z);
         let above = point.y - ground.height;
@@ -66,7 +66,7 @@ impl HeightField {
             step += 1;
             let length = change.norm();
             if length <= 1e-12 * (above.abs() + length) + 1e-15 || step > STEPS {
-                return Some(Foot { place, ground, jacobian });
+                return Some(GroundPoint { place, ground, jacobian });
             }
             place += change;
             if length <= SHORT * self.spacing {
@@ -74,14 +74,14 @@ impl HeightField {
                     Vector2::new(uu * change.x + uv * change.y, uv * change.x + vv * change.y);
                 ground.height += change.dot(&(slopes + bend * 0.5));
                 ground.slopes = (slopes + bend).into();
-                return Some(Foot { place, ground, jacobian });
+                return Some(GroundPoint { place, ground, jacobian });
             }
             ground = self.heights.at(place.x, place.y);
         }
     }
 }
 
-impl Foot {
+impl GroundPoint {
     /// Up, out of the ground, and its length.
     #[inline]
     fn upward(&self) -> (Vector3<f64>, f64) {

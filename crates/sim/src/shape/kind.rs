@@ -6,7 +6,7 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::{DistanceField, Moments};
 
 use super::ball::Ball;
-use super::border::Border;
+use super::border::Edges;
 use super::capsule::Capsule;
 use super::compound::Compound;
 use super::cuboid::RoundCuboid;
@@ -15,13 +15,13 @@ use super::ground::Ground;
 use super::lifted::LiftedField;
 use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
-use super::solid::{Sample, Solid};
+use super::solid::{Convex, RoundSample};
 use crate::fields::INSET;
 use crate::magnitude::{LARGEST, SMALLEST};
 use crate::surface::check_spacing;
 
 /// Kind of a shape, without the values of its dimensions.
-pub(crate) enum Kind {
+pub(crate) enum ShapeKind {
     Ball(Ball),
     Cuboid(RoundCuboid),
     Capsule(Capsule),
@@ -35,18 +35,18 @@ pub(crate) enum Kind {
 macro_rules! each {
     ($kind:expr, $solid:ident => $call:expr, $ground:ident => $other:expr, $all:ident => $parts:expr) => {
         match $kind {
-            Kind::Ball($solid) => $call,
-            Kind::Cuboid($solid) => $call,
-            Kind::Capsule($solid) => $call,
-            Kind::Revolved($solid) => $call,
-            Kind::Polyhedron($solid) => $call,
-            Kind::Ground($ground) => $other,
-            Kind::Compound($all) => $parts,
+            ShapeKind::Ball($solid) => $call,
+            ShapeKind::Cuboid($solid) => $call,
+            ShapeKind::Capsule($solid) => $call,
+            ShapeKind::Revolved($solid) => $call,
+            ShapeKind::Polyhedron($solid) => $call,
+            ShapeKind::Ground($ground) => $other,
+            ShapeKind::Compound($all) => $parts,
         }
     };
 }
 
-impl Kind {
+impl ShapeKind {
     /// The names of its dimensions.
     pub(super) fn names(&self) -> Vec<String> {
         each!(self, solid => solid.names(), _ground => Vec::new(), all => all.names())
@@ -70,9 +70,9 @@ impl Kind {
         }, all => all.moments(dimensions))
     }
 
-    pub(super) fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    pub(super) fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         each!(self, solid => solid.samples(dimensions), ground => {
-            let lift = |s: &Sample<f64>| Sample {
+            let lift = |s: &RoundSample<f64>| RoundSample {
                 center: s.center.map(T::constant),
                 radius: T::constant(s.radius),
                 area: T::constant(s.area),
@@ -155,7 +155,7 @@ impl Kind {
 }
 
 /// Checks that samples leave something of a solid that an inset of `deepest` \[m\] makes nothing of.
-fn check_rounding(border: Border, dimensions: &[f64], deepest: f64) -> Result<(), ShapeError> {
+fn check_rounding(border: Edges, dimensions: &[f64], deepest: f64) -> Result<(), ShapeError> {
     let rounding = border.rounding(dimensions);
     let limit = (deepest + rounding.outward()) / INSET;
     match rounding.border() {

@@ -11,7 +11,7 @@ use super::rows::parts;
 const OTHER_FACE: f64 = 0.9;
 
 /// A triangle of a surface, and the factor by which its samples stand for more than its area.
-pub(super) struct Triangle<T: Scalar> {
+pub(super) struct MeshFace<T: Scalar> {
     pub(super) corners: [Point3<T>; 3],
     pub(super) stretch: T,
 }
@@ -21,10 +21,10 @@ pub(super) struct Triangle<T: Scalar> {
 ///
 /// Each small triangle gives a third of its area to each of its corners, which keeps area and center of every face. A node on
 /// an edge or a corner has the mean of its shares of the faces that meet there, since one of them touches at a time.
-pub(super) fn lattice<T: Scalar>(triangles: &[Triangle<T>], spacing: f64) -> Vec<(Point3<T>, T)> {
-    let mut nodes: BTreeMap<[i64; 3], Node<T>> = BTreeMap::new();
+pub(super) fn lattice<T: Scalar>(triangles: &[MeshFace<T>], spacing: f64) -> Vec<(Point3<T>, T)> {
+    let mut nodes: BTreeMap<[i64; 3], MeshNode<T>> = BTreeMap::new();
     let mut order = Vec::new();
-    for Triangle { corners: [a, b, c], stretch } in triangles {
+    for MeshFace { corners: [a, b, c], stretch } in triangles {
         let cross = (b - a).cross(&(c - a));
         let values = cross.map(T::value);
         let Some(normal) = values.try_normalize(0.0) else { continue };
@@ -44,7 +44,7 @@ pub(super) fn lattice<T: Scalar>(triangles: &[Triangle<T>], spacing: f64) -> Vec
                 let key: [i64; 3] = key.into();
                 let node = nodes.entry(key).or_insert_with(|| {
                     order.push(key);
-                    Node { place, faces: Vec::new() }
+                    MeshNode { place, faces: Vec::new() }
                 });
                 node.add(&normal, share);
             }
@@ -54,12 +54,12 @@ pub(super) fn lattice<T: Scalar>(triangles: &[Triangle<T>], spacing: f64) -> Vec
 }
 
 /// A node, and what it stands for on each of the faces that meet there.
-struct Node<T: Scalar> {
+struct MeshNode<T: Scalar> {
     place: Point3<T>,
     faces: Vec<(Vector3<f64>, T)>,
 }
 
-impl<T: Scalar> Node<T> {
+impl<T: Scalar> MeshNode<T> {
     fn add(&mut self, normal: &Vector3<f64>, share: T) {
         match self.faces.iter_mut().find(|(own, _)| own.dot(normal) > OTHER_FACE) {
             Some((_, area)) => *area += share,

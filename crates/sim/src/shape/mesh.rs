@@ -8,9 +8,9 @@ use prehend_geometry::{ClosestPoints, Moments, SdfGrid, TriMesh};
 use super::error::ShapeError;
 use super::from_parry::extents;
 use super::ground::Ground;
-use super::lattice::{Triangle, lattice};
+use super::lattice::{MeshFace, lattice};
 use super::options::ShapeOptions;
-use super::solid::Sample;
+use super::solid::RoundSample;
 
 /// Margin of the grid around the mesh, in cells: there distances are interpolated.
 const MARGIN: f64 = 8.0;
@@ -22,9 +22,9 @@ pub(super) fn mesh(mesh: &TriMesh, options: &ShapeOptions) -> Result<Ground, Sha
     let closest = ClosestPoints::new(mesh)?;
     let field = SdfGrid::build(&closest, lengths.cell, MARGIN * lengths.cell)?;
     let all = || (0..mesh.faces.len()).map(|face| mesh.triangle(face));
-    let triangles: Vec<Triangle<f64>> =
-        all().map(|corners| Triangle { corners, stretch: 1.0 }).collect();
-    let sample = |(center, area)| Sample { center, radius: 0.0, area };
+    let triangles: Vec<MeshFace<f64>> =
+        all().map(|corners| MeshFace { corners, stretch: 1.0 }).collect();
+    let sample = |(center, area)| RoundSample { center, radius: 0.0, area };
     let samples = lattice(&triangles, lengths.spacing).into_iter().map(sample).collect();
     // What is open or faces inward has none.
     let moments = mass_properties(mesh, 1.0).ok().map(|_| Moments::enclosed(all()));

@@ -6,18 +6,18 @@ use parry3d_f64::transformation::try_convex_hull;
 use prehend_autodiff::Scalar;
 use prehend_geometry::Moments;
 
-use super::border::Border;
-use super::lattice::{Triangle, lattice};
-use super::polytope::{Face, Polytope};
+use super::border::Edges;
+use super::lattice::{MeshFace, lattice};
+use super::polytope::{Facet, Polytope};
 use super::round::{Core, Round};
-use super::solid::{Sample, Solid};
+use super::solid::{Convex, RoundSample};
 
 /// A convex polyhedron, by its vertices.
 ///
 /// Its core has every face moved inward by the rounding. Samples are nodes of lattices on such faces.
 #[derive(Clone, Debug)]
 pub(crate) struct Polyhedron {
-    pub(crate) border: Border,
+    pub(crate) border: Edges,
     pub(crate) spacing: f64,
     /// Vertices of each face, counterclockwise from outside.
     pub(crate) faces: Vec<Vec<usize>>,
@@ -58,7 +58,7 @@ impl Polyhedron {
         let vertices = self.vertices(dimensions);
         let planes = self.planes(&vertices);
         if inset.value() == 0.0 && inset.is_constant_zero() {
-            let face = |(corners, (_, (normal, height))): (&Vec<usize>, &(T, Plane<T>))| Face {
+            let face = |(corners, (_, (normal, height))): (&Vec<usize>, &(T, Plane<T>))| Facet {
                 normal: *normal,
                 height: *height,
                 corners: corners.iter().map(|&i| vertices[i]).collect(),
@@ -78,7 +78,7 @@ impl Polyhedron {
                 .collect();
             sort_around(&mut corners, &normal.map(T::value));
             if corners.len() > 2 {
-                faces.push(Face { normal, height, corners });
+                faces.push(Facet { normal, height, corners });
                 areas.push(*area);
             }
         }
@@ -201,7 +201,7 @@ fn sort_around<T: Scalar>(corners: &mut Vec<Point3<T>>, normal: &Vector3<f64>) {
     *corners = kept;
 }
 
-impl Solid for Polyhedron {
+impl Convex for Polyhedron {
     fn names(&self) -> Vec<String> {
         let axes = |i| ["x", "y", "z"].map(|axis| format!("vertex_{i}_{axis}"));
         let own: Vec<String> = (0..self.vertices).flat_map(axes).collect();
@@ -212,10 +212,8 @@ impl Solid for Polyhedron {
     fn moments<T: Scalar>(&self, dimensions: &[T]) -> Moments<T> {
         let (vertices, triangles) = (self.vertices(dimensions), self.triangles());
         match self.border {
-            Border::Within(_) => {
-                Moments::enclosed(triangles.iter().map(|t| t.map(|i| vertices[i])))
-            }
-            Border::Around => {
+            Edges::Within(_) => Moments::enclosed(triangles.iter().map(|t| t.map(|i| vertices[i]))),
+            Edges::Around => {
                 Moments::round_convex(&vertices, &triangles, dimensions[3 * self.vertices])
             }
         }
@@ -227,11 +225,11 @@ impl Solid for Polyhedron {
         Round { core: Core::Polytope(core), border: rounding.border() }
     }
 
-    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         let rounding = self.border.rounding(dimensions);
         let (core, areas) = self.inset(dimensions, rounding.inset());
         let mut triangles = Vec::new();
-        for (Face { normal, corners, .. }, outer) in core.faces.iter().zip(areas) {
+        for (Facet { normal, corners, .. }, outer) in core.faces.iter().zip(areas) {
             let sum = corners.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
             let middle = Point3::from(sum * T::constant(1.0 / corners.len() as f64));
             let sides: Vec<[Point3<T>; 3]> = (0..corners.len())
@@ -243,15 +241,15 @@ impl Solid for Polyhedron {
             let stretch = outer / inner;
             // A triangle needs no middle.
             match corners.as_slice() {
-                &[a, b, c] => triangles.push(Triangle { corners: [a, b, c], stretch }),
+                &[a, b, c] => triangles.push(MeshFace { corners: [a, b, c], stretch }),
                 _ => {
-                    let all = sides.into_iter().map(|corners| Triangle { corners, stretch });
+                    let all = sides.into_iter().map(|corners| MeshFace { corners, stretch });
                     triangles.extend(all);
                 }
             }
         }
         let radius = rounding.samples();
-        let sample = |(center, area)| Sample { center, radius, area };
+        let sample = |(center, area)| RoundSample { center, radius, area };
         lattice(&triangles, self.spacing).into_iter().map(sample).collect()
     }
 }

@@ -8,12 +8,12 @@ use super::nearest::Nearest;
 /// A convex polyhedron: planes and corners of its faces.
 #[derive(Clone, Debug)]
 pub(crate) struct Polytope<T: Scalar> {
-    pub(super) faces: Vec<Face<T>>,
+    pub(super) faces: Vec<Facet<T>>,
 }
 
 /// A face: its outward normal, the place of its plane along it \[m\], its corners counterclockwise from outside \[m\].
 #[derive(Clone, Debug)]
-pub(super) struct Face<T: Scalar> {
+pub(super) struct Facet<T: Scalar> {
     pub(super) normal: Vector3<T>,
     pub(super) height: T,
     pub(super) corners: Vec<Point3<T>>,
@@ -23,7 +23,7 @@ impl<T: Scalar> Polytope<T> {
     pub(super) fn nearest(&self, point: &Point3<T>) -> Nearest<T> {
         let mut deepest: Option<(T, &Vector3<T>)> = None;
         let mut closest: Option<Nearest<T>> = None;
-        for Face { normal, height, corners } in &self.faces {
+        for Facet { normal, height, corners } in &self.faces {
             let distance = normal.dot(&point.coords) - *height;
             if closest.is_none() && deepest.is_none_or(|(most, _)| distance.value() > most.value())
             {
@@ -88,7 +88,7 @@ impl Polytope<f64> {
     /// The least distance between a face and the farthest corner below it.
     pub(super) fn thickness(&self) -> f64 {
         let corners = || self.faces.iter().flat_map(|face| &face.corners);
-        let width = |face: &Face<f64>| {
+        let width = |face: &Facet<f64>| {
             let depths = corners().map(|p| face.height - face.normal.dot(&p.coords));
             depths.fold(0.0, f64::max)
         };

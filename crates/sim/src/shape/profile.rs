@@ -21,7 +21,7 @@ struct Side<T: Scalar> {
 }
 
 /// The part of an outline that is nearest to a point.
-enum Feature<T: Scalar> {
+enum OutlineFeature<T: Scalar> {
     Side { distance: T, normal: Vector2<T> },
     Corner(Vector2<T>),
 }
@@ -37,9 +37,9 @@ impl<T: Scalar> Profile<T> {
     }
 
     #[inline]
-    fn feature(&self, place: &Vector2<T>) -> Feature<T> {
+    fn feature(&self, place: &Vector2<T>) -> OutlineFeature<T> {
         let (mut deepest, mut inside) = (None, true);
-        let mut closest: Option<(f64, Feature<T>)> = None;
+        let mut closest: Option<(f64, OutlineFeature<T>)> = None;
         for side in &self.sides {
             let offset = place - side.from;
             let normal = side.normal();
@@ -53,11 +53,11 @@ impl<T: Scalar> Profile<T> {
             inside = false;
             let along = offset.dot(&side.direction);
             let feature = match along.value() {
-                x if x < 0.0 => Feature::Corner(offset),
+                x if x < 0.0 => OutlineFeature::Corner(offset),
                 x if x > side.length.value() => {
-                    Feature::Corner(offset - side.direction * side.length)
+                    OutlineFeature::Corner(offset - side.direction * side.length)
                 }
-                _ => Feature::Side { distance, normal },
+                _ => OutlineFeature::Side { distance, normal },
             };
             let away = feature.distance().value();
             if closest.as_ref().is_none_or(|(best, _)| away < *best) {
@@ -66,9 +66,9 @@ impl<T: Scalar> Profile<T> {
         }
         match (closest, deepest) {
             (Some((_, feature)), _) if !inside => feature,
-            (_, Some((distance, normal))) => Feature::Side { distance, normal },
+            (_, Some((distance, normal))) => OutlineFeature::Side { distance, normal },
             // Of a point that is no number.
-            _ => Feature::Side { distance: T::constant(f64::NAN), normal: Vector2::x() },
+            _ => OutlineFeature::Side { distance: T::constant(f64::NAN), normal: Vector2::x() },
         }
     }
 
@@ -80,11 +80,11 @@ impl<T: Scalar> Profile<T> {
     pub(super) fn nearest(&self, point: &Point3<T>) -> Nearest<T> {
         let out = out(point);
         match self.feature(&Vector2::new(out, point.y)) {
-            Feature::Side { distance, normal } => {
+            OutlineFeature::Side { distance, normal } => {
                 let flat = [T::zero(); 3];
                 Nearest::revolved(distance, normal.into(), flat, point, out)
             }
-            Feature::Corner(offset) => {
+            OutlineFeature::Corner(offset) => {
                 let distance = offset.norm();
                 let [a, b] = (offset / distance).into();
                 let curved = [b * b, -a * b, a * a].map(|x| x / distance);
@@ -102,7 +102,7 @@ impl<T: Scalar> Side<T> {
     }
 }
 
-impl<T: Scalar> Feature<T> {
+impl<T: Scalar> OutlineFeature<T> {
     #[inline]
     fn distance(&self) -> T {
         match self {

@@ -6,11 +6,11 @@ use nalgebra::Point3;
 use prehend_autodiff::Scalar;
 use prehend_geometry::Moments;
 
-use super::border::Border;
+use super::border::Edges;
 use super::profile::Profile;
 use super::round::{Core, Round};
 use super::rows::{parts, rows};
-use super::solid::{Sample, Solid};
+use super::solid::{Convex, RoundSample};
 
 /// Kind of a solid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub(crate) enum Outline {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Revolved {
     pub(crate) outline: Outline,
-    pub(crate) border: Border,
+    pub(crate) border: Edges,
     pub(crate) spacing: f64,
     /// Width of the strips next to the rim \[m\].
     strip: f64,
@@ -40,7 +40,7 @@ const PRISM: usize = 24;
 
 impl Revolved {
     /// The strips are as wide as the closest rows of the `dimensions`.
-    pub(crate) fn new(outline: Outline, border: Border, spacing: f64, dimensions: &[f64]) -> Self {
+    pub(crate) fn new(outline: Outline, border: Edges, spacing: f64, dimensions: &[f64]) -> Self {
         let solid = Self { outline, border, spacing, strip: spacing };
         let corners = solid.corners(dimensions, border.rounding(dimensions).inset());
         let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
@@ -77,7 +77,7 @@ impl Revolved {
     }
 }
 
-impl Solid for Revolved {
+impl Convex for Revolved {
     fn names(&self) -> Vec<String> {
         self.border.names(&["half_height", "radius"])
     }
@@ -85,12 +85,12 @@ impl Solid for Revolved {
     fn moments<T: Scalar>(&self, dimensions: &[T]) -> Moments<T> {
         let [half, radius] = [dimensions[0], dimensions[1]];
         match (self.outline, self.border) {
-            (Outline::Cylinder, Border::Within(_)) => Moments::cylinder(half, radius),
-            (Outline::Cone, Border::Within(_)) => Moments::cone(half, radius),
-            (Outline::Cylinder, Border::Around) => {
+            (Outline::Cylinder, Edges::Within(_)) => Moments::cylinder(half, radius),
+            (Outline::Cone, Edges::Within(_)) => Moments::cone(half, radius),
+            (Outline::Cylinder, Edges::Around) => {
                 Moments::round_cylinder(half, radius, dimensions[2])
             }
-            (Outline::Cone, Border::Around) => Moments::round_cone(half, radius, dimensions[2]),
+            (Outline::Cone, Edges::Around) => Moments::round_cone(half, radius, dimensions[2]),
         }
     }
 
@@ -100,7 +100,7 @@ impl Solid for Revolved {
         Round { core: Core::Profile(Profile::new(&corners)), border: rounding.border() }
     }
 
-    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         let rounding = self.border.rounding(dimensions);
         let radius = rounding.samples();
         let corners = self.corners(dimensions, rounding.inset());
@@ -158,7 +158,7 @@ impl Solid for Revolved {
 struct Rings<T: Scalar> {
     radius: T,
     spacing: f64,
-    samples: Vec<Sample<T>>,
+    samples: Vec<RoundSample<T>>,
 }
 
 impl<T: Scalar> Rings<T> {
@@ -172,7 +172,7 @@ impl<T: Scalar> Rings<T> {
         for i in 0..around {
             let (sin, cos) = (TAU * i as f64 / around as f64).sin_cos();
             let center = Point3::new(out.times(cos), height, out.times(sin));
-            self.samples.push(Sample { center, radius: self.radius, area: share });
+            self.samples.push(RoundSample { center, radius: self.radius, area: share });
         }
     }
 }

@@ -8,14 +8,14 @@ use super::round::Round;
 
 /// A ball that touches others where they are nearest: its center and radius \[m\] and the area that it stands for \[m²\].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample<T: Scalar> {
+pub(crate) struct RoundSample<T: Scalar> {
     pub(crate) center: Point3<T>,
     pub(crate) radius: T,
     pub(crate) area: T,
 }
 
 /// A convex solid of a few dimensions, which may carry derivatives. How many samples it has follows from their values.
-pub(crate) trait Solid {
+pub(crate) trait Convex {
     /// Names of its dimensions.
     fn names(&self) -> Vec<String>;
 
@@ -26,5 +26,5 @@ pub(crate) trait Solid {
     fn round<T: Scalar>(&self, dimensions: &[T]) -> Round<T>;
 
     /// Samples of its surface.
-    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>>;
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>>;
 }

@@ -9,7 +9,7 @@ use crate::contact::dynamic::DynContactLaw;
 use crate::contact::moved::LiftedContact;
 use crate::contact::point::ContactKinematics;
 use crate::shape::lifted::LiftedField;
-use crate::shape::solid::Sample;
+use crate::shape::solid::RoundSample;
 
 /// Dimensions that one evaluation differentiates by.
 pub(crate) const LANES: usize = 6;
@@ -23,7 +23,7 @@ pub(crate) type Lane = Fwd<LANES>;
 pub(crate) struct VariableShapes<'a> {
     pub(crate) query: &'a ContactQuery<'a>,
     /// The samples, if they change.
-    pub(crate) samples: Option<Vec<Sample<Lane>>>,
+    pub(crate) samples: Option<Vec<RoundSample<Lane>>>,
     pub(crate) field: LiftedField<Lane>,
 }
 
@@ -56,7 +56,7 @@ impl VariableShapes<'_> {
                 let [radius, area] = [touch.radius, touch.area].map(Fwd::constant);
                 (constant(&touch.arm), radius, area)
             }
-            Some(Sample { center, radius, area }) => {
+            Some(RoundSample { center, radius, area }) => {
                 let from_com = center - self.query.com.map(Fwd::constant);
                 let arm = rotation.matrix().map(Fwd::constant) * from_com;
                 (arm, *radius, area.times(touch.area / area.value))

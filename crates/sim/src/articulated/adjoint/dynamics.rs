@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
 
-use super::inputs::{Inputs, LinkAdjoint, add_varying};
+use super::inputs::{LinkAdjoint, VariedInputs, add_varying};
 use super::motion::{Force, mass_adjoint};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
@@ -37,16 +37,16 @@ pub(crate) fn accelerations<S: Scalar>(tree: &Articulation<S>, on: &Acting<'_, S
     };
     let first = on.gravity.iter().chain(on.coordinates).chain(on.velocities).chain(on.efforts);
     let first = first.chain(on.wrenches.iter().flat_map(|wrench| wrench.iter())).copied();
-    let Inputs { varying, varies, links } = Inputs::new(first, tree);
+    let VariedInputs { varying, varies, links } = VariedInputs::new(first, tree);
     let accelerations = result.clone();
-    let node = Node { tree: plain, gravity, q, v, wrenches, accelerations, links, varies };
+    let node = DynamicsNode { tree: plain, gravity, q, v, wrenches, accelerations, links, varies };
     match S::recorded(&varying, result.as_slice(), node) {
         Some(recorded) => DVector::from_vec(recorded),
         None => result.map(S::constant),
     }
 }
 
-struct Node {
+struct DynamicsNode {
     tree: Articulation,
     gravity: Vector3<f64>,
     q: Vec<f64>,
@@ -57,14 +57,14 @@ struct Node {
     varies: Vec<bool>,
 }
 
-impl CustomVjp for Node {
+impl CustomVjp for DynamicsNode {
     /// With λ = M⁻¹ times the adjoint of the accelerations, adjoints are the derivatives of −λ·(τ(q, v, v̇) − Jᵀf) at fixed v̇: inverse
     /// dynamics swept once more, backward.
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
         let at = self.tree.kinematics(&self.q, &self.v).under(self.gravity);
         let (_, factor) = at.articulated(&vec![0.0; self.v.len()], None);
         let multipliers = at.accelerated(&factor, output_adjoints);
-        let sweep = Sweep::new(self, &at, multipliers.as_slice());
+        let sweep = AdjointSweep::new(self, &at, multipliers.as_slice());
         let links = if self.links { at.link_adjoints(&sweep.links) } else { Vec::new() };
         let first = sweep.gravity.iter().chain(&sweep.q).chain(&sweep.v).chain(&multipliers);
         let first = first.chain(sweep.wrenches.iter().flat_map(|wrench| wrench.iter()));
@@ -73,7 +73,7 @@ impl CustomVjp for Node {
 }
 
 /// Adjoints, which all are derivatives of −λ·(τ − Jᵀf).
-struct Sweep {
+struct AdjointSweep {
     gravity: Vector3<f64>,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -81,8 +81,8 @@ struct Sweep {
     links: Vec<LinkAdjoint>,
 }
 
-impl Sweep {
-    fn new(node: &Node, at: &Kinematics<'_>, multipliers: &[f64]) -> Self {
+impl AdjointSweep {
+    fn new(node: &DynamicsNode, at: &Kinematics<'_>, multipliers: &[f64]) -> Self {
         let (tree, count) = (&node.tree, node.tree.links().len());
         let effort = at.effort(node.accelerations.as_slice());
         // The motion of each link if λ were velocities.

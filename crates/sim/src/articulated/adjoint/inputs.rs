@@ -21,7 +21,7 @@ pub(super) struct LinkAdjoint {
 }
 
 /// Inputs of a node that vary: constants are not recorded.
-pub(super) struct Inputs<S> {
+pub(super) struct VariedInputs<S> {
     /// The numbers that vary.
     pub(super) varying: Vec<S>,
     /// True for each number that varies, among all in their order.
@@ -30,7 +30,7 @@ pub(super) struct Inputs<S> {
     pub(super) links: bool,
 }
 
-impl<S: Scalar> Inputs<S> {
+impl<S: Scalar> VariedInputs<S> {
     /// Inputs `first` and, if any number of a link varies, those of all links.
     pub(super) fn new(first: impl Iterator<Item = S>, tree: &Articulation<S>) -> Self {
         let links = tree.links().iter().any(|link| link.numbers().any(|x| !x.is_constant()));

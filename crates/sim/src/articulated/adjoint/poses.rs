@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Quaternion, Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
 
-use super::inputs::{Inputs, LinkAdjoint, add_varying};
+use super::inputs::{LinkAdjoint, VariedInputs, add_varying};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::Articulation;
 use crate::body_state::{BodyState, STATE, coordinates_of, states_of};
@@ -21,9 +21,10 @@ pub(crate) fn link_states<S: Scalar>(
     let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
     let plain = tree.map(S::value);
     let result: Vec<BodyState> = plain.motion(&plain_q, &plain_v).link_states().collect();
-    let Inputs { varying, varies, links } = Inputs::new(q.iter().chain(v).copied(), tree);
+    let VariedInputs { varying, varies, links } =
+        VariedInputs::new(q.iter().chain(v).copied(), tree);
     let outputs: Vec<f64> = coordinates_of(&result).collect();
-    let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
+    let node = PosesNode { tree: plain, q: plain_q, v: plain_v, links, varies };
     match S::recorded(&varying, &outputs, node) {
         Some(recorded) => states_of(&recorded).collect(),
         None => result.iter().map(BodyState::cast).collect(),
@@ -40,7 +41,7 @@ impl<S: Scalar> Kinematics<'_, S> {
     }
 }
 
-struct Node {
+struct PosesNode {
     tree: Articulation,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -48,7 +49,7 @@ struct Node {
     varies: Vec<bool>,
 }
 
-impl CustomVjp for Node {
+impl CustomVjp for PosesNode {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
         let at = self.tree.motion(&self.q, &self.v);
         let count = self.tree.links().len();

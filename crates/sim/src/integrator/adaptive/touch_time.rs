@@ -32,7 +32,7 @@ fn first_of(
     earliest: f64,
 ) -> Option<f64> {
     let reach = pair.law().cutoff();
-    let passage = Passage::new(model, pair, ends, dt)?;
+    let passage = SamplesOverStep::new(model, pair, ends, dt)?;
     let times = passage.each_near(reach).filter_map(|(point, _)| {
         let [from, to] = passage.gaps(point, reach);
         crossing(from?, to?, dt).filter(|time| *time > earliest)
@@ -49,7 +49,7 @@ pub(super) fn dips(
     depth: f64,
 ) -> bool {
     let reach = pair.law().cutoff() + pair.smoothing.force_band();
-    let Some(passage) = Passage::new(model, pair, ends, dt) else { return false };
+    let Some(passage) = SamplesOverStep::new(model, pair, ends, dt) else { return false };
     passage.each_near(reach).any(|(point, distance)| {
         // Most of those that are asked about touch.
         if distance - point.radius <= reach {
@@ -61,7 +61,7 @@ pub(super) fn dips(
 }
 
 /// Samples beside a field at both ends of a step.
-struct Passage<'a> {
+struct SamplesOverStep<'a> {
     /// At the start.
     query: ContactQuery<'a>,
     ends: [BodyState; 2],
@@ -69,7 +69,7 @@ struct Passage<'a> {
     travel: f64,
 }
 
-impl<'a> Passage<'a> {
+impl<'a> SamplesOverStep<'a> {
     /// Samples of `pair` beside its field at both `ends` of a step of `dt` \[s\].
     fn new(model: &'a Model, pair: &'a ContactPair, ends: [&Rows; 2], dt: f64) -> Option<Self> {
         let ends = ends.map(|states| model.relative_value(pair, states));

@@ -60,8 +60,8 @@ pub(super) fn step<S: Scalar>(
         if windows > settings.max_substeps {
             return Err(plain.too_many_substeps(&values(), window.start, settings.max_substeps));
         }
-        let Window { candidates, islands } =
-            Window::find(settings, &search, &tangents, window, &next_substeps)?;
+        let ContactWindow { candidates, islands } =
+            ContactWindow::find(settings, &search, &tangents, window, &next_substeps)?;
         let after = match S::ORDER {
             0 => Vec::new(),
             _ => followed(model, &model.contacts_with(&candidates), &states, &islands, window)?,
@@ -134,13 +134,13 @@ fn length(search: &BroadPhase<'_, f64>, states: &Rows<Tangent>) -> f64 {
 }
 
 /// Contacts and islands of a window.
-struct Window {
+struct ContactWindow {
     /// The contacts of groups that may touch.
     candidates: Vec<CandidateContact>,
     islands: Vec<(Island, Schedule)>,
 }
 
-impl Window {
+impl ContactWindow {
     /// Window of `step`. Contacts are searched again where a body deviates farther from uniform motion than the search assumed;
     /// schedules of islands that stay the same are kept.
     fn find(

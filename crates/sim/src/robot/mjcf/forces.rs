@@ -9,7 +9,7 @@ use prehend_geometry::mjcf::{
 
 use super::super::constraints::{Mobility, limits, losses};
 use super::MjcfError;
-use super::lengths::{Along, Lengths};
+use super::lengths::{Along, PathLengths};
 use crate::handle::{BodyId, JointForceId};
 use crate::joint_law::damper::JointDamper;
 use crate::joint_law::dynamic::DynJointLaw;
@@ -25,7 +25,7 @@ use crate::model::transmission::Rotor;
 pub(super) struct Forces<'a> {
     pub(super) model: &'a mut Model,
     pub(super) mjcf: &'a MjcfModel,
-    pub(super) lengths: Lengths<'a>,
+    pub(super) lengths: PathLengths<'a>,
     /// The first link.
     pub(super) link: BodyId,
     /// The axis whose velocity is the state of each actuator that has one.

@@ -8,7 +8,7 @@ use prehend_geometry::mjcf::{
 };
 
 use crate::model::joint_force::JointAxis;
-use crate::model::path::{Anchor, Frame, Obstacle, Path, PathPart};
+use crate::model::path::{Anchor, LinkFrame, Obstacle, Path, PathPart};
 
 /// A length.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(super) enum Along {
 }
 
 /// Lengths along the joints and tendons of a model.
-pub(super) struct Lengths<'a> {
+pub(super) struct PathLengths<'a> {
     pub(super) mjcf: &'a MjcfModel,
     /// The link that each body is.
     pub(super) bodies: &'a [usize],
@@ -27,23 +27,23 @@ pub(super) struct Lengths<'a> {
     pub(super) t_world_mjcf: nalgebra::Isometry3<f64>,
 }
 
-impl Lengths<'_> {
+impl PathLengths<'_> {
     pub(super) fn axis(&self, joint: JointIndex) -> (JointAxis, usize) {
         let found = self.axes.binary_search_by(|(own, ..)| own.cmp(&joint));
         let (_, axis, link) = self.axes[found.unwrap_or_default()];
         (axis, link)
     }
 
-    fn frame(&self, PlacedFrame { body, t_body_frame }: &PlacedFrame) -> Frame {
+    fn frame(&self, PlacedFrame { body, t_body_frame }: &PlacedFrame) -> LinkFrame {
         let link = body.map(|body| self.bodies[body]);
         let t_link_frame =
             if link.is_some() { *t_body_frame } else { self.t_world_mjcf * t_body_frame };
-        Frame { link, t_link_frame }
+        LinkFrame { link, t_link_frame }
     }
 
     fn anchor(&self, body: Option<usize>, point: &nalgebra::Point3<f64>) -> Anchor {
         let frame = PlacedFrame { body, t_body_frame: point.coords.into() };
-        let Frame { link, t_link_frame } = self.frame(&frame);
+        let LinkFrame { link, t_link_frame } = self.frame(&frame);
         Anchor { link, point: t_link_frame.translation.vector.into() }
     }
 

@@ -8,7 +8,7 @@ use crate::articulated::{Joint, Link};
 
 /// The links of a model: one for each joint, one more where a body's frame is not that of its last joint.
 #[derive(Default)]
-pub(super) struct Chain {
+pub(super) struct LinkChain {
     pub(super) links: Vec<Link>,
     /// The link that each body is.
     pub(super) bodies: Vec<usize>,
@@ -25,7 +25,7 @@ pub(super) struct ChainJoint {
     pub(super) link: usize,
 }
 
-impl Chain {
+impl LinkChain {
     pub(super) fn new(mjcf: &MjcfModel, options: &MjcfOptions) -> Self {
         let mut chain = Self::default();
         for body in &mjcf.bodies {

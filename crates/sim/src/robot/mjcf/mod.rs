@@ -187,7 +187,7 @@ impl Model {
             }
             warnings.push(what);
         }
-        let mut chain = links::Chain::new(mjcf, options);
+        let mut chain = links::LinkChain::new(mjcf, options);
         let activated = mjcf.actuators.iter().filter(|own| own.dynamics != Dynamics::Direct);
         let first = chain.links.len();
         chain.links.extend(activated.map(|own| links::activation(&own.name)));
@@ -221,7 +221,7 @@ impl Model {
         let joints = mjcf.joint_indices().zip(&chain.joints);
         let axes: Vec<_> =
             joints.map(|(index, own)| (index, links[own.link].into(), own.link)).collect();
-        let lengths = lengths::Lengths {
+        let lengths = lengths::PathLengths {
             mjcf,
             bodies: &chain.bodies,
             axes: &axes,

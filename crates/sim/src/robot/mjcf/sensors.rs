@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_geometry::Inertial;
 use prehend_geometry::mjcf::{FramePart, JointIndex, PlacedFrame, Quantity, Sensor};
 
-use super::lengths::{Along, Lengths};
+use super::lengths::{Along, PathLengths};
 use super::{MjcfError, MjcfRobot};
 use crate::body_state::BodyState;
 use crate::handle::BodyId;
@@ -27,7 +27,7 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    pub(super) fn new(lengths: &Lengths<'_>) -> Self {
+    pub(super) fn new(lengths: &PathLengths<'_>) -> Self {
         let (mjcf, t_world_mjcf) = (lengths.mjcf, lengths.t_world_mjcf);
         let inertials = mjcf.bodies.iter().map(|body| (body.parent, body.inertial));
         Self {
