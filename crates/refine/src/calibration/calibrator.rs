@@ -44,7 +44,7 @@ pub struct Calibrator {
     /// Inverse variances of the parameters beforehand.
     prior: DVector<f64>,
     /// Models as they were given, and as they are corrected.
-    models: BTreeMap<u32, Model>,
+    models: BTreeMap<u32, CalibrationModel>,
     /// How much frames disagree with the rig, half of them less; unknown as long as it is nominal.
     usual_disagreement: Option<f64>,
     /// Sums over frames that are no longer visited, about the present parameters.
@@ -56,7 +56,7 @@ pub struct Calibrator {
 }
 
 #[derive(Clone)]
-struct Model {
+struct CalibrationModel {
     given: Arc<Object>,
     corrected: Arc<Object>,
 }
@@ -85,7 +85,7 @@ impl Calibrator {
         for (id, given) in objects {
             let deviation = SurfaceDeviation::new(&given, &settings.fused.settings.patches);
             rig.objects.extend(deviation.map(|deviation| (id, deviation)));
-            models.insert(id, Model { corrected: Arc::clone(&given), given });
+            models.insert(id, CalibrationModel { corrected: Arc::clone(&given), given });
         }
         let prior = sigmas.map(|sigma| sigma.powi(-2));
         Ok(Self {

@@ -27,7 +27,7 @@ pub struct Visit {
 /// Normal equations, play and disagreements of the frames of a pass. Sums are reproducible for a given order of frames.
 #[derive(Clone, Default)]
 pub struct Pass {
-    pub(super) sums: Sums,
+    pub(super) sums: CalibrationSums,
     /// By frame that is visited again, with its object's number.
     play: Vec<(u32, FramePlay)>,
     /// By frame, those left out among them.
@@ -38,9 +38,9 @@ pub struct Pass {
 
 /// By object: normal equations of the rig's parameters, and then of the object's coefficients.
 #[derive(Clone, Default)]
-pub(super) struct Sums(pub(super) BTreeMap<u32, (DMatrix<f64>, DVector<f64>)>);
+pub(super) struct CalibrationSums(pub(super) BTreeMap<u32, (DMatrix<f64>, DVector<f64>)>);
 
-impl Sums {
+impl CalibrationSums {
     fn add(&mut self, obj_id: u32, hessian: DMatrix<f64>, gradient: DVector<f64>) {
         match self.0.entry(obj_id) {
             Entry::Vacant(none) => drop(none.insert((hessian, gradient))),
@@ -140,7 +140,7 @@ mod tests {
         let root = DMatrix::from_fn(4, 4, |r, c| ((3 * r + c * c) as f64).sin());
         let hessian = &root * root.transpose();
         let gradient = DVector::from_vec(vec![1.0, -2.0, 0.5, 3.0]);
-        let mut sums = Sums::default();
+        let mut sums = CalibrationSums::default();
         sums.add(7, hessian.clone(), gradient.clone());
         let (change, of_object) =
             (DVector::from_vec(vec![0.1, 0.2]), DVector::from_vec(vec![-0.3, 0.4]));

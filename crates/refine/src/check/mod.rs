@@ -64,14 +64,14 @@ pub(crate) fn check_frame(
         );
         found.add(Subject::Pose, message);
     } else if model::is_plausible(object) {
-        let images = Images { observation, object, drawn, touch };
+        let images = CheckedImages { observation, object, drawn, touch };
         found.0.extend(images.check(t_cam_object).0);
     }
     found.0
 }
 
 /// Images of a frame, to be compared with the object at poses.
-struct Images<'a> {
+struct CheckedImages<'a> {
     observation: &'a Frame,
     object: &'a Arc<Object>,
     /// Depth of the hand \[m\], unless that is at fault.
@@ -80,7 +80,7 @@ struct Images<'a> {
     touch: Option<&'a HandMeasurement>,
 }
 
-impl Images<'_> {
+impl CheckedImages<'_> {
     fn check(&self, t_cam_object: &Isometry3<f64>) -> Warnings {
         let Self { observation, object, .. } = *self;
         if !observation.is_segmented() {

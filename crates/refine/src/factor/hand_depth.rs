@@ -32,12 +32,12 @@ settings! {
 /// The distances determine the hand's pose relative to the object in the same image, whatever errors depth has in common. Touch needs it.
 pub struct HandDepthFactor {
     hand: Arc<Hand>,
-    points: Vec<Point>,
+    points: Vec<DepthPoint>,
     settings: HandDepthSettings,
 }
 
 /// A depth point.
-struct Point {
+struct DepthPoint {
     /// Its column and row \[px\].
     pixel: Vector2<f64>,
     /// Its direction, (x/z, y/z).
@@ -89,7 +89,7 @@ impl HandDepthFactor {
         }
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
-            Point {
+            DepthPoint {
                 pixel: Vector2::new(x, y),
                 ray: camera.unproject(x, y, 1.0).coords.xy(),
                 depth: f64::from(depth.pixels()[pixel]),
@@ -105,18 +105,19 @@ impl HandDepthFactor {
             points(most)
         } else {
             let posed = robot.posed(&measured.t_cam_hand, &measured.joints)?;
-            let body = |Point { ray, depth, .. }: &Point| {
+            let body = |DepthPoint { ray, depth, .. }: &DepthPoint| {
                 let (link, _) =
                     posed.sample_link(&(ray.push(1.0) * *depth).into(), settings.reach)?;
                 Some(first.partition_point(|first| *first <= link))
             };
-            let mut of_bodies: Vec<Vec<Point>> = (0..=first.len()).map(|_| Vec::new()).collect();
+            let mut of_bodies: Vec<Vec<DepthPoint>> =
+                (0..=first.len()).map(|_| Vec::new()).collect();
             for point in points(settings.candidates * most) {
                 if let Some(body) = body(&point) {
                     of_bodies[body].push(point);
                 }
             }
-            let evenly = |points: Vec<Point>| {
+            let evenly = |points: Vec<DepthPoint>| {
                 let step = points.len().div_ceil(most.max(1)).max(1);
                 points.into_iter().step_by(step)
             };
@@ -131,7 +132,7 @@ impl HandDepthFactor {
             return Vec::new();
         };
         let reach = 2.0 * self.settings.reach;
-        let sample = |Point { ray, depth, .. }: &Point| {
+        let sample = |DepthPoint { ray, depth, .. }: &DepthPoint| {
             let point = state.camera.point(ray, *depth);
             Some((point, hand.distance_with_gradient(&point, reach)?))
         };
@@ -146,7 +147,9 @@ impl Factor for HandDepthFactor {
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
         let weighting = self.settings.noise.weighting(self.points.len());
-        for (sample, Point { pixel, ray, depth }) in self.samples(state).iter().zip(&self.points) {
+        for (sample, DepthPoint { pixel, ray, depth }) in
+            self.samples(state).iter().zip(&self.points)
+        {
             let Some((point, sample)) = sample else {
                 // Points out of reach are as bad as those at its end.
                 rows.add_constant(weighting.cost(2.0 * self.settings.reach));

@@ -154,8 +154,8 @@ impl RenderingFactor {
     }
 
     /// Under the light that is best at `state`.
-    fn lit_at(&self, state: &State) -> Lit<'_> {
-        Lit { factor: self, light: self.light(state) }
+    fn lit_at(&self, state: &State) -> LitModel<'_> {
+        LitModel { factor: self, light: self.light(state) }
     }
 
     /// Hypothesis of each of `states`, under the light that fits best there.
@@ -277,12 +277,12 @@ impl Factor for RenderingFactor {
 }
 
 /// The factor under a light.
-struct Lit<'a> {
+struct LitModel<'a> {
     factor: &'a RenderingFactor,
     light: Light,
 }
 
-impl Factor for Lit<'_> {
+impl Factor for LitModel<'_> {
     fn name(&self) -> &'static str {
         self.factor.name()
     }
@@ -375,7 +375,7 @@ mod tests {
         let factor = factor(&frame);
         let truth = State { t_cam_object: scene().truth, ..state.clone() };
         assert!(factor.cost(&truth) < 0.5 * factor.cost(&state));
-        let white = Lit { factor: &factor, light: Light::ambient(1.0) };
+        let white = LitModel { factor: &factor, light: Light::ambient(1.0) };
         assert!(factor.cost(&truth) < white.cost(&truth));
     }
 }

@@ -70,7 +70,7 @@ struct Push {
 }
 
 /// A sample of the object that may touch the hand, in the camera frame.
-struct Near {
+struct NearPoint {
     point: Point3<f64>,
     sample: RobotSample,
     support: Support,
@@ -83,7 +83,7 @@ struct Held {
     hand: ArticulatedRobot,
     /// Center of mass, in the camera frame.
     mass_center: Point3<f64>,
-    near: Vec<Near>,
+    near: Vec<NearPoint>,
     balance: CompliantBalance,
 }
 
@@ -125,7 +125,7 @@ impl SupportFactor {
         // Samples follow each other over the surface.
         let stride = self.object.sample_stride(self.settings.samples);
         let samples = self.object.samples.par_iter().step_by(stride).with_min_len(128);
-        let near: Vec<Near> = samples
+        let near: Vec<NearPoint> = samples
             .filter_map(|sample| {
                 let point = state.t_cam_object * sample.point;
                 self.near(point, state.t_cam_object * -sample.normal, &hand)
@@ -150,7 +150,7 @@ impl SupportFactor {
         point: Point3<f64>,
         inward: Vector3<f64>,
         hand: &ArticulatedRobot,
-    ) -> Option<Near> {
+    ) -> Option<NearPoint> {
         let reach = self.settings.reach;
         let sample = hand.distance_with_gradient(&point, reach)?;
         let apart = (sample.field.distance / reach).max(0.0);
@@ -165,7 +165,7 @@ impl SupportFactor {
         let compliance = self.settings.area / (area * left * left);
         let stiffening = 4.0 * apart / (left * reach);
         let support = Support { position: point, normal, friction, compliance };
-        Some(Near { point, sample, support, stiffening })
+        Some(NearPoint { point, sample, support, stiffening })
     }
 
     /// Force and torque over the object's radius \[N\].

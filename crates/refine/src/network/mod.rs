@@ -43,7 +43,7 @@ pub use self::settings::NetworkSettings;
 pub use self::tensors::{NetworkError, Tensor, Tensors, read_tensors, write_tensors};
 
 use self::dense::{Dense, rectified, relu};
-use self::votes::{Shape, Vote};
+use self::votes::{Vote, VotedShape};
 use crate::error::RefineError;
 use crate::pose_finder::{PoseCandidate, PoseFinder};
 use crate::scene::{Object, PreparedFrame};
@@ -79,7 +79,7 @@ impl PoseNetwork {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_tensors(file: &Path, tensors: Tensors) -> Result<Self, NetworkError> {
-        let mut source = Source { file: file.to_owned(), tensors };
+        let mut source = NetworkSource { file: file.to_owned(), tensors };
         let numbers = source.take("object.center", &[Some(3)])?.values;
         let center = Point3::new(numbers[0], numbers[1], numbers[2]).cast();
         let radius = f64::from(source.take("object.radius", &[Some(1)])?.values[0]);
@@ -205,8 +205,8 @@ impl PoseNetwork {
         self.shape().difference(a, b).angle
     }
 
-    fn shape(&self) -> Shape<'_> {
-        Shape { center: &self.center, radius: self.radius, turns: &self.turns }
+    fn shape(&self) -> VotedShape<'_> {
+        VotedShape { center: &self.center, radius: self.radius, turns: &self.turns }
     }
 
     /// The vote of a point for a pose; none if it makes no rotation.
@@ -245,12 +245,12 @@ fn spread<T: Copy>(items: &[T], limit: usize) -> Vec<T> {
 }
 
 /// Tensors of a file, to be taken one after the other.
-struct Source {
+struct NetworkSource {
     file: PathBuf,
     tensors: Tensors,
 }
 
-impl Source {
+impl NetworkSource {
     fn fault(&self, name: &str, problem: String) -> NetworkError {
         NetworkError::Tensor { file: self.file.clone(), name: name.to_owned(), problem }
     }

@@ -53,7 +53,7 @@ pub enum NetworkError {
 
 /// Entry of the header.
 #[derive(Serialize, Deserialize)]
-struct Entry {
+struct TensorEntry {
     dtype: String,
     shape: Vec<usize>,
     data_offsets: [usize; 2],
@@ -89,7 +89,7 @@ pub fn read_tensors(file: &Path) -> Result<Tensors, NetworkError> {
 }
 
 fn values(entry: Value, data: &[u8]) -> Result<Tensor, String> {
-    let Entry { dtype, shape, data_offsets: [start, end] } =
+    let TensorEntry { dtype, shape, data_offsets: [start, end] } =
         serde_json::from_value(entry).map_err(|e| e.to_string())?;
     if dtype != "F32" {
         return Err(format!("is of {dtype}, must be of F32"));
@@ -116,8 +116,10 @@ pub fn write_tensors(file: &Path, tensors: &Tensors) -> Result<(), NetworkError>
         let start = data.len();
         data.extend(tensor.values.iter().flat_map(|v| v.to_le_bytes()));
         let data_offsets = [start, data.len()];
-        header
-            .insert(name, Entry { dtype: "F32".into(), shape: tensor.shape.clone(), data_offsets });
+        header.insert(
+            name,
+            TensorEntry { dtype: "F32".into(), shape: tensor.shape.clone(), data_offsets },
+        );
     }
     let fault = |reason| NetworkError::File { file: file.to_owned(), reason };
     let mut header = serde_json::to_vec(&header).map_err(|e| fault(e.into()))?;

@@ -16,7 +16,7 @@ pub(super) struct Vote {
 
 /// Difference of two poses.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Difference {
+pub(super) struct PoseDifference {
     /// Angle, turns of the object apart \[rad\].
     pub(super) angle: f64,
     /// Distance of the centers \[radii\].
@@ -25,7 +25,7 @@ pub(super) struct Difference {
     turn: usize,
 }
 
-impl Difference {
+impl PoseDifference {
     /// Both as one number.
     fn size(&self) -> f64 {
         self.angle + self.distance
@@ -33,16 +33,16 @@ impl Difference {
 }
 
 /// The object that votes are for.
-pub(super) struct Shape<'a> {
+pub(super) struct VotedShape<'a> {
     pub(super) center: &'a Point3<f64>,
     pub(super) radius: f64,
     /// Rotations of the object that change nothing, the identity first.
     pub(super) turns: &'a [UnitQuaternion<f64>],
 }
 
-impl Shape<'_> {
+impl VotedShape<'_> {
     /// Difference of two poses.
-    pub(super) fn difference(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> Difference {
+    pub(super) fn difference(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> PoseDifference {
         let between = a.rotation.conjugate() * b.rotation;
         // The angle of between · turn is that of their scalar product, the conjugate's.
         let cosine =
@@ -52,7 +52,7 @@ impl Shape<'_> {
             |best: (usize, f64), next: (usize, f64)| if next.1 > best.1 { next } else { best };
         let (best, most) = self.turns.iter().map(cosine).enumerate().fold((0, -1.0), better);
         let distance = (a * self.center - b * self.center).norm() / self.radius;
-        Difference { angle: 2.0 * most.min(1.0).acos(), distance, turn: best }
+        PoseDifference { angle: 2.0 * most.min(1.0).acos(), distance, turn: best }
     }
 
     /// Hypotheses, the one with most votes first; scores are shares of the confidence of the votes that are gathered.
@@ -130,7 +130,7 @@ mod tests {
         let half = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
         let turns = [UnitQuaternion::identity(), half];
         let center = Point3::new(0.0, 0.0, 0.02);
-        let shape = Shape { center: &center, radius: 0.05, turns: &turns };
+        let shape = VotedShape { center: &center, radius: 0.05, turns: &turns };
         let truth = Isometry3::new(Vector3::new(0.1, 0.0, 0.5), Vector3::new(0.3, -0.2, 1.0));
         let other = Isometry3::new(Vector3::new(0.1, 0.0, 0.5), Vector3::new(1.9, 0.0, 0.0));
         let vote = |k: i32| {

@@ -271,7 +271,7 @@ impl NormalEquations {
         let (known, auxiliary) = self.blocks_and_auxiliary();
         let mut part = auxiliary.gradient.rows_mut(0, count);
         part += gradient.rows(own, count);
-        for Place { from, to, size } in places(known, blocks) {
+        for BlockPlace { from, to, size } in places(known, blocks) {
             let mut part = auxiliary.coupling.view_mut((0, to), (count, size));
             part += hessian.view((own, from), (count, size));
         }
@@ -293,7 +293,7 @@ impl NormalEquations {
         for (patch, PatchPart { gradient, hessian }) in patches.iter().enumerate() {
             let own = hessian.fixed_columns::<3>(0).into_owned();
             auxiliary.add_patch(patch, gradient, &own);
-            for Place { from, to, size } in places(known, blocks) {
+            for BlockPlace { from, to, size } in places(known, blocks) {
                 let mut part = auxiliary.coupling.view_mut((3 * patch, to), (3, size));
                 part += hessian.columns(from, size);
             }
@@ -340,19 +340,19 @@ fn offset(blocks: &[Block], block: Block) -> Option<usize> {
 }
 
 /// Where the parameters of a block are: among those of a factor, and among those that are requested.
-struct Place {
+struct BlockPlace {
     from: usize,
     to: usize,
     size: usize,
 }
 
 /// Those of a factor's `blocks` that are among the `known` ones.
-fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = Place> {
+fn places(known: &[Block], blocks: &[Block]) -> impl Iterator<Item = BlockPlace> {
     let mut next = 0;
     blocks.iter().filter_map(move |&block| {
         let (from, size) = (next, block.dimension());
         next += size;
-        offset(known, block).map(|to| Place { from, to, size })
+        offset(known, block).map(|to| BlockPlace { from, to, size })
     })
 }
 

@@ -382,14 +382,14 @@ mod tests {
     use crate::scene::{PreparedFrame, default_scene};
 
     /// Measurements that are linear in the object's twist and the displacements of patches.
-    struct Linear {
+    struct LinearProblem {
         residuals: DVector<f64>,
         by_twist: DMatrix<f64>,
         by_patches: DMatrix<f64>,
         weight: f64,
     }
 
-    impl Factor for Linear {
+    impl Factor for LinearProblem {
         fn name(&self) -> &'static str {
             "linear"
         }
@@ -414,9 +414,9 @@ mod tests {
     }
 
     /// Promises a way down where there is none.
-    struct Flat;
+    struct FlatProblem;
 
-    impl Factor for Flat {
+    impl Factor for FlatProblem {
         fn name(&self) -> &'static str {
             "flat"
         }
@@ -438,7 +438,7 @@ mod tests {
         let bare = Frame { hand: None, ..scene.frame.clone() };
         let frame = PreparedFrame::new(&bare, &scene.object).unwrap();
         let state = State::new(&frame, &scene.truth).unwrap();
-        let problem = Problem::new(vec![Arc::new(Flat)], vec![Block::ObjectPose]);
+        let problem = Problem::new(vec![Arc::new(FlatProblem)], vec![Block::ObjectPose]);
         let mut steps = Vec::new();
         let solver = Solver { iterations: 10, min_decrease: 1e-9 };
         let solution = problem.solve(problem.linearize(&state), &solver, |down| {
@@ -475,7 +475,7 @@ mod tests {
             by_twist.tr_mul(&(&information * &residuals)),
             by_twist.tr_mul(&(&information * &by_twist)),
         );
-        let linear = Linear { residuals, by_twist, by_patches, weight };
+        let linear = LinearProblem { residuals, by_twist, by_patches, weight };
         let rigid = Problem::new(vec![Arc::new(linear)], vec![Block::ObjectPose]);
         let problem = rigid.clone().with_patches(Some(Arc::new(patches)));
         let at = problem.linearize(&state);

@@ -75,10 +75,10 @@ fn shuffled<T>(items: Vec<T>) -> Vec<T> {
 /// Image of the visible object and of depth, at a low resolution.
 pub(super) struct SightMap {
     camera: Camera,
-    pixels: Vec<Sight>,
+    pixels: Vec<SearchView>,
 }
 
-struct Sight {
+struct SearchView {
     /// Whether the object is seen here.
     object: bool,
     /// Nearest depth of anything here \[m\], 0 where unknown.
@@ -108,7 +108,8 @@ impl SightMap {
             (0..width * height).map(|i| at(i % width, i / width)).unzip();
         let away = pixel_distances(&object, width, true);
         let seen = object.into_iter().zip(depths).zip(away);
-        let pixels = seen.map(|((object, depth), away)| Sight { object, depth, away }).collect();
+        let pixels =
+            seen.map(|((object, depth), away)| SearchView { object, depth, away }).collect();
         // Pixel (x, y) of the map is pixel (x factor + factor/2, …) of the image.
         let (scale, middle) = (1.0 / factor as f64, (factor / 2) as f64);
         let camera = Camera {

@@ -8,7 +8,7 @@ use prehend_render::{DepthImage, draw_depth};
 
 use super::Tracker;
 use super::memory::{Prediction, TrackState};
-use super::pyramid::{LEVELS, Level, pyramid};
+use super::pyramid::{LEVELS, PyramidLevel, pyramid};
 use super::sight::Sight;
 use crate::defaults::settings;
 use crate::scene::Object;
@@ -72,7 +72,7 @@ impl Keyframe {
     ) -> Option<Self> {
         let center = pose * object.center;
         let levels = pyramid(sight, &center, object.radius)?;
-        let Level { camera, pixels } = &levels[0];
+        let PyramidLevel { camera, pixels } = &levels[0];
         let mut drawn = DepthImage::default();
         draw_depth(&mut drawn, camera, &[(&object.model, *pose)]);
         let full = &sight.frame.camera;
@@ -240,7 +240,7 @@ impl Normal {
     fn new(
         keyframe: &Keyframe,
         intensities: &[f32],
-        level: &Level,
+        level: &PyramidLevel,
         pose: &Isometry3<f64>,
         object: &Object,
         [gain, offset]: &[f64; 2],

@@ -14,7 +14,7 @@ use crate::strategy::{Posterior, PosteriorMode, ScaleMixture};
 
 /// A pose that the object may have instead of that which is tracked.
 #[derive(Clone, Copy, Debug)]
-struct Mode {
+struct TrackedMode {
     /// Coordinates of the object there → those of the object as it is tracked.
     in_object: Isometry3<f64>,
     /// Logarithm of its weight over that of the tracked pose.
@@ -25,7 +25,7 @@ struct Mode {
 /// err alike.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Modes {
-    others: Vec<Mode>,
+    others: Vec<TrackedMode>,
     /// Object → camera, when they were last weighed.
     seen: UnitQuaternion<f64>,
     /// Uncertainty of scales in each.
@@ -36,7 +36,7 @@ impl Modes {
     /// Those of `posterior`.
     pub(super) fn new(posterior: &Posterior) -> Self {
         let [best, others @ ..] = &posterior.modes[..] else { return Self::default() };
-        let mode = |other: &PosteriorMode| Mode {
+        let mode = |other: &PosteriorMode| TrackedMode {
             in_object: best.t_cam_object.inverse() * other.t_cam_object,
             log_odds: (other.weight / best.weight).ln(),
         };
@@ -54,14 +54,15 @@ impl Modes {
 
     /// Tracks the one at `index`, and has the tracked one in its place.
     fn swap(&mut self, index: usize) {
-        let Mode { in_object, log_odds } = self.others[index];
+        let TrackedMode { in_object, log_odds } = self.others[index];
         let back = in_object.inverse();
         for (k, mode) in self.others.iter_mut().enumerate() {
             *mode = match k == index {
-                true => Mode { in_object: back, log_odds: -log_odds },
-                false => {
-                    Mode { in_object: back * mode.in_object, log_odds: mode.log_odds - log_odds }
-                }
+                true => TrackedMode { in_object: back, log_odds: -log_odds },
+                false => TrackedMode {
+                    in_object: back * mode.in_object,
+                    log_odds: mode.log_odds - log_odds,
+                },
             };
         }
     }
@@ -71,16 +72,17 @@ impl Modes {
         for turn in [*turn, -turn] {
             let rotation = UnitQuaternion::from_scaled_axis(turn);
             let in_object = Isometry3::from_parts((center - rotation * center).into(), rotation);
-            self.others.push(Mode { in_object, log_odds: 0.0 });
+            self.others.push(TrackedMode { in_object, log_odds: 0.0 });
         }
     }
 
     /// Leaves out those of hardly any weight, and those turned as the tracked one or another, within an `angle` \[rad\].
     fn prune(&mut self, least: f64, angle: f64) {
-        let mut kept: Vec<Mode> = Vec::new();
+        let mut kept: Vec<TrackedMode> = Vec::new();
         for mode in self.others.drain(..) {
             let rotation = mode.in_object.rotation;
-            let is_same = |other: &Mode| other.in_object.rotation.angle_to(&rotation) < angle;
+            let is_same =
+                |other: &TrackedMode| other.in_object.rotation.angle_to(&rotation) < angle;
             let is_tracked = rotation.angle() < angle;
             if mode.log_odds > least && !is_tracked && !kept.iter().any(is_same) {
                 kept.push(mode);
@@ -170,7 +172,7 @@ mod tests {
     use crate::tracker::TrackerSettings;
 
     fn modes(angles: &[(f64, f64)]) -> Modes {
-        let mode = |&(angle, log_odds): &(f64, f64)| Mode {
+        let mode = |&(angle, log_odds): &(f64, f64)| TrackedMode {
             in_object: Isometry3::rotation(Vector3::z() * angle),
             log_odds,
         };

@@ -9,14 +9,14 @@ use super::sight::Sight;
 pub(super) const LEVELS: usize = 3;
 
 /// Part of an image in gray at one resolution.
-pub(super) struct Level {
+pub(super) struct PyramidLevel {
     /// Camera of that part at that resolution.
     pub(super) camera: Camera,
     /// Intensities from 0 to 1, row-major.
     pub(super) pixels: Vec<f32>,
 }
 
-impl Level {
+impl PyramidLevel {
     /// Level of the same part at half the resolution.
     fn halved(&self) -> Self {
         let Self { camera: full, pixels } = self;
@@ -46,7 +46,11 @@ impl Level {
 }
 
 /// The part of the image of `sight` that shows what is within `reach` \[m\] of `center` (camera frame), at each resolution; none if that is out of the image.
-pub(super) fn pyramid(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option<[Level; LEVELS]> {
+pub(super) fn pyramid(
+    sight: &Sight,
+    center: &Point3<f64>,
+    reach: f64,
+) -> Option<[PyramidLevel; LEVELS]> {
     let camera = &sight.frame.camera;
     let at = camera.project(center)?;
     let extent = reach * camera.fx.max(camera.fy) / (center.z - reach).max(reach);
@@ -62,7 +66,7 @@ pub(super) fn pyramid(sight: &Sight, center: &Point3<f64>, reach: f64) -> Option
     let line = |y: usize| &color[y * camera.width + left..][..width];
     let gray = |color: &[f32; 3]| color.iter().sum::<f32>() / color.len() as f32;
     let pixels = (top..top + height).flat_map(|y| line(y).iter().map(gray)).collect();
-    let full = Level { camera: camera.cropped(left, top, width, height), pixels };
+    let full = PyramidLevel { camera: camera.cropped(left, top, width, height), pixels };
     let half = full.halved();
     let quarter = half.halved();
     Some([full, half, quarter])

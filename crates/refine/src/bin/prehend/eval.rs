@@ -12,13 +12,13 @@ use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
 use crate::failures::Failures;
-use crate::options::{Input, Job};
+use crate::options::{InputArgs, Job};
 use crate::terminal::{progress, say};
 
 #[derive(Args)]
 pub(crate) struct Eval {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
     /// Print BOP's average recall over all targets instead: AR_VSD, AR_MSSD, AR_MSPD and AR, by object too
     ///
     /// Of each object in an image, as many poses count as there are instances to be found, those of the highest scores; what has no
@@ -36,7 +36,7 @@ pub(crate) struct Eval {
 
 impl Eval {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Input { selection, poses } = &self.input;
+        let InputArgs { selection, poses } = &self.input;
         let dataset = selection.open()?;
         let (jobs, failures) = selection.jobs(poses, None)?;
         if self.bop {
@@ -77,7 +77,7 @@ impl Eval {
         rows: &[ResultRow],
         failures: &Failures,
     ) -> anyhow::Result<ExitCode> {
-        let Input { selection, poses } = &self.input;
+        let InputArgs { selection, poses } = &self.input;
         let mut scorer = Scorer::new(dataset);
         let mut targets = scorer.targets(self.targets.as_deref())?;
         targets.retain(|t| selection.admits(t.scene_id, t.im_id, t.obj_id));

@@ -11,7 +11,7 @@ use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, DatasetError, check_writable};
 use prehend_refine::export::SceneFilm;
 
-use crate::options::{Input, Job, open_rig};
+use crate::options::{InputArgs, Job, open_rig};
 use crate::terminal::{cache, progress, say};
 
 /// Images by scene and id, with the poses in each.
@@ -20,7 +20,7 @@ type JobsByImage<'a> = BTreeMap<(u32, u32), Vec<&'a Job>>;
 #[derive(Args)]
 pub(crate) struct Export {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: hand and models are corrected by it
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     rig: Option<PathBuf>,
@@ -37,7 +37,7 @@ pub(crate) struct Export {
 
 impl Export {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { input: Input { selection, poses }, rig, glb, rate } = &self;
+        let Self { input: InputArgs { selection, poses }, rig, glb, rate } = &self;
         check_writable(glb)?;
         let mut film = SceneFilm::new(*rate)?;
         let dataset = selection.open()?;

@@ -22,7 +22,7 @@ use serde_json::json;
 
 use crate::failures::Failures;
 use crate::options::{
-    HYPOTHESES, Masks, Rendering, Selection, beside, limit_threads, row, write_poses,
+    HYPOTHESES, Masks, RenderingArgs, Selection, beside, limit_threads, row, write_poses,
 };
 use crate::settings::SettingsOptions;
 use crate::terminal::{cache, progress, say};
@@ -81,7 +81,7 @@ pub(crate) struct Initial {
     #[command(flatten)]
     settings: SettingsOptions,
     #[command(flatten)]
-    rendering: Rendering,
+    rendering: RenderingArgs,
 }
 
 /// A pose that a search ended with, as the journal has it.

@@ -45,7 +45,7 @@ pub(crate) struct Selection {
 
 /// A dataset and poses on it.
 #[derive(Args)]
-pub(crate) struct Input {
+pub(crate) struct InputArgs {
     #[command(flatten)]
     pub(crate) selection: Selection,
     /// Poses on the dataset's images, as a BOP results file
@@ -129,7 +129,7 @@ impl Masks {
 
 /// Where pictures are rendered.
 #[derive(Args)]
-pub(crate) struct Rendering {
+pub(crate) struct RenderingArgs {
     /// What renders: cpu; gpu, a graphics device, a software one only if there is no other; or auto, graphics hardware if there is
     /// any. A device that fails is replaced by the processor
     ///
@@ -145,7 +145,7 @@ pub(crate) struct Rendering {
     pub(crate) device: Device,
 }
 
-impl Rendering {
+impl RenderingArgs {
     /// The device, ready to render.
     pub(crate) fn open(&self) -> anyhow::Result<Arc<dyn Backend>> {
         self.device.open().map_err(|error| anyhow!("--device {}: {error}", self.device))

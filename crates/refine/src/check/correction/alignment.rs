@@ -9,7 +9,7 @@ use prehend_geometry::RobustKernel;
 use prehend_render::{DepthImage, OutlinePoint, outline_points};
 
 use super::evidence::{FrameImages, centroid};
-use super::inputs::Inputs;
+use super::inputs::CheckInputs;
 use crate::scene::median;
 
 /// Pose, logarithm of the scale of depth, logarithm of the focal length.
@@ -29,7 +29,7 @@ pub(super) struct Fitted {
     /// Agreement with the frame times the plausibility of the move, 0 to 1.
     pub(super) agreement: f64,
     /// With the object where mask and depth have it.
-    pub(super) inputs: Inputs,
+    pub(super) inputs: CheckInputs,
     /// Sum of squares of outline, depth and pose there.
     pub(super) sum: Sum,
 }
@@ -42,7 +42,7 @@ struct PoseFit<'a> {
 
 impl FrameImages<'_> {
     /// `start` with the object moved to where mask and depth have it, and, if `sized`, with depth scaled; none where the object is not in view.
-    pub(super) fn fit(&self, start: &Inputs, sized: bool) -> Option<Fitted> {
+    pub(super) fn fit(&self, start: &CheckInputs, sized: bool) -> Option<Fitted> {
         let fit = PoseFit { evidence: self, hand: self.hand_drawn(start) };
         let (inputs, sum) = fit.align(start, sized)?;
         let plausible = fit.plausibility(start, &inputs.t_cam_object);
@@ -53,7 +53,7 @@ impl FrameImages<'_> {
 
 impl PoseFit<'_> {
     /// The inputs of a fit, and their sum of squares.
-    fn align(&self, start: &Inputs, sized: bool) -> Option<(Inputs, Sum)> {
+    fn align(&self, start: &CheckInputs, sized: bool) -> Option<(CheckInputs, Sum)> {
         let start = self.placed(start)?;
         let radius = self.evidence.object.radius;
         let size = if sized && self.evidence.has_depth { 1.0 } else { 0.0 };
@@ -83,7 +83,7 @@ impl PoseFit<'_> {
     }
 
     /// With the object moved to where the mask is, and where depth has it.
-    fn placed(&self, start: &Inputs) -> Option<Inputs> {
+    fn placed(&self, start: &CheckInputs) -> Option<CheckInputs> {
         let mut inputs = *start;
         let camera = inputs.camera;
         let is_masked = |index: &usize| self.evidence.is_masked(&inputs, *index);
@@ -123,7 +123,7 @@ impl PoseFit<'_> {
     }
 
     /// Sum of squares at `inputs`, kernels so many times as wide as errors are.
-    fn sum(&self, inputs: &Inputs, start: &Inputs, width: f64) -> Option<Sum> {
+    fn sum(&self, inputs: &CheckInputs, start: &CheckInputs, width: f64) -> Option<Sum> {
         let mut sum = Quadratic::zeros();
         self.add_depth(inputs, width, &mut sum);
         self.add_outline(inputs, width, &mut sum)?;
@@ -131,7 +131,7 @@ impl PoseFit<'_> {
         Some(sum)
     }
 
-    fn add_depth(&self, inputs: &Inputs, width: f64, sum: &mut Sum) {
+    fn add_depth(&self, inputs: &CheckInputs, width: f64, sum: &mut Sum) {
         let FrameImages { settings, .. } = self.evidence;
         let (object, center) = (&self.evidence.object, self.evidence.center(inputs));
         let inverse = inputs.t_cam_object.inverse();
@@ -156,7 +156,7 @@ impl PoseFit<'_> {
     }
 
     /// None of an object that is not in view.
-    fn add_outline(&self, inputs: &Inputs, width: f64, sum: &mut Sum) -> Option<()> {
+    fn add_outline(&self, inputs: &CheckInputs, width: f64, sum: &mut Sum) -> Option<()> {
         let FrameImages { settings, .. } = self.evidence;
         let (object, camera) = (&self.evidence.object, &inputs.camera);
         let center = self.evidence.center(inputs);
@@ -189,7 +189,7 @@ impl PoseFit<'_> {
 
     /// Distance of the mask's border outward of a point of the outline \[px\]; none where there is none within `reach`, or it is that of
     /// something in front.
-    fn border(&self, inputs: &Inputs, at: &OutlinePoint, reach: f64) -> Option<f64> {
+    fn border(&self, inputs: &CheckInputs, at: &OutlinePoint, reach: f64) -> Option<f64> {
         let (width, height) = (inputs.camera.width, inputs.camera.height);
         let index = |along: f64| {
             let pixel = at.pixel + at.outward * along;
@@ -218,7 +218,7 @@ impl PoseFit<'_> {
     }
 
     /// Adds the prior of poses: they are about where they are stated.
-    fn add_prior(&self, inputs: &Inputs, start: &Inputs, sum: &mut Sum) {
+    fn add_prior(&self, inputs: &CheckInputs, start: &CheckInputs, sum: &mut Sum) {
         let turn = self.evidence.settings.turn;
         let off =
             (inputs.t_cam_object.rotation * start.t_cam_object.rotation.inverse()).scaled_axis();
@@ -234,13 +234,13 @@ impl PoseFit<'_> {
     }
 
     /// Standard deviation of the translation.
-    fn shift_sigma(&self, inputs: &Inputs) -> f64 {
+    fn shift_sigma(&self, inputs: &CheckInputs) -> f64 {
         let [of_distance, of_radius] = self.evidence.settings.shift;
         of_distance * self.evidence.center(inputs).z.abs() + of_radius * self.evidence.object.radius
     }
 
     /// Plausibility that `start` is in truth at `to`, 0 to 1.
-    fn plausibility(&self, start: &Inputs, to: &Isometry3<f64>) -> f64 {
+    fn plausibility(&self, start: &CheckInputs, to: &Isometry3<f64>) -> f64 {
         let turned = start.t_cam_object.rotation.angle_to(&to.rotation);
         let turned = turned / self.evidence.settings.turn;
         let moved = match start.is_placed {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector2};
 use prehend_render::{DepthImage, RgbImage, depth_map, render_scene};
 
-use super::inputs::Inputs;
+use super::inputs::CheckInputs;
 use super::settings::CorrectionSettings;
 use crate::check::hand::broken;
 use crate::check::limits::{HAND_PIXELS, HAND_REACH};
@@ -19,10 +19,10 @@ const RENDERED: std::ops::Range<f64> = 1e-2..1e2;
 /// A frame's images and its object.
 pub(super) struct FrameImages<'a> {
     pub(super) settings: &'a CorrectionSettings,
-    /// The object with a radius that renders: its unit of length is [`Inputs::meters`] of [`given`](Self::given).
+    /// The object with a radius that renders: its unit of length is [`CheckInputs::meters`] of [`given`](Self::given).
     pub(super) object: Arc<Object>,
     /// The inputs as they are.
-    pub(super) given: Inputs,
+    pub(super) given: CheckInputs,
     /// The frame with smaller images.
     pub(super) frame: Frame,
     /// Depth of the hand \[m\], if it can be drawn.
@@ -49,7 +49,7 @@ impl<'a> FrameImages<'a> {
             .depth(observation.depth.downsampled(factor))
             .mask(observation.mask.downsampled(factor));
         frame.hand = observation.hand.clone().filter(|measured| broken(measured).is_none());
-        let mut given = Inputs::new(camera, *t_cam_object);
+        let mut given = CheckInputs::new(camera, *t_cam_object);
         let mut object = Arc::clone(object);
         let extent = 2.0 * object.radius;
         if !RENDERED.contains(&extent) {
@@ -69,14 +69,14 @@ impl<'a> FrameImages<'a> {
     }
 
     /// True of a pixel that the mask, as `inputs` have it, covers.
-    pub(super) fn is_masked(&self, inputs: &Inputs, index: usize) -> bool {
+    pub(super) fn is_masked(&self, inputs: &CheckInputs, index: usize) -> bool {
         self.frame.mask.pixels()[index] != inputs.mask_inverted
     }
 
     /// Column and row, and depth as `inputs` have it, of some masked pixels.
     pub(super) fn masked_points(
         &self,
-        inputs: &Inputs,
+        inputs: &CheckInputs,
     ) -> impl Iterator<Item = (Vector2<f64>, f64)> {
         let scale = inputs.depth_scale;
         let points = &self.points[usize::from(inputs.mask_inverted)];
@@ -84,17 +84,17 @@ impl<'a> FrameImages<'a> {
     }
 
     /// Depth that `inputs` have at a pixel, 0 for none.
-    pub(super) fn sensor(&self, inputs: &Inputs, index: usize) -> f64 {
+    pub(super) fn sensor(&self, inputs: &CheckInputs, index: usize) -> f64 {
         f64::from(self.frame.depth.pixels()[index]) * inputs.depth_scale
     }
 
     /// Depth of the object as `inputs` have it, 0 where it is not.
-    pub(super) fn drawn(&self, inputs: &Inputs) -> DepthImage {
+    pub(super) fn drawn(&self, inputs: &CheckInputs) -> DepthImage {
         depth_map(&inputs.camera, &[(&self.object.model, inputs.t_cam_object)])
     }
 
     /// Depth of the hand \[m\] before the camera of `inputs`, where the hand is known.
-    pub(super) fn hand_drawn(&self, inputs: &Inputs) -> Option<Cow<'_, DepthImage>> {
+    pub(super) fn hand_drawn(&self, inputs: &CheckInputs) -> Option<Cow<'_, DepthImage>> {
         match inputs.camera == self.given.camera {
             true => self.hand.as_ref().map(Cow::Borrowed),
             false => {
@@ -113,7 +113,7 @@ impl<'a> FrameImages<'a> {
     }
 
     /// The point that poses turn about, in the camera frame.
-    pub(super) fn center(&self, inputs: &Inputs) -> Point3<f64> {
+    pub(super) fn center(&self, inputs: &CheckInputs) -> Point3<f64> {
         inputs.t_cam_object * self.object.center
     }
 
@@ -124,7 +124,7 @@ impl<'a> FrameImages<'a> {
 
     /// Mean of intersection over union of mask and visible object, of the part of the mask whose depth is the object's, and of the part
     /// of the hand whose depth is the hand's, of those that are known: 0 to 1.
-    pub(super) fn agreement(&self, inputs: &Inputs, hand: Option<&DepthImage>) -> f64 {
+    pub(super) fn agreement(&self, inputs: &CheckInputs, hand: Option<&DepthImage>) -> f64 {
         let tolerance = self.tolerance();
         let drawn = self.drawn(inputs);
         let (mut both, mut either, mut known, mut near) = (0.0, 0.0, 0.0, 0.0);
@@ -155,7 +155,7 @@ impl<'a> FrameImages<'a> {
 
     /// Agreement of the image's colors with the model's, 0 to 1; where red and blue are swapped, what it lacks to one. None of a pale model.
     /// Brightness has no part in it, and a pose that is a little off hardly any: distributions are compared, of (red − blue) / (red + green + blue).
-    pub(super) fn color_agreement(&self, inputs: &Inputs) -> Option<f64> {
+    pub(super) fn color_agreement(&self, inputs: &CheckInputs) -> Option<f64> {
         let model = (&*self.object.model, inputs.t_cam_object);
         let drawn = render_scene(&inputs.camera, &[model], 1, |_, p| p.albedo, |_, _| [0.0; 3]);
         let chromas = |image: &RgbImage| {
@@ -178,7 +178,7 @@ impl<'a> FrameImages<'a> {
     }
 
     /// Part of the hand, beside the mask, whose depth is the hand's; none where too little of it is seen.
-    pub(super) fn hand_share(&self, inputs: &Inputs, hand: &DepthImage) -> Option<f64> {
+    pub(super) fn hand_share(&self, inputs: &CheckInputs, hand: &DepthImage) -> Option<f64> {
         let (mut count, mut near) = (0, 0);
         for (index, hand) in hand.pixels().iter().enumerate() {
             let sensor = self.sensor(inputs, index) * inputs.meters;

@@ -34,7 +34,7 @@ pub fn find_corrections(
     settings: &CorrectionSettings,
 ) -> Vec<Finding> {
     let (found, explained) = (Vec::new(), vec![false; trials.len()]);
-    let mut search = Search { trials, settings, found, explained };
+    let mut search = FaultSearch { trials, settings, found, explained };
     search.intrinsics();
     let of_color = |t: &Tried| t.correction == Correction::ChannelsSwapped;
     search.level(|_, _| 0, &|t| !of_color(t));
@@ -54,14 +54,14 @@ pub fn find_corrections(
 }
 
 /// Corrections found, and which of the trials they explain.
-struct Search<'a> {
+struct FaultSearch<'a> {
     trials: &'a [(Target, CorrectionTrial)],
     settings: &'a CorrectionSettings,
     found: Vec<Finding>,
     explained: Vec<bool>,
 }
 
-impl Search<'_> {
+impl FaultSearch<'_> {
     /// Adds the corrections of intrinsics that most frames of a scene need: a single one may be a crop.
     fn intrinsics(&mut self) {
         for group in groups(self.trials, |_, target| target.scene_id) {

@@ -7,7 +7,7 @@ use super::kind::Correction;
 
 /// A frame's inputs but for its images, lengths in units of the model as it was read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inputs {
+pub(super) struct CheckInputs {
     pub(super) camera: Camera,
     /// Object → camera.
     pub(super) t_cam_object: Isometry3<f64>,
@@ -21,7 +21,7 @@ pub(super) struct Inputs {
     pub(super) is_placed: bool,
 }
 
-impl Inputs {
+impl CheckInputs {
     pub(super) fn new(camera: Camera, t_cam_object: Isometry3<f64>) -> Self {
         Self {
             camera,

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::inputs::Inputs;
+use super::inputs::CheckInputs;
 use super::*;
 use crate::scene::Target;
 use crate::scene::{Object, Scene, default_scene};
@@ -134,7 +134,7 @@ fn corrections_undo_mistakes_of_rotation() {
     for (correction, mistake) in mistakes {
         let wrong = Isometry3::from_parts(right.translation, mistake(right.rotation));
         assert!(wrong.rotation.angle_to(&right.rotation) > 0.3, "{correction:?}");
-        let corrected = Inputs::new(camera, wrong).corrected(correction, 1.0).t_cam_object;
+        let corrected = CheckInputs::new(camera, wrong).corrected(correction, 1.0).t_cam_object;
         assert!(corrected.rotation.angle_to(&right.rotation) < 1e-9, "{correction:?}");
         assert_eq!(corrected.translation, right.translation);
     }

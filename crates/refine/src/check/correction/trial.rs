@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::alignment::Fitted;
 use super::evidence::FrameImages;
-use super::inputs::Inputs;
+use super::inputs::CheckInputs;
 use super::kind::{Correction, candidates, is_nearly_one};
 use super::settings::CorrectionSettings;
 use crate::error::RefineError;
@@ -142,7 +142,7 @@ impl Size {
         let scale = (given.depth_scale / fitted.inputs.depth_scale).ln();
         let vector = information * Vector2::new(scale, 0.0) - gradient;
         let focal = given.corrected(Correction::FocalLength, scale.exp());
-        let share = |inputs: &Inputs| {
+        let share = |inputs: &CheckInputs| {
             let hand = evidence.hand_drawn(inputs)?;
             evidence.hand_share(inputs, &hand)
         };

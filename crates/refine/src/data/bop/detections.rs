@@ -55,7 +55,7 @@ struct Place {
 
 /// Entry of the file.
 #[derive(Deserialize)]
-struct Entry {
+struct DetectionEntry {
     score: Option<Real>,
     bbox: Option<Numbers<4>>,
     segmentation: Option<Segmentation>,
@@ -72,14 +72,14 @@ enum Segmentation {
 /// COCO's run lengths of a mask, by columns, of unset and set pixels in turns.
 #[derive(Deserialize)]
 struct RunLengths {
-    counts: Counts,
+    counts: RleCounts,
     /// Height and width.
     size: [usize; 2],
 }
 
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "is neither a list of run lengths nor a string of compressed ones")]
-enum Counts {
+enum RleCounts {
     Plain(Vec<u64>),
     Compressed(String),
 }
@@ -137,7 +137,7 @@ impl Detections {
     }
 }
 
-impl Entry {
+impl DetectionEntry {
     /// Pixels of the entry.
     ///
     /// # Errors
@@ -166,7 +166,7 @@ impl Entry {
 impl Detection {
     /// The entry `name` of a file of that `text`.
     fn read(file: &Path, name: &str, text: &RawValue) -> Result<Self, DatasetError> {
-        let entry: Entry = convert(file, name, text)?;
+        let entry: DetectionEntry = convert(file, name, text)?;
         let score = entry.score.map_or(1.0, |score| score.0);
         let shape = entry.shape().map_err(|(field, problem)| {
             DatasetError::field(file, &format!("{name}.{field}"), problem)
@@ -213,8 +213,8 @@ impl RunLengths {
     fn lengths(self) -> Result<Vec<u32>, String> {
         let [height, width] = self.size;
         let lengths = match self.counts {
-            Counts::Plain(lengths) => lengths,
-            Counts::Compressed(text) => decompressed(&text)?,
+            RleCounts::Plain(lengths) => lengths,
+            RleCounts::Compressed(text) => decompressed(&text)?,
         };
         let count = width.checked_mul(height).filter(|n| *n <= MAX_PIXELS);
         let count = count.ok_or_else(|| format!("size is {height} x {width} pixels"))?;

@@ -8,7 +8,7 @@ use prehend_render::{DepthImage, Mask, RgbImage};
 use crate::data::bop::drop_saturated;
 
 use super::messages::{
-    COMPRESSED_IMAGE, CompressedImage, Header, IMAGE, RosImage, Stamped, decode,
+    COMPRESSED_IMAGE, CompressedImage, IMAGE, RosHeader, RosImage, Stamped, decode,
 };
 
 /// Kind of the images of a topic.
@@ -21,7 +21,7 @@ pub(super) enum Content {
 }
 
 /// When and in which frame a message was taken, and what it shows by what it says of itself.
-pub(super) fn describe(kind: &str, data: &[u8]) -> Result<(Header, Content), String> {
+pub(super) fn describe(kind: &str, data: &[u8]) -> Result<(RosHeader, Content), String> {
     let (header, encoding) = if kind == IMAGE {
         let image: Stamped<RosImage<'_>> = decode(data)?;
         (image.header, image.content.encoding)
@@ -156,7 +156,7 @@ mod tests {
     fn image(encoding: &str, size: [u32; 2], step: u32, data: &[u8]) -> Vec<u8> {
         let [width, height] = size;
         let content = RosImage { height, width, encoding, is_bigendian: 0, step, data };
-        encode(&Stamped { header: Header::default(), content }).unwrap()
+        encode(&Stamped { header: RosHeader::default(), content }).unwrap()
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl Time {
 
 /// Moment and frame of a message.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-pub(super) struct Header {
+pub(super) struct RosHeader {
     pub(super) stamp: Time,
     pub(super) frame_id: String,
 }
@@ -53,7 +53,7 @@ pub(super) struct Header {
 /// A message that begins with a header.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(super) struct Stamped<T> {
-    pub(super) header: Header,
+    pub(super) header: RosHeader,
     pub(super) content: T,
 }
 
@@ -101,7 +101,7 @@ pub(super) struct CameraInfo {
 
 /// [`JOINT_STATE`].
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-pub(super) struct JointState {
+pub(super) struct JointStateMessage {
     pub(super) name: Vec<String>,
     pub(super) position: Vec<f64>,
     pub(super) velocity: Vec<f64>,
@@ -111,7 +111,7 @@ pub(super) struct JointState {
 /// An entry of [`TRANSFORMS`]: pose of the frame `child_frame_id` in that of the header.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct TransformStamped {
-    pub(super) header: Header,
+    pub(super) header: RosHeader,
     pub(super) child_frame_id: String,
     pub(super) transform: RosTransform,
 }
@@ -227,7 +227,7 @@ mod tests {
     fn messages_are_read_in_both_orders_of_bytes() {
         let stamp = Time::from_nanoseconds(-1_500_000_000);
         assert_eq!(stamp.nanoseconds(), -1_500_000_000);
-        let header = Header { stamp, frame_id: "tip".to_owned() };
+        let header = RosHeader { stamp, frame_id: "tip".to_owned() };
         let message = Vector { header, content: [1.0, -2.0, 3.5] };
         assert_eq!(decode::<Vector>(&encode(&message).unwrap()).unwrap(), message);
         let big = re_cdr::to_vec::<_, BigEndian>(&message).unwrap();

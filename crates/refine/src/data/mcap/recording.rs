@@ -14,8 +14,8 @@ use super::camera::camera_of;
 use super::frames::Frames;
 use super::images::describe;
 use super::messages::{
-    CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, Header, IMAGE, JOINT_STATE, JointState, Stamped,
-    TRANSFORMS, TransformStamped, VECTOR, WRENCH, decode,
+    CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, IMAGE, JOINT_STATE, JointStateMessage, RosHeader,
+    Stamped, TRANSFORMS, TransformStamped, VECTOR, WRENCH, decode,
 };
 use super::reader::MessageReader;
 use super::series::TimeSeries;
@@ -213,7 +213,7 @@ pub(super) fn taxel_frame(index: usize) -> String {
 }
 
 /// When a message was made \[ns\]; when it was recorded, if it does not say so.
-pub(super) fn moment(header: &Header, message: &mcap::Message<'_>) -> i64 {
+pub(super) fn moment(header: &RosHeader, message: &mcap::Message<'_>) -> i64 {
     match header.stamp.nanoseconds() {
         0 => i64::try_from(message.log_time).unwrap_or(i64::MAX),
         stamp => stamp,
@@ -271,7 +271,7 @@ impl RecordingIndex {
                 self.cameras.insert(topic.to_owned(), info.content);
             }
         } else if kind == JOINT_STATE {
-            let Stamped { header, content }: Stamped<JointState> = self.keep(data)?;
+            let Stamped { header, content }: Stamped<JointStateMessage> = self.keep(data)?;
             for (name, position) in content.name.into_iter().zip(content.position) {
                 let series = self.readings.joints.entry(name).or_default();
                 series.push(moment(&header, message), position);

@@ -123,11 +123,11 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::data::mcap::messages::{Header, Time};
+    use crate::data::mcap::messages::{RosHeader, Time};
 
     fn placed(parent: &str, child: &str, pose: &Isometry3<f64>) -> TransformStamped {
         TransformStamped {
-            header: Header { stamp: Time::default(), frame_id: parent.to_owned() },
+            header: RosHeader { stamp: Time::default(), frame_id: parent.to_owned() },
             child_frame_id: child.to_owned(),
             transform: pose.into(),
         }

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::messages::{
     CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, CompressedImage, DIAGNOSTICS, DiagnosticStatus,
-    Header, IMAGE, JOINT_STATE, JointState, MARKER, Marker, NUMBER, POSE, RosImage, RosTransform,
-    Stamped, TRANSFORMS, Time, TransformStamped, VECTOR, WRENCH, encode,
+    IMAGE, JOINT_STATE, JointStateMessage, MARKER, Marker, NUMBER, POSE, RosHeader, RosImage,
+    RosTransform, Stamped, TRANSFORMS, Time, TransformStamped, VECTOR, WRENCH, encode,
 };
 use super::recording::taxel_frame;
 use super::schemas::schema;
@@ -101,10 +101,10 @@ impl RecordingWriter {
     /// Joints and forces.
     fn felt(&mut self, at: i64, measured: &HandMeasurement) -> Result<(), DatasetError> {
         let hand = &measured.hand;
-        let joints = JointState {
+        let joints = JointStateMessage {
             name: hand.tree.joint_names().to_vec(),
             position: measured.joints.clone(),
-            ..JointState::default()
+            ..JointStateMessage::default()
         };
         self.stamped(("/joint_states", JOINT_STATE), at, "", joints)?;
         for (taxel, force) in hand.taxels.iter().zip(&measured.forces) {
@@ -235,8 +235,8 @@ impl RecordingWriter {
     }
 }
 
-fn header(at: i64, frame: &str) -> Header {
-    Header { stamp: Time::from_nanoseconds(at), frame_id: frame.to_owned() }
+fn header(at: i64, frame: &str) -> RosHeader {
+    RosHeader { stamp: Time::from_nanoseconds(at), frame_id: frame.to_owned() }
 }
 
 /// Where the frame `child` is in `parent`.

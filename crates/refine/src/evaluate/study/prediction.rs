@@ -24,7 +24,7 @@ const EVENTS: [(f64, f64); 7] = [
 /// Position errors are those of the center of the object's bounding box, the origin of the covariance's twists, not of
 /// the model's origin as in PE. Symmetries are not taken into account.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Prediction {
+pub(super) struct StudyPrediction {
     /// Position error \[mm\] and orientation error \[°\].
     errors: [Option<f64>; 2],
     /// Standard deviations of the two: roots of the traces of the covariance's blocks \[mm, °\].
@@ -51,7 +51,7 @@ pub(super) struct Prediction {
     termination: String,
 }
 
-impl Prediction {
+impl StudyPrediction {
     /// Compares `posterior` in a pose of `object` with the true pose `truth` (object → camera \[m\]); `None` where a number is not finite.
     pub(super) fn new(
         posterior: &Posterior,
@@ -143,7 +143,7 @@ mod tests {
         let refined = refine(&frame, &scene.initial, &Method::default()).unwrap();
         let pose = *refined.t_cam_object();
         let posterior = refined.posterior.unwrap();
-        let stated = Prediction::new(&posterior, &scene.object, &scene.truth).unwrap();
+        let stated = StudyPrediction::new(&posterior, &scene.object, &scene.truth).unwrap();
         // Nothing is as sure as the bound.
         for (bound, sigma) in stated.bounds.iter().zip(&stated.sigmas) {
             assert!(bound.unwrap() > 0.0 && bound < sigma, "{stated:?}");
@@ -157,7 +157,7 @@ mod tests {
         let p = stated.probabilities.map(|p| p.unwrap());
         assert!(p.iter().all(|p| (0.0..=1.0).contains(p)));
         assert!(p[0] <= p[1] && p[1] <= p[2] && p[6] <= p[2].min(p[5]) + 1e-12);
-        let own = Prediction::new(&posterior, &scene.object, &pose).unwrap();
+        let own = StudyPrediction::new(&posterior, &scene.object, &pose).unwrap();
         assert!(own.errors.iter().all(|error| error.unwrap() < 1e-9));
         assert!(own.squared_distances.iter().all(|s| s.unwrap() < 1e-12));
     }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kind::Kind;
-use super::prediction::Prediction;
+use super::prediction::StudyPrediction;
 use super::sweep::Sweep;
 use crate::data::PlainPose;
 use crate::evaluate::metrics::COLUMNS as METRICS;
@@ -84,7 +84,7 @@ pub struct Record {
     /// Metrics, in the order of [`METRICS`].
     pub(super) metrics: [Option<f64>; METRICS.len()],
     /// The posterior that the method states, beside the error.
-    pub(super) prediction: Prediction,
+    pub(super) prediction: StudyPrediction,
     /// Provenance.
     pub(super) provenance: Provenance,
 }
@@ -101,7 +101,7 @@ impl Record {
             status: OK.into(),
             pose: [None; 7],
             metrics: [None; METRICS.len()],
-            prediction: Prediction::default(),
+            prediction: StudyPrediction::default(),
             provenance,
         }
     }

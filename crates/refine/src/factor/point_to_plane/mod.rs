@@ -60,7 +60,7 @@ settings! {
 /// nothing. What the points' errors have in common, a smooth field, is eliminated.
 pub struct PointToPlaneFactor {
     object: Arc<Object>,
-    points: Vec<Point>,
+    points: Vec<MeasuredPoint>,
     field: Option<SmoothField>,
     /// Where the object may be off from its model.
     patches: Option<Arc<SurfacePatches>>,
@@ -68,7 +68,7 @@ pub struct PointToPlaneFactor {
 }
 
 /// A depth point.
-struct Point {
+struct MeasuredPoint {
     /// Its column and row.
     pixel: (usize, usize),
     /// Its direction, (x/z, y/z).
@@ -87,7 +87,7 @@ const MET: f64 = 1e-5;
 const STEPS: usize = 96;
 
 /// A point seen from the surface.
-struct Residual {
+struct PlaneResidual {
     /// Signed distance from the surface \[m\].
     distance: f64,
     /// Signed distance from the nearest place of the surface \[m\], whether or not the point can be of that.
@@ -112,7 +112,7 @@ impl PointToPlaneFactor {
         let (object, hand) = (Arc::clone(frame.object()), frame.hand_depth());
         let (mask, camera) = (&frame.observation().mask, &frame.observation().camera);
         let settings = settings.clone();
-        let point = |(x, y, depth): (usize, usize, f64)| Point {
+        let point = |(x, y, depth): (usize, usize, f64)| MeasuredPoint {
             pixel: (x, y),
             ray: camera.unproject(x as f64, y as f64, 1.0).coords.xy(),
             depth,
@@ -129,7 +129,7 @@ impl PointToPlaneFactor {
         // Of an object that is hardly more than border, that must do.
         let depths =
             if central.len() as f64 > 0.5 * depths.len() as f64 { central } else { depths };
-        let points: Vec<Point> = depths.into_iter().map(point).collect();
+        let points: Vec<MeasuredPoint> = depths.into_iter().map(point).collect();
         if points.is_empty() {
             return Err(RefineError::NoDepth);
         }
@@ -144,9 +144,9 @@ impl PointToPlaneFactor {
     }
 
     /// Residual of each point at `state`; `None` without a nearest place on the surface.
-    fn residuals(&self, state: &State) -> Vec<Option<Residual>> {
+    fn residuals(&self, state: &State) -> Vec<Option<PlaneResidual>> {
         let (t_object_cam, weighting) = (state.t_cam_object.inverse(), self.weighting());
-        let residual = |point: &Point| {
+        let residual = |point: &MeasuredPoint| {
             let place = state.camera.point(&point.ray, point.depth);
             let (query, face) = (t_object_cam * place, point.face.load(Ordering::Relaxed));
             let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
@@ -158,7 +158,7 @@ impl PointToPlaneFactor {
             let facing = self.facing(state, &closest, &surface);
             let away =
                 if distance.abs() > f64::EPSILON.sqrt() { offset / distance } else { normal };
-            let residual = Residual { distance, nearest: distance, facing, surface, away };
+            let residual = PlaneResidual { distance, nearest: distance, facing, surface, away };
             // What is far behind is of something else.
             if facing > 0.0 || !weighting.is_inlier(distance) {
                 return Some(residual);
@@ -185,7 +185,7 @@ impl PointToPlaneFactor {
         state: &State,
         t_object_cam: &Isometry3<f64>,
         nearest: f64,
-    ) -> Option<Residual> {
+    ) -> Option<PlaneResidual> {
         let Object { surface, center, radius, .. } = &*self.object;
         let (eye, direction) = (t_object_cam * Point3::origin(), t_object_cam * place.coords);
         let length = direction.norm();
@@ -205,7 +205,7 @@ impl PointToPlaneFactor {
                 let facing = self.facing(state, &closest, &met);
                 let distance = away.dot(&(place.coords - met));
                 let surface = place.coords - away * distance;
-                let residual = Residual { distance, nearest, facing, surface, away };
+                let residual = PlaneResidual { distance, nearest, facing, surface, away };
                 return Some(residual).filter(|_| facing > 0.0);
             }
         }
@@ -213,8 +213,8 @@ impl PointToPlaneFactor {
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.
-    fn fit(&self, residuals: &[Option<Residual>]) -> FieldFit {
-        let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
+    fn fit(&self, residuals: &[Option<PlaneResidual>]) -> FieldFit {
+        let distance = |r: &Option<PlaneResidual>| r.as_ref().map_or(0.0, |r| r.distance);
         let distances: Vec<f64> = residuals.iter().map(distance).collect();
         let weighting = self.weighting();
         let facing = |i: usize| residuals[i].as_ref().map_or(0.0, |r| r.facing);
@@ -224,10 +224,10 @@ impl PointToPlaneFactor {
     }
 
     /// Nats at the fitted field.
-    fn cost_of(&self, residuals: &[Option<Residual>], fit: &FieldFit) -> f64 {
+    fn cost_of(&self, residuals: &[Option<PlaneResidual>], fit: &FieldFit) -> f64 {
         let weighting = self.weighting();
-        let cost = |(left, residual): (&f64, &Option<Residual>)| {
-            let Some(Residual { nearest, facing, .. }) = residual else { return 0.0 };
+        let cost = |(left, residual): (&f64, &Option<PlaneResidual>)| {
+            let Some(PlaneResidual { nearest, facing, .. }) = residual else { return 0.0 };
             facing * weighting.cost(*left) + (1.0 - facing) * weighting.cost(*nearest)
         };
         fit.left.iter().zip(residuals).map(cost).sum::<f64>() + fit.cost
@@ -264,9 +264,9 @@ impl Factor for PointToPlaneFactor {
         let seen = residuals.iter().flatten().count() as f64;
         equations.add_degrees(seen * self.weighting().degrees);
         let center = state.center();
-        let row = |(point, residual): (&Point, &Option<Residual>)| {
+        let row = |(point, residual): (&MeasuredPoint, &Option<PlaneResidual>)| {
             let mut row = [0.0; N];
-            let Some(Residual { surface, away, .. }) = residual else { return row };
+            let Some(PlaneResidual { surface, away, .. }) = residual else { return row };
             let twist = twist_row(&(surface - center), &-away);
             let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(away);
             row[..6].copy_from_slice(twist.as_slice());
@@ -370,7 +370,7 @@ mod tests {
         let (frame, state) = fixture(0);
         let factor = factor(&frame, 0.0);
         for (point, residual) in factor.points.iter().zip(factor.residuals(&state)) {
-            let Residual { distance, surface, away, .. } = residual.unwrap();
+            let PlaneResidual { distance, surface, away, .. } = residual.unwrap();
             let place = state.camera.point(&point.ray, point.depth).coords;
             assert!((surface + away * distance - place).norm() < 1e-12);
             assert!((away.norm() - 1.0).abs() < 1e-9);

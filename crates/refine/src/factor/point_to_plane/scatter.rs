@@ -2,7 +2,7 @@
 
 use crate::problem::State;
 
-use super::{PointToPlaneFactor, Residual};
+use super::{PlaneResidual, PointToPlaneFactor};
 
 /// How depth points scatter about a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub(crate) struct NoiseEstimate {
 
 /// Number, sum and sum of squares of the residuals in a patch.
 #[derive(Clone, Copy, Default)]
-struct Patch {
+struct ScatterPatch {
     count: f64,
     sum: f64,
     squares: f64,
@@ -39,10 +39,10 @@ impl PointToPlaneFactor {
         let side = (area / wanted).sqrt().max(1.0);
         let patch = |from: usize, to: usize| ((to - from) as f64 / side) as usize;
         let across = patch(left, right) + 1;
-        let mut patches = vec![Patch::default(); across * (patch(top, bottom) + 1)];
+        let mut patches = vec![ScatterPatch::default(); across * (patch(top, bottom) + 1)];
         let limit = self.settings.noise.kernel.scale().unwrap_or(f64::INFINITY);
         for (point, residual) in self.points.iter().zip(self.residuals(state)) {
-            let Some(Residual { distance, facing, .. }) = residual else { continue };
+            let Some(PlaneResidual { distance, facing, .. }) = residual else { continue };
             let residual = distance.clamp(-limit, limit);
             let (x, y) = point.pixel;
             let patch = &mut patches[patch(top, y) * across + patch(left, x)];

@@ -70,18 +70,23 @@ impl Display for DiagnosisSummary {
 
 /// Sensors that may be at fault: colors of another texture, depth of what shines or lets light through, a skin that feels what is not there, cameras
 /// that were moved. Outlines, and that things are not in the same place, are always evidence.
-const SENSORS: [Sensor; 4] = [Sensor::Color, Sensor::Depth, Sensor::Touch, Sensor::Views];
+const SENSORS: [DiagnosedSensor; 4] = [
+    DiagnosedSensor::Color,
+    DiagnosedSensor::Depth,
+    DiagnosedSensor::Touch,
+    DiagnosedSensor::Views,
+];
 
 #[derive(Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
-enum Sensor {
+enum DiagnosedSensor {
     Color,
     Depth,
     Touch,
     Views,
 }
 
-impl Sensor {
+impl DiagnosedSensor {
     /// Its evidence.
     fn modalities(self) -> &'static [Modality] {
         match self {
@@ -132,7 +137,7 @@ impl Fused {
         for sensor in SENSORS.into_iter().filter(|sensor| sensor.is_in(frame, &self.settings)) {
             let mut fused = self.clone();
             fused.settings.modalities.retain(|modality| !sensor.modalities().contains(modality));
-            fused.settings.views &= sensor != Sensor::Views;
+            fused.settings.views &= sensor != DiagnosedSensor::Views;
             all.push(run(&fused, sensor.into())?);
         }
         Ok(all)

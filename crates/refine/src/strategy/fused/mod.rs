@@ -30,7 +30,7 @@ pub use self::posterior::{
     Inconsistency, Posterior, PosteriorMode, PosteriorSettings, UnobservableDirection,
 };
 pub(crate) use self::posterior::{ScaleMixture, chi_square_z};
-use self::run::Run;
+use self::run::FusedRun;
 pub use self::settings::{FusedSettings, HypothesisSettings, Modality, Nuisance, Stage};
 pub use self::summary::PosteriorSummary;
 use super::{Estimate, Observer, Strategy};
@@ -238,7 +238,7 @@ impl Strategy for Fused {
         if rendering.downsample == 0 || stages.iter().any(|stage| stage.downsample == 0) {
             return Err(RefineError::Setting { name: "downsample", problem: "is zero".into() });
         }
-        Run::new(self, frame, initial)?.finish(observe)
+        FusedRun::new(self, frame, initial)?.finish(observe)
     }
 
     fn iterations(&self) -> usize {

@@ -27,13 +27,13 @@ pub enum NominalSizeError {
 
 /// Physical dimension of a size.
 #[derive(Clone, Copy)]
-enum Quantity {
+enum NominalQuantity {
     Length,
     Angle,
     Ratio,
 }
 
-impl Quantity {
+impl NominalQuantity {
     /// Its units, with their values in SI units.
     fn units(self) -> &'static [(&'static str, f64)] {
         match self {
@@ -47,24 +47,26 @@ impl Quantity {
 type Field = fn(&mut FusedSettings) -> Option<&mut f64>;
 
 /// All sizes: standard deviations of the errors, for most objects and rigs.
-const SIZES: [(&str, Quantity, Field); 17] = [
-    ("object.translation", Quantity::Length, |s| Some(&mut s.prior.object_translation)),
-    ("object.rotation", Quantity::Angle, |s| Some(&mut s.prior.object_rotation)),
-    ("hand.translation", Quantity::Length, |s| Some(&mut s.prior.hand_translation)),
-    ("hand.rotation", Quantity::Angle, |s| Some(&mut s.prior.hand_rotation)),
-    ("joints", Quantity::Angle, |s| Some(&mut s.prior.joints)),
-    ("joints.prismatic", Quantity::Length, |s| Some(&mut s.prior.prismatic_joints)),
-    ("depth.scale", Quantity::Ratio, |s| Some(&mut s.prior.depth_scale)),
-    ("depth.bias", Quantity::Length, |s| Some(&mut s.prior.depth_bias)),
-    ("depth.noise", Quantity::Length, |s| Some(&mut s.depth.noise.sigma)),
-    ("camera.principal-point", Quantity::Ratio, |s| Some(&mut s.prior.principal_point)),
-    ("camera.focal-length", Quantity::Ratio, |s| Some(&mut s.prior.focal_scale)),
-    ("camera.aspect", Quantity::Ratio, |s| Some(&mut s.prior.aspect)),
-    ("view.translation", Quantity::Length, |s| Some(&mut s.prior.view_translation)),
-    ("view.rotation", Quantity::Angle, |s| Some(&mut s.prior.view_rotation)),
-    ("model", Quantity::Length, |s| Some(&mut s.patches.sigma)),
-    ("model.scale", Quantity::Ratio, |s| Some(&mut s.model_scale.sigma)),
-    ("touch", Quantity::Length, |s| s.tactile.touch.noise_mut().map(|noise| &mut noise.sigma)),
+const SIZES: [(&str, NominalQuantity, Field); 17] = [
+    ("object.translation", NominalQuantity::Length, |s| Some(&mut s.prior.object_translation)),
+    ("object.rotation", NominalQuantity::Angle, |s| Some(&mut s.prior.object_rotation)),
+    ("hand.translation", NominalQuantity::Length, |s| Some(&mut s.prior.hand_translation)),
+    ("hand.rotation", NominalQuantity::Angle, |s| Some(&mut s.prior.hand_rotation)),
+    ("joints", NominalQuantity::Angle, |s| Some(&mut s.prior.joints)),
+    ("joints.prismatic", NominalQuantity::Length, |s| Some(&mut s.prior.prismatic_joints)),
+    ("depth.scale", NominalQuantity::Ratio, |s| Some(&mut s.prior.depth_scale)),
+    ("depth.bias", NominalQuantity::Length, |s| Some(&mut s.prior.depth_bias)),
+    ("depth.noise", NominalQuantity::Length, |s| Some(&mut s.depth.noise.sigma)),
+    ("camera.principal-point", NominalQuantity::Ratio, |s| Some(&mut s.prior.principal_point)),
+    ("camera.focal-length", NominalQuantity::Ratio, |s| Some(&mut s.prior.focal_scale)),
+    ("camera.aspect", NominalQuantity::Ratio, |s| Some(&mut s.prior.aspect)),
+    ("view.translation", NominalQuantity::Length, |s| Some(&mut s.prior.view_translation)),
+    ("view.rotation", NominalQuantity::Angle, |s| Some(&mut s.prior.view_rotation)),
+    ("model", NominalQuantity::Length, |s| Some(&mut s.patches.sigma)),
+    ("model.scale", NominalQuantity::Ratio, |s| Some(&mut s.model_scale.sigma)),
+    ("touch", NominalQuantity::Length, |s| {
+        s.tactile.touch.noise_mut().map(|noise| &mut noise.sigma)
+    }),
 ];
 
 /// Standard deviation of what is exact, as a share of the nominal one.

@@ -24,7 +24,7 @@ use crate::strategy::{Estimate, Iteration, Observer, Recorder};
 const IMAGE: &str = "rendering";
 
 /// A refinement under way.
-pub(super) struct Run<'a> {
+pub(super) struct FusedRun<'a> {
     fused: &'a Fused,
     frame: &'a PreparedFrame<'a>,
     initial: &'a State,
@@ -36,7 +36,7 @@ pub(super) struct Run<'a> {
     noise: NoiseScales,
 }
 
-impl<'a> Run<'a> {
+impl<'a> FusedRun<'a> {
     pub(super) fn new(
         fused: &'a Fused,
         frame: &'a PreparedFrame<'a>,

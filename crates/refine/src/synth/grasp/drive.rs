@@ -9,7 +9,7 @@ use prehend_sim::SimulationError;
 use super::grasper::Grasper;
 use super::preshape::Preshape;
 use super::self_collision::ball;
-use super::simulation::Simulation;
+use super::simulation::GraspSimulation;
 use crate::scene::Hand;
 
 /// The least lever that counts \[m\].
@@ -45,7 +45,7 @@ pub(super) fn levers(robot: &Hand, preshape: &Preshape, paths: &[Vec<usize>]) ->
     (0..joints.len()).map(lever).collect()
 }
 
-impl Simulation<'_> {
+impl GraspSimulation<'_> {
     /// One time step of [`advance`](Self::advance), in which the joints close; returns the change of their positions.
     pub(super) fn close(
         &mut self,

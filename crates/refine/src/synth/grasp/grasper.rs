@@ -14,7 +14,7 @@ use super::placement::Placement;
 use super::preshape::Preshape;
 use super::self_collision::SelfCollision;
 use super::settings::GraspSettings;
-use super::simulation::Simulation;
+use super::simulation::GraspSimulation;
 use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
 use crate::scene::{Hand, Object};
@@ -137,7 +137,7 @@ impl<'a> Grasper<'a> {
         let mut pace = |_: &f64| 1.0 + settings.speed_spread * (2.0 * random.uniform() - 1.0);
         let pace: Vec<f64> = self.preshape.speed.iter().map(&mut pace).collect();
         let grip = settings.grip + settings.grip_per_weight * weight;
-        let mut simulation = Simulation::new(self, &joints, &t_hand_object, grip)?;
+        let mut simulation = GraspSimulation::new(self, &joints, &t_hand_object, grip)?;
         simulation.pace = pace;
         self.close(&mut simulation)?;
         self.check_links(&simulation)?;
@@ -191,7 +191,7 @@ impl<'a> Grasper<'a> {
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
     /// creeping, and whether the object is held will be seen.
-    fn close(&self, simulation: &mut Simulation<'_>) -> Result<(), GraspError> {
+    fn close(&self, simulation: &mut GraspSimulation<'_>) -> Result<(), GraspError> {
         let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
         let mut still = 0;
         for _ in 0..steps(self.settings.closing_time) {
@@ -210,7 +210,7 @@ impl<'a> Grasper<'a> {
     }
 
     /// Refuses an object that moves faster than this many times what counts as still.
-    fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspError> {
+    fn check_rest(&self, simulation: &GraspSimulation<'_>, times: f64) -> Result<(), GraspError> {
         let (speed, spin) = simulation.speed();
         let rests = speed < times * STILL.1 && spin < times * STILL.2;
         let error = "hand and object did not come to rest";
@@ -220,7 +220,7 @@ impl<'a> Grasper<'a> {
     /// Lets gravity pull in several directions; how far the object moves and turns at most.
     fn hold(
         &self,
-        simulation: &mut Simulation<'_>,
+        simulation: &mut GraspSimulation<'_>,
         random: &mut SplitMix64,
     ) -> Result<(f64, f64), GraspError> {
         let start = simulation.t_hand_object();
@@ -256,7 +256,7 @@ impl<'a> Grasper<'a> {
     }
 
     /// Links that touch, if they are enough.
-    fn check_links(&self, simulation: &Simulation<'_>) -> Result<Vec<usize>, GraspError> {
+    fn check_links(&self, simulation: &GraspSimulation<'_>) -> Result<Vec<usize>, GraspError> {
         let mut forces = vec![0.0; simulation.poses.len()];
         for touch in simulation.touches() {
             forces[touch.link] += touch.force.norm();
@@ -269,7 +269,7 @@ impl<'a> Grasper<'a> {
     }
 
     /// Contact area \[cm²\] and shared volume \[cm³\], within their bounds.
-    fn measure(&self, simulation: &Simulation<'_>) -> Result<(f64, f64), GraspError> {
+    fn measure(&self, simulation: &GraspSimulation<'_>) -> Result<(f64, f64), GraspError> {
         let t_hand_object = &simulation.t_hand_object();
         let hand = self.robot.posed(&Isometry3::identity(), &simulation.joints)?;
         let hand = SolidUnion::new(&hand.mesh_parts())?;

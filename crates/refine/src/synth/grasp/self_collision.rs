@@ -16,11 +16,11 @@ const APART: f64 = 2e-3;
 
 /// Pairs of links that should stay apart.
 pub(super) struct SelfCollision {
-    links: Vec<Link>,
+    links: Vec<HandLink>,
     pairs: Vec<LinkPair>,
 }
 
-struct Link {
+struct HandLink {
     number: usize,
     shape: Arc<LinkShape>,
     points: Vec<Point3<f64>>,
@@ -45,7 +45,7 @@ impl SelfCollision {
             let mut mesh = TriMesh::default();
             shape.parts().iter().for_each(|p| mesh.append(p));
             let points = surface_samples(&mesh, SAMPLES, 0).into_iter().map(|s| s.point).collect();
-            links.push(Link { number, shape: shape.clone(), points, center, radius });
+            links.push(HandLink { number, shape: shape.clone(), points, center, radius });
         }
         let mut pairs = Vec::new();
         for i in 0..links.len() {
@@ -72,7 +72,7 @@ impl SelfCollision {
 
 impl LinkPair {
     /// True if a sample of the one is within `reach` of the other.
-    fn meets(&self, links: &[Link], poses: &[Isometry3<f64>], reach: f64) -> bool {
+    fn meets(&self, links: &[HandLink], poses: &[Isometry3<f64>], reach: f64) -> bool {
         let [a, b] = self.links.map(|l| &links[l]);
         let t_b_a = poses[b.number].inverse() * poses[a.number];
         if (t_b_a * a.center - b.center).norm() > a.radius + b.radius + reach {

@@ -39,7 +39,7 @@ pub(super) struct Touch {
 }
 
 /// One hand and one object, at one moment.
-pub(super) struct Simulation<'a> {
+pub(super) struct GraspSimulation<'a> {
     pub(super) grasper: &'a Grasper<'a>,
     model: Model,
     /// States of the model's bodies.
@@ -66,7 +66,7 @@ struct Solid {
     looked_at: Option<Isometry3<f64>>,
 }
 
-impl<'a> Simulation<'a> {
+impl<'a> GraspSimulation<'a> {
     /// Hand and object at rest.
     pub(super) fn new(
         grasper: &'a Grasper<'a>,

@@ -6,7 +6,7 @@ use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 
 use super::preshape::Preshape;
-use super::simulation::Simulation;
+use super::simulation::GraspSimulation;
 use super::*;
 use crate::scene::{Hand, Object};
 
@@ -39,7 +39,7 @@ fn loaded(
     gravity: Vector3<f64>,
 ) -> (Vector3<f64>, (f64, f64)) {
     let mut simulation =
-        Simulation::new(grasper, &grasp.joints, &grasp.t_hand_object, grasp.grip).unwrap();
+        GraspSimulation::new(grasper, &grasp.joints, &grasp.t_hand_object, grasp.grip).unwrap();
     let still = vec![0.0; grasp.joints.len()];
     for _ in 0..40 {
         simulation.advance(&still, Some(gravity)).unwrap();

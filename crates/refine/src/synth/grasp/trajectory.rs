@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 
 use super::error::GraspError;
 use super::grasper::{Grasp, Grasper};
-use super::simulation::Simulation;
+use super::simulation::GraspSimulation;
 use super::skin::taxel_forces;
 use crate::synth::pose_noise::random_direction;
 
@@ -69,7 +69,7 @@ impl Grasper<'_> {
         let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(random));
         let squeezing = Waves::new(random);
         let Grasp { joints, t_hand_object, grip, .. } = grasp;
-        let mut simulation = Simulation::new(self, joints, t_hand_object, *grip)?;
+        let mut simulation = GraspSimulation::new(self, joints, t_hand_object, *grip)?;
         let dt = settings.time_step;
         let inner = (settings.frame_time / dt).round().max(1.0) as usize;
         let settling = (SETTLING / dt).ceil() as usize;
@@ -113,7 +113,7 @@ impl Grasper<'_> {
     }
 
     /// Force of the object on each taxel, in the frame of its link \[N\].
-    fn taxel_forces(&self, simulation: &Simulation<'_>) -> Vec<Vector3<f64>> {
+    fn taxel_forces(&self, simulation: &GraspSimulation<'_>) -> Vec<Vector3<f64>> {
         let (taxels, reach) = (&self.robot.taxels, self.settings.taxel_reach);
         taxel_forces(taxels, &self.taxel_links, reach, &simulation.touches(), &simulation.poses)
     }
@@ -141,7 +141,7 @@ impl Slips {
     }
 
     /// True while the grip is loose.
-    fn at(&mut self, moment: usize, simulation: &Simulation<'_>, dt: f64) -> bool {
+    fn at(&mut self, moment: usize, simulation: &GraspSimulation<'_>, dt: f64) -> bool {
         let pose = simulation.t_hand_object();
         if let Some((_, distance)) = self.left.pop_if(|(next, _)| moment >= *next) {
             self.now = Some((pose, distance, LOOSE_TIME));

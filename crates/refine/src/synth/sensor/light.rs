@@ -15,7 +15,8 @@ impl LightSettings {
         noise: &mut SplitMix64,
     ) -> Lights {
         let up = up.try_normalize(1e-9).unwrap_or_else(|| -Vector3::y());
-        let mut lamps: Vec<Lamp> = (0..self.lamps).map(|k| self.lamp(k, &up, noise)).collect();
+        let mut lamps: Vec<SensorLamp> =
+            (0..self.lamps).map(|k| self.lamp(k, &up, noise)).collect();
         let total: f32 = lamps.iter().map(|l| l.strength.iter().sum::<f32>() / 3.0).sum();
         let share = 1.0 - self.ambient_share as f32;
         // A surface faces its lamps by half, say: as bright in all as under light from everywhere.
@@ -31,12 +32,12 @@ impl LightSettings {
         Lights { up: up.cast(), ambient, lamps, gloss, shadow, shadow_share }
     }
 
-    fn lamp(&self, index: u32, up: &Vector3<f64>, noise: &mut SplitMix64) -> Lamp {
+    fn lamp(&self, index: u32, up: &Vector3<f64>, noise: &mut SplitMix64) -> SensorLamp {
         let spread = Vector3::from_fn(|_, _| noise.normal());
         // Mostly from above and from the camera's side, so that what is seen is lit.
         let towards = spread.normalize() + up * 0.7 - Vector3::z() * 0.7;
         let strength = if index == 0 { 1.0 } else { 0.2 + 0.4 * noise.uniform() };
-        Lamp { towards: towards.normalize().cast(), strength: self.tinted(strength, noise) }
+        SensorLamp { towards: towards.normalize().cast(), strength: self.tinted(strength, noise) }
     }
 
     fn tinted(&self, strength: f64, noise: &mut SplitMix64) -> [f32; 3] {
@@ -48,14 +49,14 @@ impl LightSettings {
 pub(super) struct Lights {
     up: Vector3<f32>,
     ambient: [f32; 3],
-    lamps: Vec<Lamp>,
+    lamps: Vec<SensorLamp>,
     gloss: f32,
     shadow: Option<Shadow>,
     shadow_share: f32,
 }
 
 /// A lamp far away.
-struct Lamp {
+struct SensorLamp {
     towards: Vector3<f32>,
     strength: [f32; 3],
 }

@@ -12,7 +12,7 @@ use prehend_render::Mask;
 
 use self::parts::large_parts;
 pub use self::settings::SegmentationSettings;
-use self::window::{Label, Pixel, Window};
+use self::window::{Label, SegmentationWindow, WindowPixel};
 use super::TrackerSettings;
 use super::sight::Sight;
 use crate::scene::{
@@ -37,7 +37,7 @@ pub(super) struct Segmenter {
     /// See [`color_shares`](Self::color_shares); none before any was learnt from a pose.
     usual_shares: Option<[f64; 2]>,
     /// Where the last frame was looked at; its memory serves the next one.
-    window: Window,
+    window: SegmentationWindow,
 }
 
 impl Segmenter {
@@ -72,7 +72,7 @@ impl Segmenter {
         is_seen
     }
 
-    fn segment_window(&mut self, sight: &mut Sight, window: &Window) -> bool {
+    fn segment_window(&mut self, sight: &mut Sight, window: &SegmentationWindow) -> bool {
         self.judge_masks(window, sight.measured);
         let [set, unset] = self.mask_evidence(sight);
         let settings = &self.settings;
@@ -103,7 +103,7 @@ impl Segmenter {
     }
 
     /// Regions by the given mask, if that and the pixels which seem to show the object overlap, and else by colors.
-    fn regions(&self, sight: &Sight, window: &Window) -> RegionEvidence {
+    fn regions(&self, sight: &Sight, window: &SegmentationWindow) -> RegionEvidence {
         let Sight { frame, given, tells, .. } = sight;
         let both =
             frame.mask.pixels().iter().zip(given.pixels()).filter(|(a, b)| **a && **b).count();
@@ -118,7 +118,7 @@ impl Segmenter {
 
     /// Adds to the regions of `sight` that `object` is `about` that pose, and in the given box, if there is one.
     pub(super) fn add_prior(&self, sight: &mut Sight, object: &Object, about: &Isometry3<f64>) {
-        let mut window = Window::default();
+        let mut window = SegmentationWindow::default();
         let Some(regions) = sight.regions.take() else { return };
         let mut regions = Arc::unwrap_or_clone(regions);
         if window.look(sight, object, about, self.settings.reach, &self.settings).is_some() {
@@ -168,16 +168,16 @@ impl Segmenter {
     }
 
     /// See [`anywhere`](Self::anywhere): connected parts. Where no depth is measured it is that of the object, `depth` \[m\].
-    fn places(&self, sight: &Sight, depth: f32) -> Option<Vec<Vec<Pixel>>> {
+    fn places(&self, sight: &Sight, depth: f32) -> Option<Vec<Vec<WindowPixel>>> {
         let settings = &self.settings;
-        let window = Window::whole(sight, depth, settings);
+        let window = SegmentationWindow::whole(sight, depth, settings);
         let [set, unset] = self.mask_evidence(sight);
         let center = window.hand_center();
         // Nothing is known at all.
         if center.is_none() && !self.ratios.are_known() && set == 0.0 {
             return None;
         }
-        let may_show = |pixel: &Pixel| {
+        let may_show = |pixel: &WindowPixel| {
             let color = self.ratios.of_index(pixel.color);
             let told = if pixel.masked { set } else { unset };
             let near = pixel.near_hand(center, &window.place(pixel), settings);
@@ -185,14 +185,14 @@ impl Segmenter {
             // Before any color is known, all that is near the hand may be the object.
             evidence > 0.0 || evidence == 0.0 && !self.ratios.are_known()
         };
-        let pixels: Vec<Pixel> = window.pixels().copied().collect();
+        let pixels: Vec<WindowPixel> = window.pixels().copied().collect();
         let may_show: Vec<bool> = pixels.iter().map(may_show).collect();
         let columns = sight.frame.camera.width.div_ceil(settings.stride());
         let parts = large_parts(&may_show, columns, settings.least_share);
         let of_part = |part: &Vec<usize>| part.iter().map(|k| pixels[*k]).collect();
-        let parts: Vec<Vec<Pixel>> = parts.iter().map(of_part).collect();
+        let parts: Vec<Vec<WindowPixel>> = parts.iter().map(of_part).collect();
         let shown = || parts.iter().flatten();
-        let area: f32 = shown().map(Pixel::seen_area).sum();
+        let area: f32 = shown().map(WindowPixel::seen_area).sum();
         let enough = shown().count() >= settings.enough
             && area >= settings.least_share as f32 * self.seen_area;
         enough.then_some(parts)
@@ -206,7 +206,7 @@ impl Segmenter {
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
-        let mut window = Window::default();
+        let mut window = SegmentationWindow::default();
         if window.look(sight, object, t_cam_object, 0.0, &self.settings).is_none() {
             return 0.0;
         }
@@ -231,7 +231,7 @@ impl Segmenter {
     }
 
     /// Share of the pixels which should show the object that rather have its colors, and intersection of their histogram and its own.
-    fn color_shares(&self, window: &Window) -> [f64; 2] {
+    fn color_shares(&self, window: &SegmentationWindow) -> [f64; 2] {
         let shown = window.pixels().filter(|pixel| pixel.is_expected());
         let shown: Vec<u16> = shown.map(|pixel| pixel.color).collect();
         let own = shown.iter().filter(|color| self.ratios.of_index(**color) > 0.0).count();
@@ -242,11 +242,11 @@ impl Segmenter {
     pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
         let mut window = mem::take(&mut self.window);
         if window.look(sight, object, t_cam_object, self.settings.reach, &self.settings).is_some() {
-            let area: f32 = window.pixels().map(Pixel::expected_area).sum();
+            let area: f32 = window.pixels().map(WindowPixel::expected_area).sum();
             let gain = if self.seen_area > 0.0 { self.gain } else { 1.0 };
             self.seen_area += gain * (area - self.seen_area);
             let is_known = self.ratios.are_known();
-            let label = |pixel: &Pixel| match (sight.measured, is_known) {
+            let label = |pixel: &WindowPixel| match (sight.measured, is_known) {
                 (true, _) => pixel.label(&self.settings),
                 (false, true) => pixel.label_by(self.ratios.of_index(pixel.color) >= 0.0),
                 (false, false) => pixel.label_by(pixel.masked || !sight.tells),
@@ -267,7 +267,7 @@ impl Segmenter {
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.
-    fn judge_masks(&mut self, window: &Window, measured: bool) {
+    fn judge_masks(&mut self, window: &SegmentationWindow, measured: bool) {
         let mut expected = 0.0_f32;
         // Of those that show the object and of others, how many are not in the mask and are.
         let mut counts = [[0.0_f32; 2]; 2];

@@ -19,7 +19,7 @@ pub(super) enum Label {
 
 /// One pixel of a window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
+pub(super) struct WindowPixel {
     /// Column and row in the picture.
     pub(super) at: [u32; 2],
     /// The share of its neighbors that should show the object.
@@ -34,8 +34,8 @@ pub(super) struct Pixel {
 
 /// Part of a picture at every so many pixels. It can look at many pictures, one after the other, in the same memory.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Window {
-    pixels: Vec<Pixel>,
+pub(super) struct SegmentationWindow {
+    pixels: Vec<WindowPixel>,
     range: [Range<usize>; 2],
     /// Camera of the whole picture.
     camera: Option<Camera>,
@@ -49,7 +49,7 @@ pub(super) struct Window {
     settings: SegmentationSettings,
 }
 
-impl Window {
+impl SegmentationWindow {
     /// Looks about an object at `t_cam_object`, and `reach` \[m\] to all sides; none if that is out of the picture.
     pub(super) fn look(
         &mut self,
@@ -82,10 +82,10 @@ impl Window {
         self.pixels.clear();
         for (row, line) in self.drawn.pixels().chunks(columns).enumerate() {
             self.pixels.extend(line.iter().enumerate().map(|(column, &own)| {
-                let pixel = Pixel::sensed(sight, picture(column, row));
+                let pixel = WindowPixel::sensed(sight, picture(column, row));
                 let hidden = pixel.hand > 0.0 && pixel.hand < own;
                 let share = if own > 0.0 && !hidden { 1.0 } else { 0.0 };
-                Pixel { share, object: own, ..pixel }
+                WindowPixel { share, object: own, ..pixel }
             }));
         }
         if self.pixels.iter().all(|pixel| pixel.share == 0.0) {
@@ -122,9 +122,9 @@ impl Window {
     pub(super) fn whole(sight: &Sight, depth: f32, settings: &SegmentationSettings) -> Self {
         let (full, stride) = (&sight.frame.camera, settings.stride());
         let (columns, rows) = (full.width.div_ceil(stride), full.height.div_ceil(stride));
-        let pixel = |k: usize| Pixel {
+        let pixel = |k: usize| WindowPixel {
             object: depth,
-            ..Pixel::sensed(sight, [k % columns * stride, k / columns * stride])
+            ..WindowPixel::sensed(sight, [k % columns * stride, k / columns * stride])
         };
         let range = [0..full.width, 0..full.height];
         let pixels = (0..columns * rows).map(pixel).collect();
@@ -132,7 +132,7 @@ impl Window {
     }
 
     /// Point that is visible at a pixel of a whole picture, camera frame \[m\].
-    pub(super) fn place(&self, pixel: &Pixel) -> Vector3<f32> {
+    pub(super) fn place(&self, pixel: &WindowPixel) -> Vector3<f32> {
         let [x, y] = pixel.at.map(f64::from);
         let place = self.camera.map(|camera| camera.unproject(x, y, f64::from(pixel.sensor)));
         place.map_or_else(Vector3::zeros, |place| place.coords.cast())
@@ -160,12 +160,12 @@ impl Window {
         (0..rows.len()).flat_map(|y| (0..columns.len()).map(move |x| drawn(x, y))).collect()
     }
 
-    pub(super) fn pixels(&self) -> impl Iterator<Item = &Pixel> + Clone {
+    pub(super) fn pixels(&self) -> impl Iterator<Item = &WindowPixel> + Clone {
         self.pixels.iter()
     }
 }
 
-impl Pixel {
+impl WindowPixel {
     /// Measured pixel at a column and row, without an expectation.
     fn sensed(sight: &Sight, at: [usize; 2]) -> Self {
         let Sight { frame: observation, given, hand_depth, .. } = sight;

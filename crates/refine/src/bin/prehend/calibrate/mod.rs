@@ -19,14 +19,14 @@ use prehend_refine::data::identity::canonical;
 use prehend_refine::evaluate::report::Report;
 use prehend_refine::scene::Object;
 
-use crate::options::{Input, Job, limit_threads, write_poses};
+use crate::options::{InputArgs, Job, limit_threads, write_poses};
 use crate::settings::SettingsOptions;
 use crate::terminal::{cache, progress, say};
 
 #[derive(Args)]
 pub(crate) struct Calibrate {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
     /// Write the rig here, as JSON (see docs/RIG.md); an existing one is replaced
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,

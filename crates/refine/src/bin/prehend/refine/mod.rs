@@ -16,7 +16,7 @@ use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
 use crate::options::{
-    HYPOTHESES, Masks, Rendering, Selection, beside, check_details, limit_threads,
+    HYPOTHESES, Masks, RenderingArgs, Selection, beside, check_details, limit_threads,
 };
 
 #[derive(Args)]
@@ -53,7 +53,7 @@ pub(crate) struct Refine {
     #[command(flatten)]
     method: MethodOptions,
     #[command(flatten)]
-    rendering: Rendering,
+    rendering: RenderingArgs,
 }
 
 impl Refine {

@@ -7,7 +7,7 @@ use prehend_refine::scene::{Frame, Object};
 use prehend_refine::tracker::Tracked;
 
 /// A frame of a film.
-pub(super) struct Moment {
+pub(super) struct FilmMoment {
     pub(super) target: Target,
     /// Time since the first one.
     pub(super) time: Duration,

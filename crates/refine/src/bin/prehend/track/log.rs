@@ -12,7 +12,7 @@ use prehend_refine::scene::{Frame, Hand, Object};
 use prehend_refine::tracker::{TrackStatus, Tracked};
 use prehend_render::{RenderModel, draw_outline};
 
-use super::film::{FrameLog, Moment};
+use super::film::{FilmMoment, FrameLog};
 use super::log_options::LogOptions;
 use super::{Start, Tracking};
 use crate::terminal::cache;
@@ -93,7 +93,7 @@ pub(super) fn track(
             Ok(FrameInput { frame, object: Arc::clone(&object), rig: rig.clone() })
         };
         let time = Duration::from_nanos(since.max(0) as u64);
-        let moment = Moment { target, time, stamp: Some(nanoseconds), input: input() };
+        let moment = FilmMoment { target, time, stamp: Some(nanoseconds), input: input() };
         target.im_id += 1;
         moment
     };

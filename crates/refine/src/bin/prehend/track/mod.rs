@@ -37,13 +37,13 @@ use prehend_render::Backend;
 use serde_json::json;
 
 use self::done::{Done, told};
-use self::film::{FrameLog, Moment};
+use self::film::{FilmMoment, FrameLog};
 use self::images::{Watch, select_scene, stop_on_ctrl_c};
 use self::log_options::LogOptions;
 use self::report::FilmReport;
 use crate::failures::Failures;
 use crate::options::{
-    Masks, Rendering, Selection, check_details, limit_threads, open_rig, row, write_poses,
+    Masks, RenderingArgs, Selection, check_details, limit_threads, open_rig, row, write_poses,
 };
 use crate::settings::SettingsOptions;
 use crate::terminal::{cache, progress, say, warn};
@@ -129,7 +129,7 @@ pub(crate) struct Track {
     #[arg(long, value_name = "N", help_heading = "Method")]
     threads: Option<NonZeroUsize>,
     #[command(flatten)]
-    rendering: Rendering,
+    rendering: RenderingArgs,
 }
 
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
@@ -361,7 +361,7 @@ impl Tracking<'_> {
                     let seconds = f64::from(im_id - first) / *rate;
                     let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                     let input = assets.load(&target, None, &[]).map_err(anyhow::Error::from);
-                    Some(Moment { target, time, stamp: None, input })
+                    Some(FilmMoment { target, time, stamp: None, input })
                 });
                 self.follow(&mut film, count, &object, initial)
             };
@@ -374,7 +374,7 @@ impl Tracking<'_> {
     /// Follows `object` through `film`, of `count` frames or 0 if nobody knows, from `initial` on if that is known.
     fn follow(
         &mut self,
-        film: &mut dyn Iterator<Item = Moment>,
+        film: &mut dyn Iterator<Item = FilmMoment>,
         count: usize,
         object: &Arc<Object>,
         initial: Option<Isometry3<f64>>,
@@ -393,7 +393,7 @@ impl Tracking<'_> {
             report.begin(count);
         }
         while !stopped()
-            && let Some(Moment { target, time, stamp, input }) = film.next()
+            && let Some(FilmMoment { target, time, stamp, input }) = film.next()
         {
             // What was sensed is given back where it is asked for once more.
             let attempt = || -> anyhow::Result<(Tracked, Option<FrameInput>)> {
