@@ -19,4 +19,5 @@ pub use film::FilmSettings;
 pub(super) use lens::SimulatedLens;
 pub(super) use rig::SensorRig;
 pub use settings::{SensorSettings, SettingError};
+#[cfg(feature = "cli")]
 pub(crate) use smooth_field::smooth_field;
