@@ -163,7 +163,7 @@ impl Plant {
             }
             Ok::<_, SimulationError>(())
         };
-        Ok(self.model.simulate_controlled(&SemiImplicitEuler, start, time_steps, control)?)
+        Ok(self.model.simulate_controlled(&SemiImplicitEuler, start, time_steps, control)?.states)
     }
 
     /// Displacements after some seconds from `start`.

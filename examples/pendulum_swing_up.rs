@@ -64,7 +64,7 @@ impl Pendulum {
         };
         let time_steps = TimeSteps { dt: HOLD / parts as f64, steps: parts * efforts.len() };
         let run = model.rollout_controlled(integrator, &start, time_steps, control)?;
-        run.iter().map(|states| model.joint_motion(states, self.rod)).collect()
+        run.states.iter().map(|states| model.joint_motion(states, self.rod)).collect()
     }
 
     /// How far the rod ends from upright and at rest.

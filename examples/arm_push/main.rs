@@ -69,7 +69,7 @@ fn push<S: Scalar>(
     };
     let time_steps = TimeSteps { dt: TICK / parts as f64, steps: parts * ticks };
     let end = scene.model.cast().simulate_controlled(integrator, &start, time_steps, control)?;
-    run.push(end);
+    run.push(end.states);
     Ok(run)
 }
 

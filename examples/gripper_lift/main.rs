@@ -62,7 +62,7 @@ pub(crate) fn main() -> anyhow::Result<()> {
         Ok::<_, SimulationError>(())
     };
     let began = std::time::Instant::now();
-    let run = model.rollout_controlled(&Adaptive::default(), &start, time_steps, control)?;
+    let run = model.rollout_controlled(&Adaptive::default(), &start, time_steps, control)?.states;
     println!("{HELD} s simulated in {:.1} s", began.elapsed().as_secs_f64());
 
     let height = |states: &State| states[lifted].pose.translation.z;

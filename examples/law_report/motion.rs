@@ -183,7 +183,7 @@ fn unaudited(
     mut visit: impl FnMut(Step, &State),
 ) -> Result<State, SimulationError> {
     let control = |step: Step, _: &mut Model, states: &mut State| visit(step, states);
-    model.simulate_controlled(&Adaptive::default(), start, time_steps, control)
+    Ok(model.simulate_controlled(&Adaptive::default(), start, time_steps, control)?.states)
 }
 
 /// Half a period of the contact that rests \[s\].

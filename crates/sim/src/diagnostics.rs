@@ -73,15 +73,21 @@ pub(crate) struct Diagnostics<'a, S: Scalar> {
     /// None if the integrator holds its error itself.
     roughness: Option<StepResolution>,
     tunneling: Option<Tunneling>,
-    energy: EnergyBalance,
+    /// None where energy may come from anywhere.
+    energy: Option<EnergyBalance>,
 }
 
 impl<'a, S: Scalar> Diagnostics<'a, S> {
-    /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not.
-    pub(crate) fn new(model: &'a Model<S>, initial: &Rows<S>, controls_error: bool) -> Self {
+    /// Diagnostics of a simulation from `initial` by an integrator that `controls_error` or not, of which contacts may bring no energy if it `is_passive`.
+    pub(crate) fn new(
+        model: &'a Model<S>,
+        initial: &Rows<S>,
+        controls_error: bool,
+        is_passive: bool,
+    ) -> Self {
         let roughness = (!controls_error).then(|| StepResolution::new(model, initial));
         let tunneling = (!controls_error).then(|| Tunneling::new(model, initial));
-        let energy = EnergyBalance::new(model, initial, controls_error);
+        let energy = is_passive.then(|| EnergyBalance::new(model, initial, controls_error));
         Self { model, roughness, tunneling, energy }
     }
 
@@ -96,7 +102,7 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
         if let Some(tunneling) = &mut self.tunneling {
             tunneling.step(self.model, step, states);
         }
-        self.energy.step(self.model, step, states)
+        self.energy.as_mut().map_or(Ok(()), |energy| energy.step(self.model, step, states))
     }
 
     /// Report on a number of steps that have led to `state`.
@@ -105,7 +111,9 @@ impl<'a, S: Scalar> Diagnostics<'a, S> {
     /// If contacts have made energy, or velocities are too large to be squared.
     pub(crate) fn finish(mut self, steps: usize, state: &State<S>) -> Result<Resolution> {
         let (time, states) = (state.time, state.rows());
-        self.energy.check(self.model, time, states)?;
+        if let Some(energy) = &mut self.energy {
+            energy.check(self.model, time, states)?;
+        }
         let roughness = self.roughness.as_ref().map(StepResolution::mean);
         if roughness.is_some_and(|roughness| !roughness.is_finite()) {
             return Err(self.model.blown_up(states, time));

@@ -9,6 +9,7 @@ mod contact_frequency;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 mod contacts_between;
+mod dynamics;
 mod failure;
 mod generalized_coordinates;
 pub(crate) mod joint_force;

@@ -132,7 +132,8 @@ impl<S: Scalar> Model<S> {
         time_steps: TimeSteps,
         mut visit: impl FnMut(&State<S>),
     ) -> Result<Simulation<State<S>>> {
-        let mut diagnostics = Diagnostics::new(self, state.rows(), integrator.controls_error());
+        let mut diagnostics =
+            Diagnostics::new(self, state.rows(), integrator.controls_error(), true);
         let mut near = SampleCulling::new(self);
         let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
         for step in time_steps.after(state.time) {
@@ -168,7 +169,7 @@ impl<S: Scalar> Model<S> {
     /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
     /// either, whose error ends it, too.
     ///
-    /// Nothing is said of how well the steps resolve the motion, as [`Model::simulate_with`] does: see [`Model::check_time_step`].
+    /// In the report, what the controller changes from one step to the next counts as roughness.
     ///
     /// Over a scalar that carries derivatives they pass through the controller too.
     ///
@@ -189,7 +190,8 @@ impl<S: Scalar> Model<S> {
     ///     model.bodies[ball].external_wrench.x = -stiffness * state[ball].pose.translation.x;
     /// };
     /// let (lifted, start) = (model.cast(), start.cast());
-    /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+    /// let run = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+    /// let end = run.states;
     /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
     /// # Ok(())
     /// # }
@@ -203,7 +205,7 @@ impl<S: Scalar> Model<S> {
         initial: &State<S>,
         time_steps: TimeSteps,
         control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
-    ) -> Result<State<S>> {
+    ) -> Result<Simulation<State<S>>> {
         self.controlled(integrator, initial, time_steps, control, |_| ())
     }
 
@@ -217,12 +219,12 @@ impl<S: Scalar> Model<S> {
         initial: &State<S>,
         time_steps: TimeSteps,
         control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
-    ) -> Result<Vec<State<S>>> {
-        let mut run = room_for(time_steps.steps)?;
-        let keep = |state: &State<S>| run.push(state.clone());
+    ) -> Result<Simulation<Vec<State<S>>>> {
+        let mut states = room_for(time_steps.steps)?;
+        let keep = |state: &State<S>| states.push(state.clone());
         let end = self.controlled(integrator, initial, time_steps, control, keep)?;
-        run.push(end);
-        Ok(run)
+        states.push(end.states);
+        Ok(Simulation { states, resolution: end.resolution })
     }
 
     fn controlled<R: ControlResult>(
@@ -232,8 +234,11 @@ impl<S: Scalar> Model<S> {
         time_steps: TimeSteps,
         mut control: impl FnMut(Step, &mut Self, &mut State<S>) -> R,
         mut visit: impl FnMut(&State<S>),
-    ) -> Result<State<S>> {
+    ) -> Result<Simulation<State<S>>> {
         let (mut state, mut model) = (self.initialize(initial, time_steps)?, self.clone());
+        let mut diagnostics =
+            Diagnostics::new(self, state.rows(), integrator.controls_error(), false);
+        let mut steps = 0;
         for step in time_steps.after(state.time) {
             if control(step, &mut model, &mut state).into_flow()?.is_break() {
                 break;
@@ -242,8 +247,11 @@ impl<S: Scalar> Model<S> {
             visit(&state);
             model.check(&state, step)?;
             state = model.advance(integrator, &state, step)?;
+            diagnostics.step(step, state.rows())?;
+            steps += 1;
         }
-        Ok(state)
+        let resolution = diagnostics.finish(steps, &state)?;
+        Ok(Simulation { states: state, resolution })
     }
 
     /// State at the end of a step: the integrator's, then that of kinematic bodies. The step says when it begins, whatever `state.time` is.
@@ -436,9 +444,9 @@ mod tests {
         };
         let run = model.rollout_controlled(&SemiImplicitEuler, &states, time_steps, control);
         let run = run.unwrap();
-        assert_eq!(run.len(), 8);
+        assert_eq!((run.states.len(), run.resolution.steps), (8, 7));
         let end = model.simulate_controlled(&SemiImplicitEuler, &states, time_steps, control);
-        assert_eq!(&end.unwrap(), run.last().unwrap());
+        assert_eq!(&end.unwrap().states, run.states.last().unwrap());
         let fails = |step: Step, _: &mut Model, _: &mut State| match step.index {
             3 => Err(SimulationError::TimeStep(0.0)),
             _ => Ok(ControlFlow::Continue(())),

@@ -127,7 +127,7 @@ impl StabilityLoss {
         let initial = self.states(model, *start);
         let end =
             model.simulate_controlled(&SemiImplicitEuler, &initial, self.time_steps, go_on)?;
-        let state = &end[self.object];
+        let state = &end.states[self.object];
         let shift = state.pose.translation.vector - start.pose.translation.vector;
         let turn = so3_log(&(state.pose.rotation * start.pose.rotation.inverse()));
         let parts = [shift, turn, state.linear, state.angular];

@@ -183,6 +183,14 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
         spatial(&force, &(angular(wrench) + self.places[link].cross(&force)))
     }
 
+    /// Linear momentum \[kg m/s\] and angular momentum about the world's origin \[kg m²/s\] of all links, without armature.
+    pub fn momentum(&self) -> Vector6<S> {
+        let links = self.inertias.iter().zip(&self.velocities);
+        let sum = links.fold(Vector6::zeros(), |sum, (inertia, v)| sum + inertia.times(v));
+        let along = linear(&sum);
+        spatial(&along, &(angular(&sum) + self.origin.map(S::constant).cross(&along)))
+    }
+
     /// Kinetic and potential energy.
     pub fn energy(&self, v: &[S]) -> Energy<S> {
         let (mut kinetic, mut potential) = (S::zero(), S::zero());

@@ -36,8 +36,8 @@
 //! let lifted = model.cast();
 //! let start = lifted.neutral_state();
 //! let time_steps = TimeSteps { dt: 0.02, steps: 20 };
-//! let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
-//! let [angle, _] = lifted.joint_motion(&end, rod)?;
+//! let run = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+//! let [angle, _] = lifted.joint_motion(&run.states, rod)?;
 //! assert!(angle.value > 0.1 && angle.derivative[0] > 0.1);
 //! # Ok(())
 //! # }

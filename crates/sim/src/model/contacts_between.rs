@@ -90,7 +90,7 @@ impl<S: Scalar> Model<S> {
     }
 
     /// Samples and fields by which two bodies touch, with the weight of each contact.
-    pub(super) fn sides(
+    pub(crate) fn sides(
         &self,
         a: BodyId,
         b: BodyId,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::Model;
 use crate::contact::calibration::ContactCalibration;
 use crate::contact::composite::Law;
+use crate::contact::dynamic::DynContactLaw;
 use crate::contact::friction::bristle::BristleFriction;
 use crate::contact::friction::coulomb::Coulomb;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -74,6 +75,16 @@ impl Model {
             body.surface.is_some() || body.field.is_some()
         };
         let bodies: Vec<BodyId> = self.body_ids().filter(touches).collect();
+        let (law, smoothing) = self.material_law(&bodies, material)?;
+        self.add_contacts_between(&bodies, &bodies, law, smoothing)
+    }
+
+    /// Law of a material between bodies, by the heaviest beside the area that it rests on and the smallest.
+    pub(crate) fn material_law(
+        &self,
+        bodies: &[BodyId],
+        material: Material,
+    ) -> Result<(Arc<dyn DynContactLaw>, GapSmoothing), BuildError> {
         let gravity = Some(self.gravity.norm()).filter(|g| *g > 0.0).unwrap_or(GRAVITY);
         let mut target: Option<ContactCalibration> = None;
         let mut size = f64::INFINITY;
@@ -99,8 +110,7 @@ impl Model {
             Coulomb { friction: material.friction, slip_scale: SLIP * (gravity * size).sqrt() };
         let friction = BristleFriction { friction, deflection: DEFLECTION * penetration };
         let smoothing = GapSmoothing::Softplus { width: WIDTH * penetration };
-        let law = Arc::new(Law::new(normal, friction)?);
-        self.add_contacts_between(&bodies, &bodies, law, smoothing)
+        Ok((Arc::new(Law::new(normal, friction)?), smoothing))
     }
 }
 

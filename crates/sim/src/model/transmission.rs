@@ -157,7 +157,7 @@ impl<S: Scalar> Model<S> {
     }
 
     /// The mass matrix of an articulation, with what moves with lengths: accelerations of its joints cause efforts by it.
-    pub(crate) fn mass_matrix(&self, articulation: usize, states: &Rows<S>) -> DMatrix<S> {
+    pub(crate) fn mass_matrix_of(&self, articulation: usize, states: &Rows<S>) -> DMatrix<S> {
         let own = &self.articulations[articulation];
         let joints = &states[self.joint_range(articulation)];
         let [q, v] = own.coordinates(joints);

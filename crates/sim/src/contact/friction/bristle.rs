@@ -171,7 +171,7 @@ mod tests {
             };
             let adaptive = crate::Adaptive::default();
             let end = model.simulate_controlled(&adaptive, &start, time_steps, control).unwrap();
-            end[1].pose.translation.x
+            end.states[1].pose.translation.x
         };
         let [early, late] = [10, 40].map(|periods| shake(0.5, periods, &mut model));
         assert!((late - early).abs() < 2e-6, "{early} {late}");

@@ -1,6 +1,7 @@
 //! Robots in MJCF.
 
 mod actuators;
+mod contacts;
 mod forces;
 mod lengths;
 mod links;
@@ -50,11 +51,13 @@ impl Default for MjcfOptions {
     }
 }
 
-/// A robot in a model.
+/// Robot or scene of a file in a model: handles by the names of the file.
 #[derive(Clone, Debug)]
 pub struct MjcfRobot {
-    /// The body of each body of the model, in its order. Its frame is the body's.
+    /// Link of each body of the file, in its order. Its frame is the body's.
     pub bodies: Vec<BodyId>,
+    /// Fixed body of each geom of the file's world that collides, in its order.
+    pub fixed: Vec<BodyId>,
     /// Each joint with a name.
     pub joints: Vec<(String, JointAxis)>,
     /// Each actuator with its name, to set its `"control"`.
@@ -155,11 +158,12 @@ pub enum MjcfError {
 }
 
 impl Model {
-    /// Adds the bodies of a model as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops. Geoms
-    /// of the file's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
-    /// [`Model::reference_positions`] puts it where the file has it.
+    /// Adds the bodies of an MJCF file as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops.
+    /// Geoms of the file's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
+    /// [`reference_positions`](MjcfModel::reference_positions) puts it where the file has it.
     ///
-    /// Contacts are the caller's to add, with [`Model::add_contacts_between`].
+    /// Gravity stays that of this model, and contacts are the caller's to add ([`Model::add_contacts`], [`Model::add_contacts_between`]);
+    /// [`Model::from_mjcf`] takes both from the file.
     ///
     /// # Errors
     /// If a body weighs nothing and yet should move by itself, or a shape cannot be. The model is then as it was.
@@ -198,7 +202,8 @@ impl Model {
             _ => states.next(),
         });
         let activations: Vec<Option<BodyId>> = activations.collect();
-        let robot = MjcfRobot {
+        let mut robot = MjcfRobot {
+            fixed: Vec::new(),
             bodies: chain.bodies.iter().map(|link| links[*link]).collect(),
             joints: named(&chain.joints, |link| links[link]),
             actuators: Vec::new(),
@@ -210,7 +215,7 @@ impl Model {
             moved: chain.joints.iter().map(|joint| (joint.kind, links[joint.link])).collect(),
         };
         if options.shapes {
-            self.add_shapes(mjcf, &robot, options)?;
+            robot.fixed = self.add_shapes(mjcf, &robot, options)?;
         }
         for (body, id) in mjcf.bodies.iter().zip(&robot.bodies) {
             if body.gravity_compensation != 0.0 {

@@ -123,7 +123,7 @@ impl MjcfRobot {
         else {
             return DMatrix::zeros(0, 0);
         };
-        let own = model.mass_matrix(articulation, state.rows());
+        let own = model.mass_matrix_of(articulation, state.rows());
         let count = self.moved.iter().map(|(kind, _)| kind.velocities()).sum();
         // Velocities of the articulation by MuJoCo's.
         let mut turned = DMatrix::zeros(own.nrows(), count);

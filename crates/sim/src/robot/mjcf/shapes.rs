@@ -14,6 +14,7 @@ use prehend_geometry::sdf::HeightSpline;
 
 use super::{MjcfError, MjcfOptions, MjcfRobot};
 use crate::fields::{HalfSpace as Below, Placed};
+use crate::handle::BodyId;
 use crate::model::Model;
 use crate::model::body::Body;
 use crate::shape::Shape;
@@ -25,13 +26,13 @@ use crate::shape::options::ShapeOptions;
 const ELLIPSOID: usize = 12;
 
 impl Model {
-    /// Gives the robot's bodies the shapes of their geoms that collide, and adds the fixed ones of the file's world.
+    /// Gives the robot's bodies the shapes of their geoms that collide, and adds the fixed ones of the file's world, which it returns.
     pub(super) fn add_shapes(
         &mut self,
         mjcf: &MjcfModel,
         robot: &MjcfRobot,
         options: &MjcfOptions,
-    ) -> Result<(), MjcfError> {
+    ) -> Result<Vec<BodyId>, MjcfError> {
         // Bodies of the same geoms share their shape.
         let mut made: Vec<(&[Geom], Option<Shape>)> = Vec::new();
         for (body, id) in mjcf.bodies.iter().zip(&robot.bodies) {
@@ -51,6 +52,7 @@ impl Model {
                 own.field = Some(shape.field().clone());
             }
         }
+        let mut fixed = Vec::new();
         for geom in mjcf.world_geoms.iter().filter(|geom| geom.collides()) {
             let wrong = |error| MjcfError::Shape { body: geom.name.clone(), error };
             let shape = match geom.shape {
@@ -63,14 +65,14 @@ impl Model {
                         height: normal.dot(&place),
                     };
                     let body = Body::fixed(&geom.name);
-                    self.add(body.with_field(Arc::new(field)));
+                    fixed.push(self.add(body.with_field(Arc::new(field))));
                     continue;
                 }
                 MjcfShape::HeightField(ref terrain) => {
                     let field = ground(terrain).ok_or(ShapeError::Heights).map_err(wrong)?;
                     let pose = options.t_world_mjcf * geom.t_body_geom * field.pose;
                     let body = Body::fixed(&geom.name);
-                    self.add(body.with_field(Arc::new(Placed { pose, ..field })));
+                    fixed.push(self.add(body.with_field(Arc::new(Placed { pose, ..field }))));
                     continue;
                 }
                 _ => {
@@ -80,10 +82,10 @@ impl Model {
                 }
             };
             if let Some(shape) = shape {
-                self.add(Body::fixed_from_shape(&geom.name, &shape));
+                fixed.push(self.add(Body::fixed_from_shape(&geom.name, &shape)));
             }
         }
-        Ok(())
+        Ok(fixed)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Articulations as parts of a model.
 
+mod dynamics;
 mod free_body;
 mod golden;
 mod gradients;

@@ -26,14 +26,7 @@ fn free_tree(seed: u64) -> (Model, State) {
 }
 
 fn energy(model: &Model, states: &State) -> f64 {
-    let [mut q, mut v] = [Vec::new(), Vec::new()];
-    for link in model.articulations[0].bodies() {
-        let joint = model.joint(states, *link).unwrap();
-        q.extend(joint.position);
-        v.extend(joint.velocity);
-    }
-    let at = model.articulations[0].tree.kinematics(&q, &v).under(model.gravity);
-    let Energy { kinetic, potential } = at.energy(&v);
+    let Energy { kinetic, potential } = model.energy(states).unwrap();
     kinetic + potential
 }
 

@@ -3,6 +3,7 @@
 mod bounces;
 mod holding;
 mod material;
+mod mjcf;
 mod parcel;
 mod scene;
 mod scenes;

@@ -140,7 +140,7 @@ fn runs_go_on_from_the_time_of_their_state() {
         let controlled = model.simulate_controlled(integrator, &half, time_steps(150), look);
         let batch = Batch::with_integrator(integrator.clone(), &model).unwrap();
         let mut of_batch = batch.simulate([(model.clone(), half.clone())], time_steps(150));
-        let ends = [run(&half, 150), controlled.unwrap(), of_batch.remove(0).unwrap()];
+        let ends = [run(&half, 150), controlled.unwrap().states, of_batch.remove(0).unwrap()];
         for end in ends {
             assert!((end.time - TIME).abs() < 1e-12, "{}", end.time);
             for (a, b) in end.bodies().iter().zip(whole.bodies()) {
