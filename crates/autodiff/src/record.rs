@@ -72,7 +72,7 @@ pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
 }
 
 /// [`Scalar::solve`](crate::Scalar::solve) for [`Var`].
-pub(crate) fn solve(matrix: &Factored<f64>, b: &[Var]) -> Vec<Var> {
+pub(crate) fn solve(matrix: &Factored, b: &[Var]) -> Vec<Var> {
     let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
     matrix.solve_in_place(&mut x);
     if b.iter().all(|b| Differentiable::is_constant(*b)) {
@@ -82,7 +82,7 @@ pub(crate) fn solve(matrix: &Factored<f64>, b: &[Var]) -> Vec<Var> {
 }
 
 /// x = A⁻¹ b.
-struct Inverse(Factored<f64>);
+struct Inverse(Factored);
 
 impl CustomVjp for Inverse {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
@@ -249,7 +249,7 @@ mod tests {
     fn solutions_have_the_same_derivatives_in_every_mode() {
         let matrix = nalgebra::Matrix3::new(2.0, 1.0, 0.5, -1.0, 3.0, 0.0, 0.3, 0.2, 4.0);
         let factors = crate::solve::lu(&matrix).unwrap();
-        fn value<S: Scalar>(factors: &Factored<f64>, p: &[S]) -> S {
+        fn value<S: Scalar>(factors: &Factored, p: &[S]) -> S {
             let b = [p[0] * p[1], p[1].sin(), S::constant(0.7)];
             S::solve(factors, &b).iter().fold(S::zero(), |sum, x| sum + *x * *x)
         }

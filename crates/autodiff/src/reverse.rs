@@ -101,7 +101,7 @@ impl_real_field!([] Var {
         Some(record::custom(inputs, outputs, operation))
     }
 
-    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+    fn solve(matrix: &Factored, b: &[Self]) -> Vec<Self> {
         record::solve(matrix, b)
     }
 });

@@ -153,7 +153,7 @@ pub trait Scalar: RealField + Copy + Default {
     ///
     /// # Panics
     /// If `b` has another number of rows.
-    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+    fn solve(matrix: &Factored, b: &[Self]) -> Vec<Self> {
         let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
         matrix.solve_in_place(&mut x);
         x.iter().map(|x| Self::constant(*x)).collect()

@@ -3,7 +3,6 @@
 
 use nalgebra::{ComplexField, Matrix2, Matrix3, SVector, Vector2, Vector3, Vector6};
 use prehend_autodiff::check::compare_gradients;
-use prehend_autodiff::implicit::{Residual, newton, solution};
 use prehend_autodiff::lie::{
     perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse, se3_log,
     se3_right_jacobian, se3_right_jacobian_inverse, so3_log,
@@ -12,8 +11,6 @@ use prehend_autodiff::optimize::{
     Adam, GradientDescent, LevenbergMarquardt, NormalEquations, OptimizeError,
 };
 use prehend_autodiff::rigid::{conjugated, rotate, turned};
-#[cfg(feature = "faer")]
-use prehend_autodiff::solve::SparseSolver;
 use prehend_autodiff::solve::{lu, sparse_lu};
 use prehend_autodiff::{Fwd, Quadratic, Recording, Scalar};
 use proptest::prelude::*;
@@ -142,15 +139,6 @@ fn motions<S: Scalar>(x: &[S]) -> Vec<S> {
     all
 }
 
-/// x³ = p, whose slope vanishes with x.
-struct Cube;
-
-impl Residual for Cube {
-    fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
-        vec![x[0] * x[0] * x[0] - p[0]]
-    }
-}
-
 fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         failure_persistence: None,
@@ -204,7 +192,6 @@ proptest! {
     #[test]
     fn linear_systems_are_solved_or_refused(m in [extremes(), extremes(), extremes(), extremes()], b in [extremes(), extremes()]) {
         let Ok(factored) = lu(&Matrix2::new(m[0], m[1], m[2], m[3])) else { return Ok(()) };
-        prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
         if let Ok(x) = factored.solve(&Vector2::from(b)) {
             prop_assert!(x.iter().all(|x| x.is_finite()));
         }
@@ -215,18 +202,9 @@ proptest! {
         let places = [(0, 0), (1, 0), (0, 1), (1, 1), (1, 1)];
         let values = [m[0], m[1], m[2], m[3], m[0]];
         let entries = std::array::from_fn::<_, 5, _>(|k| (places[k].0, places[k].1, values[k]));
-        let found = [
-            sparse_lu(2, &entries),
-            #[cfg(feature = "faer")]
-            SparseSolver::lu(2, &places).and_then(|solver| solver.factor(&values)),
-            #[cfg(feature = "faer")]
-            SparseSolver::cholesky(2, &places).and_then(|solver| solver.factor(&values)),
-        ];
-        for factored in found.into_iter().flatten() {
-            prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
-            if let Ok(x) = factored.solve(&Vector2::from(b)) {
-                prop_assert!(x.iter().all(|x| x.is_finite()));
-            }
+        let Ok(factored) = sparse_lu(2, &entries) else { return Ok(()) };
+        if let Ok(x) = factored.solve(&Vector2::from(b)) {
+            prop_assert!(x.iter().all(|x| x.is_finite()));
         }
     }
 
@@ -237,17 +215,6 @@ proptest! {
         let same = compare_gradients(&a, &a);
         let zero = a.iter().all(|a| *a == 0.0);
         prop_assert!(same.relative == 0.0 && (zero || a[0].abs().max(a[1].abs()) < 1e-300 || same.cosine > 1.0 - 1e-15));
-    }
-
-    #[test]
-    fn roots_are_found_or_refused(start in extremes(), p in extremes()) {
-        if let Ok(x) = newton(&Cube, &[start], &[p]) {
-            prop_assert!(x[0].is_finite());
-            if let Ok(moved) = solution(Cube, &x, &Fwd::<1>::variables([p])) {
-                // Infinite like that of a root at zero.
-                prop_assert!(!moved[0].derivative[0].is_nan(), "{moved:?}");
-            }
-        }
     }
 }
 
