@@ -21,7 +21,7 @@ pub enum Device {
 }
 
 impl Device {
-    /// The device, open and ready. [`WithFallback`](super::WithFallback) goes on with the processor where it fails.
+    /// The device, open and ready.
     ///
     /// Opening a graphics device and compiling its shaders takes some tenths of a second: call this once.
     ///

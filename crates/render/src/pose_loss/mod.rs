@@ -98,11 +98,6 @@ pub struct PoseImage {
     pub coverage: Vec<f32>,
     /// Z of the surface at pixel centers \[m\], 0 where there is none; with several samples a pixel, their mean.
     pub depth: DepthImage,
-    /// Unit normal at pixel centers, or the sample next to them, as shading sees it, towards the camera (camera frame), row-major; zero where there is
-    /// no surface.
-    pub normal: Vec<[f32; 3]>,
-    /// The face there, counting those that the model draws, row-major.
-    pub face: Vec<Option<u32>>,
 }
 
 impl PoseLoss {
@@ -277,8 +272,6 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
         color: RgbImage::filled(camera.width, camera.height, [0.0; 3]),
         coverage: vec![0.0; camera.width * camera.height],
         depth: DepthImage::filled(camera.width, camera.height, 0.0),
-        normal: vec![[0.0; 3]; camera.width * camera.height],
-        face: vec![None; camera.width * camera.height],
     };
     for block in 0..view.blocks() {
         view.visit::<false>(block, |x, y, seen| {
@@ -288,11 +281,6 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
                 image.coverage[at] = pixel.coverage;
                 image.depth.pixels_mut()[at] = if hit { pixel.z } else { 0.0 };
             }
-        });
-        view.faces(block, |x, y, face, normal| {
-            let at = y * camera.width + x;
-            image.normal[at] = normal.into();
-            image.face[at] = Some(face);
         });
     }
     image

@@ -139,7 +139,7 @@ impl pulp::WithSimd for Collect<'_> {
                     run.collect(faces, indices.iter().filter(near).copied(), [x0, y], settings);
                     for lane in 0..S::F32_LANES.min(end - x0) {
                         let inside = run.inside(lane);
-                        block.inside.push(inside.map_or(NONE, |(index, _)| ids[index as usize]));
+                        block.inside.push(inside.map_or(NONE, |index| ids[index as usize]));
                         block.faces.extend(run.faces(lane).map(|index| ids[index as usize]));
                         block.start.push(block.faces.len() as u32);
                     }

@@ -54,7 +54,6 @@ mod tests;
 
 use std::sync::OnceLock;
 
-use glam::Vec3;
 use nalgebra::{Isometry3, Point3};
 
 use crate::camera::Camera;
@@ -68,7 +67,6 @@ use crate::shading::surface::PosedLight;
 use crate::view::{Seen, View};
 pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
-use number::Number;
 pub(crate) use number::Wide;
 pub(crate) use pixel::LEAST_SHARE;
 use pixel::Scene;
@@ -208,75 +206,21 @@ impl View for SoftRasView<'_> {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        self.arch.dispatch(Walk { view: self, block, each_run: Shown::<DERIVATIVES, _>(each) });
-    }
-
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, Vec3)) {
-        self.arch.dispatch(Walk { view: self, block, each_run: Centers(each) });
-    }
-}
-
-/// Visitor of the pixels of each run.
-trait EachRun {
-    /// Visits the first `count` pixels from (column, row) on.
-    fn run<T: Number>(&mut self, scene: &Scene, run: &mut Run<T>, pixel: [usize; 2], count: usize);
-}
-
-/// Visitor of the pixels' values and derivatives.
-struct Shown<const DERIVATIVES: bool, F>(F);
-
-impl<const DERIVATIVES: bool, F> EachRun for Shown<DERIVATIVES, F>
-where
-    F: FnMut(usize, usize, Option<Seen>),
-{
-    #[inline(always)]
-    fn run<T: Number>(
-        &mut self,
-        scene: &Scene,
-        run: &mut Run<T>,
-        [first, y]: [usize; 2],
-        count: usize,
-    ) {
-        let pixels = scene.pixels::<DERIVATIVES, _>(run, first, y);
-        for lane in 0..count {
-            let mut seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
-            if let Some(seen) = seen.as_mut().filter(|_| scene.settings.fade) {
-                seen.pixel.fade::<DERIVATIVES>();
-            }
-            (self.0)(first + lane, y, seen);
-        }
-    }
-}
-
-/// Visitor of the faces at the pixels' centers.
-struct Centers<F>(F);
-
-impl<F: FnMut(usize, usize, u32, Vec3)> EachRun for Centers<F> {
-    #[inline(always)]
-    fn run<T: Number>(
-        &mut self,
-        scene: &Scene,
-        run: &mut Run<T>,
-        [first, y]: [usize; 2],
-        count: usize,
-    ) {
-        for lane in 0..count {
-            if let Some((face, b)) = run.inside(lane) {
-                let (face, normal) = scene.normal(face, b);
-                (self.0)(first + lane, y, face, normal);
-            }
-        }
+        self.arch.dispatch(Walk::<DERIVATIVES, _> { view: self, block, each });
     }
 }
 
 /// The work on one row of pixels, compiled for each set of vector instructions.
-struct Walk<'a, E> {
+struct Walk<'a, const DERIVATIVES: bool, F> {
     view: &'a SoftRasView<'a>,
     block: usize,
-    each_run: E,
+    each: F,
 }
 
-impl<E: EachRun> pulp::WithSimd for Walk<'_, E> {
+impl<const DERIVATIVES: bool, F> pulp::WithSimd for Walk<'_, DERIVATIVES, F>
+where
+    F: FnMut(usize, usize, Option<Seen>),
+{
     type Output = ();
 
     #[inline(always)]
@@ -290,7 +234,14 @@ impl<E: EachRun> pulp::WithSimd for Walk<'_, E> {
             let end = (first + RUN).min(region.x1);
             for x in (first..end).step_by(S::F32_LANES) {
                 run.collect(&scene.faces, faces.iter().copied(), [x, y], &scene.settings);
-                self.each_run.run(scene, &mut run, [x, y], S::F32_LANES.min(end - x));
+                let pixels = scene.pixels::<DERIVATIVES, _>(&mut run, x, y);
+                for lane in 0..S::F32_LANES.min(end - x) {
+                    let mut seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
+                    if let Some(seen) = seen.as_mut().filter(|_| scene.settings.fade) {
+                        seen.pixel.fade::<DERIVATIVES>();
+                    }
+                    (self.each)(x + lane, y, seen);
+                }
             }
         }
     }

@@ -4,7 +4,6 @@
 
 use std::sync::OnceLock;
 
-use glam::Vec3;
 use nalgebra::Point3;
 
 use super::blend::Blend;
@@ -17,7 +16,7 @@ use super::settings::Settings;
 use crate::camera::Camera;
 use crate::posed::Posed;
 use crate::precision::single;
-use crate::shading::surface::{PosedLight, posed_normal};
+use crate::shading::surface::PosedLight;
 use crate::view::{Pixel, Seen};
 
 /// Least share of a fragment in its pixel. Smaller ones are left out: 64 of them are less than 1e-6 of its color.
@@ -124,12 +123,6 @@ impl Scene<'_> {
             self.rows(run, &blend, column, row, &mut pixels);
         }
         pixels
-    }
-
-    /// The unit normal (camera frame) of a face at barycentric coordinates, and the model's index of the face.
-    pub(crate) fn normal(&self, face: u32, b: [f32; 3]) -> (u32, Vec3) {
-        let id = self.ids[face as usize];
-        (id, posed_normal(&self.posed, id as usize, b))
     }
 
     #[inline(always)]

@@ -21,10 +21,6 @@ impl View for PixelByPixel<'_> {
     ) {
         self.0.visit::<DERIVATIVES>(block, each);
     }
-
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, glam::Vec3)) {
-        self.0.faces(block, each);
-    }
 }
 
 #[test]
