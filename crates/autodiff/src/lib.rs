@@ -36,7 +36,7 @@
 //!
 //! | the operation | implement | apply with |
 //! |---|---|---|
-//! | takes a fixed, small number of scalars | [`LocalFunction`] | [`Scalar::local`], [`Scalar::sum_local`] |
+//! | takes a fixed, small number of scalars | [`LocalFunction`] | [`Scalar::local`] |
 //! | takes many numbers and knows its vector–Jacobian product: an image, a point set | [`CustomVjp`] | [`custom`] |
 //! | is generic code, too long to keep on the tape: a time step | [`Recompute`] | [`Scalar::recompute`] |
 //!

@@ -73,14 +73,6 @@ impl_real_field!([] Var {
     }
 
     #[inline]
-    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
-        x: &[Self],
-        terms: impl IntoIterator<Item = (F, [usize; K])>,
-    ) -> Self {
-        record::sum_local(x, terms)
-    }
-
-    #[inline]
     fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
         recomputed::recompute(function, x)
     }

@@ -4,13 +4,10 @@
 use nalgebra::{ComplexField, Matrix2, Matrix3, SVector, Vector2, Vector3, Vector6};
 use prehend_autodiff::check::compare_gradients;
 use prehend_autodiff::lie::{
-    perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse, se3_log,
-    se3_right_jacobian, se3_right_jacobian_inverse, so3_log,
+    perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_log, so3_log,
 };
-use prehend_autodiff::optimize::{
-    Adam, GradientDescent, LevenbergMarquardt, NormalEquations, OptimizeError,
-};
-use prehend_autodiff::rigid::{conjugated, rotate, turned};
+use prehend_autodiff::optimize::{Adam, LevenbergMarquardt, NormalEquations, OptimizeError};
+use prehend_autodiff::rigid::{conjugated, turned};
 use prehend_autodiff::solve::{lu, sparse_lu};
 use prehend_autodiff::{Fwd, Quadratic, Recording, Scalar};
 use proptest::prelude::*;
@@ -122,16 +119,9 @@ fn motions<S: Scalar>(x: &[S]) -> Vec<S> {
     all.extend(perturb_about(&motion, &rho, &xi).to_homogeneous().iter());
     all.extend(se3_log(&motion).iter());
     all.extend(so3_log(&(turn * turn.inverse())).iter());
-    for matrix in [
-        se3_adjoint(&motion),
-        se3_left_jacobian(&xi),
-        se3_right_jacobian(&xi),
-        se3_left_jacobian_inverse(&xi),
-        se3_right_jacobian_inverse(&xi),
-    ] {
+    for matrix in [se3_adjoint(&motion), se3_left_jacobian(&xi)] {
         all.extend(matrix.iter());
     }
-    all.extend(rotate(&turn, &rho).iter());
     all.extend(turned(&turn, &omega).coords.iter());
     all.extend(
         conjugated(&turn, &Matrix3::new(1.0, 0.1, 0.0, 0.1, 2.0, 0.0, 0.0, 0.0, 3.0), &rho).iter(),
@@ -251,9 +241,8 @@ proptest! {
         let start = [start, 1.0];
         for found in [
             Adam::default().minimize(&start, slope),
-            GradientDescent::default().minimize(&start, slope),
             LevenbergMarquardt::default().minimize(&start, equations),
-            LevenbergMarquardt::gauss_newton().minimize(&start, equations),
+            LevenbergMarquardt { damping: 0.0, ..Default::default() }.minimize(&start, equations),
         ] {
             match found {
                 Ok(found) => prop_assert!(found.value.is_finite() && found.parameters.iter().all(|p| p.is_finite())),
