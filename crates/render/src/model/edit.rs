@@ -34,14 +34,6 @@ impl RenderModel {
         Some((width, height, &map.levels[0].texels))
     }
 
-    /// The one color of the model, if it has but one.
-    pub fn uniform_color(&self) -> Option<[f32; 3]> {
-        match &self.albedo {
-            Albedo::Uniform(color) => Some(*color),
-            _ => None,
-        }
-    }
-
     /// Model of the same topology with other welded vertices, mesh frame \[m\]. Normals follow them. The [center](Self::center),
     /// the [radius](Self::radius) and the choice of texture levels stay those of the original, so that images change smoothly.
     ///
@@ -120,7 +112,7 @@ mod tests {
         let colors = model.vertex_colors().unwrap();
         let same = model.clone().with_colors(&colors).unwrap();
         assert_eq!(same.vertex_colors().unwrap(), colors);
-        assert!(model.texture().is_none() && model.uniform_color().is_none());
+        assert!(model.texture().is_none() && !matches!(model.albedo, Albedo::Uniform(_)));
     }
 
     #[test]

@@ -176,11 +176,6 @@ impl RenderModel {
     pub fn face_count(&self) -> usize {
         self.faces.len()
     }
-
-    /// Whether every edge has exactly two faces.
-    pub fn is_closed(&self) -> bool {
-        self.closed
-    }
 }
 
 fn check(mesh: &TriMesh) -> Result<(), ModelError> {
@@ -257,7 +252,7 @@ mod tests {
         }));
         let model = RenderModel::new(&mesh).unwrap();
         assert!((model.texel_density - 4.0).abs() < 1e-9);
-        assert!(!model.is_closed());
+        assert!(!model.closed);
         assert_eq!(model.face_count(), 1);
         assert!((model.center() - Point3::new(0.5, 0.5, 0.0)).norm() < 1e-15);
     }

@@ -15,6 +15,8 @@ mod target;
 pub(crate) mod tests;
 mod tiles;
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3};
 
 use averaged::Averaged;
@@ -119,8 +121,9 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Loss {
-        let all = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
-        all.loss(target)
+        let (center, whole) = (Point3::origin(), Tiling::WHOLE);
+        let tiles = self.sums::<false>(model, t_cam_object, &center, light, target, whole);
+        Sums::total(&tiles).loss(target)
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
@@ -132,8 +135,8 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Linearized {
-        let all = self.sum::<true>(model, t_cam_object, center, light, target);
-        all.linearized(target)
+        let tiles = self.sums::<true>(model, t_cam_object, center, light, target, Tiling::WHOLE);
+        Sums::total(&tiles).linearized(target)
     }
 
     /// The loss by square tiles of the image, `side` pixels wide and high from its upper left corner on, each with the derivatives by a twist of
@@ -148,25 +151,14 @@ impl PoseLoss {
         target: &Target,
         side: usize,
     ) -> Vec<Tile> {
-        struct ByTiles<'a>(Residuals<'a>, Tiling);
-
-        impl Task for ByTiles<'_> {
-            type Output = Vec<Tile>;
-
-            fn run(self, view: &impl View) -> Vec<Tile> {
-                let Self(residuals, tiling) = self;
-                let target = residuals.target;
-                let tile = |([column, row], sums): ([usize; 2], Sums)| Tile {
-                    column,
-                    row,
-                    at: sums.linearized(target),
-                };
-                residuals.by_tiles::<true>(view, tiling).into_iter().map(tile).collect()
-            }
-        }
-
-        let task = ByTiles(Residuals { options: &self.options, target }, Tiling::new(side));
-        self.compare(model, t_cam_object, center, light, target, task)
+        let tiling = Tiling::new(side);
+        let tiles = self.sums::<true>(model, t_cam_object, center, light, target, tiling);
+        let tile = |([column, row], sums): ([usize; 2], Sums)| Tile {
+            column,
+            row,
+            at: sums.linearized(target),
+        };
+        tiles.into_iter().map(tile).collect()
     }
 
     /// The picture whose difference from the target is the loss's residual (without occluder).
@@ -219,41 +211,28 @@ impl PoseLoss {
         }
     }
 
-    fn sum<const DERIVATIVES: bool>(
+    /// The sums over each tile of the view of all that `target` is compared with, by column and row.
+    fn sums<const DERIVATIVES: bool>(
         &self,
         model: &RenderModel,
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
         light: &Light,
         target: &Target,
-    ) -> Sums {
-        struct Total<'a, const DERIVATIVES: bool>(Residuals<'a>);
+        tiling: Tiling,
+    ) -> BTreeMap<[usize; 2], Sums> {
+        struct ByTiles<'a, const DERIVATIVES: bool>(Residuals<'a>, Tiling);
 
-        impl<const DERIVATIVES: bool> Task for Total<'_, DERIVATIVES> {
-            type Output = Sums;
+        impl<const DERIVATIVES: bool> Task for ByTiles<'_, DERIVATIVES> {
+            type Output = BTreeMap<[usize; 2], Sums>;
 
-            fn run(self, view: &impl View) -> Sums {
-                self.0.total::<DERIVATIVES>(view)
+            fn run(self, view: &impl View) -> Self::Output {
+                self.0.by_tiles::<DERIVATIVES>(view, self.1)
             }
         }
 
-        let task = Total::<DERIVATIVES>(Residuals { options: &self.options, target });
-        self.compare(model, pose, center, light, target, task)
-    }
-
-    /// Runs a task on the view of all that `target` is compared with.
-    fn compare<T: Task + Send>(
-        &self,
-        model: &RenderModel,
-        pose: &Isometry3<f64>,
-        center: &Point3<f64>,
-        light: &Light,
-        target: &Target,
-        task: T,
-    ) -> T::Output
-    where
-        T::Output: Send,
-    {
+        let residuals = Residuals { options: &self.options, target };
+        let task = ByTiles::<DERIVATIVES>(residuals, tiling);
         let (camera, also) = (&target.camera, &target.bounds);
         // One of rayon's threads takes all of it, or each of its parallel loops would hand over and wait.
         rayon::scope(|_| self.view(model, pose, center, camera, light, also, task))

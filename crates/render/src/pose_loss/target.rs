@@ -269,7 +269,10 @@ mod tests {
         assert_eq!(bad, TargetError::NotFinite { x: 2, y: 1 });
         let flat = Camera { fy: 0.0, ..CAMERA };
         let bad = Target::new(flat, &RgbImage::filled(4, 2, [0.5; 3]), &mask).unwrap_err();
-        assert_eq!(bad.to_string(), "focal length fy is 0 px, expected more than zero");
+        assert_eq!(
+            bad.to_string(),
+            "focal length fy is 0 px, expected more than zero and 1e9 at most"
+        );
     }
 
     #[test]

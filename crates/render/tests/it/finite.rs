@@ -237,7 +237,7 @@ fn positions_views_and_lights() {
         assert!(CAMERA.project(&Point3::new(x, 0.0, z)).iter().all(finite), "{x} {z}");
     }
     let long = Camera { fx: 1e30, ..CAMERA };
-    assert_eq!(long.check(), Err(CameraError::TooLong { name: "fx", value: 1e30 }));
+    assert_eq!(long.check(), Err(CameraError::FocalLength { name: "fx", value: 1e30 }));
     let ends = [
         Vector3::zeros(),
         Vector3::x(),
