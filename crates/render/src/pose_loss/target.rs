@@ -116,8 +116,7 @@ impl Target {
             coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
         let covered = image.pixels().iter().zip(&coverage);
         let color = covered.map(|(c, a)| if *a > 0.0 { *c } else { [0.0; 3] }).collect();
-        let bounds =
-            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds = covered_region(camera.width, &coverage)?;
         Self::assemble(camera, color, coverage, bounds)
     }
 
@@ -216,12 +215,17 @@ impl Target {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
         // Blocks that were cut off may have been all that there was.
-        let bounds =
-            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds = covered_region(camera.width, &coverage)?;
         let area: f64 = bounds.indices(camera.width).map(|at| f64::from(coverage[at])).sum();
         let normalization = 1.0 / (3.0 * area);
         Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalization })
     }
+}
+
+/// The smallest rectangle around all that is covered.
+fn covered_region(width: usize, coverage: &[f32]) -> Result<Region, TargetError> {
+    let mask: Vec<bool> = coverage.iter().map(|a| *a > 0.0).collect();
+    Region::around_mask(width, &mask).ok_or(TargetError::EmptyMask)
 }
 
 fn check(
