@@ -3,10 +3,10 @@
 use glam::Vec2;
 
 use super::outline::{Foot, Piece};
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region, edge_functions};
-use crate::raster::{Seen, Visible};
+use crate::raster::{SeenFace, Visible};
 use crate::view::Pixel;
 
 /// A piece of a visible crease, directed as the one of its two faces runs through it that `outward` points away from.
@@ -42,7 +42,9 @@ pub(crate) fn creases<'a>(
             let t = piece.middle();
             let z = 1.0 / (a.z + t * (b.z - a.z));
             let nearest = Visible::seen(visible, piece.at(t));
-            if nearest.is_none_or(|Seen { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face)) {
+            if nearest
+                .is_none_or(|SeenFace { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face))
+            {
                 // The other face runs through the edge the other way.
                 let other_corners = [(edge.other_corner + 1) % 3, edge.other_corner];
                 out.push(Crease { piece, other: edge.other, other_corners });
@@ -82,7 +84,7 @@ impl Crease {
 /// Depths that differ by less than this share may lie on one surface.
 const SAME: f32 = 0.01;
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// Blends in what lies beyond a crease, at a pixel that shows `own` of this
     /// inverse depth.
     ///

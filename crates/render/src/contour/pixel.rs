@@ -7,12 +7,12 @@ use super::footprint::{Around, Beside, Cut};
 use super::interior::{Motion, add_level, row};
 use super::near::Near;
 use super::outline::{Foot, Piece};
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::projected::barycentric;
 use crate::shading::surface::{Shaded, shade};
 use crate::view::{Pixel, Row, scaled_sum};
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// The pixel `at` that `face` covers, with what is near.
     #[inline]
     pub(super) fn inside<const DERIVATIVES: bool>(

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Albedo, CREASE, Mipmap, ModelError, RenderModel, topology};
+use super::{Albedo, CREASE, Mipmap, ModelError, RenderModel, expect, topology};
 use crate::precision::{double, single};
 
 impl RenderModel {
@@ -90,10 +90,6 @@ impl RenderModel {
         self.find_creases();
         self
     }
-}
-
-fn expect(what: &'static str, found: usize, expected: usize) -> Result<(), ModelError> {
-    if found == expected { Ok(()) } else { Err(ModelError::Count { what, found, expected }) }
 }
 
 #[cfg(test)]

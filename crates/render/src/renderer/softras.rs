@@ -18,11 +18,11 @@ pub(super) struct SoftFaces {
     settings: Settings,
     /// Column, row \[px\] and Z \[m\] of the vertices; Z is 0 where it is not in front of the camera.
     screen: Vec<[f64; 3]>,
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<SoftBlock>,
 }
 
 /// The faces that count at the pixels of some rows.
-pub(super) struct Block {
+pub(super) struct SoftBlock {
     pub(super) region: Region,
     /// Where the faces of each pixel start in `faces`, and the end.
     start: Vec<u32>,
@@ -81,13 +81,13 @@ impl SoftFaces {
     }
 }
 
-fn blocks(faces: &[Face], ids: &[u32], region: &Region, settings: &Settings) -> Vec<Block> {
+fn blocks(faces: &[Face], ids: &[u32], region: &Region, settings: &Settings) -> Vec<SoftBlock> {
     let tiles = FaceTiles::new(faces, region);
     let arch = pulp::Arch::new();
     let block = |(y, tiles): (usize, &[Vec<u32>])| {
         let y0 = region.y0 + y * RUN;
         let region = Region { y0, y1: (y0 + RUN).min(region.y1), ..*region };
-        let block = Block { region, start: vec![0], faces: Vec::new(), inside: Vec::new() };
+        let block = SoftBlock { region, start: vec![0], faces: Vec::new(), inside: Vec::new() };
         arch.dispatch(Collect { faces, ids, settings, tiles, block })
     };
     let rows: Vec<&[Vec<u32>]> = tiles.rows().collect();
@@ -100,14 +100,14 @@ struct Collect<'a> {
     ids: &'a [u32],
     settings: &'a Settings,
     tiles: &'a [Vec<u32>],
-    block: Block,
+    block: SoftBlock,
 }
 
 impl pulp::WithSimd for Collect<'_> {
-    type Output = Block;
+    type Output = SoftBlock;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) -> Block {
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> SoftBlock {
         let Self { faces, ids, settings, tiles, mut block } = self;
         let region = block.region;
         let mut run = Run::new(Wide::zero(simd));

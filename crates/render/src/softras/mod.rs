@@ -70,14 +70,14 @@ pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
 pub(crate) use number::Wide;
 pub(crate) use pixel::LEAST_SHARE;
-use pixel::Scene;
+use pixel::SoftScene;
 pub(crate) use run::{RUN, Run};
 pub(crate) use settings::{BACKGROUND, Settings};
 pub(crate) use tiles::FaceTiles;
 
 /// A posed model whose faces spread beyond their borders.
 pub(crate) struct SoftRasView<'a> {
-    scene: Scene<'a>,
+    scene: SoftScene<'a>,
     region: Region,
     tiles: FaceTiles,
     /// The vector instructions at hand. No sum is fused, so that results do not depend on them.
@@ -112,8 +112,17 @@ impl<'a> SoftRasView<'a> {
         let tiles = FaceTiles::new(&faces, &region);
         let motions = faces.iter().map(|_| OnceLock::new()).collect();
         let (camera, twist_center) = (*camera, *center);
-        let scene =
-            Scene { posed, lighting, settings, camera, screen, faces, ids, motions, twist_center };
+        let scene = SoftScene {
+            posed,
+            lighting,
+            settings,
+            camera,
+            screen,
+            faces,
+            ids,
+            motions,
+            twist_center,
+        };
         Self { scene, region, tiles, arch: pulp::Arch::new() }
     }
 }

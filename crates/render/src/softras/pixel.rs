@@ -23,7 +23,7 @@ use crate::view::{Pixel, Seen};
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
 
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).
-pub(crate) struct Scene<'a> {
+pub(crate) struct SoftScene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
     pub(crate) settings: Settings,
@@ -81,7 +81,7 @@ impl<T: Number> Pixels<T> {
     }
 }
 
-impl Scene<'_> {
+impl SoftScene<'_> {
     /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the color in the weight of its part.
     #[inline(always)]
     pub(crate) fn pixels<const DERIVATIVES: bool, T: Number>(

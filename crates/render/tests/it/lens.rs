@@ -158,7 +158,7 @@ fn planes_keep_their_depth() {
 #[test]
 fn images_of_another_size_are_refused() {
     let camera = Camera { fx: 8.0, fy: 8.0, cx: 4.0, cy: 3.0, width: 8, height: 6 };
-    let made = Remap::undistort(camera, &BrownConrady::default().into(), camera);
+    let made = Remap::undistort(camera, &Distortion::BrownConrady(BrownConrady::default()), camera);
     let wrong = made.rgb(&RgbImage::filled(8, 7, [0.0; 3]));
     assert!(matches!(wrong, Err(DistortionError::Size { found_height: 7, .. })));
 }
