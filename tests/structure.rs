@@ -6,10 +6,10 @@ use std::{fs, io};
 
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
-    ("autodiff", 4_070),
-    ("geometry", 15_466),
-    ("sim", 16_456),
-    ("render", 10_630),
+    ("autodiff", 3_396),
+    ("geometry", 14_990),
+    ("sim", 16_600),
+    ("render", 10_207),
     ("refine", 30_649),
 ];
 

@@ -137,7 +137,7 @@ impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {
         function.evaluate(x)
     }
 
-    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+    fn solve(matrix: &Factored, b: &[Self]) -> Vec<Self> {
         let values: Vec<T> = b.iter().map(|b| b.value).collect();
         let mut x: Vec<Self> = T::solve(matrix, &values)
             .into_iter()

@@ -36,7 +36,7 @@
 //!
 //! | the operation | implement | apply with |
 //! |---|---|---|
-//! | takes a fixed, small number of scalars | [`LocalFunction`] | [`Scalar::local`], [`Scalar::sum_local`] |
+//! | takes a fixed, small number of scalars | [`LocalFunction`] | [`Scalar::local`] |
 //! | takes many numbers and knows its vector–Jacobian product: an image, a point set | [`CustomVjp`] | [`custom`] |
 //! | is generic code, too long to keep on the tape: a time step | [`Recompute`] | [`Scalar::recompute`] |
 //!
@@ -60,8 +60,6 @@
 //! assert!((by[0] - 1.5 * force / 0.01).abs() < 1e-9 * by[0]);
 //! ```
 //!
-//! [`Operand`] is the bound of the operations that bring a derivative for both modes ([`solve`], [`implicit`]).
-//!
 //! # Further
 //! [A differentiable solve](implicit#a-differentiable-solve).
 //!
@@ -80,7 +78,6 @@ pub mod implicit;
 mod jacobian;
 mod lanes;
 pub mod lie;
-mod operand;
 pub mod optimize;
 mod quadratic;
 mod real_field;
@@ -99,7 +96,6 @@ mod vjp;
 
 pub use fwd::Fwd;
 pub use jacobian::{forward_jacobian, jacobian};
-pub use operand::{CustomJvp, Operand};
 pub use quadratic::Quadratic;
 pub use record::custom;
 pub use recording::{Adjoints, Recording, gradient, gradient_into};

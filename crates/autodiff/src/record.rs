@@ -8,7 +8,7 @@ use crate::differentiable::Differentiable;
 use crate::fwd::linearize;
 use crate::scalar::LocalFunction;
 use crate::solve::Factored;
-use crate::tape::{push_block, push_custom, with_tape};
+use crate::tape::{push_block, push_custom};
 use crate::var::Var;
 use crate::vjp::CustomVjp;
 
@@ -40,39 +40,8 @@ pub(crate) fn local<const N: usize, const M: usize>(
     std::array::from_fn(|i| group.var(i, values[i]))
 }
 
-/// [`Scalar::sum_local`](crate::Scalar::sum_local) for [`Var`].
-#[inline]
-pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
-    x: &[Var],
-    terms: impl IntoIterator<Item = (F, [usize; K])>,
-) -> Var {
-    let mut sum = 0.0;
-    let mut gradient = with_tape(|tape| tape.scratch(x.len()));
-    gradient.fill(0.0);
-    // Neighboring terms often share a number. What was touched last is held in a register, because reading
-    // back what was just written would be the slowest part.
-    let mut held = (0, 0.0);
-    for (term, places) in terms {
-        let ([value], [slopes]) = linearize(&term, places.map(|place| x[place].value));
-        sum += value;
-        for (place, slope) in places.into_iter().zip(slopes) {
-            if place != held.0 {
-                gradient[held.0] = held.1;
-                held = (place, gradient[place]);
-            }
-            held.1 += slope;
-        }
-    }
-    if let Some(last) = gradient.get_mut(held.0) {
-        *last = held.1;
-    }
-    let node = push_block(x, 1, &gradient).var(0, sum);
-    with_tape(|tape| tape.keep(gradient));
-    node
-}
-
 /// [`Scalar::solve`](crate::Scalar::solve) for [`Var`].
-pub(crate) fn solve(matrix: &Factored<f64>, b: &[Var]) -> Vec<Var> {
+pub(crate) fn solve(matrix: &Factored, b: &[Var]) -> Vec<Var> {
     let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
     matrix.solve_in_place(&mut x);
     if b.iter().all(|b| Differentiable::is_constant(*b)) {
@@ -82,7 +51,7 @@ pub(crate) fn solve(matrix: &Factored<f64>, b: &[Var]) -> Vec<Var> {
 }
 
 /// x = A⁻¹ b.
-struct Inverse(Factored<f64>);
+struct Inverse(Factored);
 
 impl CustomVjp for Inverse {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
@@ -104,14 +73,6 @@ mod tests {
     impl LocalFunction<2, 2> for Pair {
         fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 2] {
             [a.sin() * b, a / b]
-        }
-    }
-
-    struct Difference(f64);
-
-    impl LocalFunction<2, 1> for Difference {
-        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
-            [(a - b).powi(2).times(self.0)]
         }
     }
 
@@ -142,48 +103,6 @@ mod tests {
         let [y, _] = Var::local(&Pair, [2.0, 3.0].map(Var::from));
         assert_eq!(recording.statistics(), before);
         assert_eq!((recording.gradient(y).wrt(x), recording.gradient(y).wrt(y)), (0.0, 0.0));
-    }
-
-    #[test]
-    fn a_sum_of_terms_is_one_node() {
-        let x: Vec<f64> = (0..20).map(|i| f64::from(i * i % 7)).collect();
-        let terms = || (0..19).map(|i| (Difference(f64::from(i as u32)), [i, (i * 5 + 1) % 20]));
-        let (plain_value, plain) = gradient(|x| crate::scalar::add_up(x, terms()), &x);
-        let (value, summed) = gradient(|x| Var::sum_local(x, terms()), &x);
-        assert_eq!((plain_value, &plain), (value, &summed));
-        assert_eq!(f64::sum_local(&x, terms()), value);
-        let recording = Recording::start();
-        let inputs = recording.variables_of(&x);
-        let _ = Var::sum_local(&inputs, terms());
-        assert_eq!(recording.statistics().nodes, x.len() + 1);
-    }
-
-    #[test]
-    fn long_blocks_find_their_parents_wherever_they_are() {
-        fn sum<S: Scalar>(x: &[S], order: fn(&mut [S])) -> S {
-            let mut x: Vec<S> = x.to_vec();
-            order(&mut x);
-            let terms = (0..299).map(|i| (Difference(1.0 + i as f64), [i, (i * 7 + 1) % 300]));
-            S::sum_local(&x, terms)
-        }
-        let x: Vec<f64> = (0..300).map(|i| (i * i % 11) as f64).collect();
-        // Neighbors on the tape; the other way round; a fused result, a constant and a repetition among them.
-        type Order<S> = fn(&mut [S]);
-        let orders: [(Order<Var>, Order<f64>); 3] =
-            [(|_| (), |_| ()), (<[Var]>::reverse, <[f64]>::reverse), (mix::<Var>, mix::<f64>)];
-        fn mix<S: Scalar>(x: &mut [S]) {
-            (x[10], x[70], x[200]) = (x[10].times(2.0), S::constant(0.5), x[201]);
-        }
-        for (order, plain_order) in orders {
-            let (value, gradient) = gradient(|x| sum(x, order), &x);
-            assert_eq!(value, sum(&x, plain_order));
-            let differences =
-                crate::check::finite_difference_gradient(|x| sum(x, plain_order), &x, 1e-3);
-            // Central differences of a quadratic function are exact but for rounding.
-            for (exact, difference) in gradient.iter().zip(&differences) {
-                assert!((exact - difference).abs() < 1e-5 * (1.0 + exact.abs()));
-            }
-        }
     }
 
     #[test]
@@ -249,7 +168,7 @@ mod tests {
     fn solutions_have_the_same_derivatives_in_every_mode() {
         let matrix = nalgebra::Matrix3::new(2.0, 1.0, 0.5, -1.0, 3.0, 0.0, 0.3, 0.2, 4.0);
         let factors = crate::solve::lu(&matrix).unwrap();
-        fn value<S: Scalar>(factors: &Factored<f64>, p: &[S]) -> S {
+        fn value<S: Scalar>(factors: &Factored, p: &[S]) -> S {
             let b = [p[0] * p[1], p[1].sin(), S::constant(0.7)];
             S::solve(factors, &b).iter().fold(S::zero(), |sum, x| sum + *x * *x)
         }

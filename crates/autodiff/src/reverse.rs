@@ -73,14 +73,6 @@ impl_real_field!([] Var {
     }
 
     #[inline]
-    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
-        x: &[Self],
-        terms: impl IntoIterator<Item = (F, [usize; K])>,
-    ) -> Self {
-        record::sum_local(x, terms)
-    }
-
-    #[inline]
     fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
         recomputed::recompute(function, x)
     }
@@ -101,7 +93,7 @@ impl_real_field!([] Var {
         Some(record::custom(inputs, outputs, operation))
     }
 
-    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+    fn solve(matrix: &Factored, b: &[Self]) -> Vec<Self> {
         record::solve(matrix, b)
     }
 });

@@ -11,19 +11,6 @@ use crate::lie::{cross_matrix, so3_exp};
 use crate::scalar::{LocalFunction, Scalar};
 use crate::stumpff::stumpff;
 
-/// `rotation * vector`.
-#[inline]
-pub fn rotate<S: Scalar>(rotation: &UnitQuaternion<S>, vector: &Vector3<S>) -> Vector3<S> {
-    let [i, j, k, w] = rotation.coords.into();
-    Vector3::from(S::local(&Rotate, [i, j, k, w, vector.x, vector.y, vector.z]))
-}
-
-/// `a.cross(b)`: a torque of arm and force, a velocity of spin and arm.
-#[inline]
-pub fn cross<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector3<S> {
-    Vector3::from(S::local(&Cross, [a.x, a.y, a.z, b.x, b.y, b.z]))
-}
-
 /// exp(`turn`) · `rotation` for a rotation vector `turn` \[rad\], with the quaternion's length brought back to one.
 #[inline]
 pub fn turned<S: Scalar>(rotation: &UnitQuaternion<S>, turn: &Vector3<S>) -> UnitQuaternion<S> {
@@ -48,45 +35,6 @@ pub fn conjugated<S: Scalar>(
 #[inline]
 fn quaternion<S: Scalar>([i, j, k, w]: [S; 4]) -> UnitQuaternion<S> {
     UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))
-}
-
-struct Rotate;
-
-impl LocalFunction<7, 3> for Rotate {
-    #[inline]
-    fn evaluate<S: Scalar>(&self, [i, j, k, w, x, y, z]: [S; 7]) -> [S; 3] {
-        (quaternion([i, j, k, w]) * Vector3::new(x, y, z)).into()
-    }
-
-    // Of w t + u × t + v with t = 2 u × v, which is what nalgebra evaluates.
-    #[inline]
-    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> Option<([f64; 3], [[f64; 7]; 3])> {
-        let (u, v) = (Vector3::new(i, j, k), Vector3::new(x, y, z));
-        let t = u.cross(&v) * 2.0;
-        let (by_u, by_v) = (cross_matrix(&v), cross_matrix(&u));
-        let by_t = Matrix3::from_diagonal_element(w) + by_v;
-        let [du, dv] =
-            [by_t * by_u * -2.0 - cross_matrix(&t), by_t * by_v * 2.0 + Matrix3::identity()];
-        let row =
-            |r| [du[(r, 0)], du[(r, 1)], du[(r, 2)], t[r], dv[(r, 0)], dv[(r, 1)], dv[(r, 2)]];
-        Some(((t * w + u.cross(&t) + v).into(), std::array::from_fn(row)))
-    }
-}
-
-struct Cross;
-
-impl LocalFunction<6, 3> for Cross {
-    #[inline]
-    fn evaluate<S: Scalar>(&self, [a, b, c, x, y, z]: [S; 6]) -> [S; 3] {
-        Vector3::new(a, b, c).cross(&Vector3::new(x, y, z)).into()
-    }
-
-    #[inline]
-    fn linearize(&self, [a, b, c, x, y, z]: [f64; 6]) -> Option<([f64; 3], [[f64; 6]; 3])> {
-        let jacobian =
-            [[0.0, z, -y, 0.0, -c, b], [-z, 0.0, x, c, 0.0, -a], [y, -x, 0.0, -b, a, 0.0]];
-        Some(([b * z - c * y, c * x - a * z, a * y - b * x], jacobian))
-    }
 }
 
 /// exp(ω) · q, whose length is that of q.
@@ -247,15 +195,12 @@ mod tests {
     fn jacobians_match_forward_mode() {
         for q in [[0.0, 0.0, 0.0, 1.0], [0.3, -0.5, 0.2, 0.7], [1.0, 0.1, 0.0, 0.0]] {
             let [i, j, k, w] = q;
-            // Rotate's derivative holds for quaternions of any length; the others' for unit ones.
-            check(&Rotate, [i, j, k, w, 0.4, -1.2, 2.0]);
             for velocity in VELOCITIES {
                 let [x, y, z] = velocity;
                 check(&Exponential, unit([i, j, k, w, x, y, z]));
                 check(&Turned, unit([i, j, k, w, x, y, z]));
                 let matrix = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, 0.1, 0.4, 0.5);
                 check(&Conjugated { matrix }, unit([i, j, k, w, x, y, z]));
-                check(&Cross, [x, y, z, 0.3, w, -1.0]);
             }
         }
     }
@@ -267,12 +212,15 @@ mod tests {
             let x = recording.variables([0.2, -0.3, 0.4, 1.0, 2.0, -1.0]);
             let rotation = so3_exp(&Vector3::new(x[0], x[1], x[2]));
             let v = Vector3::new(x[3], x[4], x[5]);
-            let (rotated, turned) = if plain {
-                (rotation * v, so3_exp(&(v * Var::from(0.1))) * rotation)
+            let step = v * Var::from(0.1);
+            let matrix = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, 0.1, 0.4, 0.5);
+            let (conjugated, turned) = if plain {
+                let local = rotation.inverse() * v;
+                (rotation * (matrix.map(Var::from) * local), so3_exp(&step) * rotation)
             } else {
-                (rotate(&rotation, &v), turned(&rotation, &(v * Var::from(0.1))))
+                (conjugated(&rotation, &matrix, &v), turned(&rotation, &step))
             };
-            let [sum, end] = [rotated, turned.inverse() * cross(&rotated, &v)].map(|v| v.sum());
+            let [sum, end] = [conjugated, turned.inverse() * v].map(|v| v.sum());
             let out = sum * end.sin();
             let gradient = recording.gradient(out);
             (out.value(), x.map(|x| gradient.wrt(x)))

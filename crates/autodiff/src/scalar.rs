@@ -63,21 +63,6 @@ pub trait Scalar: RealField + Copy + Default {
         function.evaluate(x)
     }
 
-    /// The sum of many terms, each a function of `K` of the numbers `x`; every term comes with the places of
-    /// its numbers in `x`.
-    ///
-    /// For [`Var`](crate::Var) the whole sum is one node, whose gradient is added up outside the tape.
-    ///
-    /// # Panics
-    /// If a place is not in `x`.
-    #[inline]
-    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
-        x: &[Self],
-        terms: impl IntoIterator<Item = (F, [usize; K])>,
-    ) -> Self {
-        add_up(x, terms)
-    }
-
     /// `function` of `x`: plain generic code for most scalars; for [`Var`](crate::Var) one node that keeps only `x`,
     /// whose inside the sweep computes again.
     ///
@@ -153,7 +138,7 @@ pub trait Scalar: RealField + Copy + Default {
     ///
     /// # Panics
     /// If `b` has another number of rows.
-    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+    fn solve(matrix: &Factored, b: &[Self]) -> Vec<Self> {
         let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
         matrix.solve_in_place(&mut x);
         x.iter().map(|x| Self::constant(*x)).collect()
@@ -281,16 +266,6 @@ pub trait Recompute: 'static {
     /// # Errors
     /// If there are no results.
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, Self::Error>;
-}
-
-/// [`Scalar::sum_local`] as plain generic code.
-#[inline]
-pub(crate) fn add_up<S: Scalar, const K: usize, F: LocalFunction<K, 1>>(
-    x: &[S],
-    terms: impl IntoIterator<Item = (F, [usize; K])>,
-) -> S {
-    let values = terms.into_iter().map(|(term, places)| term.evaluate(places.map(|p| x[p])));
-    values.fold(S::zero(), |sum, [value]| sum + value)
 }
 
 macro_rules! plain_scalar {

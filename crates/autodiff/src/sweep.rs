@@ -157,8 +157,7 @@ impl<const K: usize, const CAREFUL: bool> Sweep<'_, K, CAREFUL> {
     /// Goes back over a group with a dense Jacobian.
     fn dense(&mut self, tape: &Tape, group: &Group) {
         let base = self.start.node;
-        let run = group.kind == Kind::Run;
-        let parents = tape.parents.take_back(&mut self.parent, if run { 1 } else { group.inputs });
+        let parents = tape.parents.take_back(&mut self.parent, group.inputs);
         let slopes = tape.slopes.take_back(&mut self.slope, group.inputs * group.outputs);
         let first = self.node - group.outputs;
         self.node = first;
@@ -170,13 +169,6 @@ impl<const K: usize, const CAREFUL: bool> Sweep<'_, K, CAREFUL> {
         let (before, outputs) = self.adjoints.split_at_mut(first);
         let active = || outputs.iter().zip(slopes.chunks_exact(group.inputs));
         let active = || active().filter(|(adjoint, _)| **adjoint != [0.0; K]);
-        if run {
-            let parents = &mut before[(parents[0] - base) as usize..][..group.inputs];
-            for (adjoint, row) in active() {
-                add_row::<K, CAREFUL>(parents, row, *adjoint);
-            }
-            return;
-        }
         // Several inputs at a time, summed over the outputs in registers.
         for (chunk, parents) in parents.chunks(COLUMNS).enumerate() {
             let start = chunk * COLUMNS;

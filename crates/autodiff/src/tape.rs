@@ -34,18 +34,13 @@ pub(crate) struct Group {
 pub(crate) enum Kind {
     /// Through a dense Jacobian.
     Dense,
-    /// Through a dense Jacobian, to parents that follow each other: only the first is kept.
-    Run,
     /// By an operation with its own derivative.
     Custom,
 }
 
 impl Kind {
-    const ALL: [Self; 3] = [Self::Dense, Self::Run, Self::Custom];
+    const ALL: [Self; 2] = [Self::Dense, Self::Custom];
 }
-
-/// Inputs from which on a block looks whether they follow each other: for fewer, looking costs more.
-const LONG: usize = 64;
 
 impl Entry {
     fn group(group: &Group) -> Self {
@@ -186,16 +181,6 @@ pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Ou
         if recording == 0 || inputs.is_empty() {
             return push_sparse_block(inputs, outputs, jacobian);
         }
-        if inputs.len() >= LONG && is_run(inputs, recording) {
-            let kind = Kind::Run;
-            let group = end.push_group(&Group { outputs, inputs: inputs.len(), kind });
-            TAPE.with(|tape| {
-                let tape = &mut *tape.borrow_mut();
-                tape.parents.room(1).push(inputs[0].node);
-                tape.slopes.room(jacobian.len()).extend_from_slice(jacobian);
-            });
-            return group;
-        }
         if inputs.iter().any(|var| var.recording != recording) {
             return push_sparse_block(inputs, outputs, jacobian);
         }
@@ -219,17 +204,6 @@ pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Ou
         });
         group
     })
-}
-
-/// Whether `inputs` are nodes of `recording` that follow each other.
-fn is_run(inputs: &[Var], recording: u32) -> bool {
-    let follows = |(var, node): (&Var, u32)| {
-        var.node == node && var.recording == recording && var.coefficient == 1.0
-    };
-    // Without an early end inside, a chunk is compared without branches.
-    let mut chunks = inputs.chunks(LONG).zip((inputs[0].node..).step_by(LONG));
-    chunks
-        .all(|(chunk, first)| chunk.iter().zip(first..).fold(true, |all, pair| all & follows(pair)))
 }
 
 /// [`push_block`] where some inputs are constants (or of another recording).

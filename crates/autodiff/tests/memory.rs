@@ -46,7 +46,8 @@ fn throw(x: &[Var]) -> Var {
         position += velocity * Var::from(1e-3);
     }
     let [gap] = Var::local(&Gap, [position.x, position.y]);
-    gap + Var::sum_local(x, [(Gap, [0, 3]), (Gap, [2, 5])])
+    let [rise] = Var::local(&Gap, [position.z, velocity.z]);
+    gap + rise
 }
 
 #[test]

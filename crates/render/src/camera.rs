@@ -33,17 +33,9 @@ pub enum CameraError {
         /// The entry.
         value: f64,
     },
-    /// A focal length is zero or negative.
-    #[error("focal length {name} is {value} px, expected more than zero")]
+    /// A focal length is zero, negative or larger than [`Camera::MAX_FOCAL_LENGTH`].
+    #[error("focal length {name} is {value} px, expected more than zero and 1e9 at most")]
     FocalLength {
-        /// `"fx"` or `"fy"`.
-        name: &'static str,
-        /// The focal length \[px\].
-        value: f64,
-    },
-    /// A focal length is larger than [`Camera::MAX_FOCAL_LENGTH`].
-    #[error("focal length {name} is {value} px, expected 1e9 at most")]
-    TooLong {
         /// `"fx"` or `"fy"`.
         name: &'static str,
         /// The focal length \[px\].
@@ -104,11 +96,8 @@ impl Camera {
             return Err(CameraError::NotFinite { index, value });
         }
         for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
-            if value <= 0.0 {
+            if value <= 0.0 || value > Self::MAX_FOCAL_LENGTH {
                 return Err(CameraError::FocalLength { name, value });
-            }
-            if value > Self::MAX_FOCAL_LENGTH {
-                return Err(CameraError::TooLong { name, value });
             }
         }
         Ok(())
@@ -210,7 +199,7 @@ mod tests {
         };
         assert!(matches!(with(2, f64::NAN), CameraError::NotFinite { index: 2, .. }));
         assert!(matches!(with(4, -1.0), CameraError::FocalLength { name: "fy", .. }));
-        assert!(matches!(with(0, 1e30), CameraError::TooLong { name: "fx", .. }));
+        assert!(matches!(with(0, 1e30), CameraError::FocalLength { name: "fx", .. }));
         assert!(matches!(with(1, 0.3), CameraError::Layout { index: 1, .. }));
         assert!(matches!(Camera::from_k(K, 0, 480), Err(CameraError::Empty { .. })));
     }

@@ -1,7 +1,7 @@
 //! Poses and cameras as graphics engines have them: glam's types, and cameras that look along −z with y up.
 //!
 //! Bevy, rend3 and most programs on wgpu keep transforms in glam's [`Mat4`], [`Affine3A`], [`Quat`] and [`Vec3`], and project with a
-//! matrix of the frustum. [`ModelView`] converts poses, [`Camera::to_perspective`] and [`Camera::from_perspective`] cameras. (Vectors,
+//! matrix of the frustum. [`ModelView`] converts poses, [`Camera::from_perspective`] cameras. (Vectors,
 //! rotations and matrices by themselves convert between glam and nalgebra with `From`, in the same axes. Types of another version of glam
 //! than 0.33, which is re-exported as `prehend_render::glam`, go through their arrays, such as `to_cols_array`.)
 //!
@@ -23,7 +23,7 @@
 //! # }
 //! ```
 
-use glam::{Affine3A, DMat3, DMat4, DQuat, DVec3, DVec4, Mat4, Quat, Vec3};
+use glam::{Affine3A, DMat3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use crate::camera::{Camera, CameraError};
@@ -152,30 +152,10 @@ impl From<ModelView> for (Vec3, Quat) {
 }
 
 impl Camera {
-    /// The projection into clip space as wgpu and Direct3D have it (right-handed view space, depth 0 at `near` and 1
-    /// at `far` \[m\]: 0 < `near` < `far`, which may be infinite).
-    pub fn to_perspective(&self, near: f64, far: f64) -> Mat4 {
-        let (width, height) = (self.width as f64, self.height as f64);
-        let ratio = if far.is_finite() { far / (near - far) } else { -1.0 };
-        DMat4::from_cols(
-            DVec4::X * (2.0 * self.fx / width),
-            DVec4::Y * (2.0 * self.fy / height),
-            // Images reach half a pixel beyond the centers of their first and last pixels.
-            DVec4::new(
-                1.0 - (2.0 * self.cx + 1.0) / width,
-                (2.0 * self.cy + 1.0) / height - 1.0,
-                ratio,
-                -1.0,
-            ),
-            DVec4::Z * (ratio * near),
-        )
-        .as_mat4()
-    }
-
     /// The camera of `width` by `height` pixels with this projection, whatever it makes of depth (reversed or infinite too).
     ///
     /// # Errors
-    /// When the matrix is not finite, no perspective (right-handed, as [`Self::to_perspective`] makes them), skewed or shifted, or the
+    /// When the matrix is not finite, no perspective of a right-handed view space, skewed or shifted, or the
     /// image is empty.
     pub fn from_perspective(
         projection: &Mat4,

@@ -43,9 +43,7 @@ pub use glam;
 
 #[cfg(feature = "gpu")]
 pub use backend::Gpu;
-pub use backend::{
-    Backend, BackendError, Cpu, Device, Hypothesis, PoseProblem, Session, WithFallback,
-};
+pub use backend::{Backend, BackendError, Cpu, Device, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
 pub use distortion::{BrownConrady, Distortion, DistortionError, KannalaBrandt, Remap};
 pub use graphics::{MatrixError, ModelView};

@@ -21,22 +21,6 @@ pub(crate) struct Region {
 impl Region {
     pub(crate) const EMPTY: Self = Self { x0: 0, y0: 0, x1: 0, y1: 0 };
 
-    /// The smallest rectangle around all pixels of an image of `width` columns that are `covered`.
-    pub(crate) fn around<T>(
-        width: usize,
-        pixels: &[T],
-        covered: impl Fn(&T) -> bool,
-    ) -> Option<Self> {
-        let mut bounds: Option<Self> = None;
-        for (y, row) in pixels.chunks(width.max(1)).enumerate() {
-            let Some(x0) = row.iter().position(&covered) else { continue };
-            let x1 = row.iter().rposition(&covered).unwrap_or(x0) + 1;
-            let here = Self { x0, y0: y, x1, y1: y + 1 };
-            bounds = Some(bounds.map_or(here, |bounds| bounds.union(&here)));
-        }
-        bounds
-    }
-
     /// Smallest rectangle around the set pixels of a mask, which are looked at side by side, in a tenth of the time.
     pub(crate) fn around_mask(width: usize, pixels: &[bool]) -> Option<Self> {
         let mut rows = pixels.chunks(width.max(1));

@@ -1,6 +1,6 @@
 //! Modes of this crate in the comparison: one line for each workload and mode.
 
-use prehend_autodiff::{Fwd, LocalFunction, Recording, Scalar, Var, gradient_into};
+use prehend_autodiff::{CustomVjp, Fwd, Recording, Scalar, Var, custom, gradient_into};
 
 use super::rigid_blocks;
 use super::table::{Comparison, print};
@@ -37,12 +37,7 @@ impl<'a> Comparisons<'a> {
         let mut a = Comparison::new("a Rosenbrock", rosenbrock::inputs(), rosenbrock::sum);
         a.add("by hand", rosenbrock::adjoint);
         a.add_taped("ours, reverse", reverse(rosenbrock::sum));
-        a.add_taped(
-            "ours, summed terms",
-            reverse(|x: &[Var; rosenbrock::INPUTS]| {
-                Var::sum_local(x, (1..x.len()).map(|i| (RosenbrockTerm, [i - 1, i])))
-            }),
-        );
+        a.add_taped("ours, summed terms", reverse(summed_terms));
         a.add_absent("ours, forward", TOO_MANY);
 
         let mut b = Comparison::new("b point mass", point_mass::INPUTS, point_mass::miss);
@@ -105,13 +100,27 @@ fn reverse<const N: usize>(
     }
 }
 
-/// Term of two neighbors in the Rosenbrock chain.
-struct RosenbrockTerm;
+/// The Rosenbrock chain as one node, whose gradient forward mode adds up term by term.
+fn summed_terms(x: &[Var; rosenbrock::INPUTS]) -> Var {
+    let (mut sum, mut gradient) = (0.0, vec![0.0; rosenbrock::INPUTS]);
+    for i in 1..x.len() {
+        let [a, b] = Fwd::<2>::variables([x[i - 1].value(), x[i].value()]);
+        let (bend, offset) = (b - a * a, Fwd::constant(1.0) - a);
+        let term = (bend * bend).times(100.0) + offset * offset;
+        sum += term.value;
+        gradient[i - 1] += term.derivative[0];
+        gradient[i] += term.derivative[1];
+    }
+    custom(x, &[sum], Gradient(gradient))[0]
+}
 
-impl LocalFunction<2, 1> for RosenbrockTerm {
-    #[inline]
-    fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
-        let (bend, offset) = (b - a * a, S::one() - a);
-        [(bend * bend).times(100.0) + offset * offset]
+/// The gradient of a sum.
+struct Gradient(Vec<f64>);
+
+impl CustomVjp for Gradient {
+    fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+        for (adjoint, slope) in input_adjoints.iter_mut().zip(&self.0) {
+            *adjoint += output_adjoints[0] * slope;
+        }
     }
 }

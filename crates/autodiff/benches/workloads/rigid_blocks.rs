@@ -31,15 +31,36 @@ pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
         velocity += Vector3::new(fx, fy, fz.plus(-GRAVITY)).map(|force| force.times(STEP));
         let torque = Vector3::new(tx, ty, tz);
         let momentum = rigid::conjugated(&rotation, &inertia, &spin);
-        let change = torque - rigid::cross(&spin, &momentum);
+        let change = torque - cross(&spin, &momentum);
         let acceleration = rigid::conjugated(&rotation, &inverse, &change);
         spin += acceleration.map(|rate| rate.times(STEP));
         position += velocity.map(|rate| rate.times(STEP));
         rotation = rigid::turned(&rotation, &spin.map(|rate| rate.times(STEP)));
     }
     let offset = position - Vector3::from(TARGET.map(S::constant));
-    let tilt = S::one() - rigid::rotate(&rotation, &Vector3::z()).z;
+    let tilt = S::one() - (rotation * Vector3::z()).z;
     offset.dot(&offset) + tilt * tilt
+}
+
+/// `a.cross(b)`.
+fn cross<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector3<S> {
+    Vector3::from(S::local(&Cross, [a.x, a.y, a.z, b.x, b.y, b.z]))
+}
+
+struct Cross;
+
+impl LocalFunction<6, 3> for Cross {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, [a, b, c, x, y, z]: [S; 6]) -> [S; 3] {
+        Vector3::new(a, b, c).cross(&Vector3::new(x, y, z)).into()
+    }
+
+    #[inline]
+    fn linearize(&self, [a, b, c, x, y, z]: [f64; 6]) -> Option<([f64; 3], [[f64; 6]; 3])> {
+        let jacobian =
+            [[0.0, z, -y, 0.0, -c, b], [-z, 0.0, x, c, 0.0, -a], [y, -x, 0.0, -b, a, 0.0]];
+        Some(([b * z - c * y, c * x - a * z, a * y - b * x], jacobian))
+    }
 }
 
 /// Whether any point is below the floor.

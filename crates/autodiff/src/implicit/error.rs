@@ -2,7 +2,7 @@
 
 use crate::solve::SolveError;
 
-/// A solution that was not found, or cannot be differentiated.
+/// A root that was not found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImplicitError {
@@ -21,18 +21,6 @@ pub enum ImplicitError {
         unknowns: usize,
         /// Rows, and columns, of the Jacobian.
         found: usize,
-    },
-    /// The given numbers do not solve the equation.
-    #[error(
-        "not a solution: unknown {unknown} is {value:e}, and a Newton step would move it by {step:e}"
-    )]
-    NotASolution {
-        /// The unknown that is farthest from the solution, relative to what is tolerated.
-        unknown: usize,
-        /// Its value.
-        value: f64,
-        /// The Newton step from there.
-        step: f64,
     },
     /// Newton's method came to a halt.
     #[error(

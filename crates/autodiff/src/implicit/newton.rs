@@ -2,9 +2,8 @@
 
 use nalgebra::DVector;
 
-use super::linearization::{check_length, linearize};
-use super::{ImplicitError, Residual};
-use crate::solve::{Factored, lu};
+use super::ImplicitError;
+use crate::solve::Factored;
 
 const MOST_ITERATIONS: usize = 60;
 
@@ -15,10 +14,10 @@ const SHORTEST: f64 = 1e-6;
 /// after it is rounding.
 const LAST: (f64, f64) = (1e-12, 1e-9);
 
-/// So many times that error is as near as rounding may let it come: what [`solution`](super::solution) tolerates.
+/// So many times that error is as near as rounding may let it come.
 const ROUNDING: f64 = 1e3;
 
-/// As many equations F(x) = 0 as unknowns, for [`newton_on`].
+/// As many equations F(x) = 0 as unknowns, for [`newton`].
 pub trait Equations {
     /// F(x).
     fn residual(&self, x: &DVector<f64>) -> DVector<f64>;
@@ -27,7 +26,7 @@ pub trait Equations {
     ///
     /// # Errors
     /// If there are not as many equations as unknowns, or the Jacobian is singular or not finite.
-    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError>;
+    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored), ImplicitError>;
 
     /// The norm of a residual in a unit that all equations share, if there is one. A step then has to lower it (Armijo's
     /// condition); without one, the length of the next Newton step with the same Jacobian, which does not depend on the
@@ -44,73 +43,27 @@ pub trait Equations {
     }
 }
 
-/// Solves F(x, p) = 0 by Newton's method from `start`.
+/// Solves F(x) = 0 by Newton's method from `x`.
 ///
 /// A step is halved until the next one, with the same Jacobian, gets shorter: see [`Equations::norm`]. Lengths are Euclidean, so
 /// unknowns of very different size are better scaled by the caller.
 ///
 /// # Errors
-/// If F does not have as many components as there are unknowns, cannot be linearized where the iteration
-/// takes it, or no solution was found.
-///
-/// # Examples
-/// ```
-/// use prehend_autodiff::Scalar;
-/// use prehend_autodiff::implicit::{ImplicitError, Residual, newton};
-///
-/// struct SquareRoot;
-/// impl Residual for SquareRoot {
-///     fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
-///         vec![x[0] * x[0] - p[0]]
-///     }
-/// }
-///
-/// assert_eq!(newton(&SquareRoot, &[1.0], &[9.0])?, [3.0]);
-/// # Ok::<(), ImplicitError>(())
-/// ```
-pub fn newton(
-    equation: &impl Residual,
-    start: &[f64],
-    p: &[f64],
-) -> Result<Vec<f64>, ImplicitError> {
-    let x = newton_on(&At { equation, p }, DVector::from_column_slice(start))?;
-    Ok(x.as_slice().to_vec())
-}
-
-/// An equation at fixed parameters.
-struct At<'a, R> {
-    equation: &'a R,
-    p: &'a [f64],
-}
-
-impl<R: Residual> Equations for At<'_, R> {
-    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
-        DVector::from_vec(self.equation.residual(x.as_slice(), self.p))
-    }
-
-    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError> {
-        let (residual, jacobian) = linearize(self.equation, x.as_slice(), self.p);
-        check_length(x.as_slice(), residual.len())?;
-        Ok((DVector::from_vec(residual), lu(&jacobian)?))
-    }
-}
-
-/// Solves `equations` by Newton's method from `x`, as [`newton`] does, with a Jacobian and a measure of one's own.
-///
-/// # Errors
 /// If residual or Jacobian are of another size than the unknowns, the Jacobian is singular, a number is not finite, or no step
 /// makes the residual smaller.
-pub fn newton_on(
+pub fn newton(
     equations: &impl Equations,
     mut x: DVector<f64>,
 ) -> Result<DVector<f64>, ImplicitError> {
     let mut iterations = 0;
     loop {
         let (residual, jacobian) = equations.linearize(&x)?;
-        check_length(x.as_slice(), residual.len())?;
-        if jacobian.size() != x.len() {
-            let (unknowns, found) = (x.len(), jacobian.size());
-            return Err(ImplicitError::Jacobian { unknowns, found });
+        let unknowns = x.len();
+        if residual.len() != unknowns {
+            return Err(ImplicitError::Equations { unknowns, found: residual.len() });
+        }
+        if jacobian.size() != unknowns {
+            return Err(ImplicitError::Jacobian { unknowns, found: jacobian.size() });
         }
         if x.is_empty() {
             return Ok(x);
@@ -152,67 +105,105 @@ pub fn newton_on(
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{ComplexField, DMatrix};
+
     use super::*;
-    use crate::Scalar;
-    use crate::solve::SolveError;
+    use crate::solve::{SolveError, lu};
+    use crate::{Fwd, Scalar, forward_jacobian};
 
-    /// atan(x − p) = 0: full Newton steps from far away run off.
-    struct Arctangent;
+    fn at(x: &[f64]) -> DVector<f64> {
+        DVector::from_column_slice(x)
+    }
 
-    impl Residual for Arctangent {
-        fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
-            x.iter().map(|&x| (x - p[0]).atan()).collect()
+    /// Equations of the numbers in a slice.
+    struct Written<F>(F);
+
+    impl<F: Fn(&[Fwd<2>]) -> Vec<Fwd<2>>> Equations for Written<F> {
+        fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+            let x: Vec<Fwd<2>> = x.iter().map(|x| Fwd::constant(*x)).collect();
+            DVector::from_vec((self.0)(&x).into_iter().map(|f| f.value).collect())
+        }
+
+        fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored), ImplicitError> {
+            let (residual, jacobian): (_, DMatrix<f64>) = forward_jacobian(&self.0, x.as_slice());
+            Ok((DVector::from_vec(residual), lu(&jacobian)?))
         }
     }
 
-    /// x² + 1 = 0, one equation whatever the number of unknowns.
-    struct NoRoot;
+    /// atan(x − ¼) = 0: full Newton steps from far away run off.
+    fn arctangent(x: &[Fwd<2>]) -> Vec<Fwd<2>> {
+        x.iter().map(|x| x.plus(-0.25).atan()).collect()
+    }
 
-    impl Residual for NoRoot {
-        fn residual<S: Scalar>(&self, x: &[S], _: &[S]) -> Vec<S> {
-            vec![x.iter().fold(S::one(), |sum, &x| sum + x * x)]
-        }
+    /// x² + 1 = 0, one equation whatever the number of unknowns.
+    fn no_root(x: &[Fwd<2>]) -> Vec<Fwd<2>> {
+        vec![x.iter().fold(Fwd::constant(1.0), |sum, &x| sum + x * x)]
     }
 
     #[test]
     fn damping_brings_far_starts_home() {
         for start in [0.5, 3.0, -40.0, 1e5] {
-            let x = newton(&Arctangent, &[start, 1.0], &[0.25]).unwrap();
+            let x = newton(&Written(arctangent), at(&[start, 1.0])).unwrap();
             assert!(x.iter().all(|x| (x - 0.25).abs() < 1e-15), "{start}: {x:?}");
-        }
-    }
-
-    /// x₀ = p, x₁² = 10⁻⁸: unknowns of very different size.
-    struct Apart;
-
-    impl Residual for Apart {
-        fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
-            vec![x[0] - p[0], x[1] * x[1] - S::constant(1e-8)]
         }
     }
 
     #[test]
     fn a_large_unknown_excuses_no_small_one() {
         for p in [1.0, 1e5, 1e7] {
-            let x = newton(&Apart, &[p, 1.0], &[p]).unwrap();
+            let apart = |x: &[Fwd<2>]| vec![x[0].plus(-p), (x[1] * x[1]).plus(-1e-8)];
+            let x = newton(&Written(apart), at(&[p, 1.0])).unwrap();
             assert!((x[1] - 1e-4).abs() < 1e-12, "{x:?}");
-            assert!(crate::implicit::solution(Apart, &x, &[p]).is_ok());
         }
     }
 
     #[test]
     fn what_has_no_solution_is_an_error() {
-        let refused = newton(&NoRoot, &[0.7], &[]).unwrap_err();
+        let refused = newton(&Written(no_root), at(&[0.7])).unwrap_err();
         assert!(matches!(refused, ImplicitError::NotConverged { .. }), "{refused}");
-        let refused = newton(&NoRoot, &[0.0], &[]).unwrap_err();
+        let refused = newton(&Written(no_root), at(&[0.0])).unwrap_err();
         assert!(matches!(refused, ImplicitError::Solve(SolveError::Singular { .. })), "{refused}");
-        assert!(newton(&NoRoot, &[], &[]).is_err());
-        assert!(newton(&NoRoot, &[1.0, 2.0], &[]).is_err());
-        assert!(newton(&Arctangent, &[f64::NAN], &[0.0]).is_err());
+        assert!(newton(&Written(no_root), at(&[])).is_err());
+        assert!(newton(&Written(no_root), at(&[1.0, 2.0])).is_err());
+        assert!(newton(&Written(arctangent), at(&[f64::NAN])).is_err());
+    }
+
+    #[test]
+    fn the_numbers_of_equations_and_unknowns_must_agree() {
+        /// Answers of sizes of their own.
+        struct Sized(usize, usize);
+        impl Equations for Sized {
+            fn residual(&self, _: &DVector<f64>) -> DVector<f64> {
+                DVector::zeros(self.0)
+            }
+            fn linearize(
+                &self,
+                x: &DVector<f64>,
+            ) -> Result<(DVector<f64>, Factored), ImplicitError> {
+                Ok((self.residual(x), lu(&DMatrix::identity(self.1, self.1))?))
+            }
+        }
+        let refused = newton(&Sized(1, 2), at(&[3.0, 4.0]));
+        assert_eq!(refused, Err(ImplicitError::Equations { unknowns: 2, found: 1 }));
+        let refused = newton(&Sized(2, 1), at(&[3.0, 4.0]));
+        assert_eq!(refused, Err(ImplicitError::Jacobian { unknowns: 2, found: 1 }));
+    }
+
+    #[test]
+    fn roots_are_found_or_refused_wherever_it_starts() {
+        let extremes = [0.0, 5e-324, 1e-310, 1e-160, 1e-9, 1.0, 1e16, 1e155, 1e200];
+        for (start, p) in
+            extremes.into_iter().flat_map(|a| extremes.map(|b| [(a, b), (-a, b)])).flatten()
+        {
+            let cube = |x: &[Fwd<2>]| vec![(x[0] * x[0] * x[0]).plus(-p)];
+            if let Ok(x) = newton(&Written(cube), at(&[start])) {
+                assert!(x[0].is_finite(), "{start:e} {p:e}");
+            }
+        }
     }
 
     #[test]
     fn no_unknowns_are_solved_at_once() {
-        assert!(newton(&Arctangent, &[], &[0.0]).unwrap().is_empty());
+        assert!(newton(&Written(arctangent), at(&[])).unwrap().is_empty());
     }
 }

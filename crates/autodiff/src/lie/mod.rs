@@ -8,10 +8,10 @@
 //! | | SO(3) | SE(3) |
 //! |---|---|---|
 //! | exponential, logarithm | [`so3_exp`], [`so3_log`] | [`se3_exp`], [`se3_log`] |
-//! | left Jacobian, inverse | [`so3_left_jacobian`], [`so3_left_jacobian_inverse`] | [`se3_left_jacobian`], [`se3_left_jacobian_inverse`] |
-//! | right Jacobian, inverse | [`so3_right_jacobian`], [`so3_right_jacobian_inverse`] | [`se3_right_jacobian`], [`se3_right_jacobian_inverse`] |
+//! | left Jacobian, inverse | [`so3_left_jacobian`], [`so3_left_jacobian_inverse`] | [`se3_left_jacobian`] |
+//! | right Jacobian, inverse | [`so3_right_jacobian`], [`so3_right_jacobian_inverse`] | |
 //! | adjoint of the group | the rotation matrix itself | [`se3_adjoint`] |
-//! | adjoint of the algebra | [`cross_matrix`] | [`se3_little_adjoint`] |
+//! | adjoint of the algebra | [`cross_matrix`] | |
 //!
 //! [`lift`] makes constants of a pose. [`twist_row`] is the derivative of a point's coordinate by a left twist about a center, [`perturb_about`] that twist.
 //!
@@ -24,10 +24,7 @@
 mod se3;
 mod so3;
 
-pub use se3::{
-    lift, perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse,
-    se3_little_adjoint, se3_log, se3_right_jacobian, se3_right_jacobian_inverse, twist_row,
-};
+pub use se3::{lift, perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_log, twist_row};
 pub use so3::{
     cross_matrix, so3_exp, so3_left_jacobian, so3_left_jacobian_inverse, so3_log,
     so3_right_jacobian, so3_right_jacobian_inverse,

@@ -250,8 +250,45 @@ fn norm(v: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::GradientDescent;
+    use super::super::test_problems::{half_square, rosenbrock};
     use super::*;
+    use crate::gradient;
+
+    /// Steps against the gradient, whose length follows their gain.
+    struct SteepestDescent {
+        rate: f64,
+    }
+
+    impl Method for SteepestDescent {
+        type Evaluation = (f64, Vec<f64>);
+
+        fn propose(&mut self, (_, gradient): &Self::Evaluation) -> Option<Trial> {
+            let step = gradient.iter().map(|g| -self.rate * g).collect();
+            let predicted = self.rate * gradient.iter().map(|g| g * g).sum::<f64>();
+            Some(Trial { step, predicted: Some(predicted) })
+        }
+
+        fn taken(&mut self, gain: f64) {
+            // On a parabola the gain is ½ exactly at its minimum.
+            self.rate *= if gain > 0.5 { 2.0 } else { 0.5 };
+        }
+
+        fn refused(&mut self) {
+            self.rate *= 0.5;
+        }
+    }
+
+    fn minimize(
+        (rate, criteria): (f64, Criteria),
+        start: &[f64],
+        objective: impl FnMut(&[f64]) -> (f64, Vec<f64>),
+    ) -> Result<Outcome, OptimizeError> {
+        iterate(SteepestDescent { rate }, &criteria, start, objective, unobserved)
+    }
+
+    fn default() -> (f64, Criteria) {
+        (0.01, Criteria { iterations: 1000, ..Criteria::default() })
+    }
 
     fn bowl(x: &[f64]) -> (f64, Vec<f64>) {
         (x.iter().map(|x| x * x).sum(), x.iter().map(|x| 2.0 * x).collect())
@@ -260,7 +297,7 @@ mod tests {
     #[test]
     fn bad_input_is_refused() {
         let refused = |start: &[f64], f: fn(&[f64]) -> (f64, Vec<f64>)| {
-            GradientDescent::default().minimize(start, f).unwrap_err()
+            minimize(default(), start, f).unwrap_err()
         };
         assert_eq!(refused(&[], bowl), OptimizeError::NoParameters);
         assert_eq!(refused(&[0.0, f64::NAN], bowl), OptimizeError::StartNotFinite { index: 1 });
@@ -279,7 +316,7 @@ mod tests {
     fn tolerances_must_not_be_negative() {
         for bad in [-1.0, f64::NAN] {
             let criteria = Criteria { step: bad, ..Criteria::default() };
-            let refused = GradientDescent { criteria, ..Default::default() }.minimize(&[1.0], bowl);
+            let refused = minimize((0.01, criteria), &[1.0], bowl);
             assert!(matches!(refused, Err(OptimizeError::Setting { name: "step", .. })));
         }
     }
@@ -294,9 +331,8 @@ mod tests {
             predicted_decrease: 0.0,
         };
         let stop = |criteria| {
-            let method = GradientDescent { rate: 0.01, criteria };
             // An offset, so that the relative decrease becomes small before the steps do.
-            method.minimize(&[3.0, 4.0], |x| (bowl(x).0 + 1.0, bowl(x).1)).unwrap()
+            minimize((0.01, criteria), &[3.0, 4.0], |x| (bowl(x).0 + 1.0, bowl(x).1)).unwrap()
         };
         assert_eq!(stop(Criteria { gradient: 1e-3, ..never }).stop, Stop::Gradient);
         assert_eq!(stop(Criteria { step: 1e-3, ..never }).stop, Stop::Step);
@@ -304,24 +340,63 @@ mod tests {
         assert_eq!(stop(Criteria { predicted_decrease: 1e-3, ..never }).stop, Stop::Decrease);
         let ended = stop(Criteria { iterations: 3, ..never });
         assert_eq!((ended.stop, ended.iterations), (Stop::Iterations, 3));
-        let at_once = GradientDescent::default().minimize(&[0.0], bowl).unwrap();
+        let at_once = minimize(default(), &[0.0], bowl).unwrap();
         assert_eq!((at_once.stop, at_once.iterations), (Stop::Gradient, 0));
     }
 
     #[test]
     fn an_observer_ends_it_early() {
         let mut seen = Vec::new();
-        let found = GradientDescent::default()
-            .minimize_observed(&[3.0, 4.0], bowl, |iteration| {
-                seen.push(iteration.number);
-                if iteration.number == 2 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            })
-            .unwrap();
+        let (rate, criteria) = default();
+        let observe = |iteration: &Iteration| {
+            seen.push(iteration.number);
+            if iteration.number == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let method = SteepestDescent { rate };
+        let found = iterate(method, &criteria, &[3.0, 4.0], bowl, observe).unwrap();
         assert_eq!((found.stop, found.iterations, seen), (Stop::Observer, 2, vec![1, 2]));
         assert_eq!(bowl(&found.parameters).0, found.value);
+    }
+
+    #[test]
+    fn the_value_falls_all_the_way_and_never_rises() {
+        let criteria = Criteria { iterations: 20_000, gradient: 1e-6, ..Criteria::default() };
+        for rate in [1e-6, 1.0, 1e6] {
+            let mut last = f64::INFINITY;
+            let objective = |x: &[f64]| gradient(|x| half_square(rosenbrock(x)), x);
+            let observe = |iteration: &Iteration| {
+                assert!(iteration.value <= last);
+                last = iteration.value;
+                ControlFlow::Continue(())
+            };
+            let method = SteepestDescent { rate };
+            let found = iterate(method, &criteria, &[-1.2, 1.0], objective, observe).unwrap();
+            assert_eq!(found.stop, Stop::Gradient, "{found:?}");
+            assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-4), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn it_does_not_step_out_of_the_domain() {
+        let mut bad = 0;
+        let objective = |x: &[f64]| {
+            bad += usize::from(x[0] <= 0.0);
+            (x[0] - x[0].ln(), vec![1.0 - 1.0 / x[0]])
+        };
+        let found = minimize((100.0, default().1), &[10.0], objective).unwrap();
+        assert!(bad > 0, "every step was finite, so nothing was tested");
+        assert!((found.parameters[0] - 1.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn landing_at_the_same_height_across_the_valley_is_not_convergence() {
+        let found = minimize((1.0, default().1), &[1.0], bowl).unwrap();
+        assert_eq!((found.stop, found.parameters), (Stop::Gradient, vec![0.0]));
+    }
+
+    #[test]
+    fn a_gradient_of_the_wrong_sign_ends_with_short_steps() {
+        let found = minimize(default(), &[1.0], |x| (x[0], vec![-1.0])).unwrap();
+        assert_eq!((found.stop, found.parameters), (Stop::Step, vec![1.0]));
     }
 }

@@ -40,7 +40,8 @@ const LEAST_DAMPING: f64 = 1e-8;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevenbergMarquardt {
-    /// First damping, relative to the diagonal of JᵀJ; 1e-3 by default.
+    /// First damping, relative to the diagonal of JᵀJ; 1e-3 by default. With 0 the steps are Gauss and Newton's until one fails,
+    /// because JᵀJ is singular or the value would rise.
     pub damping: f64,
     /// When to stop.
     pub criteria: Criteria,
@@ -53,11 +54,6 @@ impl Default for LevenbergMarquardt {
 }
 
 impl LevenbergMarquardt {
-    /// Gauss–Newton: no damping until a step fails, because JᵀJ is singular or the value would rise.
-    pub fn gauss_newton() -> Self {
-        Self { damping: 0.0, ..Self::default() }
-    }
-
     /// Minimizes ½‖r‖² from `start`, given its normal equations at any point.
     ///
     /// # Errors

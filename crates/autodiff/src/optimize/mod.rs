@@ -3,8 +3,7 @@
 //! | the objective is | use |
 //! |---|---|
 //! | a sum of squared residuals, with up to a few hundred parameters | [`LevenbergMarquardt`] |
-//! | smooth, and well scaled | [`GradientDescent`] |
-//! | noisy, kinked or badly scaled, as through contacts | [`Adam`] |
+//! | anything else: noisy, kinked or badly scaled, as through contacts | [`Adam`] |
 //!
 //! For anything more (quasi-Newton methods, bounds) [`gradient`](crate::gradient) plugs into a general
 //! optimization library; `benches/peers/autodiff/examples/argmin_lbfgs.rs` does so.
@@ -13,7 +12,7 @@
 //! is given:
 //!
 //! ```
-//! use prehend_autodiff::optimize::{GradientDescent, LevenbergMarquardt, NormalEquations};
+//! use prehend_autodiff::optimize::{Adam, LevenbergMarquardt, NormalEquations};
 //! use prehend_autodiff::{Scalar, gradient};
 //!
 //! fn residuals<S: Scalar>(x: &[S]) -> Vec<S> {
@@ -24,7 +23,7 @@
 //! }
 //!
 //! let start = [1.0, 1.0];
-//! let slow = GradientDescent::default().minimize(&start, |x| gradient(energy, x))?;
+//! let slow = Adam { rate: 0.1, ..Adam::default() }.minimize(&start, |x| gradient(energy, x))?;
 //! let fast = LevenbergMarquardt::default()
 //!     .minimize(&start, |x| NormalEquations::forward::<2>(residuals, x))?;
 //! for x in [slow.parameters, fast.parameters] {
@@ -43,7 +42,6 @@
 mod adam;
 mod criteria;
 mod error;
-mod gradient_descent;
 mod iterate;
 mod least_squares;
 mod normal_equations;
@@ -55,7 +53,6 @@ mod test_problems;
 pub use adam::Adam;
 pub use criteria::Criteria;
 pub use error::OptimizeError;
-pub use gradient_descent::GradientDescent;
 pub use least_squares::{LevenbergMarquardt, Solved};
 pub use normal_equations::NormalEquations;
 pub use problem::{LeastSquares, QuadraticModel};

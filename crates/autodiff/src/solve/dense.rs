@@ -7,8 +7,6 @@ use nalgebra::{DMatrix, Dim, Dyn, LU, Matrix, PermutationSequence, RawStorage};
 use super::SolveError;
 use super::factored::Factored;
 use super::factors::Factors;
-use super::pattern::Pattern;
-use crate::operand::Operand;
 
 /// Rows from which on a sparse factorization is faster, with some twenty entries each.
 #[cfg(feature = "faer")]
@@ -22,23 +20,22 @@ const SPARSE: usize = 120;
 /// # Examples
 /// ```
 /// use nalgebra::{Matrix2, Vector2};
-/// use prehend_autodiff::{Fwd, Scalar, solve::lu};
-/// let [a, b] = Fwd::<2>::variables([4.0, 3.0]);
-/// let o = Fwd::constant(0.0);
-/// let x = lu(&Matrix2::new(a, o, o, b))?.solve(&Vector2::new(b, o))?;
-/// assert_eq!((x[0].value, x[0].derivative), (0.75, [-3.0 / 16.0, 0.25]));
+/// use prehend_autodiff::solve::lu;
+/// let x = lu(&Matrix2::new(4.0, 0.0, 0.0, 2.0))?.solve(&Vector2::new(3.0, 1.0))?;
+/// assert_eq!(x, Vector2::new(0.75, 0.5));
 /// # Ok::<(), prehend_autodiff::solve::SolveError>(())
 /// ```
-pub fn lu<S: Operand, D: Dim>(
-    a: &Matrix<S, D, D, impl RawStorage<S, D, D>>,
-) -> Result<Factored<S>, SolveError> {
+pub fn lu<D: Dim>(
+    a: &Matrix<f64, D, D, impl RawStorage<f64, D, D>>,
+) -> Result<Factored, SolveError> {
     let (size, columns) = a.shape();
     if size != columns {
         return Err(SolveError::NotSquare { rows: size, columns });
     }
-    Factored::new(Pattern::Dense(size), a.iter().copied().collect(), |values| {
-        let (permutation, lower, upper) =
-            LU::new(DMatrix::from_column_slice(size, size, values)).unpack();
+    let a = DMatrix::from_iterator(size, size, a.iter().copied());
+    let entries = a.iter().enumerate().map(|(k, value)| (k % size, k / size, *value));
+    Factored::new(size, entries, || {
+        let (permutation, lower, upper) = LU::new(a.clone()).unpack();
         if upper.diagonal().iter().any(|pivot| *pivot == 0.0) {
             return Err(SolveError::Singular { condition: f64::INFINITY });
         }
@@ -52,15 +49,10 @@ pub fn lu<S: Operand, D: Dim>(
 ///
 /// # Errors
 /// If a place lies outside the matrix, a value is not finite, or the matrix is singular to working precision.
-pub fn sparse_lu(
-    size: usize,
-    entries: &[(usize, usize, f64)],
-) -> Result<Factored<f64>, SolveError> {
+pub fn sparse_lu(size: usize, entries: &[(usize, usize, f64)]) -> Result<Factored, SolveError> {
     #[cfg(feature = "faer")]
     if size >= SPARSE {
-        let places: Vec<_> = entries.iter().map(|(row, column, _)| (*row, *column)).collect();
-        let values: Vec<f64> = entries.iter().map(|(.., value)| *value).collect();
-        return super::SparseSolver::lu(size, &places)?.factor(&values);
+        return super::sparse::lu(size, entries);
     }
     let mut matrix = DMatrix::zeros(size, size);
     for &(row, column, value) in entries {
@@ -114,7 +106,7 @@ mod tests {
     #[test]
     fn bad_matrices_are_refused() {
         assert_eq!(
-            lu(&DMatrix::<f64>::zeros(2, 3)).unwrap_err(),
+            lu(&DMatrix::zeros(2, 3)).unwrap_err(),
             SolveError::NotSquare { rows: 2, columns: 3 }
         );
         for bad in [f64::NAN, f64::NEG_INFINITY] {
@@ -122,7 +114,7 @@ mod tests {
             assert_eq!(refused.unwrap_err(), SolveError::NotFinite("matrix"));
         }
         let singular = SolveError::Singular { condition: f64::INFINITY };
-        assert_eq!(lu(&Matrix2::<f64>::zeros()).unwrap_err(), singular);
+        assert_eq!(lu(&Matrix2::zeros()).unwrap_err(), singular);
         assert_eq!(lu(&Matrix2::new(1.0, 2.0, 2.0, 4.0)).unwrap_err(), singular);
     }
 }

@@ -12,17 +12,15 @@ pub enum SolveError {
         /// Columns of the matrix.
         columns: usize,
     },
-    /// The number of values does not fit the matrix: rows of a right-hand side, or entries of a pattern.
-    #[error("{expected} {what} are needed, {found} were given")]
+    /// A right-hand side has more rows than the matrix, or fewer.
+    #[error("{expected} rows of the right-hand side are needed, {found} were given")]
     Length {
-        /// Name of the values, such as `entries`.
-        what: &'static str,
-        /// How many the matrix needs.
+        /// How many the matrix has.
         expected: usize,
         /// How many there were.
         found: usize,
     },
-    /// An entry of a sparse pattern lies outside the matrix.
+    /// An entry of a sparse matrix lies outside the matrix.
     #[error("entry ({row}, {column}) lies outside a matrix of size {size}")]
     OutOfBounds {
         /// Row of the entry.
@@ -38,14 +36,8 @@ pub enum SolveError {
     /// The matrix is singular, or too close to it for its solution to mean anything.
     #[error("the matrix is singular to working precision (condition number about {condition:.1e})")]
     Singular {
-        /// The estimate of [`Factored::condition`](super::Factored::condition); infinite when a pivot is zero.
+        /// Estimated condition number in the best units of unknowns and equations; infinite when a pivot is zero.
         condition: f64,
-    },
-    /// A Cholesky factorization met a pivot that is not positive.
-    #[error("the matrix is not positive definite (step {step} of its Cholesky factorization)")]
-    NotPositiveDefinite {
-        /// The step of the elimination, in the order that it chose.
-        step: usize,
     },
     /// The factorization needs more memory than there is, or more entries than can be counted.
     #[error("the matrix is too large to factorize")]

@@ -3,17 +3,11 @@
 
 use nalgebra::{ComplexField, Matrix2, Matrix3, SVector, Vector2, Vector3, Vector6};
 use prehend_autodiff::check::compare_gradients;
-use prehend_autodiff::implicit::{Residual, newton, solution};
 use prehend_autodiff::lie::{
-    perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse, se3_log,
-    se3_right_jacobian, se3_right_jacobian_inverse, so3_log,
+    perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_log, so3_log,
 };
-use prehend_autodiff::optimize::{
-    Adam, GradientDescent, LevenbergMarquardt, NormalEquations, OptimizeError,
-};
-use prehend_autodiff::rigid::{conjugated, rotate, turned};
-#[cfg(feature = "faer")]
-use prehend_autodiff::solve::SparseSolver;
+use prehend_autodiff::optimize::{Adam, LevenbergMarquardt, NormalEquations, OptimizeError};
+use prehend_autodiff::rigid::{conjugated, turned};
 use prehend_autodiff::solve::{lu, sparse_lu};
 use prehend_autodiff::{Fwd, Quadratic, Recording, Scalar};
 use proptest::prelude::*;
@@ -125,30 +119,14 @@ fn motions<S: Scalar>(x: &[S]) -> Vec<S> {
     all.extend(perturb_about(&motion, &rho, &xi).to_homogeneous().iter());
     all.extend(se3_log(&motion).iter());
     all.extend(so3_log(&(turn * turn.inverse())).iter());
-    for matrix in [
-        se3_adjoint(&motion),
-        se3_left_jacobian(&xi),
-        se3_right_jacobian(&xi),
-        se3_left_jacobian_inverse(&xi),
-        se3_right_jacobian_inverse(&xi),
-    ] {
+    for matrix in [se3_adjoint(&motion), se3_left_jacobian(&xi)] {
         all.extend(matrix.iter());
     }
-    all.extend(rotate(&turn, &rho).iter());
     all.extend(turned(&turn, &omega).coords.iter());
     all.extend(
         conjugated(&turn, &Matrix3::new(1.0, 0.1, 0.0, 0.1, 2.0, 0.0, 0.0, 0.0, 3.0), &rho).iter(),
     );
     all
-}
-
-/// x³ = p, whose slope vanishes with x.
-struct Cube;
-
-impl Residual for Cube {
-    fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
-        vec![x[0] * x[0] * x[0] - p[0]]
-    }
 }
 
 fn config(cases: u32) -> ProptestConfig {
@@ -204,7 +182,6 @@ proptest! {
     #[test]
     fn linear_systems_are_solved_or_refused(m in [extremes(), extremes(), extremes(), extremes()], b in [extremes(), extremes()]) {
         let Ok(factored) = lu(&Matrix2::new(m[0], m[1], m[2], m[3])) else { return Ok(()) };
-        prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
         if let Ok(x) = factored.solve(&Vector2::from(b)) {
             prop_assert!(x.iter().all(|x| x.is_finite()));
         }
@@ -215,18 +192,9 @@ proptest! {
         let places = [(0, 0), (1, 0), (0, 1), (1, 1), (1, 1)];
         let values = [m[0], m[1], m[2], m[3], m[0]];
         let entries = std::array::from_fn::<_, 5, _>(|k| (places[k].0, places[k].1, values[k]));
-        let found = [
-            sparse_lu(2, &entries),
-            #[cfg(feature = "faer")]
-            SparseSolver::lu(2, &places).and_then(|solver| solver.factor(&values)),
-            #[cfg(feature = "faer")]
-            SparseSolver::cholesky(2, &places).and_then(|solver| solver.factor(&values)),
-        ];
-        for factored in found.into_iter().flatten() {
-            prop_assert!(factored.condition() >= 1.0 && factored.condition().is_finite());
-            if let Ok(x) = factored.solve(&Vector2::from(b)) {
-                prop_assert!(x.iter().all(|x| x.is_finite()));
-            }
+        let Ok(factored) = sparse_lu(2, &entries) else { return Ok(()) };
+        if let Ok(x) = factored.solve(&Vector2::from(b)) {
+            prop_assert!(x.iter().all(|x| x.is_finite()));
         }
     }
 
@@ -237,17 +205,6 @@ proptest! {
         let same = compare_gradients(&a, &a);
         let zero = a.iter().all(|a| *a == 0.0);
         prop_assert!(same.relative == 0.0 && (zero || a[0].abs().max(a[1].abs()) < 1e-300 || same.cosine > 1.0 - 1e-15));
-    }
-
-    #[test]
-    fn roots_are_found_or_refused(start in extremes(), p in extremes()) {
-        if let Ok(x) = newton(&Cube, &[start], &[p]) {
-            prop_assert!(x[0].is_finite());
-            if let Ok(moved) = solution(Cube, &x, &Fwd::<1>::variables([p])) {
-                // Infinite like that of a root at zero.
-                prop_assert!(!moved[0].derivative[0].is_nan(), "{moved:?}");
-            }
-        }
     }
 }
 
@@ -284,9 +241,8 @@ proptest! {
         let start = [start, 1.0];
         for found in [
             Adam::default().minimize(&start, slope),
-            GradientDescent::default().minimize(&start, slope),
             LevenbergMarquardt::default().minimize(&start, equations),
-            LevenbergMarquardt::gauss_newton().minimize(&start, equations),
+            LevenbergMarquardt { damping: 0.0, ..Default::default() }.minimize(&start, equations),
         ] {
             match found {
                 Ok(found) => prop_assert!(found.value.is_finite() && found.parameters.iter().all(|p| p.is_finite())),

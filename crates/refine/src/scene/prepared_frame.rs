@@ -123,8 +123,7 @@ impl<'a> PreparedFrame<'a> {
 
     /// The frame on another rendering device ([`Device::open`](prehend_render::Device::open)): factors compare all hypotheses of a call there at once.
     ///
-    /// The processor renders where the device fails. Pass no device [`WithFallback`](prehend_render::WithFallback): it would be called under a lock,
-    /// in which the tasks of the processor must not wait for each other.
+    /// The processor renders where the device fails.
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
         let of_view = |view: CameraView<'a>| {
             let frame = view.frame.with_backend(Arc::clone(&backend));

@@ -9,7 +9,7 @@ use prehend_refine::scene::{PreparedFrame, default_scene};
 use prehend_refine::search::{PoseSearch, SearchSettings};
 use prehend_refine::{Method, PoseFinder, refine};
 use prehend_render::{
-    Backend, BackendError, Hypothesis, Linearized, Loss, PoseImage, PoseProblem, Session, Tile,
+    Backend, BackendError, Hypothesis, Linearized, Loss, PoseProblem, Session, Tile,
 };
 
 /// A device that computes as the processor does, and is lost after some calls.
@@ -45,10 +45,6 @@ impl FragileSession {
 }
 
 impl Session for FragileSession {
-    fn name(&self) -> &str {
-        "fragile"
-    }
-
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         self.call(hypotheses.len())?;
         self.0.evaluate(hypotheses)
@@ -66,10 +62,6 @@ impl Session for FragileSession {
     ) -> Result<Vec<Vec<Tile>>, BackendError> {
         self.call(hypotheses.len())?;
         self.0.linearize_tiles(hypotheses, side)
-    }
-
-    fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
-        self.0.render(hypothesis)
     }
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Backend, BackendError, Hypothesis, PoseProblem, Session};
-use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
+use crate::pose_loss::{Linearized, Loss, Tile};
 
 /// All cores of this processor. Never fails.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,10 +42,6 @@ impl PoseProblem {
 }
 
 impl Session for PoseProblem {
-    fn name(&self) -> &str {
-        Cpu.name()
-    }
-
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         Ok(self.losses(hypotheses))
     }
@@ -64,9 +60,5 @@ impl Session for PoseProblem {
         side: usize,
     ) -> Result<Vec<Vec<Tile>>, BackendError> {
         Ok(self.tiles(hypotheses, side))
-    }
-
-    fn render(&mut self, h: &Hypothesis) -> Result<PoseImage, BackendError> {
-        Ok(self.loss.render(&self.model, &h.t_cam_object, &self.target.camera, &h.light))
     }
 }

@@ -21,7 +21,7 @@ pub enum Device {
 }
 
 impl Device {
-    /// The device, open and ready. [`WithFallback`](super::WithFallback) goes on with the processor where it fails.
+    /// The device, open and ready.
     ///
     /// Opening a graphics device and compiling its shaders takes some tenths of a second: call this once.
     ///
@@ -30,8 +30,21 @@ impl Device {
     pub fn open(self) -> Result<Arc<dyn Backend>, BackendError> {
         match self {
             Self::Cpu => Ok(Arc::new(Cpu)),
-            Self::Gpu => gpu(),
-            Self::Auto => Ok(hardware().unwrap_or_else(|| Arc::new(Cpu))),
+            Self::Gpu => match graphics(false) {
+                Err(BackendError::NoDevice(_)) => {
+                    let software = graphics(true)?;
+                    log::warn!("{} is slower than the processor by itself", software.name());
+                    Ok(software)
+                }
+                opened => opened,
+            },
+            Self::Auto => Ok(graphics(false).unwrap_or_else(|error| {
+                match error {
+                    BackendError::NoDevice(_) | BackendError::NotBuilt => log::debug!("{error}"),
+                    error => log::warn!("{error}; continuing on the CPU"),
+                }
+                Arc::new(Cpu)
+            })),
         }
     }
 }
@@ -40,41 +53,16 @@ fn unknown(text: &str) -> String {
     format!("no device {text:?}: one of {}", Device::VARIANTS.join(", "))
 }
 
+/// Graphics hardware, or a software adapter.
 #[cfg(feature = "gpu")]
-fn gpu() -> Result<Arc<dyn Backend>, BackendError> {
-    use super::Gpu;
-
-    let gpu = Gpu::new().or_else(|error| match error {
-        BackendError::NoDevice(_) => {
-            let software = Gpu::with_software()?;
-            log::warn!("{} is slower than the processor by itself", software.name());
-            Ok(software)
-        }
-        error => Err(error),
-    })?;
+fn graphics(software: bool) -> Result<Arc<dyn Backend>, BackendError> {
+    let gpu = if software { super::Gpu::with_software()? } else { super::Gpu::new()? };
     Ok(Arc::new(gpu))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn gpu() -> Result<Arc<dyn Backend>, BackendError> {
+fn graphics(_: bool) -> Result<Arc<dyn Backend>, BackendError> {
     Err(BackendError::NotBuilt)
-}
-
-#[cfg(feature = "gpu")]
-fn hardware() -> Option<Arc<dyn Backend>> {
-    use super::Gpu;
-
-    match Gpu::new() {
-        Ok(gpu) => return Some(Arc::new(gpu)),
-        Err(BackendError::NoDevice(reason)) => log::debug!("no graphics device: {reason}"),
-        Err(error) => log::warn!("{error}; continuing on the CPU"),
-    }
-    None
-}
-
-#[cfg(not(feature = "gpu"))]
-fn hardware() -> Option<Arc<dyn Backend>> {
-    None
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 mod cpu;
 mod device;
 mod error;
-mod fallback;
 #[cfg(feature = "gpu")]
 mod gpu;
 
@@ -14,13 +13,12 @@ use nalgebra::Isometry3;
 pub use cpu::Cpu;
 pub use device::Device;
 pub use error::BackendError;
-pub use fallback::WithFallback;
 #[cfg(feature = "gpu")]
 pub use gpu::Gpu;
 
 use crate::light::Light;
 use crate::model::RenderModel;
-use crate::pose_loss::{Linearized, Loss, PoseImage, PoseLoss, Target, Tile};
+use crate::pose_loss::{Linearized, Loss, PoseLoss, Target, Tile};
 
 /// Object, target and loss that many poses have in common.
 #[derive(Clone, Debug)]
@@ -51,7 +49,7 @@ pub struct Hypothesis {
 /// use prehend_geometry::shapes::cuboid;
 /// use prehend_render::{
 ///     Backend, Camera, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage,
-///     Target, WithFallback,
+///     Target,
 /// };
 ///
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
@@ -61,7 +59,7 @@ pub struct Hypothesis {
 ///     target: Arc::new(Target::new(camera, &image, &mask)?),
 ///     loss: PoseLoss::default(),
 /// };
-/// let mut session = WithFallback(Device::Auto.open()?).prepare(&problem)?;
+/// let mut session = Device::Auto.open()?.prepare(&problem)?;
 /// let hypotheses: Vec<Hypothesis> = (0..100)
 ///     .map(|i| Hypothesis {
 ///         t_cam_object: Isometry3::translation(0.0, 0.0, 0.3 + 0.01 * i as f64),
@@ -82,22 +80,9 @@ pub trait Backend: Send + Sync {
     fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError>;
 }
 
-impl Backend for Arc<dyn Backend> {
-    fn name(&self) -> &str {
-        (**self).name()
-    }
-
-    fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError> {
-        (**self).prepare(problem)
-    }
-}
-
 /// A problem on its device. Results come in the order of the hypotheses, and a hypothesis has the same result whatever
 /// the others are.
 pub trait Session: Send {
-    /// Name of the device in use at present, for people to read.
-    fn name(&self) -> &str;
-
     /// The loss of each hypothesis.
     ///
     /// # Errors
@@ -122,10 +107,4 @@ pub trait Session: Send {
         hypotheses: &[Hypothesis],
         side: usize,
     ) -> Result<Vec<Vec<Tile>>, BackendError>;
-
-    /// The picture of one hypothesis.
-    ///
-    /// # Errors
-    /// When the device fails.
-    fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError>;
 }

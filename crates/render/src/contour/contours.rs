@@ -6,7 +6,7 @@ use super::crease::{Crease, creases};
 use super::drawing::Drawing;
 use super::inner::{Inner, LEAST_STEP, inner_contours};
 use super::outline::{Piece, Silhouette, outline};
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::model::RenderModel;
@@ -18,7 +18,7 @@ use crate::shading::surface::PosedLight;
 
 /// A posed model with its contours.
 pub(crate) struct ContourView<'a> {
-    pub(crate) scene: Scene<'a>,
+    pub(crate) scene: ContourScene<'a>,
     /// Columns and rows of the image.
     pub(super) size: [usize; 2],
     pub(super) region: Region,
@@ -62,7 +62,7 @@ impl<'a> ContourView<'a> {
             }
         };
         let twist_center = single(&center.coords);
-        let scene = Scene { posed, lighting, drawing, twist_center };
+        let scene = ContourScene { posed, lighting, drawing, twist_center };
         let size = [camera.width, camera.height];
         Self { scene, size, region, pieces: silhouette.outline, inner, creases, visible }
     }

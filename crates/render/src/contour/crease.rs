@@ -2,11 +2,11 @@
 
 use glam::Vec2;
 
-use super::outline::{Foot, PIECE, Piece, clip};
-use super::scene::Scene;
+use super::outline::{Foot, Piece};
+use super::scene::ContourScene;
 use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region, edge_functions};
-use crate::raster::{Seen, Visible};
+use crate::raster::{SeenFace, Visible};
 use crate::view::Pixel;
 
 /// A piece of a visible crease, directed as the one of its two faces runs through it that `outward` points away from.
@@ -36,32 +36,17 @@ pub(crate) fn creases<'a>(
             continue;
         }
         let [a, b] = edge.vertices.map(|v| projected.screen[v as usize]);
-        let d = (b - a).truncate();
-        let length = d.x.hypot(d.y);
-        if !(length > 1e-4 && length.is_finite()) {
-            continue;
-        }
-        let sign = f32::from(facing);
-        let whole = Piece {
-            face: edge.face,
-            corners: [edge.corner, (edge.corner + 1) % 3],
-            a: a.truncate(),
-            b: b.truncate(),
-            range: [0.0, 1.0],
-            outward: sign * d.perp() / length,
-        };
-        let Some([start, end]) = clip(&whole, region, margin) else { continue };
-        let count = ((end - start) * length / PIECE).ceil().max(1.0);
-        for i in 0..count as usize {
-            let at = |j: f32| start + (end - start) * j / count;
-            let range = [at(i as f32), at(i as f32 + 1.0)];
-            let t = 0.5 * (range[0] + range[1]);
+        let ends = [a, b].map(|end| end.truncate());
+        let whole = Piece::whole(edge.face, edge.corner, ends, facing);
+        for piece in whole.into_iter().flat_map(|whole| whole.cut(region, margin)) {
+            let t = piece.middle();
             let z = 1.0 / (a.z + t * (b.z - a.z));
-            let nearest = Visible::seen(visible, whole.at(t));
-            if nearest.is_none_or(|Seen { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face)) {
+            let nearest = Visible::seen(visible, piece.at(t));
+            if nearest
+                .is_none_or(|SeenFace { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face))
+            {
                 // The other face runs through the edge the other way.
                 let other_corners = [(edge.other_corner + 1) % 3, edge.other_corner];
-                let piece = Piece { range, ..whole };
                 out.push(Crease { piece, other: edge.other, other_corners });
             }
         }
@@ -99,7 +84,7 @@ impl Crease {
 /// Depths that differ by less than this share may lie on one surface.
 const SAME: f32 = 0.01;
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// Blends in what lies beyond a crease, at a pixel that shows `own` of this
     /// inverse depth.
     ///

@@ -5,10 +5,10 @@ use glam::Vec2;
 use super::drawing::falling_step;
 use super::footprint::Layers;
 use super::inner::Inner;
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::view::{Pixel, scaled_sum};
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// Blends the near and the far surface across an inner contour, at a pixel that shows `own`.
     ///
     /// On the far side the near surface has the color of the foot; on the near side the far surface has the

@@ -8,7 +8,7 @@ use super::inner::Inner;
 use super::interior::add_level;
 use super::near::{Hit, Place};
 use super::outline::Foot;
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::projected::barycentric;
 use crate::raster::Visible;
 use crate::shading::surface::{Shaded, shade};
@@ -106,7 +106,7 @@ impl Cut {
     }
 }
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// Rows of the color of the pixel `at` of depth `z` that shows `face` as `shaded`, from the differences of the colors seen
     /// at its opposite sides.
     ///

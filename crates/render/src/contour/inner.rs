@@ -31,7 +31,7 @@ pub(crate) fn inner_contours(
     least: impl Fn(u32, u32) -> Option<f32>,
 ) -> Vec<Inner> {
     let select = |piece: Piece| {
-        let t = 0.5 * (piece.range[0] + piece.range[1]);
+        let t = piece.middle();
         let face = projected.faces[piece.face as usize];
         let [wa, wb] = piece.corners.map(|c| projected.screen[face[c as usize] as usize].z);
         let z = 1.0 / (wa + t * (wb - wa));

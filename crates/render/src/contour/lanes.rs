@@ -9,7 +9,7 @@ use glam::{Vec3, vec2, vec3};
 use pulp::{Arch, NullaryFnOnce};
 
 use super::interior::{Motion, add_level};
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::model::{Albedo, Cell, Mipmap, Texel};
 use crate::projected::barycentric;
 use crate::shading::surface::{Unlit, coordinates, lit};
@@ -73,7 +73,7 @@ impl Waiting {
     /// Hands all that wait to `sink`; none does afterwards.
     pub(crate) fn flush<const DERIVATIVES: bool>(
         &mut self,
-        scene: &Scene,
+        scene: &ContourScene,
         sink: &mut impl Sink<DERIVATIVES>,
     ) {
         if self.patch.count == 0 {
@@ -147,7 +147,7 @@ impl<const DERIVATIVES: bool, S: Sink<DERIVATIVES>> NullaryFnOnce
 
 struct Flush<'a, 'b, const DERIVATIVES: bool, S> {
     waiting: &'a mut Waiting,
-    scene: &'a Scene<'b>,
+    scene: &'a ContourScene<'b>,
     sink: &'a mut S,
 }
 
@@ -178,7 +178,7 @@ fn flat([a, b, c]: [Vec3; 3]) -> [f32; 9] {
 
 impl Waiting {
     #[inline(always)]
-    fn gather(&mut self, scene: &Scene) {
+    fn gather(&mut self, scene: &ContourScene) {
         let (posed, model) = (&scene.posed, scene.posed.model);
         for l in 0..LANES {
             let face = self.face[l] as usize;
@@ -191,7 +191,7 @@ impl Waiting {
 
     /// Barycentric coordinates.
     #[inline(always)]
-    fn locate(&mut self, scene: &Scene) {
+    fn locate(&mut self, scene: &ContourScene) {
         let posed = &scene.posed;
         for l in 0..LANES {
             let [a, b, c] = triple(get(&self.corners, l));
@@ -202,7 +202,7 @@ impl Waiting {
 
     /// Unlit colors.
     #[inline(always)]
-    fn color(&mut self, scene: &Scene) {
+    fn color(&mut self, scene: &ContourScene) {
         match &scene.posed.model.albedo {
             Albedo::Uniform(color) => {
                 (0..3).for_each(|k| self.unlit.color[k] = [color[k]; LANES]);
@@ -244,7 +244,7 @@ impl Waiting {
 
     /// Lit colors, and rows.
     #[inline(always)]
-    fn shade<const DERIVATIVES: bool>(&mut self, scene: &Scene) {
+    fn shade<const DERIVATIVES: bool>(&mut self, scene: &ContourScene) {
         let posed = &scene.posed;
         let (twist_center, arm) = (scene.twist_center, scene.level_arm());
         for l in 0..LANES {

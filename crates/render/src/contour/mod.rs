@@ -29,10 +29,9 @@ pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
 pub(crate) use outline::{Band, Piece, outline};
 
-use glam::{Vec3, vec2};
+use glam::vec2;
 
 use crate::projected::Region;
-use crate::raster::MISS;
 use crate::view::{Seen, Sink, View};
 use footprint::Beside;
 use near::{Bands, Found, Hit, Place};
@@ -94,14 +93,6 @@ impl View for ContourView<'_> {
         for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
             let (place, found) = bands.found(x, y);
             each(x, y, self.seen::<DERIVATIVES>(place, found));
-        }
-    }
-
-    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, Vec3)) {
-        let visible = &self.visible[block];
-        for (i, &face) in visible.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
-            let (x, y) = visible.position(i);
-            each(x, y, face, self.scene.normal(face as usize, vec2(x as f32, y as f32)));
         }
     }
 

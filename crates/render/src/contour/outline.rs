@@ -7,7 +7,7 @@ use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region};
 
 /// Longest piece of an edge that is judged as a whole \[px\].
-pub(super) const PIECE: f32 = 4.0;
+const PIECE: f32 = 4.0;
 /// How far outside an edge it is probed for other parts of the object \[px\]: small against a pixel, large against
 /// the rounding of coordinates.
 const PROBE: f32 = 0.02;
@@ -38,6 +38,36 @@ pub(crate) struct Foot {
 }
 
 impl Piece {
+    /// The whole edge from `corner` of `face` on, between these places in the image \[px\]; none of a very short edge, which is
+    /// spanned by its neighbors' ends.
+    pub(super) fn whole(face: u32, corner: u8, [a, b]: [Vec2; 2], facing: i8) -> Option<Self> {
+        let d = b - a;
+        let length = d.x.hypot(d.y);
+        let outward = f32::from(facing) * d.perp() / length;
+        let corners = [corner, (corner + 1) % 3];
+        let has_length = length > 1e-4 && length.is_finite();
+        has_length.then_some(Self { face, corners, a, b, range: [0.0, 1.0], outward })
+    }
+
+    /// The pieces of a whole edge that come within `margin` pixels of `region`.
+    pub(super) fn cut(self, region: &Region, margin: f32) -> impl Iterator<Item = Self> {
+        let d = self.b - self.a;
+        let length = d.x.hypot(d.y);
+        let pieces = clip(&self, region, margin).map(|[start, end]| {
+            let count = ((end - start) * length / PIECE).ceil().max(1.0);
+            let at = move |j: f32| start + (end - start) * j / count;
+            let range = move |i: usize| [at(i as f32), at(i as f32 + 1.0)];
+            (0..count as usize).map(move |i| Self { range: range(i), ..self })
+        });
+        pieces.into_iter().flatten()
+    }
+
+    /// Share of the edge's screen length in its middle.
+    #[inline]
+    pub(super) fn middle(&self) -> f32 {
+        0.5 * (self.range[0] + self.range[1])
+    }
+
     #[inline]
     pub(crate) fn foot(&self, at: Vec2) -> Foot {
         let (d, r) = (self.b - self.a, at - self.a);
@@ -75,33 +105,17 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
         let [a, b] = edge.vertices.map(|v| projected.screen[v as usize].truncate());
         let layers = f32::from(other) - f32::from(own);
         segments.push(Segment { a, b, layers });
-        let use_own = own == 1 || other == 0;
-        let (face, corner) =
-            if use_own { (edge.face, edge.corner) } else { (edge.other, edge.other_corner) };
-        let (a, b) = if use_own { (a, b) } else { (b, a) };
-        let sign = f32::from(projected.facing[face as usize]);
-        let corners = [corner, (corner + 1) % 3];
-        let d = b - a;
-        let length = d.x.hypot(d.y);
-        // Shorter edges are spanned by their neighbors' ends.
-        if length > 1e-4 && length.is_finite() {
-            let outward = sign * d.perp() / length;
-            candidates.push((Piece { face, corners, a, b, range: [0.0, 1.0], outward }, length));
-        }
+        candidates.extend(match own == 1 || other == 0 {
+            true => Piece::whole(edge.face, edge.corner, [a, b], own),
+            false => Piece::whole(edge.other, edge.other_corner, [b, a], other),
+        });
     }
     let layers = Layers::new(&segments, region, margin + 1.0);
     let mut silhouette = Silhouette::default();
-    for (edge, length) in candidates {
-        let Some([start, end]) = clip(&edge, region, margin) else { continue };
-        let count = ((end - start) * length / PIECE).ceil().max(1.0);
-        for i in 0..count as usize {
-            let at = |j: f32| start + (end - start) * j / count;
-            let range = [at(i as f32), at(i as f32 + 1.0)];
-            let middle = edge.at(0.5 * (range[0] + range[1]));
-            let free = layers.at(middle + PROBE * edge.outward) < 0.5;
-            let list = if free { &mut silhouette.outline } else { &mut silhouette.covered };
-            list.push(Piece { range, ..edge });
-        }
+    for piece in candidates.into_iter().flat_map(|edge: Piece| edge.cut(region, margin)) {
+        let free = layers.at(piece.at(piece.middle()) + PROBE * piece.outward) < 0.5;
+        let list = if free { &mut silhouette.outline } else { &mut silhouette.covered };
+        list.push(piece);
     }
     silhouette
 }
@@ -119,7 +133,7 @@ fn silhouette_edges<'a>(projected: &Projected<'a>) -> Vec<(&'a Edge, i8, i8)> {
 }
 
 /// The share of an edge within `margin` of `region`.
-pub(super) fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2]> {
+fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2]> {
     let (mut start, mut end) = (0.0f32, 1.0f32);
     let bounds = [(region.x0, region.x1), (region.y0, region.y1)];
     for (k, (low, high)) in bounds.into_iter().enumerate() {

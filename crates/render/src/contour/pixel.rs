@@ -7,12 +7,12 @@ use super::footprint::{Around, Beside, Cut};
 use super::interior::{Motion, add_level, row};
 use super::near::Near;
 use super::outline::{Foot, Piece};
-use super::scene::Scene;
+use super::scene::ContourScene;
 use crate::projected::barycentric;
-use crate::shading::surface::{Shaded, posed_normal, shade};
+use crate::shading::surface::{Shaded, shade};
 use crate::view::{Pixel, Row, scaled_sum};
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// The pixel `at` that `face` covers, with what is near.
     #[inline]
     pub(super) fn inside<const DERIVATIVES: bool>(
@@ -113,13 +113,6 @@ impl Scene<'_> {
             self.foot_rows(piece, &shaded, &slide, &mut pixel);
         }
         pixel
-    }
-
-    /// Unit normal of a face at a pixel, camera frame.
-    pub(super) fn normal(&self, face: usize, at: Vec2) -> Vec3 {
-        let projected = &self.posed.projected;
-        let b = barycentric(projected.corners(face), at);
-        posed_normal(&self.posed, face, b)
     }
 
     /// Rows of the color of an outline point, whose material point slides along the edge by `slide`.

@@ -7,14 +7,14 @@ use crate::posed::Posed;
 use crate::shading::surface::PosedLight;
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
-pub(crate) struct Scene<'a> {
+pub(crate) struct ContourScene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
     pub(crate) drawing: Drawing,
     pub(crate) twist_center: Vec3,
 }
 
-impl Scene<'_> {
+impl ContourScene<'_> {
     /// The model's center from where twists turn.
     #[inline(always)]
     pub(super) fn level_arm(&self) -> Vec3 {

@@ -111,18 +111,6 @@ impl Distortion {
     }
 }
 
-impl From<BrownConrady> for Distortion {
-    fn from(lens: BrownConrady) -> Self {
-        Self::BrownConrady(lens)
-    }
-}
-
-impl From<KannalaBrandt> for Distortion {
-    fn from(lens: KannalaBrandt) -> Self {
-        Self::KannalaBrandt(lens)
-    }
-}
-
 /// Why distortion could not be described or removed.
 #[derive(Debug, thiserror::Error)]
 pub enum DistortionError {

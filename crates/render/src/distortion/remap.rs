@@ -57,11 +57,6 @@ impl Remap {
         Self { source, target, place: place.collect() }
     }
 
-    /// The camera of the images made.
-    pub fn camera(&self) -> &Camera {
-        &self.target
-    }
-
     /// Colors, interpolated bilinearly; black beyond the source's image.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Albedo, CREASE, Mipmap, ModelError, RenderModel, topology};
+use super::{Albedo, CREASE, Mipmap, ModelError, RenderModel, expect, topology};
 use crate::precision::{double, single};
 
 impl RenderModel {
@@ -32,14 +32,6 @@ impl RenderModel {
         let Albedo::Texture(map, _) = &self.albedo else { return None };
         let (width, height) = map.size();
         Some((width, height, &map.levels[0].texels))
-    }
-
-    /// The one color of the model, if it has but one.
-    pub fn uniform_color(&self) -> Option<[f32; 3]> {
-        match &self.albedo {
-            Albedo::Uniform(color) => Some(*color),
-            _ => None,
-        }
     }
 
     /// Model of the same topology with other welded vertices, mesh frame \[m\]. Normals follow them. The [center](Self::center),
@@ -100,10 +92,6 @@ impl RenderModel {
     }
 }
 
-fn expect(what: &'static str, found: usize, expected: usize) -> Result<(), ModelError> {
-    if found == expected { Ok(()) } else { Err(ModelError::Count { what, found, expected }) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,7 +108,7 @@ mod tests {
         let colors = model.vertex_colors().unwrap();
         let same = model.clone().with_colors(&colors).unwrap();
         assert_eq!(same.vertex_colors().unwrap(), colors);
-        assert!(model.texture().is_none() && model.uniform_color().is_none());
+        assert!(model.texture().is_none() && !matches!(model.albedo, Albedo::Uniform(_)));
     }
 
     #[test]

@@ -47,24 +47,14 @@ pub enum ModelError {
         /// The vertex.
         vertex: usize,
     },
-    /// An attribute does not have one entry a vertex.
-    #[error("{found} {attribute} given for {vertices} vertices")]
-    Attribute {
-        /// `"uvs"` or `"colors"`.
-        attribute: &'static str,
-        /// Entries given.
-        found: usize,
-        /// Vertices of the mesh.
-        vertices: usize,
-    },
-    /// Numbers that should take the place of the model's own are not as many.
-    #[error("{found} {what} given, the model has {expected}")]
+    /// Attributes of vertices, or numbers that should take the place of the model's own, are not as many as are needed.
+    #[error("{found} {what} given, expected {expected}")]
     Count {
-        /// `"positions"`, `"colors"` or `"texels"`.
+        /// `"uvs"`, `"positions"`, `"colors"` or `"texels"`.
         what: &'static str,
         /// Numbers given.
         found: usize,
-        /// Numbers of the model.
+        /// How many there should be.
         expected: usize,
     },
     /// The texture has no pixels or not as many as its size says.
@@ -176,11 +166,6 @@ impl RenderModel {
     pub fn face_count(&self) -> usize {
         self.faces.len()
     }
-
-    /// Whether every edge has exactly two faces.
-    pub fn is_closed(&self) -> bool {
-        self.closed
-    }
 }
 
 fn check(mesh: &TriMesh) -> Result<(), ModelError> {
@@ -196,14 +181,15 @@ fn check(mesh: &TriMesh) -> Result<(), ModelError> {
     if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)).or(uvs).or(colors) {
         return Err(ModelError::NotFinite { vertex });
     }
-    for (attribute, found) in
-        [("uvs", mesh.uvs.as_ref().map(Vec::len)), ("colors", mesh.colors.as_ref().map(Vec::len))]
-    {
-        if let Some(found) = found.filter(|&n| n != vertices) {
-            return Err(ModelError::Attribute { attribute, found, vertices });
-        }
-    }
-    Ok(())
+    let counts =
+        [("uvs", mesh.uvs.as_ref().map(Vec::len)), ("colors", mesh.colors.as_ref().map(Vec::len))];
+    counts
+        .into_iter()
+        .try_for_each(|(what, found)| expect(what, found.unwrap_or(vertices), vertices))
+}
+
+fn expect(what: &'static str, found: usize, expected: usize) -> Result<(), ModelError> {
+    if found == expected { Ok(()) } else { Err(ModelError::Count { what, found, expected }) }
 }
 
 fn albedo(mesh: &TriMesh, kept: &[usize]) -> Result<(Albedo, f64), ModelError> {
@@ -257,7 +243,7 @@ mod tests {
         }));
         let model = RenderModel::new(&mesh).unwrap();
         assert!((model.texel_density - 4.0).abs() < 1e-9);
-        assert!(!model.is_closed());
+        assert!(!model.closed);
         assert_eq!(model.face_count(), 1);
         assert!((model.center() - Point3::new(0.5, 0.5, 0.0)).norm() < 1e-15);
     }
@@ -282,7 +268,7 @@ mod tests {
         assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Empty { faces: 1, .. })));
         let mut mesh = triangle();
         mesh.colors = Some(vec![[0.0; 3]]);
-        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Attribute { found: 1, .. })));
+        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Count { found: 1, .. })));
         let mut mesh = triangle();
         mesh.uvs = Some(vec![[0.0; 2]; 3]);
         mesh.texture =

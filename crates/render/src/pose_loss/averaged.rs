@@ -1,6 +1,5 @@
 //! Pixels that are means of finer ones.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::view::{Pixel, Row, Seen, View, scaled_sum};
@@ -188,17 +187,6 @@ impl<V: View> View for Averaged<V> {
             finish(last, sums);
         }
     }
-
-    fn faces(&self, _block: usize, mut each: impl FnMut(usize, usize, u32, Vec3)) {
-        let (samples, middle) = (self.samples, self.samples / 2);
-        for block in 0..self.fine.blocks() {
-            self.fine.faces(block, |x, y, face, normal| {
-                if x % samples == middle && y % samples == middle {
-                    each(x / samples, y / samples, face, normal);
-                }
-            });
-        }
-    }
 }
 
 #[cfg(test)]
@@ -228,7 +216,7 @@ mod tests {
             let pixels = coarse.color.pixels().iter().zip(mean.pixels());
             let worst = pixels.flat_map(|(a, b)| (0..3).map(move |k| (a[k] - b[k]).abs()));
             assert!(worst.fold(0.0, f32::max) < 1e-5);
-            assert!(coarse.face.iter().flatten().count() > 1000);
+            assert!(coarse.depth.pixels().iter().filter(|z| **z > 0.0).count() > 1000);
         }
     }
 

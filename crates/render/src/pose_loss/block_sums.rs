@@ -12,14 +12,6 @@ use crate::projected::Region;
 use crate::view::{Patch, Seen, Sink, View};
 
 impl Residuals<'_> {
-    /// Sums the residuals over all pixels of a view.
-    pub(super) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
-        let tiles = self.by_tiles::<DERIVATIVES>(view, Tiling::WHOLE);
-        let mut total = Sums::new();
-        tiles.into_iter().for_each(|(_, sums)| total.merge(&sums));
-        total
-    }
-
     /// Sums the residuals over the pixels of a view by tiles, block by block in parallel, added up in a fixed order.
     pub(super) fn by_tiles<const DERIVATIVES: bool>(
         &self,

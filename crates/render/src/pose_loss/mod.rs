@@ -15,6 +15,8 @@ mod target;
 pub(crate) mod tests;
 mod tiles;
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3};
 
 use averaged::Averaged;
@@ -98,11 +100,6 @@ pub struct PoseImage {
     pub coverage: Vec<f32>,
     /// Z of the surface at pixel centers \[m\], 0 where there is none; with several samples a pixel, their mean.
     pub depth: DepthImage,
-    /// Unit normal at pixel centers, or the sample next to them, as shading sees it, towards the camera (camera frame), row-major; zero where there is
-    /// no surface.
-    pub normal: Vec<[f32; 3]>,
-    /// The face there, counting those that the model draws, row-major.
-    pub face: Vec<Option<u32>>,
 }
 
 impl PoseLoss {
@@ -124,8 +121,9 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Loss {
-        let all = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
-        all.loss(target)
+        let (center, whole) = (Point3::origin(), Tiling::WHOLE);
+        let tiles = self.sums::<false>(model, t_cam_object, &center, light, target, whole);
+        Sums::total(&tiles).loss(target)
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
@@ -137,8 +135,8 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Linearized {
-        let all = self.sum::<true>(model, t_cam_object, center, light, target);
-        all.linearized(target)
+        let tiles = self.sums::<true>(model, t_cam_object, center, light, target, Tiling::WHOLE);
+        Sums::total(&tiles).linearized(target)
     }
 
     /// The loss by square tiles of the image, `side` pixels wide and high from its upper left corner on, each with the derivatives by a twist of
@@ -153,25 +151,14 @@ impl PoseLoss {
         target: &Target,
         side: usize,
     ) -> Vec<Tile> {
-        struct ByTiles<'a>(Residuals<'a>, Tiling);
-
-        impl Task for ByTiles<'_> {
-            type Output = Vec<Tile>;
-
-            fn run(self, view: &impl View) -> Vec<Tile> {
-                let Self(residuals, tiling) = self;
-                let target = residuals.target;
-                let tile = |([column, row], sums): ([usize; 2], Sums)| Tile {
-                    column,
-                    row,
-                    at: sums.linearized(target),
-                };
-                residuals.by_tiles::<true>(view, tiling).into_iter().map(tile).collect()
-            }
-        }
-
-        let task = ByTiles(Residuals { options: &self.options, target }, Tiling::new(side));
-        self.compare(model, t_cam_object, center, light, target, task)
+        let tiling = Tiling::new(side);
+        let tiles = self.sums::<true>(model, t_cam_object, center, light, target, tiling);
+        let tile = |([column, row], sums): ([usize; 2], Sums)| Tile {
+            column,
+            row,
+            at: sums.linearized(target),
+        };
+        tiles.into_iter().map(tile).collect()
     }
 
     /// The picture whose difference from the target is the loss's residual (without occluder).
@@ -224,41 +211,28 @@ impl PoseLoss {
         }
     }
 
-    fn sum<const DERIVATIVES: bool>(
+    /// The sums over each tile of the view of all that `target` is compared with, by column and row.
+    fn sums<const DERIVATIVES: bool>(
         &self,
         model: &RenderModel,
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
         light: &Light,
         target: &Target,
-    ) -> Sums {
-        struct Total<'a, const DERIVATIVES: bool>(Residuals<'a>);
+        tiling: Tiling,
+    ) -> BTreeMap<[usize; 2], Sums> {
+        struct ByTiles<'a, const DERIVATIVES: bool>(Residuals<'a>, Tiling);
 
-        impl<const DERIVATIVES: bool> Task for Total<'_, DERIVATIVES> {
-            type Output = Sums;
+        impl<const DERIVATIVES: bool> Task for ByTiles<'_, DERIVATIVES> {
+            type Output = BTreeMap<[usize; 2], Sums>;
 
-            fn run(self, view: &impl View) -> Sums {
-                self.0.total::<DERIVATIVES>(view)
+            fn run(self, view: &impl View) -> Self::Output {
+                self.0.by_tiles::<DERIVATIVES>(view, self.1)
             }
         }
 
-        let task = Total::<DERIVATIVES>(Residuals { options: &self.options, target });
-        self.compare(model, pose, center, light, target, task)
-    }
-
-    /// Runs a task on the view of all that `target` is compared with.
-    fn compare<T: Task + Send>(
-        &self,
-        model: &RenderModel,
-        pose: &Isometry3<f64>,
-        center: &Point3<f64>,
-        light: &Light,
-        target: &Target,
-        task: T,
-    ) -> T::Output
-    where
-        T::Output: Send,
-    {
+        let residuals = Residuals { options: &self.options, target };
+        let task = ByTiles::<DERIVATIVES>(residuals, tiling);
         let (camera, also) = (&target.camera, &target.bounds);
         // One of rayon's threads takes all of it, or each of its parallel loops would hand over and wait.
         rayon::scope(|_| self.view(model, pose, center, camera, light, also, task))
@@ -277,8 +251,6 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
         color: RgbImage::filled(camera.width, camera.height, [0.0; 3]),
         coverage: vec![0.0; camera.width * camera.height],
         depth: DepthImage::filled(camera.width, camera.height, 0.0),
-        normal: vec![[0.0; 3]; camera.width * camera.height],
-        face: vec![None; camera.width * camera.height],
     };
     for block in 0..view.blocks() {
         view.visit::<false>(block, |x, y, seen| {
@@ -288,11 +260,6 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
                 image.coverage[at] = pixel.coverage;
                 image.depth.pixels_mut()[at] = if hit { pixel.z } else { 0.0 };
             }
-        });
-        view.faces(block, |x, y, face, normal| {
-            let at = y * camera.width + x;
-            image.normal[at] = normal.into();
-            image.face[at] = Some(face);
         });
     }
     image

@@ -2,6 +2,8 @@
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix6, Vector6};
 
 use super::counts::Counts;
@@ -115,6 +117,13 @@ impl Sums {
         for (sum, lane) in self.equations.iter_mut().zip(&lanes.equations) {
             *sum += lane.iter().map(|v| *v as f64).sum::<f64>();
         }
+    }
+
+    /// The sums of all tiles together.
+    pub(crate) fn total(tiles: &BTreeMap<[usize; 2], Self>) -> Self {
+        let mut total = Self::new();
+        tiles.values().for_each(|sums| total.merge(sums));
+        total
     }
 
     /// Adds what another block of rows summed up.

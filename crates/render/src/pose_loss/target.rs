@@ -116,8 +116,7 @@ impl Target {
             coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
         let covered = image.pixels().iter().zip(&coverage);
         let color = covered.map(|(c, a)| if *a > 0.0 { *c } else { [0.0; 3] }).collect();
-        let bounds =
-            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds = covered_region(camera.width, &coverage)?;
         Self::assemble(camera, color, coverage, bounds)
     }
 
@@ -216,12 +215,17 @@ impl Target {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
         // Blocks that were cut off may have been all that there was.
-        let bounds =
-            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds = covered_region(camera.width, &coverage)?;
         let area: f64 = bounds.indices(camera.width).map(|at| f64::from(coverage[at])).sum();
         let normalization = 1.0 / (3.0 * area);
         Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalization })
     }
+}
+
+/// The smallest rectangle around all that is covered.
+fn covered_region(width: usize, coverage: &[f32]) -> Result<Region, TargetError> {
+    let mask: Vec<bool> = coverage.iter().map(|a| *a > 0.0).collect();
+    Region::around_mask(width, &mask).ok_or(TargetError::EmptyMask)
 }
 
 fn check(
@@ -269,7 +273,10 @@ mod tests {
         assert_eq!(bad, TargetError::NotFinite { x: 2, y: 1 });
         let flat = Camera { fy: 0.0, ..CAMERA };
         let bad = Target::new(flat, &RgbImage::filled(4, 2, [0.5; 3]), &mask).unwrap_err();
-        assert_eq!(bad.to_string(), "focal length fy is 0 px, expected more than zero");
+        assert_eq!(
+            bad.to_string(),
+            "focal length fy is 0 px, expected more than zero and 1e9 at most"
+        );
     }
 
     #[test]

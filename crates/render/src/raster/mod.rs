@@ -55,7 +55,7 @@ pub(crate) struct Visible {
 
 /// Face at the pixel nearest to an image point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct SeenFace {
     /// The pixel.
     pub(crate) at: Vec2,
     /// The face, and its 1/Z \[1/m\].
@@ -70,13 +70,13 @@ impl Visible {
     }
 
     /// Face that the blocks show at the pixel nearest to a point of the image, if any.
-    pub(crate) fn seen(blocks: &[Self], at: Vec2) -> Option<Seen> {
+    pub(crate) fn seen(blocks: &[Self], at: Vec2) -> Option<SeenFace> {
         let at = at.round();
         if at.x < 0.0 || at.y < 0.0 {
             return None;
         }
         let (face, inverse_z) = Self::at(blocks, at.x as usize, at.y as usize)?;
-        Some(Seen { at, face, inverse_z })
+        Some(SeenFace { at, face, inverse_z })
     }
 
     /// The face that the blocks, [`BAND`] rows each, show at pixel (x, y), and its 1/Z \[1/m\]; `None` where there is none.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::pixel::{Pixel, PixelAdjoint};
+use super::pixel::{PixelAdjoint, RenderedPixel};
 use super::scene::FaceId;
 use crate::camera::Camera;
 use crate::image::{ImageError, RgbImage};
@@ -41,7 +41,7 @@ impl Buffers {
         }
     }
 
-    pub(super) fn set(&mut self, at: usize, pixel: &Pixel, id: impl Fn(usize) -> FaceId) {
+    pub(super) fn set(&mut self, at: usize, pixel: &RenderedPixel, id: impl Fn(usize) -> FaceId) {
         self.color[at] = pixel.color;
         self.alpha[at] = pixel.alpha;
         self.depth[at] = pixel.depth;

@@ -23,11 +23,11 @@ pub(super) struct Contours {
     pub(super) outline: Vec<Piece>,
     pub(super) inner: Vec<Inner>,
     creases: Vec<Crease>,
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<ContourBlock>,
 }
 
 /// Visible faces and nearby contours of a block of rows.
-pub(super) struct Block {
+pub(super) struct ContourBlock {
     pub(super) visible: Visible,
     /// Outline piece, inner contour and crease in whose band each pixel is.
     edge: Vec<u32>,
@@ -162,7 +162,7 @@ impl Contours {
                 fold.side(&projected, at, &foot, visible.inverse_z[i]).unwrap_or(0.0)
             };
             let side = crease.iter().enumerate().map(side).collect();
-            Block { visible, edge, inner, crease, side }
+            ContourBlock { visible, edge, inner, crease, side }
         });
         let blocks = blocks.collect();
         Self { half_width: f64::from(half_width), outline: pieces, inner, creases: folds, blocks }

@@ -37,7 +37,7 @@ use crate::shading::{Chunks, Shader};
 use crate::softras::Settings;
 use contour::Contours;
 use frame::Frame;
-use pixel::{Pixel, Place, Scratch};
+use pixel::{Place, RenderedPixel, Scratch};
 use softras::SoftFaces;
 use sums::Sums;
 use surface::Lit;
@@ -159,7 +159,7 @@ impl<Sh: Shader> Rendering<Sh> {
     }
 
     /// All pixels that show more than the background, by block.
-    fn drawn<V: Visibility>(&self, visible: &V) -> Vec<Vec<(usize, Pixel)>> {
+    fn drawn<V: Visibility>(&self, visible: &V) -> Vec<Vec<(usize, RenderedPixel)>> {
         let lit = self.lit();
         let width = self.buffers.width;
         let draw = |(block, region): (usize, &Region)| {

@@ -9,7 +9,7 @@ use crate::shading::{Chunks, Shader};
 
 /// A rendered pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pixel {
+pub(super) struct RenderedPixel {
     pub(super) color: [f64; 3],
     pub(super) alpha: f64,
     pub(super) depth: f64,
@@ -71,12 +71,12 @@ impl<Sh: Shader> Lit<'_, Sh> {
         visibility: &V,
         place: Place,
         scratch: &mut Scratch<V>,
-    ) -> Option<Pixel> {
+    ) -> Option<RenderedPixel> {
         let Scratch { parts, trace, .. } = scratch;
         let at = [place.x as f64, place.y as f64];
         parts.clear();
         let blend = visibility.trace(self.frame, place.block, place.i, at, trace, parts)?;
-        let mut pixel = Pixel {
+        let mut pixel = RenderedPixel {
             color: self.background.map(|c| blend.background * c),
             alpha: blend.alpha,
             depth: 0.0,

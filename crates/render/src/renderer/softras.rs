@@ -9,18 +9,20 @@ use super::sums::Sums;
 use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
 use crate::model::NONE;
 use crate::projected::Region;
-use crate::softras::{BACKGROUND, Drawn, Face, LEAST_SHARE, RUN, Run, Settings, Wide, project};
+use crate::softras::{
+    BACKGROUND, Drawn, Face, FaceTiles, LEAST_SHARE, RUN, Run, Settings, Wide, project,
+};
 
 /// The faces that count at each pixel.
 pub(super) struct SoftFaces {
     settings: Settings,
     /// Column, row \[px\] and Z \[m\] of the vertices; Z is 0 where it is not in front of the camera.
     screen: Vec<[f64; 3]>,
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<SoftBlock>,
 }
 
 /// The faces that count at the pixels of some rows.
-pub(super) struct Block {
+pub(super) struct SoftBlock {
     pub(super) region: Region,
     /// Where the faces of each pixel start in `faces`, and the end.
     start: Vec<u32>,
@@ -79,35 +81,17 @@ impl SoftFaces {
     }
 }
 
-/// The tiles (of [`RUN`] pixels from `first` on) that lie between two places, if any.
-fn tiles_between(low: f32, high: f32, first: usize, end: usize) -> std::ops::Range<usize> {
-    if first >= end || high < first as f32 || low >= end as f32 {
-        return 0..0;
-    }
-    // Casts to integers saturate.
-    let tile = |v: f32| (v as usize).clamp(first, end - 1).saturating_sub(first) / RUN;
-    tile(low)..tile(high) + 1
-}
-
-fn blocks(faces: &[Face], ids: &[u32], region: &Region, settings: &Settings) -> Vec<Block> {
-    let columns = region.width().div_ceil(RUN);
-    let mut tiles = vec![Vec::new(); columns * (region.y1 - region.y0).div_ceil(RUN)];
-    for (index, face) in faces.iter().enumerate() {
-        let [left, right, top, bottom] = face.bounds;
-        for y in tiles_between(top, bottom, region.y0, region.y1) {
-            for x in tiles_between(left, right, region.x0, region.x1) {
-                tiles[y * columns + x].push(index as u32);
-            }
-        }
-    }
+fn blocks(faces: &[Face], ids: &[u32], region: &Region, settings: &Settings) -> Vec<SoftBlock> {
+    let tiles = FaceTiles::new(faces, region);
     let arch = pulp::Arch::new();
     let block = |(y, tiles): (usize, &[Vec<u32>])| {
         let y0 = region.y0 + y * RUN;
         let region = Region { y0, y1: (y0 + RUN).min(region.y1), ..*region };
-        let block = Block { region, start: vec![0], faces: Vec::new(), inside: Vec::new() };
+        let block = SoftBlock { region, start: vec![0], faces: Vec::new(), inside: Vec::new() };
         arch.dispatch(Collect { faces, ids, settings, tiles, block })
     };
-    tiles.par_chunks(columns.max(1)).enumerate().map(block).collect()
+    let rows: Vec<&[Vec<u32>]> = tiles.rows().collect();
+    rows.into_par_iter().enumerate().map(block).collect()
 }
 
 /// The choice of faces for the pixels of a block, compiled for each set of vector instructions.
@@ -116,22 +100,19 @@ struct Collect<'a> {
     ids: &'a [u32],
     settings: &'a Settings,
     tiles: &'a [Vec<u32>],
-    block: Block,
+    block: SoftBlock,
 }
 
 impl pulp::WithSimd for Collect<'_> {
-    type Output = Block;
+    type Output = SoftBlock;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) -> Block {
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> SoftBlock {
         let Self { faces, ids, settings, tiles, mut block } = self;
         let region = block.region;
         let mut run = Run::new(Wide::zero(simd));
         for y in region.y0..region.y1 {
-            let near = |index: &&u32| {
-                let [.., top, bottom] = faces[**index as usize].bounds;
-                (top..=bottom).contains(&(y as f32))
-            };
+            let near = |index: &&u32| faces[**index as usize].touches_row(y);
             for (tile, indices) in tiles.iter().enumerate() {
                 let first = region.x0 + tile * RUN;
                 let end = (first + RUN).min(region.x1);
@@ -139,7 +120,7 @@ impl pulp::WithSimd for Collect<'_> {
                     run.collect(faces, indices.iter().filter(near).copied(), [x0, y], settings);
                     for lane in 0..S::F32_LANES.min(end - x0) {
                         let inside = run.inside(lane);
-                        block.inside.push(inside.map_or(NONE, |(index, _)| ids[index as usize]));
+                        block.inside.push(inside.map_or(NONE, |index| ids[index as usize]));
                         block.faces.extend(run.faces(lane).map(|index| ids[index as usize]));
                         block.start.push(block.faces.len() as u32);
                     }

@@ -10,8 +10,7 @@ struct Results {
     pieces: atomic<u32>,
     // Keeps the values apart from the atomics.
     unused: u32,
-    // Sums of each square of each hypothesis (see `sums.wgsl`), or a picture: color, coverage,
-    // depth, normal and face plus one of each pixel.
+    // Sums of each square of each hypothesis (see `sums.wgsl`).
     values: array<f32>,
 }
 

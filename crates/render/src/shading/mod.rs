@@ -56,14 +56,3 @@ pub trait Shader: Send + Sync {
     /// The color of `point`, for `parameters` as many as [`parameters`](Self::parameters) gives.
     fn shade<S: Scalar>(&self, parameters: &[S], point: &SurfacePoint<S>) -> [S; 3];
 }
-
-impl<T: Shader> Shader for &T {
-    fn parameters(&self) -> Vec<f64> {
-        (**self).parameters()
-    }
-
-    #[inline]
-    fn shade<S: Scalar>(&self, parameters: &[S], point: &SurfacePoint<S>) -> [S; 3] {
-        (**self).shade(parameters, point)
-    }
-}

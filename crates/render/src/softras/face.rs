@@ -32,6 +32,13 @@ pub(crate) struct Face {
 }
 
 impl Face {
+    /// Whether the face may be kept at pixels of row `y`.
+    #[inline(always)]
+    pub(crate) fn touches_row(&self, y: usize) -> bool {
+        let [.., top, bottom] = self.bounds;
+        (top..=bottom).contains(&(y as f32))
+    }
+
     /// The face with corners at (column, row, Z) \[px, m\]; none if it has no area in the image.
     pub(crate) fn new(corners: [[f64; 3]; 3], settings: &Settings) -> Option<Self> {
         let [a, b, c] = corners;

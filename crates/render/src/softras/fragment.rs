@@ -43,7 +43,7 @@ fn cross<T: Number>(a: [T; 2], b: [T; 2]) -> T {
 
 /// The point of an edge that is nearest to a pixel.
 #[derive(Clone, Copy)]
-struct Foot<T> {
+struct NearestPoint<T> {
     /// Share of the edge.
     share: T,
     /// From the pixel \[px\].
@@ -51,7 +51,7 @@ struct Foot<T> {
     squared: T,
 }
 
-impl<T: Number> Foot<T> {
+impl<T: Number> NearestPoint<T> {
     #[inline(always)]
     fn or(self, other_instead: T::Mask, other: Self) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl<T: Number> Foot<T> {
 impl Face {
     /// On edge `edge`, whose first end lies at `start` from the pixel.
     #[inline(always)]
-    fn foot<T: Number>(&self, edge: usize, start: [T; 2]) -> Foot<T> {
+    fn foot<T: Number>(&self, edge: usize, start: [T; 2]) -> NearestPoint<T> {
         let is = |value: f32| start[0].like(value);
         let [x, y] = self.edge[edge];
         let (x, y) = (is(x), is(y));
@@ -77,7 +77,7 @@ impl Face {
         let t = T::pick(is(0.0).below(t), t, is(0.0));
         let share = T::pick(t.below(is(1.0)), t, is(1.0));
         let offset = [start[0] + share * x, start[1] + share * y];
-        Foot { share, offset, squared: offset[0] * offset[0] + offset[1] * offset[1] }
+        NearestPoint { share, offset, squared: offset[0] * offset[0] + offset[1] * offset[1] }
     }
 }
 

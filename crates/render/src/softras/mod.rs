@@ -51,10 +51,10 @@ mod run;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod tiles;
 
 use std::sync::OnceLock;
 
-use glam::Vec3;
 use nalgebra::{Isometry3, Point3};
 
 use crate::camera::Camera;
@@ -68,22 +68,18 @@ use crate::shading::surface::PosedLight;
 use crate::view::{Seen, View};
 pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
-use number::Number;
 pub(crate) use number::Wide;
 pub(crate) use pixel::LEAST_SHARE;
-use pixel::Scene;
+use pixel::SoftScene;
 pub(crate) use run::{RUN, Run};
 pub(crate) use settings::{BACKGROUND, Settings};
-
-/// Rows whose faces are listed together.
-const BAND: usize = 8;
+pub(crate) use tiles::FaceTiles;
 
 /// A posed model whose faces spread beyond their borders.
 pub(crate) struct SoftRasView<'a> {
-    scene: Scene<'a>,
+    scene: SoftScene<'a>,
     region: Region,
-    /// The faces that may count in each band of rows, in ascending order.
-    bands: Vec<Vec<u32>>,
+    tiles: FaceTiles,
     /// The vector instructions at hand. No sum is fused, so that results do not depend on them.
     arch: pulp::Arch,
 }
@@ -113,82 +109,21 @@ impl<'a> SoftRasView<'a> {
             drawn = Drawn::new(&model.faces, &screen, |_| model.closed, facing, &settings);
         }
         let Drawn { faces, ids } = drawn;
-        let bands = bands(&faces, &region);
+        let tiles = FaceTiles::new(&faces, &region);
         let motions = faces.iter().map(|_| OnceLock::new()).collect();
         let (camera, twist_center) = (*camera, *center);
-        let scene =
-            Scene { posed, lighting, settings, camera, screen, faces, ids, motions, twist_center };
-        Self { scene, region, bands, arch: pulp::Arch::new() }
-    }
-}
-
-/// The faces that may count in each [`BAND`] rows of `region`, in ascending order.
-fn bands(faces: &[Face], region: &Region) -> Vec<Vec<u32>> {
-    let mut bands = vec![Vec::new(); (region.y1 - region.y0).div_ceil(BAND)];
-    let last = bands.len().wrapping_sub(1);
-    for (i, face) in faces.iter().enumerate() {
-        let [left, right, top, bottom] = face.bounds;
-        let outside = right < region.x0 as f32
-            || left >= region.x1 as f32
-            || bottom < region.y0 as f32
-            || top >= region.y1 as f32;
-        if outside || bands.is_empty() {
-            continue;
-        }
-        // Casts to integers saturate.
-        let first = (top as usize).saturating_sub(region.y0) / BAND;
-        let end = (bottom as usize).saturating_sub(region.y0) / BAND;
-        bands[first..=end.min(last)].iter_mut().for_each(|band| band.push(i as u32));
-    }
-    bands
-}
-
-/// The faces that may count in each run of pixels of one row, in ascending order.
-struct Runs {
-    faces: Vec<u32>,
-    /// Where the faces of each run start, and the end.
-    start: Vec<usize>,
-}
-
-impl Runs {
-    fn new(scene: &Scene, band: &[u32], region: &Region, row: f32) -> Self {
-        let count = region.width().div_ceil(RUN);
-        let touched = |face: &Face| {
-            let [left, right, top, bottom] = face.bounds;
-            if row < top || row > bottom || right < region.x0 as f32 || left >= region.x1 as f32 {
-                return 0..0;
-            }
-            let first = (left as usize).saturating_sub(region.x0) / RUN;
-            let end = (right as usize).saturating_sub(region.x0) / RUN + 1;
-            first..end.min(count)
+        let scene = SoftScene {
+            posed,
+            lighting,
+            settings,
+            camera,
+            screen,
+            faces,
+            ids,
+            motions,
+            twist_center,
         };
-        let mut start = vec![0; count + 1];
-        for &index in band {
-            touched(&scene.faces[index as usize]).for_each(|run| start[run] += 1);
-        }
-        let mut sum = 0;
-        for value in &mut start {
-            sum += *value;
-            *value = sum;
-        }
-        let mut faces = vec![0; sum];
-        // Backwards, so that each run's faces end up in ascending order and `start` at its start.
-        for &index in band.iter().rev() {
-            for run in touched(&scene.faces[index as usize]) {
-                start[run] -= 1;
-                faces[start[run]] = index;
-            }
-        }
-        Self { faces, start }
-    }
-
-    fn count(&self) -> usize {
-        self.start.len() - 1
-    }
-
-    /// The faces of a run, and the first of its columns.
-    fn of(&self, run: usize, region: &Region) -> (&[u32], usize) {
-        (&self.faces[self.start[run]..self.start[run + 1]], region.x0 + run * RUN)
+        Self { scene, region, tiles, arch: pulp::Arch::new() }
     }
 }
 
@@ -208,89 +143,44 @@ impl View for SoftRasView<'_> {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        self.arch.dispatch(Walk { view: self, block, each_run: Shown::<DERIVATIVES, _>(each) });
-    }
-
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, Vec3)) {
-        self.arch.dispatch(Walk { view: self, block, each_run: Centers(each) });
-    }
-}
-
-/// Visitor of the pixels of each run.
-trait EachRun {
-    /// Visits the first `count` pixels from (column, row) on.
-    fn run<T: Number>(&mut self, scene: &Scene, run: &mut Run<T>, pixel: [usize; 2], count: usize);
-}
-
-/// Visitor of the pixels' values and derivatives.
-struct Shown<const DERIVATIVES: bool, F>(F);
-
-impl<const DERIVATIVES: bool, F> EachRun for Shown<DERIVATIVES, F>
-where
-    F: FnMut(usize, usize, Option<Seen>),
-{
-    #[inline(always)]
-    fn run<T: Number>(
-        &mut self,
-        scene: &Scene,
-        run: &mut Run<T>,
-        [first, y]: [usize; 2],
-        count: usize,
-    ) {
-        let pixels = scene.pixels::<DERIVATIVES, _>(run, first, y);
-        for lane in 0..count {
-            let mut seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
-            if let Some(seen) = seen.as_mut().filter(|_| scene.settings.fade) {
-                seen.pixel.fade::<DERIVATIVES>();
-            }
-            (self.0)(first + lane, y, seen);
-        }
-    }
-}
-
-/// Visitor of the faces at the pixels' centers.
-struct Centers<F>(F);
-
-impl<F: FnMut(usize, usize, u32, Vec3)> EachRun for Centers<F> {
-    #[inline(always)]
-    fn run<T: Number>(
-        &mut self,
-        scene: &Scene,
-        run: &mut Run<T>,
-        [first, y]: [usize; 2],
-        count: usize,
-    ) {
-        for lane in 0..count {
-            if let Some((face, b)) = run.inside(lane) {
-                let (face, normal) = scene.normal(face, b);
-                (self.0)(first + lane, y, face, normal);
-            }
-        }
+        self.arch.dispatch(Walk::<DERIVATIVES, _> { view: self, block, each });
     }
 }
 
 /// The work on one row of pixels, compiled for each set of vector instructions.
-struct Walk<'a, E> {
+struct Walk<'a, const DERIVATIVES: bool, F> {
     view: &'a SoftRasView<'a>,
     block: usize,
-    each_run: E,
+    each: F,
 }
 
-impl<E: EachRun> pulp::WithSimd for Walk<'_, E> {
+impl<const DERIVATIVES: bool, F> pulp::WithSimd for Walk<'_, DERIVATIVES, F>
+where
+    F: FnMut(usize, usize, Option<Seen>),
+{
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, simd: S) {
         let (scene, region) = (&self.view.scene, &self.view.region);
         let y = region.y0 + self.block;
-        let runs = Runs::new(scene, &self.view.bands[self.block / BAND], region, y as f32);
+        let near = |index: &&u32| scene.faces[**index as usize].touches_row(y);
+        let tiles = self.view.tiles.rows().nth(self.block / RUN).unwrap_or_default();
         let mut run = Run::new(Wide::zero(simd));
-        for i in 0..runs.count() {
-            let (faces, first) = runs.of(i, region);
+        for (tile, indices) in tiles.iter().enumerate() {
+            let first = region.x0 + tile * RUN;
             let end = (first + RUN).min(region.x1);
             for x in (first..end).step_by(S::F32_LANES) {
-                run.collect(&scene.faces, faces.iter().copied(), [x, y], &scene.settings);
-                self.each_run.run(scene, &mut run, [x, y], S::F32_LANES.min(end - x));
+                let indices = indices.iter().filter(near).copied();
+                run.collect(&scene.faces, indices, [x, y], &scene.settings);
+                let pixels = scene.pixels::<DERIVATIVES, _>(&mut run, x, y);
+                for lane in 0..S::F32_LANES.min(end - x) {
+                    let mut seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
+                    if let Some(seen) = seen.as_mut().filter(|_| scene.settings.fade) {
+                        seen.pixel.fade::<DERIVATIVES>();
+                    }
+                    (self.each)(x + lane, y, seen);
+                }
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Numbers that a formula is written for once: one, or several side by side in a vector register.
+//! Numbers that a formula is written for once: several side by side in a vector register, in tests also one.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
 
@@ -51,61 +51,6 @@ pub(crate) trait Number:
 
 /// The low bits of a shifted number are n; these are those of 2ⁿ.
 const EXPONENT: u32 = 127u32.wrapping_sub(ROUND.to_bits());
-
-impl Number for f32 {
-    type Mask = bool;
-    const LANES: usize = 1;
-
-    #[inline(always)]
-    fn like(self, value: f32) -> Self {
-        value
-    }
-
-    #[inline(always)]
-    fn loaded(self, values: &[f32]) -> Self {
-        values.first().copied().unwrap_or(0.0)
-    }
-
-    #[inline(always)]
-    fn lanes(&self) -> &[f32] {
-        std::slice::from_ref(self)
-    }
-
-    #[inline(always)]
-    fn lanes_mut(&mut self) -> &mut [f32] {
-        std::slice::from_mut(self)
-    }
-
-    #[inline(always)]
-    fn below(self, other: Self) -> bool {
-        self < other
-    }
-
-    #[inline(always)]
-    fn at_least(self, other: Self) -> bool {
-        self >= other
-    }
-
-    #[inline(always)]
-    fn pick(condition: bool, yes: Self, no: Self) -> Self {
-        if condition { yes } else { no }
-    }
-
-    #[inline(always)]
-    fn any(self, condition: bool) -> bool {
-        condition
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-
-    #[inline(always)]
-    fn power_of_two(shifted: Self) -> Self {
-        f32::from_bits(shifted.to_bits().wrapping_add(EXPONENT) << 23)
-    }
-}
 
 /// A vector register of the instructions `S`.
 #[derive(Clone, Copy)]
@@ -220,6 +165,9 @@ impl<S: Simd> Number for Wide<S> {
         Self { simd, value: simd.transmute_f32s_u32s(bits) }
     }
 }
+
+#[cfg(test)]
+mod single;
 
 #[cfg(test)]
 mod tests {

@@ -4,7 +4,6 @@
 
 use std::sync::OnceLock;
 
-use glam::Vec3;
 use nalgebra::Point3;
 
 use super::blend::Blend;
@@ -17,14 +16,14 @@ use super::settings::Settings;
 use crate::camera::Camera;
 use crate::posed::Posed;
 use crate::precision::single;
-use crate::shading::surface::{PosedLight, posed_normal};
+use crate::shading::surface::PosedLight;
 use crate::view::{Pixel, Seen};
 
 /// Least share of a fragment in its pixel. Smaller ones are left out: 64 of them are less than 1e-6 of its color.
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
 
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).
-pub(crate) struct Scene<'a> {
+pub(crate) struct SoftScene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
     pub(crate) settings: Settings,
@@ -82,7 +81,7 @@ impl<T: Number> Pixels<T> {
     }
 }
 
-impl Scene<'_> {
+impl SoftScene<'_> {
     /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the color in the weight of its part.
     #[inline(always)]
     pub(crate) fn pixels<const DERIVATIVES: bool, T: Number>(
@@ -124,12 +123,6 @@ impl Scene<'_> {
             self.rows(run, &blend, column, row, &mut pixels);
         }
         pixels
-    }
-
-    /// The unit normal (camera frame) of a face at barycentric coordinates, and the model's index of the face.
-    pub(crate) fn normal(&self, face: u32, b: [f32; 3]) -> (u32, Vec3) {
-        let id = self.ids[face as usize];
-        (id, posed_normal(&self.posed, id as usize, b))
     }
 
     #[inline(always)]

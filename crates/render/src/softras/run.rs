@@ -107,13 +107,11 @@ impl<T: Number> Run<T> {
         here.map(|candidate| candidate.face)
     }
 
-    /// The nearest face that the pixel's center lies inside, and the barycentric coordinates there.
+    /// The nearest face that the pixel's center lies inside.
     #[inline(always)]
-    pub(crate) fn inside(&self, lane: usize) -> Option<(u32, [f32; 3])> {
+    pub(crate) fn inside(&self, lane: usize) -> Option<u32> {
         let candidate = self.candidates.get(self.inside.lanes()[lane] as usize)?;
-        let [a, b, c] = &candidate.fragment.b;
-        let b = [a.lanes()[lane], b.lanes()[lane], c.lanes()[lane]];
-        (self.inside_z.lanes()[lane] < f32::INFINITY).then_some((candidate.face, b))
+        (self.inside_z.lanes()[lane] < f32::INFINITY).then_some(candidate.face)
     }
 }
 

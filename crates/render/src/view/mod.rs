@@ -5,8 +5,6 @@ mod pixel;
 
 use std::ops::Range;
 
-use glam::Vec3;
-
 pub(crate) use patch::{LANES, Lane, Patch, get, put};
 pub(crate) use pixel::{Pixel, Row, Seen, scaled_sum};
 
@@ -27,10 +25,6 @@ pub(crate) trait View: Sync {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     );
-
-    /// Calls `each` for every pixel of one block whose center shows a face, with its column and row, the face (of the
-    /// model's faces drawn) and the unit normal there (camera frame).
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, Vec3));
 
     /// Hands the pixels of one block to `sink`. A view that has a quicker way than pixel by pixel writes its own.
     fn feed<const DERIVATIVES: bool>(&self, block: usize, sink: &mut impl Sink<DERIVATIVES>) {

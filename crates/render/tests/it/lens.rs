@@ -39,7 +39,7 @@ fn straight_lines_become_straight() {
     let depth = made.depth(&DepthImage::new(80, 60, depth).unwrap()).unwrap();
     for y in 4..56 {
         for x in 4..76 {
-            let p = made.camera().ray(x as f64, y as f64).xy();
+            let p = camera.ray(x as f64, y as f64).xy();
             let color = ramp.get(x, y).unwrap()[0];
             assert!((color - 0.5 - 0.5 * p.x as f32).abs() < 1e-3, "{x} {y}");
             if (2.0 * p.x + p.y - 0.1).abs() > 0.03 {
@@ -158,7 +158,7 @@ fn planes_keep_their_depth() {
 #[test]
 fn images_of_another_size_are_refused() {
     let camera = Camera { fx: 8.0, fy: 8.0, cx: 4.0, cy: 3.0, width: 8, height: 6 };
-    let made = Remap::undistort(camera, &BrownConrady::default().into(), camera);
+    let made = Remap::undistort(camera, &Distortion::BrownConrady(BrownConrady::default()), camera);
     let wrong = made.rgb(&RgbImage::filled(8, 7, [0.0; 3]));
     assert!(matches!(wrong, Err(DistortionError::Size { found_height: 7, .. })));
 }

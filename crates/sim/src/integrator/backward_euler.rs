@@ -95,7 +95,7 @@ fn carried<S: Scalar>(
     states: &Rows<S>,
     equations: &ImplicitStep<'_>,
     solution: &DVector<f64>,
-    jacobian: &Factored<f64>,
+    jacobian: &Factored,
 ) -> Vec<BodyState<S>> {
     let velocity = |slot: usize| velocity_at(solution, slot).map(S::constant);
     let next = moved(model, states, equations, velocity);

@@ -1,11 +1,10 @@
-//! Losses, tiles and pictures from the results of the device.
+//! Losses and tiles from the results of the device.
 
 use super::layout::{
-    PICTURE_COLUMNS, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH, SUM_GRADIENT,
-    SUM_HESSIAN, SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH,
+    SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH, SUM_GRADIENT, SUM_HESSIAN,
+    SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH,
 };
-use crate::image::{DepthImage, RgbImage};
-use crate::pose_loss::{Counts, Linearized, Loss, PoseImage, Target, Tile, unpacked};
+use crate::pose_loss::{Counts, Linearized, Loss, Target, Tile, unpacked};
 
 /// From the sums of one square.
 pub(super) fn loss(sums: &[f32], target: &Target) -> Loss {
@@ -40,27 +39,4 @@ pub(super) fn tiles(sums: &[f32], [across, down]: [u32; 2], target: &Target) -> 
         (at.loss.counts != Counts::default()).then_some(Tile { column, row, at })
     };
     places.filter_map(tile).collect()
-}
-
-/// From the columns of all pixels.
-pub(super) fn picture(size: [u32; 2], values: &[f32]) -> PoseImage {
-    let [width, height] = size.map(|v| v as usize);
-    let mut picture = PoseImage {
-        color: RgbImage::filled(width, height, [0.0; 3]),
-        coverage: values.iter().skip(3).step_by(PICTURE_COLUMNS).copied().collect(),
-        depth: DepthImage::filled(width, height, 0.0),
-        normal: values.chunks_exact(PICTURE_COLUMNS).map(|v| [v[5], v[6], v[7]]).collect(),
-        face: values.chunks_exact(PICTURE_COLUMNS).map(|v| face(v[8])).collect(),
-    };
-    let pixels = picture.color.pixels_mut().iter_mut().zip(picture.depth.pixels_mut());
-    for ((color, depth), v) in pixels.zip(values.chunks_exact(PICTURE_COLUMNS)) {
-        *color = [v[0], v[1], v[2]];
-        *depth = v[4];
-    }
-    picture
-}
-
-/// The face of a picture's last column.
-fn face(column: f32) -> Option<u32> {
-    (column > 0.0).then(|| column as u32 - 1)
 }

@@ -46,9 +46,6 @@ pub(super) const SUM_MISSED: usize = 33;
 pub(super) const SUM_WITH_DEPTH: usize = 34;
 pub(super) const SUM_COLUMNS: usize = 35;
 
-/// Color, coverage, depth, normal and face plus one of a pixel of a picture.
-pub(super) const PICTURE_COLUMNS: usize = 9;
-
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct Params {

@@ -26,31 +26,9 @@ pub(super) const FIND_SEGMENTS: Pass = pass("find_segments");
 pub(super) const FIND_PIECES: Pass = pass("find_pieces");
 pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
 pub(super) const CONTOUR_DERIVATIVES: Pass = Pass { entry: "contour_residuals", derivatives: true };
-pub(super) const CONTOUR_PICTURE: Pass = pass("contour_picture");
 pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
 pub(super) const SOFTRAS_DERIVATIVES: Pass = Pass { entry: "softras_residuals", derivatives: true };
-pub(super) const SOFTRAS_PICTURE: Pass = pass("softras_picture");
 pub(super) const TOTAL: Pass = pass("total");
-pub(super) const NEEDS: Pass = pass("needs");
-
-/// All of them.
-pub(super) const PASSES: [Pass; 15] = [
-    PROJECT,
-    COUNT_FACES,
-    SCAN_BINS,
-    SCATTER_FACES,
-    RASTER,
-    FIND_SEGMENTS,
-    FIND_PIECES,
-    CONTOUR_VALUE,
-    CONTOUR_DERIVATIVES,
-    CONTOUR_PICTURE,
-    SOFTRAS_VALUE,
-    SOFTRAS_DERIVATIVES,
-    SOFTRAS_PICTURE,
-    TOTAL,
-    NEEDS,
-];
 
 /// Bindings of group 0: the settings, then buffers that are only read, then buffers that are written too.
 pub(super) const READ_ONLY: std::ops::Range<u32> = 1..8;
@@ -78,7 +56,7 @@ pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
-/// The pipelines of all passes of one entry point, which share its module.
+/// The pipelines of one entry point, which share its module: with and without derivatives where it computes any.
 pub(super) fn pipelines(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
@@ -91,25 +69,26 @@ pub(super) fn pipelines(
     });
     // A constant that the module lacks would be an error.
     let constants = module.overrides.len();
+    let variants: &[bool] = if constants == 0 { &[false] } else { &[false, true] };
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(entry),
         source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
     });
-    let pipeline = |pass: &Pass| {
-        let derivatives = [(DERIVATIVES, f64::from(u8::from(pass.derivatives)))];
+    let pipeline = |&derivatives: &bool| {
+        let given = [(DERIVATIVES, f64::from(u8::from(derivatives)))];
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(entry),
             layout: Some(&layout),
             module: &module,
             entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: derivatives.get(..constants).unwrap_or(&derivatives),
+                constants: given.get(..constants).unwrap_or(&given),
                 // The shaders write before they read.
                 zero_initialize_workgroup_memory: false,
             },
             cache: None,
         });
-        (*pass, pipeline)
+        (Pass { entry, derivatives }, pipeline)
     };
-    PASSES.iter().filter(|pass| pass.entry == entry).map(pipeline).collect()
+    variants.iter().map(pipeline).collect()
 }

@@ -4,26 +4,17 @@ use std::sync::Arc;
 
 use super::answer;
 use super::device::Device;
-use super::layout::{PICTURE_COLUMNS, Params, SUM_COLUMNS, Usage};
+use super::layout::{Params, SUM_COLUMNS, Usage};
 use super::passes::{
-    CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS,
-    NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES, SOFTRAS_PICTURE,
-    SOFTRAS_VALUE, TOTAL,
+    CONTOUR_DERIVATIVES, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS, PROJECT, Pass,
+    RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES, SOFTRAS_VALUE, TOTAL,
 };
 use super::readback::receive;
 use super::upload;
 use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::mode::Mode;
-use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
-
-/// Results that a call asks for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    Value,
-    Derivatives,
-    Picture,
-}
+use crate::pose_loss::{Linearized, Loss, Tile};
 
 /// An uploaded problem with the buffers of its passes.
 pub(super) struct GpuSession {
@@ -109,18 +100,18 @@ impl GpuSession {
         (self.params.squares[0] * self.params.squares[1]) as usize * SUM_COLUMNS
     }
 
-    /// The sums of each hypothesis, square by square.
+    /// The sums of each hypothesis, square by square, with those of derivatives or without.
     fn sums(
         &mut self,
         hypotheses: &[Hypothesis],
-        wanted: Wanted,
+        derivatives: bool,
     ) -> Result<Vec<f32>, BackendError> {
         let columns = self.sum_columns();
         let mut sums = Vec::with_capacity(hypotheses.len() * columns);
         let mut rest = hypotheses;
         while !rest.is_empty() {
             let count = self.prepare(rest.len())?;
-            sums.extend(self.attempt(&rest[..count], wanted)?.unwrap_or_default());
+            sums.extend(self.attempt(&rest[..count], derivatives)?.unwrap_or_default());
             rest = &hypotheses[sums.len() / columns..];
         }
         Ok(sums)
@@ -145,9 +136,9 @@ impl GpuSession {
     fn attempt(
         &mut self,
         hypotheses: &[Hypothesis],
-        wanted: Wanted,
+        derivatives: bool,
     ) -> Result<Option<Vec<f32>>, BackendError> {
-        let answer = self.round_trip(hypotheses, wanted);
+        let answer = self.round_trip(hypotheses, derivatives);
         if answer.is_err() {
             // Whatever state they are in now.
             self.work = None;
@@ -158,7 +149,7 @@ impl GpuSession {
     fn round_trip(
         &mut self,
         hypotheses: &[Hypothesis],
-        wanted: Wanted,
+        derivatives: bool,
     ) -> Result<Option<Vec<f32>>, BackendError> {
         let Some(work) = &self.work else { return Ok(None) };
         let poses: Vec<_> =
@@ -167,23 +158,13 @@ impl GpuSession {
         self.params.entry_capacity = work.pool() as u32;
         self.params.segment_capacity = work.capacity.segments as u32;
         self.params.piece_capacity = work.capacity.pieces as u32;
-        // A picture shows the object alone, cut at the image's border as on the CPU.
-        self.params.bounds = match wanted {
-            Wanted::Picture => [0; 4],
-            _ => upload::bounds(&self.problem.target.bounds),
-        };
-        let values = match wanted {
-            Wanted::Picture => {
-                (self.params.size[0] * self.params.size[1]) as usize * PICTURE_COLUMNS
-            }
-            _ => hypotheses.len() * self.sum_columns(),
-        };
+        let values = hypotheses.len() * self.sum_columns();
         let size = (size_of::<Usage>() + values * size_of::<f32>()) as u64;
         let queue = &self.device.queue;
         let received = self.device.watched(|| {
             queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&self.params));
             queue.write_buffer(&work.poses, 0, bytemuck::cast_slice(&poses));
-            queue.submit([self.encode(work, wanted, size)]);
+            queue.submit([self.encode(work, derivatives, size)]);
             receive(&self.device, &work.readback, size)
         })?;
         let bytes = received.map_err(|reason| self.device.failed(reason))?;
@@ -196,7 +177,7 @@ impl GpuSession {
         Ok(None)
     }
 
-    fn encode(&self, work: &Work, wanted: Wanted, size: u64) -> wgpu::CommandBuffer {
+    fn encode(&self, work: &Work, derivatives: bool, size: u64) -> wgpu::CommandBuffer {
         let mut encoder = self.device.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&work.tallies, 0, None);
         encoder.clear_buffer(&work.bins, 0, None);
@@ -216,13 +197,11 @@ impl GpuSession {
             run(COUNT_FACES, p.faces.div_ceil(64), 1);
             run(SCAN_BINS, 1, 1);
             run(SCATTER_FACES, p.faces.div_ceil(64), 1);
-            let pixels = match (&self.problem.loss.mode, wanted) {
-                (Mode::Contour(_), Wanted::Value) => CONTOUR_VALUE,
-                (Mode::Contour(_), Wanted::Derivatives) => CONTOUR_DERIVATIVES,
-                (Mode::Contour(_), Wanted::Picture) => CONTOUR_PICTURE,
-                (Mode::SoftRas(_), Wanted::Value) => SOFTRAS_VALUE,
-                (Mode::SoftRas(_), Wanted::Derivatives) => SOFTRAS_DERIVATIVES,
-                (Mode::SoftRas(_), Wanted::Picture) => SOFTRAS_PICTURE,
+            let pixels = match (&self.problem.loss.mode, derivatives) {
+                (Mode::Contour(_), false) => CONTOUR_VALUE,
+                (Mode::Contour(_), true) => CONTOUR_DERIVATIVES,
+                (Mode::SoftRas(_), false) => SOFTRAS_VALUE,
+                (Mode::SoftRas(_), true) => SOFTRAS_DERIVATIVES,
             };
             if let Mode::Contour(_) = self.problem.loss.mode {
                 run(RASTER, across, down);
@@ -230,10 +209,7 @@ impl GpuSession {
                 run(FIND_PIECES, p.segment_capacity.div_ceil(64), 1);
             }
             run(pixels, across, down);
-            match wanted {
-                Wanted::Picture => run(NEEDS, 1, 1),
-                _ => run(TOTAL, p.squares[0], p.squares[1]),
-            }
+            run(TOTAL, p.squares[0], p.squares[1]);
         }
         encoder.copy_buffer_to_buffer(&work.results, 0, &work.readback, 0, size);
         encoder.finish()
@@ -241,18 +217,14 @@ impl GpuSession {
 }
 
 impl Session for GpuSession {
-    fn name(&self) -> &str {
-        &self.device.name
-    }
-
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
-        let sums = self.sums(hypotheses, Wanted::Value)?;
+        let sums = self.sums(hypotheses, false)?;
         let target = &self.problem.target;
         Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| answer::loss(s, target)).collect())
     }
 
     fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
-        let sums = self.sums(hypotheses, Wanted::Derivatives)?;
+        let sums = self.sums(hypotheses, true)?;
         let target = &self.problem.target;
         Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| answer::linearized(s, target)).collect())
     }
@@ -265,20 +237,10 @@ impl Session for GpuSession {
         upload::set_squares(&mut self.params, side);
         let (squares, columns) = (self.params.squares, self.sum_columns());
         let sums = work::check_dispatch(&self.device, &self.params)
-            .and_then(|()| self.sums(hypotheses, Wanted::Derivatives));
+            .and_then(|()| self.sums(hypotheses, true));
         // The other calls ask for one square, even after an error.
         upload::set_squares(&mut self.params, usize::MAX);
         let (sums, target) = (sums?, &self.problem.target);
         Ok(sums.chunks_exact(columns).map(|s| answer::tiles(s, squares, target)).collect())
-    }
-
-    fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
-        let values = loop {
-            self.prepare(1)?;
-            if let Some(values) = self.attempt(&[*hypothesis], Wanted::Picture)? {
-                break values;
-            }
-        };
-        Ok(answer::picture(self.params.size, &values))
     }
 }

@@ -95,7 +95,8 @@ pub(super) fn params(problem: &PoseProblem) -> Option<Params> {
     params.tiles = [camera.width, camera.height].map(|v| v.div_ceil(TILE) as u32);
     params.focal = DVec2::new(camera.fx, camera.fy).as_vec2();
     params.principal = DVec2::new(camera.cx, camera.cy).as_vec2();
-    params.bounds = bounds(&target.bounds);
+    let Region { x0, y0, x1, y1 } = target.bounds;
+    params.bounds = [x0, y0, x1, y1].map(|v| v as u32);
     params.vertices = model.positions.len() as u32;
     params.faces = model.faces.len() as u32;
     params.edges = model.edges.len() as u32;
@@ -121,10 +122,6 @@ pub(super) fn set_squares(params: &mut Params, side: usize) {
     params.side = side;
     params.parts = 1 + (tile - least).div_ceil(side);
     params.squares = params.size.map(|size| size.div_ceil(side));
-}
-
-pub(super) fn bounds(region: &Region) -> [u32; 4] {
-    [region.x0, region.y0, region.x1, region.y1].map(|v| v as u32)
 }
 
 fn set_albedo(params: &mut Params, model: &RenderModel) -> Option<()> {

@@ -2,8 +2,8 @@
 
 use super::device::Device;
 use super::layout::{
-    BIN, ENTRY, Hypothesis, PICTURE_COLUMNS, PIECE, Params, SCREEN, SEGMENT, SUM_COLUMNS, TALLY,
-    TILE, Usage, VISIBLE,
+    BIN, ENTRY, Hypothesis, PIECE, Params, SCREEN, SEGMENT, SUM_COLUMNS, TALLY, TILE, Usage,
+    VISIBLE,
 };
 use super::passes::{READ_ONLY, READ_WRITE};
 use crate::backend::BackendError;
@@ -62,7 +62,6 @@ fn sizes(params: &Params, capacity: &Capacity, hypotheses: usize) -> [u64; 9] {
     let parts = params.parts as usize * params.parts as usize;
     let [across, down] = params.squares.map(|v| v as usize);
     let sums = hypotheses * across * down * SUM_COLUMNS;
-    let values = sums.max(width * height * PICTURE_COLUMNS);
     [
         hypotheses * params.vertices as usize * SCREEN,
         hypotheses * TALLY,
@@ -72,7 +71,7 @@ fn sizes(params: &Params, capacity: &Capacity, hypotheses: usize) -> [u64; 9] {
         hypotheses * capacity.segments * SEGMENT,
         hypotheses * capacity.pieces * PIECE,
         hypotheses * tiles * parts * SUM_COLUMNS * size_of::<f32>(),
-        size_of::<Usage>() + values * size_of::<f32>(),
+        size_of::<Usage>() + sums * size_of::<f32>(),
     ]
     .map(|size| size.max(16) as u64)
 }

@@ -21,10 +21,6 @@ impl View for PixelByPixel<'_> {
     ) {
         self.0.visit::<DERIVATIVES>(block, each);
     }
-
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, glam::Vec3)) {
-        self.0.faces(block, each);
-    }
 }
 
 #[test]
@@ -47,8 +43,11 @@ fn is_the_same_as_pixel_by_pixel() {
             let drawing = ContourOptions { creases: crease, ..Default::default() }.drawing(1);
             let (camera, bounds) = (&target.camera, &target.bounds);
             let view = ContourView::new(drawing, &model, &guess, &center, camera, &lamp(), bounds);
-            let quick = residuals.total::<true>(&view);
-            let slow = residuals.total::<true>(&PixelByPixel(view));
+            let quick = Sums::total(&residuals.by_tiles::<true>(&view, Tiling::WHOLE));
+            let slow = {
+                let tiles = residuals.by_tiles::<true>(&PixelByPixel(view), Tiling::WHOLE);
+                Sums::total(&tiles)
+            };
             let (quick_loss, slow_loss) = (quick.loss(&target), slow.loss(&target));
             assert_eq!(quick_loss.counts, slow_loss.counts);
             let counts = quick_loss.counts;

@@ -12,7 +12,7 @@ use crate::pose_loss::{PoseImage, PoseLoss};
 fn compare(ours: &Buffers, theirs: &PoseImage, rounding: f64, slope: impl Fn(usize) -> f64) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);
     for at in 0..ours.alpha.len() {
-        assert_eq!(ours.face[at].map(|id| id.face), theirs.face[at]);
+        assert_eq!(ours.face[at].is_some(), theirs.depth.pixels()[at] > 0.0);
         let close = |a: f64, b: f32| {
             let (b, bound) = (f64::from(b), rounding + 8e-6 * slope(at));
             assert!((a - b).abs() < bound, "pixel {at}: {a} {b}, bound {bound}");
@@ -23,9 +23,6 @@ fn compare(ours: &Buffers, theirs: &PoseImage, rounding: f64, slope: impl Fn(usi
             close(*a, b);
             off += (a - f64::from(b)).powi(2);
             all += f64::from(b).powi(2);
-        }
-        for (a, b) in ours.normal[at].iter().zip(theirs.normal[at]) {
-            assert!((a - f64::from(b)).abs() < 1e-4);
         }
     }
     f64::sqrt(off / all)

@@ -11,7 +11,7 @@ use super::*;
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::mode::{ContourOptions, SoftRasOptions};
-use crate::model::RenderModel;
+use crate::model::{Albedo, RenderModel};
 use crate::shading::{Lamp, Lighting, Material};
 use crate::shapes_for_tests::{lump, painted, torus};
 
@@ -305,7 +305,7 @@ fn colors_and_texels_match_differences() {
     let versions = [&low, &high].map(|t| models[1].clone().with_texels(t.clone()).unwrap());
     check_versions(1, versions, |gradient| along(&gradient.texels(), [&low, &high]));
 
-    let color = models[2].uniform_color().unwrap();
+    let Albedo::Uniform(color) = models[2].albedo else { panic!("several colors") };
     let [low, high] = [edited(&[color], -1.0)[0], edited(&[color], 1.0)[0]];
     let versions = [low, high].map(|c| models[2].clone().with_uniform_color(c));
     check_versions(2, versions, |gradient| along(&[gradient.uniform_color], [&[low], &[high]]));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
-use prehend_autodiff::implicit::{Equations, ImplicitError, newton_on};
+use prehend_autodiff::implicit::{Equations, ImplicitError, newton};
 use prehend_autodiff::rigid::turned;
 use prehend_autodiff::solve::{Factored, SolveError, sparse_lu};
 use prehend_autodiff::{Fwd, Scalar};
@@ -66,7 +66,7 @@ impl ImplicitStep<'_> {
             };
             DVector::from_vec(self.free.iter().flat_map(velocity).collect())
         };
-        let solved = newton_on(self, start(0.0)).or_else(|_| newton_on(self, start(self.step.dt)));
+        let solved = newton(self, start(0.0)).or_else(|_| newton(self, start(self.step.dt)));
         solved.map_err(|error| match error {
             ImplicitError::NotConverged { iterations, residual, .. } => {
                 self.unsolved(residual, iterations)
@@ -100,7 +100,7 @@ impl ImplicitStep<'_> {
         x: &DVector<f64>,
         wrenches: &[Vector6<f64>],
         wrenches_by_velocity: &Blocks,
-    ) -> Result<Factored<f64>, SolveError> {
+    ) -> Result<Factored, SolveError> {
         let mut entries = Vec::new();
         let mut write = |row: usize, column: usize, block: Matrix6<f64>| {
             let place = |i: usize, j: usize| (6 * row + i, 6 * column + j, block[(i, j)]);
@@ -137,7 +137,7 @@ impl Equations for ImplicitStep<'_> {
         self.excesses(x, &wrenches)
     }
 
-    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError> {
+    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored), ImplicitError> {
         let dt = self.step.dt;
         let ends = self.ends(x);
         let mut slots = vec![None; ends.len()];

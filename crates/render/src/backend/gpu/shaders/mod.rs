@@ -31,7 +31,7 @@ macro_rules! sources {
 }
 
 /// Modules that passes import, each after its own imports.
-const MODULES: [Source; 27] = sources![
+const MODULES: [Source; 26] = sources![
     "params.wgsl",
     "hypotheses.wgsl",
     "mesh.wgsl",
@@ -57,12 +57,11 @@ const MODULES: [Source; 27] = sources![
     "fragment.wgsl",
     "softras.wgsl",
     "residuals.wgsl",
-    "picture.wgsl",
     "tile_span.wgsl",
 ];
 
 /// A file with one entry point each.
-const PASSES: [Source; 13] = sources![
+const PASSES: [Source; 10] = sources![
     "passes/project.wgsl",
     "passes/count_faces.wgsl",
     "passes/scan_bins.wgsl",
@@ -71,11 +70,8 @@ const PASSES: [Source; 13] = sources![
     "passes/find_segments.wgsl",
     "passes/find_pieces.wgsl",
     "passes/contour_residuals.wgsl",
-    "passes/contour_picture.wgsl",
     "passes/softras_residuals.wgsl",
-    "passes/softras_picture.wgsl",
     "passes/total.wgsl",
-    "passes/needs.wgsl",
 ];
 
 /// The key of the constant that says whether a pass computes derivatives; see `shaders/derivatives.wgsl`.
