@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
-use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, limits, tree};
+use super::{Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, limits, tree};
 use crate::mesh::TriMesh;
 
 /// Joints by which a body floats beside another: three that slide, three that turn it to where it is, and three that turn it from there.
@@ -40,7 +40,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// If the two cannot be told apart by their names.
-    pub fn with_floating(mut self, name: &str, body: &Self) -> Result<Self, RobotError> {
+    pub fn with_floating(mut self, name: &str, body: &Self) -> Result<Self> {
         let named = |part: &str| format!("{name}/{part}");
         let first = self.links.len() + FLOATING.len() - 1;
         let base = self.root;

@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use crate::mjcf::MjcfError;
 
+/// Result of reading or posing a robot.
+pub(super) type Result<T, E = RobotError> = std::result::Result<T, E>;
+
 /// Why a robot could not be read or posed.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotError {

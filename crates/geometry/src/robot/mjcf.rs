@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use super::collision::COLUMNS;
 use super::kinematics::t_parent_child;
 use super::urdf::unique;
-use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, limits, tree};
+use super::{Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, limits, tree};
 use crate::io::read_plain;
 use crate::limits::MAX_URDF_BYTES;
 use crate::mesh::TriMesh;
@@ -21,7 +21,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_file_with(path, &ReadOptions::default())
     }
 
@@ -29,10 +29,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_file_with(
-        path: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Self, RobotError> {
+    pub fn from_file_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
         let path = path.as_ref();
         let read_error = |source| RobotError::Read { path: path.into(), source };
         let text = read_plain(path, MAX_URDF_BYTES).map_err(read_error)?;
@@ -51,7 +48,7 @@ impl KinematicTree {
     /// # Errors
     /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Cycle`] of joints that follow each other;
     /// [`RobotError::Duplicate`] where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
-    pub fn from_mjcf(model: &Model) -> Result<Self, RobotError> {
+    pub fn from_mjcf(model: &Model) -> Result<Self> {
         let mut reader = Reader { links: Vec::new(), joints: Vec::new(), bodies: Vec::new() };
         let mut hanging = model.bodies.iter().filter(|body| body.parent.is_none());
         let only = hanging.next().filter(|_| hanging.next().is_none());
@@ -100,7 +97,7 @@ struct Reader {
 
 impl Reader {
     /// Adds a body that hangs on another or on the world, with a link for each joint but the last, and one more where the last joint's frame is not the body's.
-    fn add(&mut self, named: &Named<'_>) -> Result<(), RobotError> {
+    fn add(&mut self, named: &Named<'_>) -> Result<()> {
         let Named { body, name } = named;
         let mut parent = body.parent.map_or(0, |parent| self.bodies[parent]);
         // The next joint's frame, where it is at its reference, in the frame of the link that it is mounted on.
@@ -228,7 +225,7 @@ fn ties(model: &Model, warnings: &mut Vec<String>) -> BTreeMap<JointIndex, Tie> 
 fn drive(
     joints: &mut [(Joint, Option<JointIndex>)],
     ties: &BTreeMap<JointIndex, Tie>,
-) -> Result<Vec<String>, RobotError> {
+) -> Result<Vec<String>> {
     let free = || joints.iter().filter(|(_, at)| at.is_some_and(|at| !ties.contains_key(&at)));
     let (variables, names): (Vec<_>, Vec<_>) =
         free().map(|(joint, at)| (*at, joint.name.clone())).unzip();

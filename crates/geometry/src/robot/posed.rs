@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::{RobotError, RobotShape};
+use super::{Result, RobotError, RobotShape};
 use crate::closest::box_distance;
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
@@ -39,10 +39,7 @@ impl PosedRobot {
     ///
     /// # Errors
     /// [`RobotError::PoseCount`] unless there is one pose a link, [`RobotError::Number`] for one that is not finite.
-    pub fn new(
-        shape: Arc<RobotShape>,
-        t_world_links: Vec<Isometry3<f64>>,
-    ) -> Result<Self, RobotError> {
+    pub fn new(shape: Arc<RobotShape>, t_world_links: Vec<Isometry3<f64>>) -> Result<Self> {
         let (given, expected) = (t_world_links.len(), shape.links().len());
         if given != expected {
             return Err(RobotError::PoseCount { given, expected });

@@ -1,9 +1,9 @@
 //! Are the links and joints one tree, and in which order are they visited?
 
-use super::{Joint, Link, RobotError};
+use super::{Joint, Link, Result, RobotError};
 
 /// Joints ordered so that every parent link comes before its children, and the root link.
-pub(super) fn order(links: &[Link], joints: &[Joint]) -> Result<(Vec<usize>, usize), RobotError> {
+pub(super) fn order(links: &[Link], joints: &[Joint]) -> Result<(Vec<usize>, usize)> {
     let mut parent_joint: Vec<Option<usize>> = vec![None; links.len()];
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); links.len()];
     for (j, joint) in joints.iter().enumerate() {
