@@ -66,13 +66,13 @@ mod tests {
 
     use super::*;
     use crate::closest::ClosestPoints;
-    use crate::hand::{JOINT_COUNT, allegro_xela_urdf};
+    use crate::hand::{ALLEGRO_XELA_URDF, JOINT_COUNT};
     use crate::random::SplitMix64;
     use crate::robot::{KinematicTree, RobotShape};
 
     #[test]
     fn it_is_the_closest_point_of_all_bodies_in_one_mesh() {
-        let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let robot = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap();
         // A coarse grid: it does not enter here.
         let shape = Arc::new(RobotShape::new(&robot, 0.01, 0.01).unwrap());
         let base = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, 1.0, -0.7));

@@ -72,11 +72,11 @@ impl KinematicTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::allegro_xela_urdf;
+    use crate::hand::ALLEGRO_XELA_URDF;
 
     #[test]
     fn screws_are_the_columns_of_the_jacobian() {
-        let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let robot = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap();
         let joints: Vec<f64> = (0..16).map(|i| 0.3 + 0.05 * f64::from(i)).collect();
         let poses = robot.forward_kinematics(&joints);
         let (paths, screws) = (robot.paths(), robot.screws(&poses));

@@ -130,8 +130,8 @@ fn cylinder_and_two_spheres_with_coinciding_rings_unite() {
 
 #[test]
 fn built_in_hand_unites_in_any_joint_state() {
-    let robot = crate::robot::KinematicTree::from_urdf_str(&crate::hand::allegro_xela_urdf(), None)
-        .unwrap();
+    let robot =
+        crate::robot::KinematicTree::from_urdf_str(&crate::hand::ALLEGRO_XELA_URDF, None).unwrap();
     let unite = |base: &Isometry3<f64>, q: &[f64]| {
         let poses = robot.forward_kinematics(q);
         let parts: Vec<TriMesh> = (robot.links().iter().zip(&poses))
