@@ -15,7 +15,7 @@ impl Texture {
     ///
     /// # Errors
     /// [`MeshError::Texture`] where the file is missing, not an image, or larger than [`limits`](crate::limits) allow.
-    pub fn load(path: &Path) -> Result<Texture> {
+    pub(crate) fn load(path: &Path) -> Result<Texture> {
         let name = path.display().to_string();
         let bytes =
             read_plain(path, MAX_FILE_BYTES).map_err(|e| MeshError::texture(path, &name, e))?;

@@ -2,7 +2,6 @@
 
 mod articulated;
 mod assembly;
-mod closest;
 mod collision;
 mod dynamics;
 mod error;
@@ -22,7 +21,6 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 pub use articulated::{ArticulatedRobot, RobotSample};
-pub use closest::RobotClosest;
 use error::Result;
 pub use error::RobotError;
 pub use mjcf::outermost_element;

@@ -83,13 +83,6 @@ impl PosedRobot {
         &self.t_world_links
     }
 
-    /// Links that have a shape: index, world-to-link pose, and box in the link frame \[m\].
-    pub(super) fn solids(
-        &self,
-    ) -> impl Iterator<Item = (usize, &Isometry3<f64>, &(Point3<f64>, Point3<f64>))> {
-        self.solid.iter().map(|s| (s.link, &s.t_link_world, &s.bounds))
-    }
-
     /// Every collision body in the world frame: each a closed surface, overlapping others where links meet.
     pub fn mesh_parts(&self) -> Vec<TriMesh> {
         let links = self.shape.links().iter().zip(&self.t_world_links);
