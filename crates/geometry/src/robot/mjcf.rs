@@ -7,7 +7,6 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::collision::COLUMNS;
 use super::kinematics::t_parent_child;
-use super::urdf::unique;
 use super::{Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, limits, tree};
 use crate::io::read_plain;
 use crate::limits::MAX_URDF_BYTES;
@@ -46,8 +45,8 @@ impl KinematicTree {
     /// as they are, not as their hulls; planes and terrain have no shape here. Springs and armatures are not kept.
     ///
     /// # Errors
-    /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Cycle`] of joints that follow each other;
-    /// [`RobotError::Duplicate`] where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
+    /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Structure`] of joints that follow each other, and
+    /// where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
     pub fn from_mjcf(model: &Model) -> Result<Self> {
         let mut reader = Reader { links: Vec::new(), joints: Vec::new(), bodies: Vec::new() };
         let mut hanging = model.bodies.iter().filter(|body| body.parent.is_none());
@@ -68,8 +67,8 @@ impl KinematicTree {
             }
         }
         let Reader { links, mut joints, .. } = reader;
-        unique("link", links.iter().map(|link| &link.name))?;
-        unique("joint", joints.iter().map(|(joint, _)| &joint.name))?;
+        tree::unique("link", links.iter().map(|link| &link.name))?;
+        tree::unique("joint", joints.iter().map(|(joint, _)| &joint.name))?;
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         let variables = drive(&mut joints, &ties(model, &mut warnings))?;
         let joints: Vec<Joint> = joints.into_iter().map(|(joint, _)| joint).collect();
@@ -221,7 +220,7 @@ fn ties(model: &Model, warnings: &mut Vec<String>) -> BTreeMap<JointIndex, Tie> 
 /// Gives each joint its place in the joint vector, the joint that it mimics, or the position at which it is held, and returns the names of that vector's entries.
 ///
 /// # Errors
-/// [`RobotError::Cycle`] of joints that follow each other.
+/// [`RobotError::Structure`] of joints that follow each other.
 fn drive(
     joints: &mut [(Joint, Option<JointIndex>)],
     ties: &BTreeMap<JointIndex, Tie>,
@@ -242,7 +241,8 @@ fn drive(
                 }
             }
             if hops > ties.len() {
-                return Err(RobotError::Cycle { kind: "joint", name: joint.name.clone() });
+                let reason = format!("joint '{}' is part of a cycle", joint.name);
+                return Err(RobotError::Structure { reason });
             }
         };
         let leader = variables.iter().position(|variable| *variable == Some(at));
@@ -404,7 +404,7 @@ mod tests {
             "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='a'/>",
             "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='c'/><joint joint1='c' joint2='b'/>",
         ] {
-            assert!(matches!(read(circle), Err(RobotError::Cycle { .. })));
+            assert!(matches!(read(circle), Err(RobotError::Structure { .. })));
         }
     }
 

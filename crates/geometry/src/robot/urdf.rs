@@ -1,6 +1,6 @@
 //! From URDF text to a [`KinematicTree`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -60,8 +60,8 @@ impl KinematicTree {
         if urdf.links.is_empty() {
             return Err(RobotError::Urdf { message: "the robot has no links".into() });
         }
-        unique("link", urdf.links.iter().map(|l| &l.name))?;
-        unique("joint", urdf.joints.iter().map(|j| &j.name))?;
+        tree::unique("link", urdf.links.iter().map(|l| &l.name))?;
+        tree::unique("joint", urdf.joints.iter().map(|j| &j.name))?;
         let links = urdf
             .links
             .iter()
@@ -82,9 +82,11 @@ impl KinematicTree {
         let by_name: BTreeMap<&str, &urdf_rs::Joint> =
             urdf.joints.iter().map(|j| (j.name.as_str(), j)).collect();
         let link_index = |joint: &urdf_rs::Joint, link: &str| {
-            links.iter().position(|l| l.name == link).ok_or_else(|| RobotError::UnknownLink {
-                joint: joint.name.clone(),
-                link: link.to_owned(),
+            links.iter().position(|l| l.name == link).ok_or_else(|| {
+                let joint = &joint.name;
+                RobotError::structure(format!(
+                    "joint '{joint}' refers to link '{link}', which does not exist"
+                ))
             })
         };
         let joints = urdf
@@ -197,19 +199,6 @@ fn tag_end(text: &str) -> Option<usize> {
     })
 }
 
-pub(super) fn unique<'a>(
-    kind: &'static str,
-    names: impl Iterator<Item = &'a String>,
-) -> Result<()> {
-    let mut seen = BTreeSet::new();
-    for name in names {
-        if !seen.insert(name) {
-            return Err(RobotError::Duplicate { kind, name: name.clone() });
-        }
-    }
-    Ok(())
-}
-
 fn motion(joint: &urdf_rs::Joint) -> Result<Motion> {
     match joint.joint_type {
         JointType::Fixed => Ok(Motion::Fixed),
@@ -255,7 +244,7 @@ fn drive(
             by: format!("the mimic tag of joint '{}'", current.name),
         })?;
     }
-    Err(RobotError::Cycle { kind: "mimic joint", name: joint.name.clone() })
+    Err(RobotError::structure(format!("mimic joint '{}' is part of a cycle", joint.name)))
 }
 
 #[cfg(test)]
@@ -349,7 +338,7 @@ mod tests {
         let links: String = (0..300).map(link).collect();
         let error =
             KinematicTree::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);
-        assert!(matches!(error, Err(RobotError::Roots { .. })));
+        assert!(matches!(error, Err(RobotError::Structure { .. })));
     }
 
     #[test]
