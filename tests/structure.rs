@@ -7,7 +7,7 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_070),
-    ("geometry", 15_466),
+    ("geometry", 14_961),
     ("sim", 16_443),
     ("render", 10_630),
     ("refine", 30_630),
