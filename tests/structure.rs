@@ -7,10 +7,10 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 3_396),
-    ("geometry", 14_990),
-    ("sim", 16_600),
+    ("geometry", 14_969),
+    ("sim", 16_621),
     ("render", 10_207),
-    ("refine", 30_649),
+    ("refine", 30_655),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend::geometry::hand::{allegro_xela_urdf, default_grasp};
+use prehend::geometry::hand::{ALLEGRO_XELA_URDF, default_grasp};
 use prehend::geometry::robot::{KinematicTree, RobotShape};
 use prehend::sim::contact::Bounce;
 use prehend::sim::joint_law::PositionServo;
@@ -30,7 +30,7 @@ const TIME: f64 = 1.2;
 const DT: f64 = 0.01;
 
 pub(crate) fn main() -> anyhow::Result<()> {
-    let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None)?;
+    let robot = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None)?;
     let shape = RobotShape::new(&robot, 3e-3, 6e-3)?;
     let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
     // Palm up: the hand's x is the model's z.

@@ -1,7 +1,7 @@
-//! A balanced tree of boxes, refitted when what they hold moves.
+//! A balanced tree of boxes.
 //!
 //! For what may not miss a pair: boxes are exact and of any size. The tree of closest points (`closest::bvh`) is another, because it
-//! answers another question: its boxes turn with the surface, eight at a time in single precision, and cannot be refitted.
+//! answers another question: its boxes turn with the surface, eight at a time in single precision.
 
 use nalgebra::Point3;
 
@@ -130,7 +130,7 @@ impl BoxTree {
     }
 
     /// Takes over the boxes that `of` gives for their places.
-    pub(crate) fn refit(&mut self, of: impl Fn(usize) -> Bounds) {
+    fn refit(&mut self, of: impl Fn(usize) -> Bounds) {
         for (bounds, place) in self.boxes.iter_mut().zip(&self.order) {
             *bounds = of(*place as usize);
         }

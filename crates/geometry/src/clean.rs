@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use nalgebra::Point3;
 
 use crate::mesh::TriMesh;
-use crate::orient::{compacted, orient, wedge};
+use crate::orient::{orient, wedge};
 use crate::report::MeshReport;
 use crate::topology::{components, edges, is_collapsed, non_manifold_vertices};
 use crate::weld::is_finite;
@@ -70,7 +70,7 @@ impl TriMesh {
         report.non_manifold_vertices = non_manifold_vertices(&faces, &edges).len();
         report.watertight =
             !faces.is_empty() && report.open_edges == 0 && report.non_manifold_edges == 0;
-        let clean = compacted(&TriMesh::new(weld.positions, faces));
+        let clean = TriMesh::compacted(&weld.positions, faces);
         report.flat_faces = (0..clean.faces.len()).filter(|f| is_flat(&clean, *f)).count();
         report.self_intersections = clean.self_intersections().len();
         (clean, report)

@@ -76,7 +76,11 @@ impl TriMesh {
             give(points, &mut facets[first..], left.into_iter().filter(|p| *p != peak));
             open.extend(first..count);
         }
-        Some(compact(points, &facets))
+        let left = facets.iter().filter(|facet| !facet.is_gone);
+        Some(TriMesh::compacted(
+            points,
+            left.map(|facet| facet.corners.map(|corner| corner as u32)),
+        ))
     }
 }
 
@@ -147,23 +151,6 @@ fn first_facets(points: &[Point3<f64>]) -> Option<Vec<Facet>> {
     let corners = [a, b, c, d];
     give(points, &mut facets, all().filter(|p| !corners.contains(p)));
     Some(facets)
-}
-
-/// The mesh of the facets that are left.
-fn compact(points: &[Point3<f64>], facets: &[Facet]) -> TriMesh {
-    let mut own = BTreeMap::new();
-    let mut vertices = Vec::new();
-    let left = facets.iter().filter(|facet| !facet.is_gone);
-    let faces = left.map(|facet| {
-        facet.corners.map(|corner| {
-            *own.entry(corner).or_insert_with(|| {
-                vertices.push(points[corner]);
-                vertices.len() as u32 - 1
-            })
-        })
-    });
-    let faces = faces.collect();
-    TriMesh::new(vertices, faces)
 }
 
 #[cfg(test)]

@@ -54,5 +54,5 @@ pub use robot::{KinematicTree, PosedRobot, RobotShape};
 pub use robust::RobustKernel;
 pub use sample::SurfaceSample;
 pub use sdf::{GridCache, SdfGrid};
-pub use volume::{Overlap, SolidUnion, VolumeError};
+pub use volume::{SolidUnion, VolumeError};
 pub use weld::Weld;

@@ -63,11 +63,6 @@ pub fn mass_properties(mesh: &TriMesh, density: f64) -> Result<MassProperties, M
     if open > 0 {
         return Err(MassError::NotClosed { edges: open });
     }
-    mass_of_closed(mesh, density)
-}
-
-/// As [`mass_properties`], for a mesh that is known to close.
-pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassProperties, MassError> {
     if !(density > 0.0 && density.is_finite()) {
         return Err(MassError::BadScale { what: "density", value: density });
     }

@@ -30,6 +30,25 @@ impl TriMesh {
         Self { vertices, faces, ..Self::default() }
     }
 
+    /// The mesh of `faces` alone, its vertices those that they use, in the order in which they do.
+    pub(crate) fn compacted(
+        vertices: &[Point3<f64>],
+        faces: impl IntoIterator<Item = [u32; 3]>,
+    ) -> Self {
+        let mut new = vec![u32::MAX; vertices.len()];
+        let mut used = Vec::new();
+        let mut renumbered = |v: u32| {
+            let id = &mut new[v as usize];
+            if *id == u32::MAX {
+                *id = used.len() as u32;
+                used.push(vertices[v as usize]);
+            }
+            *id
+        };
+        let faces = faces.into_iter().map(|face| face.map(&mut renumbered)).collect();
+        Self::new(used, faces)
+    }
+
     /// The corner positions of face `face` \[m\].
     #[inline]
     pub fn triangle(&self, face: usize) -> [Point3<f64>; 3] {

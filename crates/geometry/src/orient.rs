@@ -205,8 +205,8 @@ impl Shells {
             );
         }
         for (outer, candidates) in within.iter().enumerate().filter(|(_, c)| !c.is_empty()) {
-            let shell = TriMesh::new(positions.to_vec(), members[outer].clone());
-            let Ok(shell) = ClosestPoints::with_winding_sign(&compacted(&shell)) else { continue };
+            let shell = TriMesh::compacted(positions, members[outer].iter().copied());
+            let Ok(shell) = ClosestPoints::with_winding_sign(&shell) else { continue };
             for &inner in candidates {
                 let list = &members[inner];
                 // Shells that cross are not within each other: some vertices lie outside.
@@ -226,24 +226,6 @@ impl Shells {
         let larger = |a: &usize, b: &usize| self.list[*a].volume.total_cmp(&self.list[*b].volume);
         around[shell].iter().copied().max_by(larger).unwrap_or(shell)
     }
-}
-
-/// The mesh without vertices that no face uses.
-pub(crate) fn compacted(mesh: &TriMesh) -> TriMesh {
-    let mut new = vec![u32::MAX; mesh.vertices.len()];
-    let mut kept = Vec::new();
-    let faces = mesh.faces.iter().map(|f| {
-        f.map(|v| {
-            let slot = &mut new[v as usize];
-            if *slot == u32::MAX {
-                *slot = kept.len() as u32;
-                kept.push(mesh.vertices[v as usize]);
-            }
-            *slot
-        })
-    });
-    let faces = faces.collect();
-    TriMesh::new(kept, faces)
 }
 
 #[cfg(test)]

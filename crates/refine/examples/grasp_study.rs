@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use cpu_time::ProcessTime;
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::hand::{allegro_xela_urdf, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 use prehend_refine::scene::{Hand, Object};
@@ -22,7 +22,7 @@ fn main() -> anyhow::Result<()> {
     let tries: u64 = arguments.next().map_or(Ok(20), |n| n.parse()).context("TRIES")?;
     let folder = arguments.next().map(PathBuf::from);
     let only = arguments.next();
-    let robot = Hand::new(Tree::from_urdf_str(&allegro_xela_urdf(), None)?, taxels())?;
+    let robot = Hand::new(Tree::from_urdf_str(ALLEGRO_XELA_URDF, None)?, taxels())?;
     println!(
         "{:22} {:>9} {:>6} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8}  faults",
         "object", "grasps", "IV", "CA", "links", "mm", "°", "s/grasp", "frames/s"

@@ -45,8 +45,9 @@ pub fn default_grasp() -> Grasp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::allegro::joint;
+    use crate::hand::ALLEGRO_XELA_URDF;
     use crate::hand::posed::{dense, gap, link_poses, posed, surface};
+    use crate::robot::KinematicTree;
 
     #[test]
     fn palm_fingers_and_thumb_touch_and_hardly_penetrate() {
@@ -69,10 +70,8 @@ mod tests {
     #[test]
     fn joints_are_within_limits_and_the_thumb_clears_the_fingers() {
         let grasp = default_grasp();
-        for (i, q) in grasp.joints.iter().enumerate() {
-            let [lower, upper] = joint(i).limits;
-            assert!((lower..=upper).contains(q), "joint {i}: {q}");
-        }
+        let robot = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap();
+        robot.check_joints(&grasp.joints).unwrap();
         let poses = link_poses(&grasp.joints);
         let thumb: Vec<_> = [14, 15].iter().flat_map(|i| posed(Some(*i), &poses)).collect();
         let thumb: Vec<_> = thumb

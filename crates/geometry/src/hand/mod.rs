@@ -6,11 +6,13 @@
 mod allegro;
 mod grasp;
 #[cfg(test)]
+mod parts;
+#[cfg(test)]
 mod posed;
 mod taxel_csv;
 mod taxels;
 
-pub use allegro::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
+pub use allegro::{ALLEGRO_XELA_URDF, JOINT_COUNT, JOINT_NAMES};
 pub use grasp::{Grasp, default_grasp};
 pub use taxel_csv::{TaxelError, load_taxels};
 pub use taxels::{Taxel, taxels};

@@ -2,15 +2,16 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::allegro::{Part, link, link_name};
-use super::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
+use super::allegro::link_name;
+use super::parts::{Part, parts};
+use super::{ALLEGRO_XELA_URDF, JOINT_COUNT, JOINT_NAMES};
 use crate::mesh::TriMesh;
 use crate::robot::KinematicTree;
 use crate::shapes::{capsule, cuboid};
 
 /// `t_base_link` of links 0–15.
 pub(super) fn link_poses(q: &[f64; JOINT_COUNT]) -> Vec<Isometry3<f64>> {
-    let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+    let robot = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap();
     let state = JOINT_NAMES.map(str::to_owned).into_iter().zip(*q).collect();
     let poses = robot.forward_kinematics(&robot.joint_vector(&state).unwrap());
     (0..JOINT_COUNT).map(|i| poses[robot.link_index(&link_name(Some(i))).unwrap()]).collect()
@@ -19,7 +20,7 @@ pub(super) fn link_poses(q: &[f64; JOINT_COUNT]) -> Vec<Isometry3<f64>> {
 /// Parts of a link with their pose in the base frame.
 pub(super) fn posed(i: Option<usize>, poses: &[Isometry3<f64>]) -> Vec<(Isometry3<f64>, Part)> {
     let pose = i.map_or_else(Isometry3::identity, |i| poses[i]);
-    link(i).1.into_iter().map(|part| (pose, part)).collect()
+    parts(&link_name(i)).into_iter().map(|part| (pose, part)).collect()
 }
 
 /// Signed distance \[m\] of a point in the link frame.
@@ -91,7 +92,7 @@ fn straight_fingers_reach_their_published_height() {
 
 #[test]
 fn part_surfaces_lie_at_zero_distance() {
-    for part in [0, 3].into_iter().flat_map(|i| link(Some(i)).1) {
+    for part in [0, 3].into_iter().flat_map(|i| parts(&link_name(Some(i)))) {
         for point in dense(&surface(&part), 0.002) {
             let d = distance(&part, &point.coords);
             // Facets of the capsule lie up to r (1 − cos(π/24)) inside.

@@ -33,7 +33,7 @@ enum Module {
 /// (51–53).
 ///
 /// Positions on the flat modules are the published grids. On the curved tips the published columns (at 90°, 50°
-/// and 25° to the palm side, mirrored) lie 1.7 mm beneath the capsule that [`super::allegro_xela_urdf`] gives the
+/// and 25° to the palm side, mirrored) lie 1.7 mm beneath the capsule that [`super::ALLEGRO_XELA_URDF`] gives the
 /// fingertip.
 pub fn taxels() -> Vec<Taxel> {
     use Module::{CurvedTip, Flat44, Flat46};
@@ -118,7 +118,7 @@ fn curved_tip() -> Vec<(Point3<f64>, Vector3<f64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::allegro::{Part, link};
+    use crate::hand::parts::{Part, parts};
 
     #[test]
     fn counts_a_link() {
@@ -150,9 +150,7 @@ mod tests {
             }
         };
         for taxel in taxels() {
-            let number = (taxel.link != "base_link")
-                .then(|| taxel.link[5..].parse::<f64>().unwrap() as usize);
-            let parts = link(number).1;
+            let parts = parts(&taxel.link);
             let signed = |p: Vector3<f64>| {
                 parts.iter().map(|part| depth(part, &p)).fold(f64::INFINITY, f64::min)
             };

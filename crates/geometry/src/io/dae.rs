@@ -8,15 +8,15 @@ use std::path::Path;
 use nalgebra::{Matrix4, Point3, Rotation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 
-use super::MeshError;
 use super::limits::MAX_ELEMENTS;
 use super::polygon::triangles;
+use super::{MeshError, Result};
 use crate::mesh::TriMesh;
 
 /// Deepest nesting of nodes, those of instances included.
 const MOST_LEVELS: usize = 64;
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let malformed = |e: &dyn ToString| MeshError::malformed(path, "document", e.to_string());
     let text = str::from_utf8(bytes).map_err(|e| malformed(&e))?;
     let document = Document::parse(text).map_err(|e| malformed(&e))?;
@@ -51,13 +51,13 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Element that an instance or an input refers to.
-    fn target(&self, node: Node<'a, 'i>) -> Result<Node<'a, 'i>, MeshError> {
+    fn target(&self, node: Node<'a, 'i>) -> Result<Node<'a, 'i>> {
         let name = node.attribute("url").or(node.attribute("source")).unwrap_or_default();
         let found = name.strip_prefix('#').and_then(|id| self.ids.get(id)).copied();
         found.ok_or_else(|| self.fault(node, format!("nothing is called '{name}'")))
     }
 
-    fn numbers<T: std::str::FromStr>(&self, node: Node<'a, 'i>) -> Result<Vec<T>, MeshError> {
+    fn numbers<T: std::str::FromStr>(&self, node: Node<'a, 'i>) -> Result<Vec<T>> {
         let words = node.text().unwrap_or_default().split_ascii_whitespace();
         let all: Result<Vec<T>, _> = words.map(str::parse).collect();
         all.map_err(|_| self.fault(node, "holds something that is not a number"))
@@ -68,7 +68,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         node: Node<'a, 'i>,
         t_scene_parent: &Matrix4<f64>,
         level: usize,
-    ) -> Result<(), MeshError> {
+    ) -> Result<()> {
         if level > MOST_LEVELS {
             return Err(self.fault(node, "is nested too deeply"));
         }
@@ -91,7 +91,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    fn transform(&self, node: Node<'a, 'i>) -> Result<Matrix4<f64>, MeshError> {
+    fn transform(&self, node: Node<'a, 'i>) -> Result<Matrix4<f64>> {
         let numbers: Vec<f64> = self.numbers(node)?;
         Ok(match (node.tag_name().name(), numbers.as_slice()) {
             ("matrix", all) if all.len() == 16 => Matrix4::from_row_slice(all),
@@ -105,7 +105,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         })
     }
 
-    fn primitive(&mut self, node: Node<'a, 'i>, pose: &Matrix4<f64>) -> Result<(), MeshError> {
+    fn primitive(&mut self, node: Node<'a, 'i>, pose: &Matrix4<f64>) -> Result<()> {
         let kind = node.tag_name().name();
         if !["triangles", "polylist", "polygons", "tristrips", "trifans"].contains(&kind) {
             return Ok(());

@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+/// Result of reading or writing a mesh or a distance grid.
+pub(crate) type Result<T, E = MeshError> = std::result::Result<T, E>;
+
 /// Why a mesh or a distance grid could not be read or written; every variant names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
@@ -89,12 +92,7 @@ impl MeshError {
     }
 
     /// [`MeshError::TooLarge`] where `count` is more than `limit`.
-    pub(super) fn within(
-        path: &Path,
-        element: &str,
-        count: usize,
-        limit: usize,
-    ) -> Result<(), Self> {
+    pub(super) fn within(path: &Path, element: &str, count: usize, limit: usize) -> Result<()> {
         if count <= limit {
             return Ok(());
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::limits::MAX_PIXELS;
-use super::{MeshError, texture};
+use super::{MeshError, Result, texture};
 use crate::mesh::Texture;
 
 /// Images decoded so far, by name.

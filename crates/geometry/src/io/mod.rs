@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 use crate::mesh::TriMesh;
 pub use atomic::{AtomicFile, write_atomic};
 pub use error::MeshError;
+pub(crate) use error::Result;
 pub use plain::{open_plain, plain_target, read_plain};
 pub use save::{FilmBody, FilmCamera, FilmKey, GlbFilm};
 
@@ -43,7 +44,7 @@ impl TriMesh {
     /// Every error names the file, and the element or field at fault: unreadable or truncated files,
     /// counts or indices that do not fit, non-finite numbers, meshes without triangles, and whatever
     /// is larger than [`limits`](crate::limits) allow.
-    pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
+    pub fn load(path: &Path) -> Result<TriMesh> {
         let bytes = read(path)?;
         TriMesh::from_bytes(&bytes, path)
     }
@@ -53,7 +54,7 @@ impl TriMesh {
     ///
     /// # Errors
     /// As [`TriMesh::load`].
-    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<TriMesh> {
         MeshError::within(path, "file, bytes", bytes.len(), limits::MAX_FILE_BYTES)?;
         let mesh = match extension(path).as_str() {
             "ply" => ply::parse(bytes, path)?,
@@ -70,7 +71,7 @@ impl TriMesh {
 /// As [`TriMesh::load`], positions and faces alone: what an OBJ file says of materials is not looked at.
 ///
 /// Descriptions of robots often come without the materials that their meshes name.
-pub(crate) fn load_shape(path: &Path) -> Result<TriMesh, MeshError> {
+pub(crate) fn load_shape(path: &Path) -> Result<TriMesh> {
     let mesh = match extension(path).as_str() {
         "obj" => {
             let bytes = read(path)?;
@@ -91,13 +92,13 @@ fn extension(path: &Path) -> String {
     path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
+fn read(path: &Path) -> Result<Vec<u8>> {
     read_plain(path, limits::MAX_FILE_BYTES)
         .map_err(|source| MeshError::Read { path: path.into(), source })
 }
 
 /// Rejects what no later stage can use and normalizes stored normals.
-fn checked(mut mesh: TriMesh, path: &Path) -> Result<TriMesh, MeshError> {
+fn checked(mut mesh: TriMesh, path: &Path) -> Result<TriMesh> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     if vertices == 0 || faces == 0 {
         return Err(MeshError::Empty { path: path.into(), vertices, faces });

@@ -9,7 +9,7 @@ use super::images::Images;
 use super::mtl::{self, Library};
 use super::parts::{Part, join};
 use super::polygon::{Polygons, triangles};
-use super::{MeshError, text, texture};
+use super::{MeshError, Result, text, texture};
 use crate::mesh::TriMesh;
 
 /// Indices of position, texture coordinates and normal of a corner.
@@ -18,7 +18,7 @@ type Corner = [u32; 3];
 /// Index of a texture coordinate or normal that a corner has not.
 const NONE: u32 = u32::MAX;
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let content = Content::parse(bytes, path)?;
     let library = content.library(path);
     let unknown = content.unknown_materials(&library);
@@ -50,7 +50,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
 }
 
 /// Positions and faces alone; corners share their position whatever their normals are. Without faces all positions that are finite.
-pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let mut content = Content::parse(bytes, path)?;
     let mut whole = TriMesh::default();
     for (_, mesh) in content.meshes(|face, _| face.group, |[at, _, _]| [at, NONE, NONE]) {
@@ -91,7 +91,7 @@ struct Face {
 }
 
 impl Content {
-    fn parse(bytes: &[u8], path: &Path) -> Result<Self, MeshError> {
+    fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let fault =
             |line: usize, reason| MeshError::malformed(path, format!("line {line}"), reason);
         let mut all = Self::default();
@@ -283,7 +283,7 @@ mod tests {
     const CUBE_CORNER: &str = "mtllib m.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
         vt 0.5 0.5\nusemtl painted\nf 1/1 2/2 3/3\nf -4/5 -2/3 -1/4\n";
 
-    fn load(text: &str, path: &Path) -> Result<TriMesh, MeshError> {
+    fn load(text: &str, path: &Path) -> Result<TriMesh> {
         TriMesh::from_bytes(text.as_bytes(), path)
     }
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::MeshError;
 use super::limits::MAX_PIXELS;
+use super::{MeshError, Result};
 use crate::mesh::{Texture, TriMesh};
 
 /// Geometry under one material.
@@ -19,7 +19,7 @@ pub(super) struct Part {
 
 /// One mesh of all `parts`. A texture that all share stays as it is; several become one image, in which a plain
 /// color is a tile too; without any, plain colors become vertex colors.
-pub(super) fn join(parts: Vec<Part>, path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn join(parts: Vec<Part>, path: &Path) -> Result<TriMesh> {
     let first = parts.iter().find_map(|p| p.texture.clone());
     let Some(first) = first else { return Ok(join_plain(parts)) };
     let shared = parts.iter().all(|p| {
@@ -81,7 +81,7 @@ impl Tile {
 
 /// Stacks the images of `parts` from the top down, each within a border of repeated pixels so that filtering does
 /// not mix neighbors, and moves the UVs along.
-fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>, MeshError> {
+fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>> {
     let mut tiles: Vec<Tile> = Vec::new();
     let mut tile_of = Vec::new();
     for part in &mut parts {

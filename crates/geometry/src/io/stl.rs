@@ -6,11 +6,11 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use super::MeshError;
 use super::limits::MAX_ELEMENTS;
+use super::{MeshError, Result};
 use crate::mesh::TriMesh;
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let mut content = Cursor::new(as_its_kind(bytes, path)?);
     let facets = stl_io::create_stl_reader(&mut content)
         .map_err(|e| MeshError::malformed(path, "header", e))?;
@@ -30,7 +30,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
 
 /// The content as `stl_io` reads all of it. Many programs begin binary headers with `solid`, the mark of ASCII files; the length tells
 /// them apart, or a zero byte in the header.
-fn as_its_kind<'a>(bytes: &'a [u8], path: &Path) -> Result<Cow<'a, [u8]>, MeshError> {
+fn as_its_kind<'a>(bytes: &'a [u8], path: &Path) -> Result<Cow<'a, [u8]>> {
     let count = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
     let facets = bytes.len().saturating_sub(84);
     let (held, rest) = (facets / 50, facets % 50);
@@ -85,7 +85,7 @@ mod tests {
         bytes
     }
 
-    fn load(bytes: &[u8]) -> Result<TriMesh, MeshError> {
+    fn load(bytes: &[u8]) -> Result<TriMesh> {
         TriMesh::from_bytes(bytes, Path::new("m.stl"))
     }
 

@@ -7,7 +7,7 @@ use image::{ImageFormat, ImageReader, RgbImage};
 
 use super::limits::{MAX_FILE_BYTES, MAX_PIXELS};
 use super::read_plain;
-use super::{MeshError, companion};
+use super::{MeshError, Result, companion};
 use crate::mesh::Texture;
 
 impl Texture {
@@ -15,7 +15,7 @@ impl Texture {
     ///
     /// # Errors
     /// [`MeshError::Texture`] where the file is missing, not an image, or larger than [`limits`](crate::limits) allow.
-    pub fn load(path: &Path) -> Result<Texture, MeshError> {
+    pub(crate) fn load(path: &Path) -> Result<Texture> {
         let name = path.display().to_string();
         let bytes =
             read_plain(path, MAX_FILE_BYTES).map_err(|e| MeshError::texture(path, &name, e))?;
@@ -56,12 +56,7 @@ pub(super) fn near(path: &Path, name: &str) -> Result<Vec<u8>, String> {
 }
 
 /// Decodes an image of at most `limit` pixels that is embedded in, or named by, the mesh at `path`.
-pub(super) fn decode(
-    bytes: &[u8],
-    path: &Path,
-    name: &str,
-    limit: usize,
-) -> Result<Texture, MeshError> {
+pub(super) fn decode(bytes: &[u8], path: &Path, name: &str, limit: usize) -> Result<Texture> {
     let fault = |e: String| MeshError::texture(path, name, e);
     let reader = || {
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fault(e.to_string()))

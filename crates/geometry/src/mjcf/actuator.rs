@@ -10,7 +10,7 @@ use super::drive::{Drive, DriveKind, Drives};
 use super::element::Element;
 use super::error::Result;
 use super::names::{Names, Taken};
-use super::value::Limited;
+use super::value::Limits;
 use super::{JointIndex, Model};
 
 /// Transmission of an actuator: the joint, tendon, site or body on which its force acts.
@@ -121,6 +121,10 @@ pub struct Actuator {
     pub damping_ratio: Option<f64>,
 }
 
+const CONTROL_RANGE: [&str; 2] = ["ctrllimited", "ctrlrange"];
+const FORCE_RANGE: [&str; 2] = ["forcelimited", "forcerange"];
+const ACTIVATION_RANGE: [&str; 2] = ["actlimited", "actrange"];
+
 /// Attributes of an actuator: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
 pub(super) struct Spec {
@@ -128,9 +132,9 @@ pub(super) struct Spec {
     /// Length of a crank's rod \[m\].
     rod: f64,
     is_early: bool,
-    control: ([f64; 2], Limited),
-    force: ([f64; 2], Limited),
-    activation: ([f64; 2], Limited),
+    control: Limits,
+    force: Limits,
+    activation: Limits,
     drives: Drives,
     group: i32,
     length_range: Option<[f64; 2]>,
@@ -138,10 +142,9 @@ pub(super) struct Spec {
 
 impl Default for Spec {
     fn default() -> Self {
-        let free = ([0.0; 2], Limited::Auto);
-        let gear = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let free = Limits::default();
         Self {
-            gear,
+            gear: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             rod: 0.0,
             is_early: false,
             control: free,
@@ -173,14 +176,9 @@ impl Spec {
                 e.refuse_attribute(field, "of actuators is not read");
             }
         }
-        for (range, limited, value) in [
-            ("ctrlrange", "ctrllimited", &mut self.control),
-            ("forcerange", "forcelimited", &mut self.force),
-            ("actrange", "actlimited", &mut self.activation),
-        ] {
-            value.0 = e.numbers(range)?.unwrap_or(value.0);
-            value.1 = e.limited(limited)?.unwrap_or(value.1);
-        }
+        self.control.read(e, CONTROL_RANGE)?;
+        self.force.read(e, FORCE_RANGE)?;
+        self.activation.read(e, ACTIVATION_RANGE)?;
         self.drives.read(e, kind)
     }
 }
@@ -251,10 +249,8 @@ fn build(
     }
     // Nothing drives with a gain of minus zero.
     [&mut gain, &mut bias].into_iter().flatten().for_each(|x| *x += 0.0);
-    let range =
-        |fields, (range, limited): ([f64; 2], Limited)| compiler.range(e, fields, limited, range);
-    let mut control_range = range(["ctrllimited", "ctrlrange"], spec.control)?;
-    let mut activation_range = range(["actlimited", "actrange"], spec.activation)?;
+    let mut control_range = compiler.range(e, CONTROL_RANGE, spec.control)?;
+    let mut activation_range = compiler.range(e, ACTIVATION_RANGE, spec.activation)?;
     if drive.inherit_range > 0.0 {
         let own = match transmission {
             Transmission::Joint { joint, .. } => model.joint(joint).range,
@@ -280,7 +276,7 @@ fn build(
         bias,
         dynamics,
         control_range,
-        force_range: range(["forcelimited", "forcerange"], spec.force)?,
+        force_range: compiler.range(e, FORCE_RANGE, spec.force)?,
         activation_range,
         ahead,
         muscle,
@@ -296,11 +292,11 @@ fn transmission(
     names: &Names,
 ) -> Result<Option<Transmission>> {
     let frame = |field| -> Result<PlacedFrame> {
-        let (body, t_body_frame) = names.site(e, field)?;
+        let (body, t_body_frame) = names.sites.get(e, field)?;
         Ok(PlacedFrame { body, t_body_frame })
     };
     Ok(Some(if e.has("tendon") {
-        let found = names.tendon(e, "tendon")?;
+        let found = names.tendons.get(e, "tendon")?;
         if found.is_none() {
             e.refuse("left out: the tendon that it pulls at is not read");
         }
@@ -316,13 +312,13 @@ fn transmission(
         }
         Transmission::SliderCrank { crank, slider, rod: spec.rod }
     } else if e.has("body") {
-        Transmission::Adhesion(names.body(e, "body")?)
+        Transmission::Adhesion(names.bodies.get(e, "body")?)
     } else {
         let field = ["joint", "jointinparent"].into_iter().find(|f| e.has(f));
         let Some(field) = field else {
             return Err(e.misplaced("pulls at nothing"));
         };
-        let joint = names.joint(e, field)?;
+        let joint = names.joints.get(e, field)?;
         let in_parent = field == "jointinparent" && model.joint(joint).kind.velocities() > 1;
         Transmission::Joint { joint, in_parent }
     }))

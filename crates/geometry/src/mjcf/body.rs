@@ -289,7 +289,7 @@ mod tests {
         let tree: Vec<_> = model.bodies.iter().map(|b| (b.name.as_str(), b.parent)).collect();
         let parents = [("a", None), ("b", Some(0)), ("c", Some(0)), ("d", Some(2)), ("e", None)];
         assert_eq!(tree, parents);
-        assert_eq!(model.body_index("d"), Some(3));
+        assert_eq!(model.bodies.iter().position(|b| b.name == "d"), Some(3));
         assert!(model.bodies.iter().all(|b| b.inertial.is_none()));
     }
 

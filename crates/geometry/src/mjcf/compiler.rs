@@ -2,7 +2,7 @@
 
 use super::element::Element;
 use super::error::Result;
-use super::value::Limited;
+use super::value::{Limited, Limits};
 
 /// Whose inertia a body has.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,8 +116,7 @@ impl Compiler {
         &self,
         e: &Element,
         [limited_field, field]: [&'static str; 2],
-        limited: Limited,
-        [low, high]: [f64; 2],
+        Limits { range: [low, high], limited }: Limits,
     ) -> Result<Option<(f64, f64)>> {
         let given = low != 0.0 || high != 0.0;
         let is_limited = match limited {

@@ -10,7 +10,7 @@ pub(super) fn exclusions(root: &Element, names: &Names) -> Result<Vec<[Option<us
     for e in root.in_sections("contact").filter(|e| e.tag == "exclude") {
         e.take();
         e.text("name");
-        all.push([names.body(e, "body1")?, names.body(e, "body2")?]);
+        all.push([names.bodies.get(e, "body1")?, names.bodies.get(e, "body2")?]);
     }
     Ok(all)
 }

@@ -3,6 +3,7 @@
 //! They keep book of what has been asked for, so that the rest can be named in warnings.
 
 use std::cell::Cell;
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -202,19 +203,19 @@ impl Element {
         MjcfError::Value { place: Box::new(self.place()), field, reason: reason.into() }
     }
 
-    /// [`MjcfError::Missing`] of an attribute.
+    /// [`MjcfError::Value`] of an attribute that is not there.
     pub(super) fn missing(&self, field: &'static str) -> MjcfError {
-        MjcfError::Missing { place: Box::new(self.place()), field }
+        self.invalid(field, "is missing")
     }
 
-    /// [`MjcfError::Unknown`] of an attribute.
-    pub(super) fn unknown(&self, field: &'static str, name: impl Into<String>) -> MjcfError {
-        MjcfError::Unknown { place: Box::new(self.place()), field, name: name.into() }
+    /// [`MjcfError::Value`] of an attribute that refers to something that does not exist.
+    pub(super) fn unknown(&self, field: &'static str, name: impl Display) -> MjcfError {
+        self.invalid(field, format!("names '{name}', which does not exist"))
     }
 
-    /// [`MjcfError::Duplicate`] of the element.
-    pub(super) fn duplicate(&self, kind: &'static str) -> MjcfError {
-        MjcfError::Duplicate { place: Box::new(self.place()), kind }
+    /// [`MjcfError::Structure`] of an element that has the name of another of this `kind`.
+    pub(super) fn duplicate(&self, kind: &str) -> MjcfError {
+        self.misplaced(format!("another {kind} has this name"))
     }
 
     /// [`MjcfError::Structure`] of the element.

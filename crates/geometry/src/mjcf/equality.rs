@@ -98,8 +98,8 @@ pub(super) fn read(
             "weld" => reader.weld(e)?,
             "joint" => reader.joint(e)?,
             "tendon" => {
-                let first = names.tendon(e, "tendon1")?;
-                let second = if e.has("tendon2") { names.tendon(e, "tendon2")? } else { None };
+                let first = names.tendons.get(e, "tendon1")?;
+                let second = if e.has("tendon2") { names.tendons.get(e, "tendon2")? } else { None };
                 let Some(first) = first else { continue };
                 let mut polynomial = [0.0, 1.0, 0.0, 0.0, 0.0];
                 e.leading("polycoef", &mut polynomial)?;
@@ -126,8 +126,8 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn bodies(&self, e: &Element) -> Result<[Option<usize>; 2]> {
-        let first = self.names.body(e, "body1")?;
-        let second = if e.has("body2") { self.names.body(e, "body2")? } else { None };
+        let first = self.names.bodies.get(e, "body1")?;
+        let second = if e.has("body2") { self.names.bodies.get(e, "body2")? } else { None };
         Ok([first, second])
     }
 
@@ -143,7 +143,8 @@ impl Reader<'_> {
         if let Some(field) = ["body1", "body2", "anchor", "relpose"].iter().find(|f| e.has(f)) {
             return Err(e.invalid(field, "is given beside site1 and site2"));
         }
-        let (first, second) = (self.names.site(e, "site1")?, self.names.site(e, "site2")?);
+        let (first, second) =
+            (self.names.sites.get(e, "site1")?, self.names.sites.get(e, "site2")?);
         Ok(([first.0, second.0], [first.1, second.1]))
     }
 

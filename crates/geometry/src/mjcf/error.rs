@@ -70,46 +70,20 @@ pub enum MjcfError {
         /// Why not.
         reason: String,
     },
-    /// An attribute whose value does not fit.
+    /// An attribute that is missing, or whose value does not fit.
     #[error("{place}: {field} {reason}")]
     Value {
         /// The element.
         place: Box<Place>,
         /// The attribute.
         field: &'static str,
-        /// Reason, such as `must be positive`.
+        /// Reason, such as `must be positive` or `is missing`.
         reason: String,
-    },
-    /// An attribute that must be there and is not.
-    #[error("{place}: {field} is missing")]
-    Missing {
-        /// The element.
-        place: Box<Place>,
-        /// The attribute.
-        field: &'static str,
-    },
-    /// A reference to something that does not exist.
-    #[error("{place}: {field} names '{name}', which does not exist")]
-    Unknown {
-        /// The element.
-        place: Box<Place>,
-        /// The attribute.
-        field: &'static str,
-        /// The name that nothing has.
-        name: String,
-    },
-    /// Two things of one kind that share a name.
-    #[error("{place}: another {kind} has this name")]
-    Duplicate {
-        /// The later one.
-        place: Box<Place>,
-        /// Body, joint, mesh or the like.
-        kind: &'static str,
     },
     /// Something that changes masses, degrees of freedom, contacts or actuation and is not supported.
     #[error("{0}: not supported (with `partial`, it is left out)")]
     Unsupported(Box<Warning>),
-    /// An element that must not be where it is.
+    /// An element that must not be where it is, or has the name of another.
     #[error("{place}: {reason}")]
     Structure {
         /// The element.

@@ -6,12 +6,13 @@ use super::compiler::Compiler;
 use super::element::Element;
 use super::error::Result;
 use super::solver::SolverParameters;
-use super::value::Limited;
+use super::value::{FORCE_RANGE, Limits, RANGE};
 
 /// The motions that a joint allows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum JointKind {
     /// Turning about the axis through the anchor \[rad\].
+    #[default]
     Hinge,
     /// Sliding along the axis \[m\].
     Slide,
@@ -84,18 +85,17 @@ pub struct Joint {
 }
 
 /// Attributes of a joint: the defaults of its class, replaced by those of its element.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Spec {
     kind: JointKind,
     anchor: Vector3<f64>,
-    axis: Vector3<f64>,
-    range: [f64; 2],
-    limited: Limited,
+    /// Without one, z.
+    axis: Option<Vector3<f64>>,
+    range: Limits,
     /// Still in the angles of the file.
     reference: f64,
     spring_reference: f64,
-    force_range: [f64; 2],
-    force_limited: Limited,
+    force_range: Limits,
     stiffness: [f64; 3],
     damping: [f64; 3],
     friction_loss: f64,
@@ -104,30 +104,6 @@ pub(super) struct Spec {
     margin: f64,
     carries_by_actuator: bool,
     spring_damper: Option<[f64; 2]>,
-}
-
-impl Default for Spec {
-    fn default() -> Self {
-        Self {
-            kind: JointKind::Hinge,
-            anchor: Vector3::zeros(),
-            axis: Vector3::z(),
-            range: [0.0; 2],
-            limited: Limited::Auto,
-            reference: 0.0,
-            spring_reference: 0.0,
-            force_range: [0.0; 2],
-            force_limited: Limited::Auto,
-            stiffness: [0.0; 3],
-            damping: [0.0; 3],
-            friction_loss: 0.0,
-            armature: 0.0,
-            limit: SolverParameters::default(),
-            margin: 0.0,
-            carries_by_actuator: false,
-            spring_damper: None,
-        }
-    }
 }
 
 impl Spec {
@@ -140,13 +116,11 @@ impl Spec {
         ];
         self.kind = e.keyword("type", &kinds)?.unwrap_or(self.kind);
         self.anchor = e.numbers("pos")?.map_or(self.anchor, Vector3::from);
-        self.axis = e.numbers("axis")?.map_or(self.axis, Vector3::from);
-        self.range = e.numbers("range")?.unwrap_or(self.range);
-        self.limited = e.limited("limited")?.unwrap_or(self.limited);
+        self.axis = e.numbers("axis")?.map(Vector3::from).or(self.axis);
+        self.range.read(e, RANGE)?;
         self.reference = e.number("ref")?.unwrap_or(self.reference);
         self.spring_reference = e.number("springref")?.unwrap_or(self.spring_reference);
-        self.force_range = e.numbers("actuatorfrcrange")?.unwrap_or(self.force_range);
-        self.force_limited = e.limited("actuatorfrclimited")?.unwrap_or(self.force_limited);
+        self.force_range.read(e, FORCE_RANGE)?;
         self.stiffness = e.coefficients("stiffness")?.unwrap_or(self.stiffness);
         self.damping = e.coefficients("damping")?.unwrap_or(self.damping);
         self.friction_loss = e.magnitude("frictionloss")?.unwrap_or(self.friction_loss);
@@ -165,13 +139,13 @@ impl Spec {
         compiler: &Compiler,
         t_body_frame: &Isometry3<f64>,
     ) -> Result<Joint> {
-        let axis = Unit::try_new(t_body_frame * self.axis, 1e-14)
+        let axis = Unit::try_new(t_body_frame * self.axis.unwrap_or(Vector3::z()), 1e-14)
             .ok_or_else(|| e.invalid("axis", "must not be zero"))?;
         let is_angle = matches!(self.kind, JointKind::Hinge | JointKind::Ball);
         let angle = |x: f64| if is_angle { compiler.angle(x) } else { x };
         let range = match self.kind {
             JointKind::Free => None,
-            _ => compiler.range(e, ["limited", "range"], self.limited, self.range)?,
+            _ => compiler.range(e, RANGE, self.range)?,
         };
         if self.kind == JointKind::Ball && range.is_some_and(|(low, _)| low != 0.0) {
             return Err(e.invalid("range", "of a ball must begin at zero"));
@@ -179,12 +153,7 @@ impl Spec {
         let single = matches!(self.kind, JointKind::Hinge | JointKind::Slide);
         let position = |x: f64| if single { angle(x) } else { 0.0 };
         let force = match single {
-            true => compiler.range(
-                e,
-                ["actuatorfrclimited", "actuatorfrcrange"],
-                self.force_limited,
-                self.force_range,
-            )?,
+            true => compiler.range(e, FORCE_RANGE, self.force_range)?,
             false => None,
         };
         Ok(Joint {

@@ -181,11 +181,6 @@ impl Model {
         }
     }
 
-    /// Index of the body of that name; `None` for the world as for a name that no body has.
-    pub fn body_index(&self, name: &str) -> Option<usize> {
-        self.bodies.iter().position(|b| b.name == name)
-    }
-
     /// Index of the joint of that name.
     pub fn joint_index(&self, name: &str) -> Option<JointIndex> {
         self.joint_indices().find(|&index| self.joint(index).name == name)

@@ -22,75 +22,62 @@ impl Taken {
     }
 }
 
-/// Bodies, joints and sites by name.
+/// Things of one kind by name; those without one cannot be named.
+pub(super) struct Table<T>(BTreeMap<String, T>);
+
+impl<T: Copy> Table<T> {
+    fn of<'a>(named: impl IntoIterator<Item = (&'a str, T)>) -> Self {
+        let named = named.into_iter().filter(|(name, _)| !name.is_empty());
+        Self(named.map(|(name, thing)| (name.to_owned(), thing)).collect())
+    }
+
+    /// The thing that the attribute `field` of `e` names.
+    pub(super) fn get(&self, e: &Element, field: &'static str) -> Result<T> {
+        let name = e.text(field).ok_or_else(|| e.missing(field))?;
+        self.0.get(name).copied().ok_or_else(|| e.unknown(field, name))
+    }
+}
+
+/// Bodies, joints, tendons, sites and geoms by name.
 pub(super) struct Names {
     /// `None` is the world.
-    bodies: BTreeMap<String, Option<usize>>,
-    joints: BTreeMap<String, JointIndex>,
+    pub(super) bodies: Table<Option<usize>>,
+    pub(super) joints: Table<JointIndex>,
     /// `None` are those that are not read.
-    tendons: BTreeMap<String, Option<usize>>,
+    pub(super) tendons: Table<Option<usize>>,
     /// The body that each is on, and its pose there.
-    sites: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
+    pub(super) sites: Table<(Option<usize>, Isometry3<f64>)>,
     /// The body that each is on, and its place among that body's geoms.
-    geoms: BTreeMap<String, (Option<usize>, usize)>,
+    geoms: Table<(Option<usize>, usize)>,
 }
 
 impl Names {
     pub(super) fn new(model: &Model) -> Self {
-        let mut names = Self {
-            bodies: BTreeMap::from([("world".to_owned(), None)]),
-            joints: BTreeMap::new(),
-            tendons: BTreeMap::new(),
-            sites: BTreeMap::new(),
-            geoms: BTreeMap::new(),
-        };
-        for (place, geom) in model.world_geoms.iter().enumerate() {
-            names.geoms.insert(geom.name.clone(), (None, place));
+        let bodies = || model.bodies.iter().enumerate().map(|(b, body)| (Some(b), body));
+        let sites = bodies().flat_map(|(b, body)| body.sites.iter().map(move |s| (b, s)));
+        let sites = model.world_sites.iter().map(|s| (None, s)).chain(sites);
+        let geoms = bodies().map(|(b, body)| (b, &body.geoms));
+        let geoms = std::iter::once((None, &model.world_geoms)).chain(geoms);
+        let geoms = geoms.flat_map(|(b, all)| {
+            all.iter().enumerate().map(move |(place, geom)| (geom.name.as_str(), (b, place)))
+        });
+        let joints = model.joint_indices().map(|j| (model.joint(j).name.as_str(), j));
+        let named = bodies().map(|(b, body)| (body.name.as_str(), b));
+        Self {
+            bodies: Table::of(std::iter::once(("world", None)).chain(named)),
+            joints: Table::of(joints),
+            tendons: Table::of([]),
+            sites: Table::of(sites.map(|(b, s)| (s.name.as_str(), (b, s.t_body_site)))),
+            geoms: Table::of(geoms),
         }
-        for site in &model.world_sites {
-            names.sites.insert(site.name.clone(), (None, site.t_body_site));
-        }
-        for (b, body) in model.bodies.iter().enumerate() {
-            names.bodies.insert(body.name.clone(), Some(b));
-            for (j, joint) in body.joints.iter().enumerate() {
-                names.joints.insert(joint.name.clone(), JointIndex { body: b, joint: j });
-            }
-            for (place, geom) in body.geoms.iter().enumerate() {
-                names.geoms.insert(geom.name.clone(), (Some(b), place));
-            }
-            for site in &body.sites {
-                names.sites.insert(site.name.clone(), (Some(b), site.t_body_site));
-            }
-        }
-        // What has no name cannot be named.
-        names.bodies.remove("");
-        names.joints.remove("");
-        names.sites.remove("");
-        names.geoms.remove("");
-        names
     }
 
     /// Adds the tendons of `root`, of which these have been read since.
     pub(super) fn add_tendons(&mut self, root: &Element, read: &[Tendon]) {
-        let written = root.in_sections("tendon").map(|e| (e.name(), None));
-        let read = read.iter().enumerate().map(|(t, tendon)| (tendon.name.clone(), Some(t)));
-        self.tendons.extend(written.chain(read));
-        self.tendons.remove("");
-    }
-
-    /// The tendon that the attribute `field` of `e` names; `None` where it is not read.
-    pub(super) fn tendon(&self, e: &Element, field: &'static str) -> Result<Option<usize>> {
-        find(&self.tendons, e, field)
-    }
-
-    /// The body that the attribute `field` of `e` names; `None` is the world.
-    pub(super) fn body(&self, e: &Element, field: &'static str) -> Result<Option<usize>> {
-        find(&self.bodies, e, field)
-    }
-
-    /// The joint that the attribute `field` of `e` names.
-    pub(super) fn joint(&self, e: &Element, field: &'static str) -> Result<JointIndex> {
-        find(&self.joints, e, field)
+        let written: Vec<String> = root.in_sections("tendon").map(Element::name).collect();
+        let written = written.iter().map(|name| (name.as_str(), None));
+        let read = read.iter().enumerate().map(|(t, tendon)| (tendon.name.as_str(), Some(t)));
+        self.tendons = Table::of(written.chain(read));
     }
 
     /// The hinge or slide that the attribute `field` of `e` names.
@@ -100,7 +87,7 @@ impl Names {
         field: &'static str,
         model: &Model,
     ) -> Result<JointIndex> {
-        let joint = self.joint(e, field)?;
+        let joint = self.joints.get(e, field)?;
         match model.joint(joint).kind {
             JointKind::Hinge | JointKind::Slide => Ok(joint),
             _ => Err(e.invalid(field, "names neither a hinge nor a slide")),
@@ -114,22 +101,8 @@ impl Names {
         field: &'static str,
         model: &'a Model,
     ) -> Result<(Option<usize>, &'a Geom)> {
-        let (body, place) = find(&self.geoms, e, field)?;
+        let (body, place) = self.geoms.get(e, field)?;
         let all = body.map_or(&model.world_geoms, |body| &model.bodies[body].geoms);
         Ok((body, &all[place]))
     }
-
-    /// The site that the attribute `field` of `e` names: its body (`None` is the world) and its pose there.
-    pub(super) fn site(
-        &self,
-        e: &Element,
-        field: &'static str,
-    ) -> Result<(Option<usize>, Isometry3<f64>)> {
-        find(&self.sites, e, field)
-    }
-}
-
-fn find<T: Copy>(all: &BTreeMap<String, T>, e: &Element, field: &'static str) -> Result<T> {
-    let name = e.text(field).ok_or_else(|| e.missing(field))?;
-    all.get(name).copied().ok_or_else(|| e.unknown(field, name))
 }

@@ -106,11 +106,11 @@ pub(super) fn read(root: &Element, model: &Model, names: &Names) -> Result<Vec<S
 
 /// The quantity that `e` measures; `None` where it is not read, or what it is measured of is not.
 fn quantity(e: &Element, root: &Element, model: &Model, names: &Names) -> Result<Option<Quantity>> {
-    let joint = || names.joint(e, "joint");
-    let tendon = || names.tendon(e, "tendon");
-    let body = || names.body(e, "body");
+    let joint = || names.joints.get(e, "joint");
+    let tendon = || names.tendons.get(e, "tendon");
+    let body = || names.bodies.get(e, "body");
     let site = || -> Result<PlacedFrame> {
-        let (body, t_body_frame) = names.site(e, "site")?;
+        let (body, t_body_frame) = names.sites.get(e, "site")?;
         Ok(PlacedFrame { body, t_body_frame })
     };
     let actuator = || -> Result<Option<usize>> {
@@ -161,10 +161,10 @@ fn frame(
     names: &Names,
 ) -> Result<Option<PlacedFrame>> {
     let (body, t_body_frame) = match e.text(kind) {
-        Some("site") => names.site(e, name)?,
-        Some("xbody") => (names.body(e, name)?, Isometry3::identity()),
+        Some("site") => names.sites.get(e, name)?,
+        Some("xbody") => (names.bodies.get(e, name)?, Isometry3::identity()),
         Some("body") => {
-            let body = names.body(e, name)?;
+            let body = names.bodies.get(e, name)?;
             let inertial = body.and_then(|body| model.bodies[body].inertial);
             let center = inertial.map_or(Isometry3::identity(), |own| own.com.coords.into());
             if part.turns() || kind == "reftype" {

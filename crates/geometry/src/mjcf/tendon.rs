@@ -8,7 +8,7 @@ use super::element::Element;
 use super::error::Result;
 use super::names::{Names, Taken};
 use super::solver::SolverParameters;
-use super::value::Limited;
+use super::value::{FORCE_RANGE, Limits, RANGE};
 use super::{JointIndex, Model, Shape};
 
 /// A joint's part in a tendon.
@@ -82,49 +82,28 @@ pub struct Tendon {
 }
 
 /// Attributes of a tendon: the defaults of its class, replaced by those of its element.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Spec {
-    range: [f64; 2],
-    limited: Limited,
-    force_range: [f64; 2],
-    force_limited: Limited,
+    range: Limits,
+    force_range: Limits,
     stiffness: [f64; 3],
-    /// Negative where it is to be found from the joints.
-    spring: [f64; 2],
+    /// Without one, or of −1, it is to be found from the joints.
+    spring: Option<[f64; 2]>,
     damping: [f64; 3],
     friction_loss: f64,
     armature: f64,
     limit: SolverParameters,
 }
 
-impl Default for Spec {
-    fn default() -> Self {
-        Self {
-            range: [0.0; 2],
-            limited: Limited::Auto,
-            force_range: [0.0; 2],
-            force_limited: Limited::Auto,
-            stiffness: [0.0; 3],
-            spring: [-1.0; 2],
-            damping: [0.0; 3],
-            friction_loss: 0.0,
-            armature: 0.0,
-            limit: SolverParameters::default(),
-        }
-    }
-}
-
 impl Spec {
     pub(super) fn read(&mut self, e: &Element) -> Result<()> {
-        self.range = e.numbers("range")?.unwrap_or(self.range);
-        self.limited = e.limited("limited")?.unwrap_or(self.limited);
-        self.force_range = e.numbers("actuatorfrcrange")?.unwrap_or(self.force_range);
-        self.force_limited = e.limited("actuatorfrclimited")?.unwrap_or(self.force_limited);
+        self.range.read(e, RANGE)?;
+        self.force_range.read(e, FORCE_RANGE)?;
         self.stiffness = e.coefficients("stiffness")?.unwrap_or(self.stiffness);
         if let Some(length) = e.list("springlength", 2)? {
             self.spring = match length[..] {
-                [low, high] => [low, high],
-                [one] => [one; 2],
+                [low, high] => Some([low, high]),
+                [one] => Some([one; 2]),
                 _ => return Err(e.invalid("springlength", "must have 1 or 2 numbers")),
             };
         }
@@ -154,17 +133,15 @@ impl Spec {
             return Err(e.misplaced("a tendon needs a joint"));
         }
         let slack = |t: &TendonJoint| t.coefficient * model.joint(t.joint).spring_reference;
-        let spring_range = match self.spring {
-            [-1.0, -1.0] if joints.is_empty() => None,
-            [-1.0, -1.0] => Some([joints.iter().map(slack).sum(); 2]),
-            written => Some(written),
+        let spring_range = match self.spring.filter(|lengths| *lengths != [-1.0; 2]) {
+            None if !joints.is_empty() => Some([joints.iter().map(slack).sum(); 2]),
+            written => written,
         };
-        let force = ["actuatorfrclimited", "actuatorfrcrange"];
         Ok(Tendon {
             name: e.name(),
             joints,
             parts,
-            range: compiler.range(e, ["limited", "range"], self.limited, self.range)?,
+            range: compiler.range(e, RANGE, self.range)?,
             stiffness: self.stiffness[0],
             higher_stiffness: [self.stiffness[1], self.stiffness[2]],
             spring_range: spring_range.map(<(f64, f64)>::from),
@@ -172,7 +149,7 @@ impl Spec {
             higher_damping: [self.damping[1], self.damping[2]],
             friction_loss: self.friction_loss,
             armature: self.armature,
-            actuator_force_range: compiler.range(e, force, self.force_limited, self.force_range)?,
+            actuator_force_range: compiler.range(e, FORCE_RANGE, self.force_range)?,
             limit_solver: self.limit,
         })
     }
@@ -206,7 +183,7 @@ pub(super) fn read(
 fn cable(e: &Element, model: &Model, names: &Names) -> Result<Vec<TendonPart>> {
     let mut parts = Vec::new();
     let point = |part: &Element, field| -> Result<_> {
-        let (body, t_body_site) = names.site(part, field)?;
+        let (body, t_body_site) = names.sites.get(part, field)?;
         Ok((body, Point3::from(t_body_site.translation.vector)))
     };
     for part in &e.children {

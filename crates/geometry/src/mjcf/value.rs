@@ -4,14 +4,36 @@ use super::element::Element;
 use super::error::Result;
 
 /// A switch that may be left to the presence of a range.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Limited {
     /// Limited, whatever the range.
     Yes,
     /// Not limited, whatever the range.
     No,
     /// Limited where the range is not empty.
+    #[default]
     Auto,
+}
+
+/// Attributes of the positions of a joint or tendon.
+pub(super) const RANGE: [&str; 2] = ["limited", "range"];
+
+/// Attributes of the actuators' forces on a joint or tendon.
+pub(super) const FORCE_RANGE: [&str; 2] = ["actuatorfrclimited", "actuatorfrcrange"];
+
+/// A range, and whether it limits.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Limits {
+    pub(super) range: [f64; 2],
+    pub(super) limited: Limited,
+}
+
+impl Limits {
+    pub(super) fn read(&mut self, e: &Element, [limited, range]: [&'static str; 2]) -> Result<()> {
+        self.range = e.numbers(range)?.unwrap_or(self.range);
+        self.limited = e.limited(limited)?.unwrap_or(self.limited);
+        Ok(())
+    }
 }
 
 /// Larger numbers are mistakes, and products of some of them without end.

@@ -91,11 +91,6 @@ impl YcbObject {
         TriMesh { texture: Some(Arc::new(entry.texture())), ..entry.form.mesh() }
     }
 
-    /// The unrolled picture alone.
-    pub fn texture(self) -> Texture {
-        self.entry().texture()
-    }
-
     fn entry(self) -> Entry {
         let carton = |size, bulge, radius| Form::Carton { size, bulge, radius };
         let (name, bop_id, mass, form, base, print): (_, _, _, _, _, Print) = match self {
@@ -201,7 +196,7 @@ mod tests {
     #[test]
     fn prints_tell_the_sides_apart() {
         for object in YcbObject::ALL {
-            let Texture { width, height, pixels } = object.texture();
+            let Texture { width, height, pixels } = object.entry().texture();
             assert_eq!((width.max(height), pixels.len()), (TEXTURE_PIXELS, width * height));
             // Half a turn must change the color of a good part of the sheet.
             let differs = |i: &usize| {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
-use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, limits, tree};
+use super::{Drive, Joint, KinematicTree, Link, Motion, Result, limits, tree};
 use crate::mesh::TriMesh;
 
 /// Joints by which a body floats beside another: three that slide, three that turn it to where it is, and three that turn it from there.
@@ -40,7 +40,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// If the two cannot be told apart by their names.
-    pub fn with_floating(mut self, name: &str, body: &Self) -> Result<Self, RobotError> {
+    pub fn with_floating(mut self, name: &str, body: &Self) -> Result<Self> {
         let named = |part: &str| format!("{name}/{part}");
         let first = self.links.len() + FLOATING.len() - 1;
         let base = self.root;
@@ -79,11 +79,7 @@ impl KinematicTree {
             ..joint.clone()
         }));
         self.variables.extend(body.variables.iter().map(|joint| named(joint)));
-        for (k, link) in self.links.iter().enumerate() {
-            if self.links[..k].iter().any(|other| other.name == link.name) {
-                return Err(RobotError::Duplicate { kind: "link", name: link.name.clone() });
-            }
-        }
+        tree::unique("link", self.links.iter().map(|link| &link.name))?;
         (self.order, self.root) = tree::order(&self.links, &self.joints)?;
         self.ranges = limits::ranges(&self.joints, &self.variables)?;
         Ok(self)
@@ -114,6 +110,7 @@ impl Drive {
 mod tests {
     use nalgebra::{Point3, UnitQuaternion};
 
+    use super::super::RobotError;
     use super::*;
     use crate::shapes::cuboid;
 
@@ -172,6 +169,6 @@ mod tests {
     #[test]
     fn equal_names_are_an_error() {
         let twice = finger().with_floating("a", &finger()).unwrap().with_floating("a", &finger());
-        assert!(matches!(twice, Err(RobotError::Duplicate { .. })));
+        assert!(matches!(twice, Err(RobotError::Structure { .. })));
     }
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry;
 
-use super::{RobotError, origin};
+use super::{Result, RobotError, origin};
 use crate::closest;
 use crate::io::folder::{Folder, percent_decoded};
 use crate::io::load_shape;
@@ -26,7 +26,7 @@ pub(super) fn parts(
     folder: Option<&Folder>,
     options: &ReadOptions,
     warnings: &mut Vec<String>,
-) -> Result<Vec<TriMesh>, RobotError> {
+) -> Result<Vec<TriMesh>> {
     let owner = || format!("link '{}'", link.name);
     let mut parts = Vec::with_capacity(link.collision.len());
     for collision in &link.collision {
@@ -45,7 +45,7 @@ fn geometry(
     geometry: &Geometry,
     folder: Option<&Folder>,
     options: &ReadOptions,
-) -> Result<TriMesh, RobotError> {
+) -> Result<TriMesh> {
     let positive = |field: &'static str, sizes: &[f64]| {
         if sizes.iter().all(|s| s.is_finite() && *s > 0.0) {
             return Ok(());

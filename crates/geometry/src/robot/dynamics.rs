@@ -3,14 +3,14 @@
 use nalgebra::{Matrix3, Point3};
 
 use super::origin::{finite, isometry};
-use super::{Link, RobotError};
+use super::{Link, Result, RobotError};
 use crate::inertial::Inertial;
 use crate::mass::mass_properties;
 use crate::read_options::ReadOptions;
 
 /// Mass and inertia of `link` in its frame; `None` without an `inertial` tag, and where it is at the origin and all zeros, which
 /// reads the same.
-pub(super) fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>, RobotError> {
+pub(super) fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>> {
     let owner = || format!("link '{}'", link.name);
     let urdf_rs::Inertial { origin, mass, inertia } = &link.inertial;
     let urdf_rs::Inertia { ixx, ixy, ixz, iyy, iyz, izz } = *inertia;
@@ -60,9 +60,7 @@ fn is_possible(inertial: &Inertial) -> bool {
 }
 
 /// Damping and dry friction of `joint`; `None` without a `dynamics` tag.
-pub(super) fn damping_and_friction(
-    joint: &urdf_rs::Joint,
-) -> Result<Option<(f64, f64)>, RobotError> {
+pub(super) fn damping_and_friction(joint: &urdf_rs::Joint) -> Result<Option<(f64, f64)>> {
     let Some(dynamics) = &joint.dynamics else { return Ok(None) };
     let owner = || format!("joint '{}'", joint.name);
     finite(&owner, "damping", &[dynamics.damping])?;
@@ -76,7 +74,7 @@ pub(super) fn limit(
     joint: &urdf_rs::Joint,
     field: &'static str,
     value: f64,
-) -> Result<Option<f64>, RobotError> {
+) -> Result<Option<f64>> {
     if value.is_nan() {
         let owner = format!("joint '{}'", joint.name);
         return Err(RobotError::Number { owner, field, requirement: "must be a number" });

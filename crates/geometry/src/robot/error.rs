@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use crate::mjcf::MjcfError;
 
+/// Result of reading or posing a robot.
+pub(super) type Result<T, E = RobotError> = std::result::Result<T, E>;
+
 /// Why a robot could not be read or posed.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotError {
@@ -32,21 +35,11 @@ pub enum RobotError {
         /// Error of the description in that file.
         source: Box<RobotError>,
     },
-    /// Two links or two joints share a name.
-    #[error("more than one {kind} is named '{name}'")]
-    Duplicate {
-        /// "link" or "joint".
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A joint refers to a link that does not exist.
-    #[error("joint '{joint}' refers to link '{link}', which does not exist")]
-    UnknownLink {
-        /// The joint.
-        joint: String,
-        /// The missing link.
-        link: String,
+    /// Names that are not unique or name nothing, or links, joints and mimics that do not form one tree.
+    #[error("{reason}")]
+    Structure {
+        /// Reason, with the links and joints at fault.
+        reason: String,
     },
     /// A joint that does not exist is named by a mimic tag or a joint state.
     #[error("joint '{joint}', named by {by}, does not exist")]
@@ -55,30 +48,6 @@ pub enum RobotError {
         joint: String,
         /// Who names it.
         by: String,
-    },
-    /// A link hangs on two joints.
-    #[error("link '{link}' is the child of both joint '{first}' and joint '{second}'")]
-    TwoParents {
-        /// The link.
-        link: String,
-        /// One joint.
-        first: String,
-        /// The other.
-        second: String,
-    },
-    /// The joints do not form one tree.
-    #[error("expected one root link, found {}: {}", .roots.len(), .roots.join(", "))]
-    Roots {
-        /// The links without a parent.
-        roots: Vec<String>,
-    },
-    /// Links or mimic joints that depend on each other in a circle.
-    #[error("{kind} '{name}' is part of a cycle")]
-    Cycle {
-        /// "link" or "mimic joint".
-        kind: &'static str,
-        /// One of its members.
-        name: String,
     },
     /// A joint of a kind that has no place in a tree of single-axis joints.
     #[error("joint '{joint}' is of the unsupported kind {kind}")]
@@ -176,4 +145,10 @@ pub enum RobotError {
         /// Links of the robot.
         expected: usize,
     },
+}
+
+impl RobotError {
+    pub(super) fn structure(reason: impl Into<String>) -> Self {
+        Self::Structure { reason: reason.into() }
+    }
 }

@@ -1,6 +1,6 @@
-//! Forward kinematics over any scalar, and the geometric Jacobian.
+//! Forward kinematics over any scalar.
 
-use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::lift;
 
@@ -22,28 +22,6 @@ impl KinematicTree {
             poses[joint.child] = poses[joint.parent] * t_parent_child(joint, joints);
         }
         poses
-    }
-
-    /// Velocity of a point fixed to a link by each joint position: rows are the linear velocity of the
-    /// point \[m/rad or 1\] and the angular velocity of the link \[1 or rad/m\], in the base frame; columns
-    /// are the entries of the joint vector. `point` is in the link frame \[m\].
-    ///
-    /// The geometric Jacobian: Siciliano et al., Robotics, 2009, section 3.1.
-    ///
-    /// # Panics
-    /// If `joints` has not one entry a name, or there is no such link.
-    pub fn jacobian(&self, joints: &[f64], link: usize, point: &Point3<f64>) -> Matrix6xX<f64> {
-        let poses = self.forward_kinematics(joints);
-        let (screws, tip) = (self.screws(&poses), poses[link] * point);
-        let mut jacobian = Matrix6xX::zeros(joints.len());
-        for screw in self.paths()[link].iter().map(|&s| &screws[s]) {
-            let (linear, mut column) = (screw.velocity(&tip), jacobian.column_mut(screw.variable));
-            for i in 0..3 {
-                column[i] += linear[i];
-                column[i + 3] += screw.angular[i];
-            }
-        }
-        jacobian
     }
 }
 
@@ -69,7 +47,7 @@ pub(super) fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix6xX, Point3, Vector3};
 
     use super::*;
     use prehend_autodiff::{Fwd, Var, gradient};
@@ -115,6 +93,27 @@ mod tests {
         assert!(tip.t_parent_joint.rotation.angle_to(&(z * y * x)) < 1e-15);
     }
 
+    /// The geometric Jacobian by the screws of the joints: rows are the velocity of `point` of a link and the angular velocity, columns the joint
+    /// positions.
+    fn jacobian(
+        robot: &KinematicTree,
+        joints: &[f64],
+        link: usize,
+        point: &Point3<f64>,
+    ) -> Matrix6xX<f64> {
+        let poses = robot.forward_kinematics(joints);
+        let (screws, tip) = (robot.screws(&poses), poses[link] * point);
+        let mut jacobian = Matrix6xX::zeros(joints.len());
+        for screw in robot.paths()[link].iter().map(|&s| &screws[s]) {
+            let (linear, mut column) = (screw.velocity(&tip), jacobian.column_mut(screw.variable));
+            for i in 0..3 {
+                column[i] += linear[i];
+                column[i + 3] += screw.angular[i];
+            }
+        }
+        jacobian
+    }
+
     #[test]
     fn the_jacobian_matches_differences_at_zero_and_elsewhere() {
         let robot = finger();
@@ -122,7 +121,7 @@ mod tests {
         let point = Point3::new(0.003, -0.002, 0.012);
         let step = 1e-6;
         for q in [[0.0, 0.0, 0.0], [0.3, -0.8, 0.004], [-2.0, 3.0, 0.01]] {
-            let jacobian = robot.jacobian(&q, tip, &point);
+            let jacobian = jacobian(&robot, &q, tip, &point);
             assert_eq!(jacobian.ncols(), robot.joint_names().len());
             for i in 0..3 {
                 let at = |sign: f64| {
@@ -146,7 +145,7 @@ mod tests {
         let tip = robot.link_index("tip").unwrap();
         let point = Point3::new(0.003, -0.002, 0.012);
         for q in [[0.0, 0.0, 0.0], [0.3, -0.8, 0.004], [-2.0, 3.0, 0.01]] {
-            let jacobian = robot.jacobian(&q, tip, &point);
+            let jacobian = jacobian(&robot, &q, tip, &point);
             let seeded: [Fwd<3>; 3] = std::array::from_fn(|i| Fwd::variable(q[i], i));
             let pose = robot.forward_kinematics(&seeded)[tip];
             let moved = pose * point.map(Fwd::<3>::constant);

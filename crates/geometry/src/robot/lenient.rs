@@ -5,13 +5,13 @@ use std::fmt::Write as _;
 
 use roxmltree::Node;
 
-use super::RobotError;
+use super::{Result, RobotError};
 
 /// Error of a description that `xacro` has yet to expand.
 const MACROS: &str = "it has xacro macros: run `xacro FILE > robot.urdf` first and read its output";
 
 /// URDF text of links, collision shapes and joints alone that follows the format, and what was put right.
-pub(super) fn put_right(xml: &str, partial: bool) -> Result<(String, Vec<String>), RobotError> {
+pub(super) fn put_right(xml: &str, partial: bool) -> Result<(String, Vec<String>)> {
     let wrong = |message: String| RobotError::Urdf { message };
     let document = roxmltree::Document::parse(xml).map_err(|e| {
         // The prefix may be declared nowhere.
@@ -122,7 +122,7 @@ impl Writer {
         self.whole("origin", &given);
     }
 
-    fn link(&mut self, node: Node<'_, '_>) -> Result<(), RobotError> {
+    fn link(&mut self, node: Node<'_, '_>) -> Result<()> {
         self.open("link", &[("name", node.attribute("name").unwrap_or_default())]);
         if let Some(inertial) = self.first(node, "inertial") {
             self.inertial(inertial);

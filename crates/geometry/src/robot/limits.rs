@@ -1,6 +1,6 @@
 //! Joint limits: checking and clamping joint vectors.
 
-use super::{Drive, Joint, KinematicTree, RobotError};
+use super::{Drive, Joint, KinematicTree, Result, RobotError};
 
 /// Positions that an entry of the joint vector may take.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub(super) struct Range {
 
 /// Limits of each entry of the joint vector: those of its joint and, brought back through multiplier and offset, of the
 /// joints that mimic it.
-pub(super) fn ranges(joints: &[Joint], variables: &[String]) -> Result<Vec<Range>, RobotError> {
+pub(super) fn ranges(joints: &[Joint], variables: &[String]) -> Result<Vec<Range>> {
     let free = Range { lower: f64::NEG_INFINITY, upper: f64::INFINITY, by: [None; 2] };
     let mut ranges = vec![free; variables.len()];
     for (j, joint) in joints.iter().enumerate() {
@@ -68,7 +68,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError::JointCount`], [`RobotError::Number`] or [`RobotError::OutsideLimits`], naming the joint.
-    pub fn check_joints(&self, joints: &[f64]) -> Result<(), RobotError> {
+    pub fn check_joints(&self, joints: &[f64]) -> Result<()> {
         self.check_finite(joints)?;
         let outside = |(q, r): (&f64, &Range)| *q < r.lower || *q > r.upper;
         match joints.iter().zip(&self.ranges).position(outside) {
@@ -87,13 +87,13 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError::JointCount`] or [`RobotError::Number`].
-    pub fn clamp_joints(&self, joints: &[f64]) -> Result<Vec<f64>, RobotError> {
+    pub fn clamp_joints(&self, joints: &[f64]) -> Result<Vec<f64>> {
         self.check_finite(joints)?;
         Ok(joints.iter().zip(&self.ranges).map(|(q, r)| q.max(r.lower).min(r.upper)).collect())
     }
 
     /// Whether there is one finite position for each name.
-    pub(super) fn check_finite(&self, joints: &[f64]) -> Result<(), RobotError> {
+    pub(super) fn check_finite(&self, joints: &[f64]) -> Result<()> {
         let (given, expected) = (joints.len(), self.variables.len());
         if given != expected {
             return Err(RobotError::JointCount { given, expected });
@@ -113,7 +113,7 @@ impl KinematicTree {
 mod tests {
     use super::*;
 
-    fn robot(mimic_limit: &str, last: &str) -> Result<KinematicTree, RobotError> {
+    fn robot(mimic_limit: &str, last: &str) -> Result<KinematicTree> {
         let xml = format!(
             r#"<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
             <joint name="p" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="2" effort="1" velocity="1"/></joint>

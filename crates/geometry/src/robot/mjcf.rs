@@ -7,8 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::collision::COLUMNS;
 use super::kinematics::t_parent_child;
-use super::urdf::unique;
-use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, limits, tree};
+use super::{Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, limits, tree};
 use crate::io::read_plain;
 use crate::limits::MAX_URDF_BYTES;
 use crate::mesh::TriMesh;
@@ -21,7 +20,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_file_with(path, &ReadOptions::default())
     }
 
@@ -29,10 +28,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_file_with(
-        path: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Self, RobotError> {
+    pub fn from_file_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
         let path = path.as_ref();
         let read_error = |source| RobotError::Read { path: path.into(), source };
         let text = read_plain(path, MAX_URDF_BYTES).map_err(read_error)?;
@@ -49,9 +45,9 @@ impl KinematicTree {
     /// as they are, not as their hulls; planes and terrain have no shape here. Springs and armatures are not kept.
     ///
     /// # Errors
-    /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Cycle`] of joints that follow each other;
-    /// [`RobotError::Duplicate`] where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
-    pub fn from_mjcf(model: &Model) -> Result<Self, RobotError> {
+    /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Structure`] of joints that follow each other, and
+    /// where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
+    pub fn from_mjcf(model: &Model) -> Result<Self> {
         let mut reader = Reader { links: Vec::new(), joints: Vec::new(), bodies: Vec::new() };
         let mut hanging = model.bodies.iter().filter(|body| body.parent.is_none());
         let only = hanging.next().filter(|_| hanging.next().is_none());
@@ -71,8 +67,8 @@ impl KinematicTree {
             }
         }
         let Reader { links, mut joints, .. } = reader;
-        unique("link", links.iter().map(|link| &link.name))?;
-        unique("joint", joints.iter().map(|(joint, _)| &joint.name))?;
+        tree::unique("link", links.iter().map(|link| &link.name))?;
+        tree::unique("joint", joints.iter().map(|(joint, _)| &joint.name))?;
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         let variables = drive(&mut joints, &ties(model, &mut warnings))?;
         let joints: Vec<Joint> = joints.into_iter().map(|(joint, _)| joint).collect();
@@ -100,7 +96,7 @@ struct Reader {
 
 impl Reader {
     /// Adds a body that hangs on another or on the world, with a link for each joint but the last, and one more where the last joint's frame is not the body's.
-    fn add(&mut self, named: &Named<'_>) -> Result<(), RobotError> {
+    fn add(&mut self, named: &Named<'_>) -> Result<()> {
         let Named { body, name } = named;
         let mut parent = body.parent.map_or(0, |parent| self.bodies[parent]);
         // The next joint's frame, where it is at its reference, in the frame of the link that it is mounted on.
@@ -224,11 +220,11 @@ fn ties(model: &Model, warnings: &mut Vec<String>) -> BTreeMap<JointIndex, Tie> 
 /// Gives each joint its place in the joint vector, the joint that it mimics, or the position at which it is held, and returns the names of that vector's entries.
 ///
 /// # Errors
-/// [`RobotError::Cycle`] of joints that follow each other.
+/// [`RobotError::Structure`] of joints that follow each other.
 fn drive(
     joints: &mut [(Joint, Option<JointIndex>)],
     ties: &BTreeMap<JointIndex, Tie>,
-) -> Result<Vec<String>, RobotError> {
+) -> Result<Vec<String>> {
     let free = || joints.iter().filter(|(_, at)| at.is_some_and(|at| !ties.contains_key(&at)));
     let (variables, names): (Vec<_>, Vec<_>) =
         free().map(|(joint, at)| (*at, joint.name.clone())).unzip();
@@ -245,7 +241,8 @@ fn drive(
                 }
             }
             if hops > ties.len() {
-                return Err(RobotError::Cycle { kind: "joint", name: joint.name.clone() });
+                let reason = format!("joint '{}' is part of a cycle", joint.name);
+                return Err(RobotError::Structure { reason });
             }
         };
         let leader = variables.iter().position(|variable| *variable == Some(at));
@@ -407,7 +404,7 @@ mod tests {
             "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='a'/>",
             "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='c'/><joint joint1='c' joint2='b'/>",
         ] {
-            assert!(matches!(read(circle), Err(RobotError::Cycle { .. })));
+            assert!(matches!(read(circle), Err(RobotError::Structure { .. })));
         }
     }
 

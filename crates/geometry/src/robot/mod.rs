@@ -2,7 +2,6 @@
 
 mod articulated;
 mod assembly;
-mod closest;
 mod collision;
 mod dynamics;
 mod error;
@@ -22,7 +21,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 pub use articulated::{ArticulatedRobot, RobotSample};
-pub use closest::RobotClosest;
+use error::Result;
 pub use error::RobotError;
 pub use mjcf::outermost_element;
 pub use posed::PosedRobot;
@@ -166,7 +165,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError::MissingJoint`], [`RobotError::UnknownJoint`] or [`RobotError::Number`].
-    pub fn joint_vector(&self, state: &BTreeMap<String, f64>) -> Result<Vec<f64>, RobotError> {
+    pub fn joint_vector(&self, state: &BTreeMap<String, f64>) -> Result<Vec<f64>> {
         for name in state.keys() {
             if !self.joints.iter().any(|j| j.name == *name) {
                 return Err(RobotError::UnknownJoint {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::{RobotError, RobotShape};
+use super::{Result, RobotError, RobotShape};
 use crate::closest::box_distance;
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
@@ -39,10 +39,7 @@ impl PosedRobot {
     ///
     /// # Errors
     /// [`RobotError::PoseCount`] unless there is one pose a link, [`RobotError::Number`] for one that is not finite.
-    pub fn new(
-        shape: Arc<RobotShape>,
-        t_world_links: Vec<Isometry3<f64>>,
-    ) -> Result<Self, RobotError> {
+    pub fn new(shape: Arc<RobotShape>, t_world_links: Vec<Isometry3<f64>>) -> Result<Self> {
         let (given, expected) = (t_world_links.len(), shape.links().len());
         if given != expected {
             return Err(RobotError::PoseCount { given, expected });
@@ -84,13 +81,6 @@ impl PosedRobot {
     /// Pose of every link, in the order of [`super::KinematicTree::links`].
     pub fn t_world_links(&self) -> &[Isometry3<f64>] {
         &self.t_world_links
-    }
-
-    /// Links that have a shape: index, world-to-link pose, and box in the link frame \[m\].
-    pub(super) fn solids(
-        &self,
-    ) -> impl Iterator<Item = (usize, &Isometry3<f64>, &(Point3<f64>, Point3<f64>))> {
-        self.solid.iter().map(|s| (s.link, &s.t_link_world, &s.bounds))
     }
 
     /// Every collision body in the world frame: each a closed surface, overlapping others where links meet.

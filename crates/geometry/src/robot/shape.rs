@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::{KinematicTree, RobotError};
+use super::{KinematicTree, Result, RobotError};
 use crate::closest::{ClosestPoints, box_distance};
 use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
@@ -119,7 +119,7 @@ impl RobotShape {
     ///
     /// # Errors
     /// [`RobotError::Shape`], naming the link whose bodies cannot be used.
-    pub fn new(robot: &KinematicTree, spacing: f64, margin: f64) -> Result<Self, RobotError> {
+    pub fn new(robot: &KinematicTree, spacing: f64, margin: f64) -> Result<Self> {
         Self::cached(robot, spacing, margin, None)
     }
 
@@ -132,7 +132,7 @@ impl RobotShape {
         spacing: f64,
         margin: f64,
         cache: Option<&GridCache>,
-    ) -> Result<Self, RobotError> {
+    ) -> Result<Self> {
         let links = robot.links();
         // For each link the first one of equal geometry.
         let first: Vec<usize> = (0..links.len())

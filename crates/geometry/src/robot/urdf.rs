@@ -1,6 +1,6 @@
 //! From URDF text to a [`KinematicTree`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use urdf_rs::JointType;
 
 use super::origin::{finite, isometry};
 use super::{
-    Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, dynamics, lenient, limits,
-    tree,
+    Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, collision, dynamics, lenient,
+    limits, tree,
 };
 use crate::io::folder::Folder;
 use crate::io::read_plain;
@@ -22,7 +22,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
+    pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_urdf_file_with(path, &ReadOptions::default())
     }
 
@@ -30,10 +30,7 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming this file.
-    pub fn from_urdf_file_with(
-        path: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Self, RobotError> {
+    pub fn from_urdf_file_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
         let path = path.as_ref();
         let read_error = |source| RobotError::Read { path: path.into(), source };
         let bytes = read_plain(path, MAX_URDF_BYTES).map_err(read_error)?;
@@ -51,15 +48,11 @@ impl KinematicTree {
     ///
     /// # Errors
     /// [`RobotError`], naming the link, joint or mesh file.
-    pub fn from_urdf_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, RobotError> {
+    pub fn from_urdf_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self> {
         Self::from_urdf(xml, asset_dir.map(Folder::own).as_ref(), &ReadOptions::default())
     }
 
-    fn from_urdf(
-        xml: &str,
-        folder: Option<&Folder>,
-        options: &ReadOptions,
-    ) -> Result<Self, RobotError> {
+    fn from_urdf(xml: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result<Self> {
         check_size(xml)?;
         let (xml, mut warnings) = lenient::put_right(xml.trim_start(), options.partial)?;
         let urdf = urdf_rs::read_from_string(&xml)
@@ -67,8 +60,8 @@ impl KinematicTree {
         if urdf.links.is_empty() {
             return Err(RobotError::Urdf { message: "the robot has no links".into() });
         }
-        unique("link", urdf.links.iter().map(|l| &l.name))?;
-        unique("joint", urdf.joints.iter().map(|j| &j.name))?;
+        tree::unique("link", urdf.links.iter().map(|l| &l.name))?;
+        tree::unique("joint", urdf.joints.iter().map(|j| &j.name))?;
         let links = urdf
             .links
             .iter()
@@ -79,7 +72,7 @@ impl KinematicTree {
                 dynamics::judge(&mut link, options, &mut warnings);
                 Ok(link)
             })
-            .collect::<Result<Vec<_>, RobotError>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let variables: Vec<String> = urdf
             .joints
             .iter()
@@ -89,9 +82,11 @@ impl KinematicTree {
         let by_name: BTreeMap<&str, &urdf_rs::Joint> =
             urdf.joints.iter().map(|j| (j.name.as_str(), j)).collect();
         let link_index = |joint: &urdf_rs::Joint, link: &str| {
-            links.iter().position(|l| l.name == link).ok_or_else(|| RobotError::UnknownLink {
-                joint: joint.name.clone(),
-                link: link.to_owned(),
+            links.iter().position(|l| l.name == link).ok_or_else(|| {
+                let joint = &joint.name;
+                RobotError::structure(format!(
+                    "joint '{joint}' refers to link '{link}', which does not exist"
+                ))
             })
         };
         let joints = urdf
@@ -145,7 +140,7 @@ impl KinematicTree {
                     effort_limit: dynamics::limit(j, "limit effort", j.limit.effort)?,
                 })
             })
-            .collect::<Result<Vec<_>, RobotError>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let (order, root) = tree::order(&links, &joints)?;
         let ranges = limits::ranges(&joints, &variables)?;
         let floating = Vec::new();
@@ -164,7 +159,7 @@ impl KinematicTree {
 }
 
 /// Refuses text that the XML reader would take too long for, or descend into until the stack ends.
-fn check_size(xml: &str) -> Result<(), RobotError> {
+fn check_size(xml: &str) -> Result<()> {
     let too_large = |what, count, limit| Err(RobotError::TooLarge { what, count, limit });
     if xml.len() > MAX_URDF_BYTES {
         return too_large("bytes", xml.len(), MAX_URDF_BYTES);
@@ -204,20 +199,7 @@ fn tag_end(text: &str) -> Option<usize> {
     })
 }
 
-pub(super) fn unique<'a>(
-    kind: &'static str,
-    names: impl Iterator<Item = &'a String>,
-) -> Result<(), RobotError> {
-    let mut seen = BTreeSet::new();
-    for name in names {
-        if !seen.insert(name) {
-            return Err(RobotError::Duplicate { kind, name: name.clone() });
-        }
-    }
-    Ok(())
-}
-
-fn motion(joint: &urdf_rs::Joint) -> Result<Motion, RobotError> {
+fn motion(joint: &urdf_rs::Joint) -> Result<Motion> {
     match joint.joint_type {
         JointType::Fixed => Ok(Motion::Fixed),
         JointType::Revolute | JointType::Continuous => Ok(Motion::Revolute),
@@ -236,7 +218,7 @@ fn drive(
     joint: &urdf_rs::Joint,
     by_name: &BTreeMap<&str, &urdf_rs::Joint>,
     variables: &[String],
-) -> Result<Drive, RobotError> {
+) -> Result<Drive> {
     if joint.joint_type == JointType::Fixed {
         return Ok(Drive::None);
     }
@@ -262,14 +244,14 @@ fn drive(
             by: format!("the mimic tag of joint '{}'", current.name),
         })?;
     }
-    Err(RobotError::Cycle { kind: "mimic joint", name: joint.name.clone() })
+    Err(RobotError::structure(format!("mimic joint '{}' is part of a cycle", joint.name)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn arm(joints: &str) -> Result<KinematicTree, RobotError> {
+    fn arm(joints: &str) -> Result<KinematicTree> {
         let links: String = "abc".chars().map(|c| format!("<link name=\"{c}\"/>")).collect();
         KinematicTree::from_urdf_str(&format!("<robot name=\"arm\">{links}{joints}</robot>"), None)
     }
@@ -356,7 +338,7 @@ mod tests {
         let links: String = (0..300).map(link).collect();
         let error =
             KinematicTree::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);
-        assert!(matches!(error, Err(RobotError::Roots { .. })));
+        assert!(matches!(error, Err(RobotError::Structure { .. })));
     }
 
     #[test]

@@ -39,23 +39,6 @@ impl SdfGrid {
         });
         Self::from_samples(lattice, &values, bounds)
     }
-
-    /// Samples of any signed distance \[m\] of a shape within `bounds` \[m\].
-    #[cfg(test)]
-    pub(crate) fn from_fn(
-        bounds: (Point3<f64>, Point3<f64>),
-        spacing: f64,
-        margin: f64,
-        distance: impl Fn(&Point3<f64>) -> f64 + Sync,
-    ) -> Result<Self, SdfError> {
-        let lattice = Lattice::around(bounds, spacing, margin)?;
-        let [_, ny, nz] = lattice.dims();
-        let mut values = vec![0.0; lattice.dims().iter().product()];
-        values.par_iter_mut().enumerate().for_each(|(n, value)| {
-            *value = distance(&lattice.position([n / (ny * nz), n / nz % ny, n % nz]));
-        });
-        Ok(Self::from_samples(lattice, &values, bounds))
-    }
 }
 
 /// A mesh of a union, and what was found at the last samples.

@@ -1,6 +1,6 @@
 //! Distance grids kept in a folder between runs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::Point3;
 
@@ -32,11 +32,6 @@ impl GridCache {
     /// With a function that is told of each grid that is not here and has to be built, which may take seconds.
     pub fn telling(self, tell: fn(&str)) -> Self {
         Self { tell: Some(tell), ..self }
-    }
-
-    /// Where its grids are.
-    pub fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// The grid about all of `parts` within `bounds`, of that spacing and margin \[m\]: as it was left here, or as `build` makes it.
@@ -82,6 +77,7 @@ fn key(parts: &[TriMesh], lengths: [f64; 2]) -> u64 {
 mod tests {
     use std::cell::Cell;
     use std::fs;
+    use std::path::Path;
 
     use super::*;
     use crate::closest::ClosestPoints;
@@ -111,7 +107,7 @@ mod tests {
         }
 
         fn files(&self) -> Vec<PathBuf> {
-            let files = fs::read_dir(self.cache.folder()).unwrap();
+            let files = fs::read_dir(&self.cache.folder).unwrap();
             files.map(|file| file.unwrap().path()).collect()
         }
     }

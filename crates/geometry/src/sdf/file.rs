@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::lattice::FARTHEST;
 use super::{Lattice, MAX_SAMPLES, SdfGrid};
 use crate::io::read_plain;
-use crate::io::{MeshError, write_atomic};
+use crate::io::{MeshError, Result, write_atomic};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
 const VERSION: u32 = 4;
@@ -25,7 +25,7 @@ impl SdfGrid {
     ///
     /// # Errors
     /// [`MeshError::Write`].
-    pub fn save(&self, path: &Path) -> Result<(), MeshError> {
+    pub fn save(&self, path: &Path) -> Result<()> {
         write_atomic(path, &self.to_bytes())
             .map_err(|source| MeshError::Write { path: path.into(), source })
     }
@@ -34,7 +34,7 @@ impl SdfGrid {
     ///
     /// # Errors
     /// [`MeshError::Read`], or [`MeshError::Malformed`] with the field that is wrong.
-    pub fn load(path: &Path) -> Result<Self, MeshError> {
+    pub fn load(path: &Path) -> Result<Self> {
         let bytes = read_plain(path, MAX_BYTES)
             .map_err(|source| MeshError::Read { path: path.into(), source })?;
         Self::from_bytes(&bytes)

@@ -61,11 +61,6 @@ impl SdfGrid {
         self.bounds
     }
 
-    /// Smallest and largest corner of the grid \[m\].
-    pub fn extent(&self) -> (Point3<f64>, Point3<f64>) {
-        (self.lattice.position([0; 3]), self.lattice.position(self.dims().map(|n| n - 1)))
-    }
-
     /// Distance from `point` to the box around the shape: never above the exact distance outside \[m\].
     #[inline]
     pub fn lower_bound(&self, point: &Point3<f64>) -> f64 {

@@ -53,17 +53,6 @@ impl HeightSpline {
         Some(Self { origin, spacing, dims, coefficients })
     }
 
-    /// The height alone, that of [`Self::at`] \[m\].
-    #[inline]
-    pub fn height(&self, u: f64, v: f64) -> f64 {
-        let [bu, bv] = self.bases([u, v]);
-        let line = |i: usize| {
-            let row = self.row(&bu, &bv, i);
-            (0..4).map(|k| bv.weights[0][k] * row[k]).sum::<f64>()
-        };
-        (0..4).map(|i| bu.weights[0][i] * line(i)).sum()
-    }
-
     /// The height at (u, v) \[m\] with its derivatives.
     #[inline]
     pub fn at(&self, u: f64, v: f64) -> HeightSample {
@@ -132,12 +121,11 @@ mod tests {
         for (i, height) in heights.iter().enumerate() {
             let place = [i / 7, i % 7];
             let [u, v] = [0, 1].map(|k| origin[k] + place[k] as f64 * spacing[k]);
-            assert!((spline.height(u, v) - height).abs() < 1e-13);
+            assert!((spline.at(u, v).height - height).abs() < 1e-13);
         }
         let step = 1e-6;
         for [u, v] in [[-0.17, 0.9], [0.05, 1.41], [-0.5, 0.3], [0.013, 3.0]] {
             let at = spline.at(u, v);
-            assert_eq!(at.height, spline.height(u, v));
             let by = |du: f64, dv: f64| {
                 let [a, b] = [1.0, -1.0].map(|sign| spline.at(u + sign * du, v + sign * dv));
                 let slope = |x: f64, y: f64| (x - y) / (2.0 * step);

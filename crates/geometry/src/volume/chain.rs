@@ -1,6 +1,6 @@
 //! A closed surface prepared for meeting another.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use crate::box_tree::{Bounds, BoxTree};
 use crate::predicates::Plane;
@@ -46,13 +46,6 @@ impl Chain {
     /// The vertices that a side of a face runs from and to.
     pub(super) fn side(&self, side: u32) -> [u32; 2] {
         SIDES[side as usize % 3].map(|corner| self.faces[side as usize / 3][corner])
-    }
-
-    pub(super) fn moved(&self, motion: &Isometry3<f64>) -> Self {
-        let mut chain = self.clone();
-        chain.positions.iter_mut().for_each(|p| *p = motion * *p);
-        chain.tree.refit(|face| bounds(&chain.positions, &chain.faces[face]));
-        chain
     }
 
     /// How often the surface winds about `point` of the other body; this is A where `is_a`.

@@ -133,16 +133,6 @@ fn tidied(positions: Vec<Point3<f64>>, faces: &[[u32; 3]]) -> Chain {
 
 /// The surface of `faces` with the positions they use.
 pub(super) fn compact(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Chain {
-    let mut new = vec![u32::MAX; positions.len()];
-    let mut used = Vec::new();
-    let mut renumbered = |v: u32| {
-        let id = &mut new[v as usize];
-        if *id == u32::MAX {
-            *id = used.len() as u32;
-            used.push(positions[v as usize]);
-        }
-        *id
-    };
-    let faces = faces.iter().map(|f| f.map(&mut renumbered)).collect();
-    Chain::new(used, faces)
+    let mesh = TriMesh::compacted(positions, faces.iter().copied());
+    Chain::new(mesh.vertices, mesh.faces)
 }

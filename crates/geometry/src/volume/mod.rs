@@ -1,4 +1,4 @@
-//! Exact volume of the intersection of solids, and its derivative by their poses.
+//! Exact volume of the intersection of solids.
 //!
 //! No mesh of the intersection is made. Where edges of one surface pierce faces of the other is decided exactly
 //! (`crate::predicates`); from these points, the volume follows by the divergence theorem (`overlap`). The same points cut
@@ -7,15 +7,13 @@
 //! fails on a closed surface, and the volume is right to rounding.
 //!
 //! ```
-//! use nalgebra::{Isometry3, Point3, Vector3};
+//! use nalgebra::{Isometry3, Vector3};
 //! use prehend_geometry::{SolidUnion, shapes};
 //!
-//! let cube = SolidUnion::new(&[shapes::cuboid(Vector3::repeat(0.1))])?;
-//! let t = Isometry3::translation(0.09, 0.0, 0.0);
-//! let shared = cube.overlap(&cube, &t, &Point3::from(t.translation.vector))?;
-//! assert!((shared.volume - 1e-4).abs() < 1e-15);
-//! // Moving the second cube along x takes a slice of 10 cm × 10 cm off, per meter.
-//! assert!((shared.gradient.x + 0.01).abs() < 1e-15);
+//! let cube = shapes::cuboid(Vector3::repeat(0.1));
+//! let beside = cube.transformed(&Isometry3::translation(0.09, 0.0, 0.0));
+//! let shared = SolidUnion::new(&[cube])?.intersection_volume(&beside)?;
+//! assert!((shared - 1e-4).abs() < 1e-15);
 //! # Ok::<(), prehend_geometry::VolumeError>(())
 //! ```
 
@@ -29,12 +27,9 @@ mod reference;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use nalgebra::{Isometry3, Point3};
-
 use self::chain::{Chain, volume};
 use self::join::{beside, compact, union};
-pub use self::overlap::Overlap;
-use crate::mass::{MassError, MassProperties, mass_of_closed};
+use self::overlap::overlap;
 use crate::mesh::TriMesh;
 use crate::topology::{components, edges, is_collapsed};
 
@@ -62,22 +57,11 @@ pub enum VolumeError {
     /// A coordinate is not finite, or an index out of range.
     #[error("{what} has {problem}")]
     Invalid {
-        /// `part N of the body`, `the other mesh` or `the pose`.
+        /// `part N of the body` or `the other mesh`.
         what: String,
         /// Defect, such as `a vertex index out of range`.
         problem: &'static str,
     },
-}
-
-/// Volume of the part of `b` that lies inside any of `parts` \[m³\], all in one frame.
-///
-/// Parts may overlap each other, as the links of a hand do. Prepare a [`SolidUnion`] to intersect several meshes
-/// with the same parts.
-///
-/// # Errors
-/// As [`SolidUnion::new`] and [`SolidUnion::intersection_volume`].
-pub fn intersection_volume(parts: &[TriMesh], b: &TriMesh) -> Result<f64, VolumeError> {
-    SolidUnion::new(parts)?.intersection_volume(b)
 }
 
 /// The union of closed meshes, computed once.
@@ -103,62 +87,24 @@ impl SolidUnion {
         Ok(Self { chain: join(shells) })
     }
 
-    /// Volume of the union \[m³\].
-    pub fn volume(&self) -> f64 {
-        self.chain.as_ref().map_or(0.0, |c| volume(&c.positions, &c.faces))
-    }
-
     /// The surface of the union \[m\].
     ///
     /// It is closed, but where parts touch, walls of no thickness may remain, along which more than two faces meet.
     pub fn mesh(&self) -> TriMesh {
-        self.chain
-            .as_ref()
-            .map(|c| TriMesh::new(c.positions.clone(), c.faces.clone()))
-            .unwrap_or_default()
-    }
-
-    /// Mass properties of the union at uniform `density` \[kg/m³\].
-    ///
-    /// # Errors
-    /// [`MassError`] where the union is empty or the density not positive.
-    pub fn mass_properties(&self, density: f64) -> Result<MassProperties, MassError> {
-        mass_of_closed(&self.mesh(), density)
+        let mesh = |c: &Chain| TriMesh::new(c.positions.clone(), c.faces.clone());
+        self.chain.as_ref().map(mesh).unwrap_or_default()
     }
 
     /// Volume of the part of `b` inside the union \[m³\], `b` in the frame of the parts; 0 where they are apart or only touch.
     ///
-    /// Shells of `b` that overlap count once. Use [`SolidUnion::overlap`] for one body in many poses.
+    /// Shells of `b` that overlap count once.
     ///
     /// # Errors
     /// [`VolumeError`] where `b` is open, flat, inverted or not finite.
     pub fn intersection_volume(&self, b: &TriMesh) -> Result<f64, VolumeError> {
         let b = join(shells_of(b, "the other mesh")?);
         let (Some(a), Some(b)) = (&self.chain, &b) else { return Ok(0.0) };
-        Ok(overlap::overlap(a, b, &Point3::origin()).volume)
-    }
-
-    /// The volume that this body and `other` in the pose `t_self_other` share, and its derivative.
-    ///
-    /// The derivative is by δ at zero in `t_self_other ← Trans(center) · exp(δ) · Trans(−center) · t_self_other`,
-    /// `center` \[m\] in the frame of this body (`docs/CONVENTIONS.md`). One thread computes all; the result
-    /// is the same to the last bit for the same bodies and pose.
-    ///
-    /// # Errors
-    /// [`VolumeError::Invalid`] where the pose is not finite.
-    pub fn overlap(
-        &self,
-        other: &SolidUnion,
-        t_self_other: &Isometry3<f64>,
-        center: &Point3<f64>,
-    ) -> Result<Overlap, VolumeError> {
-        let numbers = t_self_other.to_homogeneous();
-        if !numbers.iter().chain(center.iter()).all(|v| v.is_finite()) {
-            let problem = "a number that is not finite";
-            return Err(VolumeError::Invalid { what: "the pose".into(), problem });
-        }
-        let (Some(a), Some(b)) = (&self.chain, &other.chain) else { return Ok(Overlap::default()) };
-        Ok(overlap::overlap(a, &b.moved(t_self_other), center))
+        Ok(overlap(a, b))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use prehend_geometry::hand::{JOINT_NAMES, Taxel, allegro_xela_urdf, load_taxels, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, JOINT_NAMES, Taxel, load_taxels, taxels};
 use urdf_rs::{Geometry, Robot as Urdf};
 
 fn hands() -> PathBuf {
@@ -11,7 +11,7 @@ fn hands() -> PathBuf {
 }
 
 fn robots() -> (Urdf, Urdf) {
-    let ours = urdf_rs::read_from_string(&allegro_xela_urdf()).expect("own URDF");
+    let ours = urdf_rs::read_from_string(ALLEGRO_XELA_URDF).expect("own URDF");
     (ours, urdf_rs::read_file(hands().join("allegro_xela_right.urdf")).expect("reference URDF"))
 }
 

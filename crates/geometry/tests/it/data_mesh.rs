@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
-use prehend_geometry::{TriMesh, sample, volume};
+use prehend_geometry::{SolidUnion, TriMesh, sample};
 use serde_json::Value;
 
 fn data(relative: &str) -> PathBuf {
@@ -41,7 +41,10 @@ fn textured_models_load_and_become_watertight() {
             );
             // Two copies of a solid share all of it; this also says that the booleans accept the mesh.
             let own = prehend_geometry::mass::mass_properties(&clean, 1.0).unwrap().volume;
-            let shared = volume::intersection_volume(std::slice::from_ref(&clean), &clean).unwrap();
+            let shared = SolidUnion::new(std::slice::from_ref(&clean))
+                .unwrap()
+                .intersection_volume(&clean)
+                .unwrap();
             assert!((shared / own - 1.0).abs() < 1e-9, "{}", path.display());
             assert_eq!(sample::surface_samples(&clean, 1000, 1).len(), 1000);
         }

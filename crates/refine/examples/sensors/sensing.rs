@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_geometry::hand::{Taxel, allegro_xela_urdf, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, Taxel, taxels};
 use prehend_geometry::sample::surface_samples;
 use prehend_render::{Camera, DepthImage};
 use serde_json::{Map, Value, json};
@@ -115,7 +115,7 @@ pub(crate) fn write_frame(
     let seen = world.seen(&CAMERA, &world.t_world_cam, &mut errors.0)?;
 
     world.object.save_ply(&folder.join("object.ply"))?;
-    std::fs::write(folder.join("hand.urdf"), allegro_xela_urdf())?;
+    std::fs::write(folder.join("hand.urdf"), ALLEGRO_XELA_URDF)?;
     let mut frame = Map::new();
     let mut set = |name: &str, value: Value| _ = frame.insert(name.to_owned(), value);
     set("K", json!(told.k()));

@@ -1,7 +1,7 @@
 //! An object that is held or lies on a table, and what cameras see of it.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, JOINT_NAMES, default_grasp, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::{KinematicTree, PosedRobot};
 use prehend_geometry::shapes::{RoundedBox, cuboid, rounded_box};
@@ -37,7 +37,7 @@ impl World {
     /// The built-in grasp, in as many as two hands, from another side for each seed.
     pub(crate) fn held(seed: u64, hands: usize) -> anyhow::Result<Self> {
         let grasp = default_grasp();
-        let tree = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None)?;
+        let tree = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None)?;
         let joints = JOINT_NAMES.iter().map(|name| (*name).to_owned()).zip(grasp.joints);
         let joints = tree.joint_vector(&joints.collect())?;
         // About the bottle's long axis: from there it looks the same.

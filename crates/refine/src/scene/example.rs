@@ -6,7 +6,7 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
-use prehend_geometry::hand::{JOINT_NAMES, Taxel, allegro_xela_urdf, default_grasp, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, JOINT_NAMES, Taxel, default_grasp, taxels};
 use prehend_geometry::robot::KinematicTree;
 use prehend_render::{Camera, Light, Mask, look_at, render_scene};
 
@@ -79,8 +79,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     let grasp = default_grasp();
     let mesh = grasp.object.mesh();
     let object = Object::with_mass(grasp.object.name(), mesh, Some(grasp.object.mass()), 0)?;
-    let urdf = allegro_xela_urdf();
-    let tree = KinematicTree::from_urdf_str(&urdf, None)?;
+    let tree = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None)?;
     let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
     let joints = tree.joint_vector(&joints)?;
     let hand = Hand::new(tree, taxels())?;
@@ -98,6 +97,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
     let initial = perturb_about(&truth, &(truth * object.center).coords, &error);
     let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
+    let urdf = ALLEGRO_XELA_URDF.into();
     Ok(Scene { frame: observation, object, obj_id, hand, urdf, truth, initial })
 }
 

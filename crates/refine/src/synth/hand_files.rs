@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, Taxel, load_taxels, taxels};
 use prehend_geometry::limits::MAX_FILE_BYTES;
 use prehend_geometry::read_plain;
 use prehend_geometry::robot::{KinematicTree, outermost_element};
@@ -33,9 +33,9 @@ impl HandFiles {
     /// # Errors
     /// If it cannot be prepared.
     pub fn built_in() -> Result<Self, AssetError> {
-        let urdf = allegro_xela_urdf();
-        let robot = Arc::new(Hand::new(KinematicTree::from_urdf_str(&urdf, None)?, taxels())?);
-        Ok(Self { robot, urdf, meshes: Vec::new() })
+        let tree = KinematicTree::from_urdf_str(ALLEGRO_XELA_URDF, None)?;
+        let robot = Arc::new(Hand::new(tree, taxels())?);
+        Ok(Self { robot, urdf: ALLEGRO_XELA_URDF.into(), meshes: Vec::new() })
     }
 
     /// The hand of a URDF file, with the skin of a taxel table.

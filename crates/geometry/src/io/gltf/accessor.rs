@@ -8,8 +8,8 @@ use ::gltf::accessor::DataType;
 use ::gltf::accessor::sparse::IndexType;
 use ::gltf::{Accessor, buffer};
 
-use crate::io::MeshError;
 use crate::io::limits::MAX_ELEMENTS;
+use crate::io::{MeshError, Result};
 
 /// The content of a file's buffers.
 pub(super) struct Buffers<'a> {
@@ -25,10 +25,7 @@ impl Buffers<'_> {
     }
 
     /// The first `N` components of each element.
-    pub(super) fn floats<const N: usize>(
-        &self,
-        accessor: &Accessor,
-    ) -> Result<Vec<[f32; N]>, MeshError> {
+    pub(super) fn floats<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>> {
         self.floats_as(accessor, N, |v| {
             let mut out = [0.0; N];
             out.iter_mut().zip(v).for_each(|(o, c)| *o = *c as f32);
@@ -42,7 +39,7 @@ impl Buffers<'_> {
         accessor: &Accessor,
         width: usize,
         f: impl Fn(&[f64]) -> T,
-    ) -> Result<Vec<T>, MeshError> {
+    ) -> Result<Vec<T>> {
         let bad = |reason: &str| {
             MeshError::malformed(self.path, format!("accessor {}", accessor.index()), reason)
         };

@@ -21,7 +21,7 @@ use super::folder::percent_decoded;
 use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
-use super::{MeshError, dae, texture};
+use super::{MeshError, Result, dae, texture};
 use crate::mesh::{Texture, TriMesh};
 
 /// Some writers leave the padding of data URIs out.
@@ -30,7 +30,7 @@ const DATA_URI: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
     let mut gltf = document(bytes, path)?;
     // The crate unwraps what the standard requires of an image.
@@ -88,7 +88,7 @@ const EXTENSIONS: [&str; 6] = [
 const COMPRESSION: [&str; 2] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression"];
 
 /// The document, validated.
-fn document(bytes: &[u8], path: &Path) -> Result<Gltf, MeshError> {
+fn document(bytes: &[u8], path: &Path) -> Result<Gltf> {
     let malformed = |reason: String| MeshError::malformed(path, "document", reason);
     let Gltf { document, blob } =
         Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
@@ -143,11 +143,7 @@ fn fetch(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
     texture::beside(path, &percent_decoded(uri))
 }
 
-fn load_buffer(
-    buffer: &buffer::Buffer,
-    blob: Option<&[u8]>,
-    path: &Path,
-) -> Result<Vec<u8>, MeshError> {
+fn load_buffer(buffer: &buffer::Buffer, blob: Option<&[u8]>, path: &Path) -> Result<Vec<u8>> {
     let bad =
         |reason: String| MeshError::malformed(path, format!("buffer {}", buffer.index()), reason);
     let bytes = match buffer.source() {
@@ -174,11 +170,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Reads what hangs on `node` itself; returns its frame.
-    fn node(
-        &mut self,
-        node: &Node,
-        t_scene_parent: &Matrix4<f64>,
-    ) -> Result<Matrix4<f64>, MeshError> {
+    fn node(&mut self, node: &Node, t_scene_parent: &Matrix4<f64>) -> Result<Matrix4<f64>> {
         // Nodes form a tree; a cycle would never end.
         if !self.visited.insert(node.index()) {
             return Err(MeshError::malformed(
@@ -195,11 +187,7 @@ impl Reader<'_> {
         Ok(t_scene_node)
     }
 
-    fn primitive(
-        &mut self,
-        primitive: &Primitive,
-        t_scene_node: &Matrix4<f64>,
-    ) -> Result<(), MeshError> {
+    fn primitive(&mut self, primitive: &Primitive, t_scene_node: &Matrix4<f64>) -> Result<()> {
         let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
         let positions = self.buffers.floats::<3>(&positions)?;
         let indices = match primitive.indices() {
@@ -283,12 +271,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn one_each<T>(
-        &self,
-        values: Vec<T>,
-        vertices: usize,
-        name: &str,
-    ) -> Result<Option<Vec<T>>, MeshError> {
+    fn one_each<T>(&self, values: Vec<T>, vertices: usize, name: &str) -> Result<Option<Vec<T>>> {
         if values.len() != vertices {
             let reason = format!("{} values for {vertices} vertices", values.len());
             return Err(MeshError::malformed(

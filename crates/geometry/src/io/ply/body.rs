@@ -4,8 +4,8 @@ use std::path::Path;
 use std::str::SplitAsciiWhitespace;
 
 use super::header::{Element, Encoding, Header, Number, Property};
-use crate::io::MeshError;
 use crate::io::limits::MAX_ELEMENTS;
+use crate::io::{MeshError, Result};
 
 /// Values that are still to be read.
 pub(super) struct Body<'a> {
@@ -27,7 +27,7 @@ impl<'a> Body<'a> {
         &mut self,
         element: &Element,
         mut use_row: impl FnMut(usize, &[Vec<f64>]) -> Result<(), String>,
-    ) -> Result<(), MeshError> {
+    ) -> Result<()> {
         // An element without properties occupies no bytes, whatever its count says.
         if element.properties.is_empty() {
             return Ok(());

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::io::MeshError;
 use crate::io::limits::MAX_PLY_HEADER;
+use crate::io::{MeshError, Result};
 
 /// Most kinds of elements, real files have four at most.
 const MAX_KINDS: usize = 256;
@@ -101,7 +101,7 @@ pub(super) struct Header {
     pub(super) length: usize,
 }
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let bad = |reason: String| MeshError::malformed(path, "header", reason);
     let (mut encoding, mut elements, mut textures) = (None, Vec::<Element>::new(), Vec::new());
     let mut at = 0;

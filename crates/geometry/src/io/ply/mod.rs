@@ -17,7 +17,7 @@ use self::header::Element;
 use super::images::Images;
 use super::limits::MAX_ELEMENTS;
 use super::polygon::{Polygons, triangles};
-use super::{MeshError, texture};
+use super::{MeshError, Result, texture};
 use crate::mesh::TriMesh;
 
 /// Which properties of the vertex element hold what.
@@ -29,7 +29,7 @@ struct VertexLayout {
 }
 
 impl VertexLayout {
-    fn of(element: &Element, path: &Path) -> Result<Self, MeshError> {
+    fn of(element: &Element, path: &Path) -> Result<Self> {
         let find = |name: &str| {
             element.properties.iter().position(|p| p.count.is_none() && p.name == name)
         };
@@ -50,7 +50,7 @@ impl VertexLayout {
     }
 }
 
-pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let header = header::parse(bytes, path)?;
     let mut body = Body::new(bytes, &header, path);
     let mut mesh = TriMesh::default();
@@ -76,7 +76,7 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErr
     Ok(mesh)
 }
 
-fn read_vertices(body: &mut Body, element: &Element, mesh: &mut TriMesh) -> Result<(), MeshError> {
+fn read_vertices(body: &mut Body, element: &Element, mesh: &mut TriMesh) -> Result<()> {
     let layout = VertexLayout::of(element, body.path)?;
     mesh.normals = layout.normal.map(|_| Vec::new());
     mesh.colors = layout.color.map(|_| Vec::new());
@@ -105,7 +105,7 @@ struct Faces {
 }
 
 impl Faces {
-    fn read(body: &mut Body, element: &Element) -> Result<Self, MeshError> {
+    fn read(body: &mut Body, element: &Element) -> Result<Self> {
         let list = |names: &[&str]| {
             element
                 .properties
@@ -204,7 +204,7 @@ mod tests {
         property float texture_u\nproperty float texture_v\nelement extra 2\nproperty list uchar short junk\n\
         property int8 k\nelement face 1\nproperty list uint8 int32 vertex_indices\nproperty int flags\nend_header\n";
 
-    fn load(bytes: &[u8]) -> Result<TriMesh, MeshError> {
+    fn load(bytes: &[u8]) -> Result<TriMesh> {
         TriMesh::from_bytes(bytes, Path::new("m.ply"))
     }
 

@@ -10,7 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::atomic::AtomicFile;
-use super::{MeshError, extension};
+use super::{MeshError, Result, extension};
 use crate::mesh::TriMesh;
 
 impl TriMesh {
@@ -28,7 +28,7 @@ impl TriMesh {
     ///
     /// # Errors
     /// [`MeshError::UnknownFormat`], or [`MeshError::Write`], and then nothing is left half-written.
-    pub fn save(&self, path: &Path) -> Result<(), MeshError> {
+    pub fn save(&self, path: &Path) -> Result<()> {
         match extension(path).as_str() {
             "ply" => self.save_ply(path),
             "obj" => self.save_obj(path),
@@ -38,7 +38,7 @@ impl TriMesh {
     }
 
     /// Refuses what no format can hold: attributes of another number than the vertices, faces that refer to none.
-    fn check_shape(&self, path: &Path) -> Result<(), MeshError> {
+    fn check_shape(&self, path: &Path) -> Result<()> {
         let n = self.vertices.len();
         let attributes = [
             self.normals.as_ref().map(Vec::len),
@@ -55,7 +55,7 @@ impl TriMesh {
     }
 
     /// The name and content of the texture file that goes with a mesh at `path`; none without UVs.
-    fn texture_beside(&self, path: &Path) -> Result<Option<(String, Vec<u8>)>, MeshError> {
+    fn texture_beside(&self, path: &Path) -> Result<Option<(String, Vec<u8>)>> {
         let (Some(texture), Some(_)) = (&self.texture, &self.uvs) else { return Ok(None) };
         let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let png = texture
@@ -65,12 +65,7 @@ impl TriMesh {
     }
 
     /// Writes all files under temporary names before any takes its own, the mesh last.
-    fn write_files(
-        &self,
-        path: &Path,
-        beside: Vec<(PathBuf, Vec<u8>)>,
-        mesh: &[u8],
-    ) -> Result<(), MeshError> {
+    fn write_files(&self, path: &Path, beside: Vec<(PathBuf, Vec<u8>)>, mesh: &[u8]) -> Result<()> {
         let all = || -> io::Result<()> {
             let mut ready = Vec::new();
             for (file, content) in &beside {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::io::MeshError;
+use crate::io::Result;
 use crate::mesh::TriMesh;
 
 impl TriMesh {
@@ -12,7 +12,7 @@ impl TriMesh {
     ///
     /// # Errors
     /// As [`TriMesh::save_ply`].
-    pub fn save_obj(&self, path: &Path) -> Result<(), MeshError> {
+    pub fn save_obj(&self, path: &Path) -> Result<()> {
         self.check_shape(path)?;
         let texture = self.texture_beside(path)?;
         let mut out = String::new();

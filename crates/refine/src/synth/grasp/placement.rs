@@ -111,10 +111,18 @@ impl Placement {
         Err(GraspError::NoGrasp("the fingers keep the object from the palm".into()))
     }
 
+    /// Distance of the probes from the surfaces of the hand \[m\], infinite where they are far.
     fn distance(&self, hand: &PosedRobot, t_hand_object: &Isometry3<f64>) -> f64 {
-        self.probes.iter().fold(f64::INFINITY, |nearest, probe| {
-            let found = hand.closest(&(t_hand_object * probe), nearest.min(2.0 * FAR));
-            found.map_or(nearest, |closest| nearest.min(closest.closest.distance))
-        })
+        let mut nearest = f64::INFINITY;
+        for probe in self.probes.iter().map(|probe| t_hand_object * probe) {
+            for (link, t_hand_link) in hand.shape().links().iter().zip(hand.t_world_links()) {
+                let local = t_hand_link.inverse_transform_point(&probe);
+                for body in link.closest() {
+                    let found = body.closest(&local, nearest.min(2.0 * FAR));
+                    nearest = found.map_or(nearest, |closest| nearest.min(closest.distance));
+                }
+            }
+        }
+        nearest
     }
 }

@@ -40,7 +40,7 @@ pub(super) fn taxel_forces(
 
 #[cfg(test)]
 mod tests {
-    use prehend_geometry::hand::{allegro_xela_urdf, taxels};
+    use prehend_geometry::hand::{ALLEGRO_XELA_URDF, taxels};
     use prehend_geometry::robot::KinematicTree as Tree;
 
     use super::*;
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn contacts_on_pads_are_felt_whole_and_others_not_at_all() {
-        let tree = Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let tree = Tree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap();
         let robot = Hand::new(tree, taxels()).unwrap();
         let links: Vec<usize> = robot.taxels.iter().map(|t| robot.link_of(t).unwrap()).collect();
         let forces =

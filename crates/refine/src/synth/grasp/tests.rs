@@ -1,7 +1,7 @@
 use std::sync::LazyLock;
 
 use nalgebra::Vector3;
-use prehend_geometry::hand::{allegro_xela_urdf, taxels};
+use prehend_geometry::hand::{ALLEGRO_XELA_URDF, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 
@@ -11,7 +11,7 @@ use super::*;
 use crate::scene::{Hand, Object};
 
 static HAND: LazyLock<Hand> = LazyLock::new(|| {
-    Hand::new(Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap(), taxels()).unwrap()
+    Hand::new(Tree::from_urdf_str(ALLEGRO_XELA_URDF, None).unwrap(), taxels()).unwrap()
 });
 
 /// Two fingers that slide towards each other before a plate.

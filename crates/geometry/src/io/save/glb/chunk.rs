@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::io::save::invalid;
-use crate::io::{MeshError, write_atomic};
+use crate::io::{MeshError, Result, write_atomic};
 
 pub(super) const FLOAT: u32 = 5126;
 pub(super) const UNSIGNED_INT: u32 = 5125;
@@ -67,7 +67,7 @@ impl Chunk {
     ///
     /// # Errors
     /// [`MeshError::Write`], and then no file has appeared or changed.
-    pub(super) fn save(self, mut document: Value, path: &Path) -> Result<(), MeshError> {
+    pub(super) fn save(self, mut document: Value, path: &Path) -> Result<()> {
         document["asset"] = json!({ "version": "2.0", "generator": "prehend" });
         document["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
         document["bufferViews"] = self.views.into();

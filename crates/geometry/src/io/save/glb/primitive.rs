@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::chunk::{Chunk, UNSIGNED_INT};
-use crate::io::MeshError;
 use crate::io::save::invalid;
+use crate::io::{MeshError, Result};
 use crate::mesh::{Texture, TriMesh};
 
 /// How vertex colors are written.
@@ -39,7 +39,7 @@ impl Parts {
         space: ColorSpace,
         chunk: &mut Chunk,
         path: &Path,
-    ) -> Result<Value, MeshError> {
+    ) -> Result<Value> {
         mesh.check_shape(path)?;
         let positions: Vec<[f32; 3]> =
             mesh.vertices.iter().map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect();
@@ -87,12 +87,7 @@ impl Parts {
     }
 
     /// The index of a texture, which is written as PNG when it is first met.
-    fn texture(
-        &mut self,
-        texture: &Arc<Texture>,
-        chunk: &mut Chunk,
-        path: &Path,
-    ) -> Result<usize, MeshError> {
+    fn texture(&mut self, texture: &Arc<Texture>, chunk: &mut Chunk, path: &Path) -> Result<usize> {
         if let Some(known) = self.textures.iter().position(|t| Arc::ptr_eq(t, texture)) {
             return Ok(known);
         }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::chunk::Chunk;
 use super::film::FilmKey;
-use crate::io::MeshError;
+use crate::io::Result;
 use crate::io::save::invalid;
 
 /// Samplers and channels of an animation.
@@ -27,7 +27,7 @@ impl Tracks {
         keys: &[FilmKey],
         chunk: &mut Chunk,
         path: &Path,
-    ) -> Result<(), MeshError> {
+    ) -> Result<()> {
         let fault = |what: &str| invalid(path, format!("{name}: {what}"));
         let times: Vec<[f32; 1]> = keys.iter().map(|key| [key.time as f32]).collect();
         if !times.is_sorted_by(|a, b| a[0] < b[0]) || times.iter().any(|t| t[0] < 0.0) {
