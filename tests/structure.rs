@@ -8,7 +8,7 @@ use std::{fs, io};
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 4_070),
     ("geometry", 15_466),
-    ("sim", 16_448),
+    ("sim", 16_508),
     ("render", 10_630),
     ("refine", 30_630),
 ];
