@@ -94,7 +94,7 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
             parameters = {name: _array(own) for name, own in parameters.items()}
         else:
             parameters = _array(parameters)
-        return run(State(*map(_array, state)), parameters, _array(controls))  # type: ignore[no-any-return]
+        return run(State(*map(_array, state)), parameters, _array(controls))
 
     return with_defaults
 

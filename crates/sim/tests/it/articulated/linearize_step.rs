@@ -130,7 +130,7 @@ fn generalized_coordinates_are_set_and_read() {
         }
         let before = set.clone();
         let short = model.set_generalized_coordinates(&mut set, &all.position[1..], &all.velocity);
-        assert!(short.unwrap_err().to_string().contains("the world has"));
+        assert!(short.unwrap_err().to_string().contains("the model has"));
         let zeros = vec![0.0; all.position.len()];
         let none = model.set_generalized_coordinates(&mut set, &zeros, &all.velocity);
         let turns = all.position.len() > all.velocity.len();

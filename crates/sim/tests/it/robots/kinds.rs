@@ -240,7 +240,7 @@ fn the_pose_of_a_mocap_body_has_its_derivatives() {
     let thing = robot.body("thing").unwrap();
     assert_eq!(model.coordinate_ranges(thing), Some([5..12, 4..10]));
 
-    let time_steps = TimeSteps { dt: 1e-3, steps: 30 };
+    let time_steps = TimeSteps { dt: 1e-5, steps: 30 };
     let function =
         RolloutFunction::with_integrator(RungeKutta4, &model, time_steps, &[], &[]).unwrap();
     let states: Vec<f64> = start.rows().iter().flat_map(|row| row.coordinates()).collect();
