@@ -137,7 +137,7 @@ fn attribute<'py>(
 /// The arrays of a `State`.
 pub(crate) fn state_arrays<'py>(state: &Bound<'py, PyAny>) -> PyResult<[Option<Numbers<'py>>; 4]> {
     let [q, v, act, fixed] = FIELDS.map(|name| -> PyResult<Option<Numbers<'py>>> {
-        Ok(attribute(state, name, "State")?.map(|own| own.extract()).transpose()?)
+        attribute(state, name, "State")?.map(|own| own.extract()).transpose()
     });
     Ok([q?, v?, act?, fixed?])
 }

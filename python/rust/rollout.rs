@@ -49,6 +49,9 @@ enum Parameters<'py> {
 /// What Python gives: a state's arrays, parameters and controls.
 type Given<'py> = ([Option<Numbers<'py>>; 4], Option<Parameters<'py>>, Option<Numbers<'py>>);
 
+/// An array with its name and its shape without a batch.
+type Expected<'a, 'py> = (&'a str, Vec<usize>, Option<&'a Numbers<'py>>);
+
 /// All inputs: those of the state, parameters together or each by itself, controls.
 struct Inputs<'a> {
     all: Vec<Input<'a>>,
@@ -87,12 +90,12 @@ impl Rollout {
         self.function.time_steps().steps
     }
 
-    /// Arrays of parameters and controls, each with its name and its shape without a batch.
+    /// Arrays of parameters and controls.
     fn others<'a, 'py>(
         &'a self,
         parameters: Option<&'a Parameters<'py>>,
         controls: Option<&'a Numbers<'py>>,
-    ) -> PyResult<Vec<(&'a str, Vec<usize>, Option<&'a Numbers<'py>>)>> {
+    ) -> PyResult<Vec<Expected<'a, 'py>>> {
         let all = |own| vec![("parameters", vec![self.values.len()], own)];
         let mut others = match parameters {
             Some(Parameters::Named(named)) => {
