@@ -9,12 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 import prehend
-from prehend import POSITION, VELOCITY
 
 BALLS, RADIUS, DT, STEPS = 10, 0.05, 1e-3, 100
 
 
-def balls() -> tuple[prehend.Model, np.ndarray]:
+def balls() -> tuple[prehend.Model, prehend.State]:
     """Balls that slide and roll on a floor, one beside the other."""
     model = prehend.Model()
     model.add_body("floor", prehend.Shape.half_space(), fixed=True)
@@ -25,9 +24,10 @@ def balls() -> tuple[prehend.Model, np.ndarray]:
             f"ball {ball}", "floor", "hunt_crossley",
             stiffness=1.56e5, damping=0.6, exponent=1.0, friction=0.4, slip_scale=0.1,
         )
-    states = model.neutral_states()
-    states[1:, POSITION] = [[0.0, 0.2 * ball, RADIUS - 1e-3] for ball in range(BALLS)]
-    return model, states
+    state = model.neutral_state()
+    for ball in range(BALLS):
+        model.set_pose(state, f"ball {ball}", [0.0, 0.2 * ball, RADIUS - 1e-3])
+    return model, state
 
 
 def median(run: Callable[[], object], times: int) -> float:
@@ -40,22 +40,22 @@ def median(run: Callable[[], object], times: int) -> float:
 
 
 def main() -> None:
-    model, states = balls()
+    model, state = balls()
     stone = prehend.Model()
     stone.add_body("stone", prehend.Shape.ball(0.1))
-    step, rest = stone.rollout(1e-4, 1, integrator="semi_implicit_euler"), stone.neutral_states()
+    step, rest = stone.rollout(1e-4, 1, integrator="semi_implicit_euler"), stone.neutral_state()
     print(f"a step of one free body: {1e6 * median(lambda: step(rest, end=True), 20001):.2f} µs a call")
     rollout = model.rollout(DT, STEPS, integrator="semi_implicit_euler")
     for count in (1, 64, 1024):
-        starts = np.repeat(states[None], count, 0)
-        speeds = 0.2 + 1e-4 * (np.arange(count) % 997)[:, None] + 0.01 * np.arange(BALLS)
-        starts[:, 1:, VELOCITY.start] = speeds
+        speeds = np.zeros((count, model.nv))
+        speeds[:, ::6] = 0.2 + 1e-4 * (np.arange(count) % 997)[:, None] + 0.01 * np.arange(BALLS)
+        starts = prehend.State(*(np.repeat(x[None], count, 0) for x in state))._replace(v=speeds)
 
-        def gradient(starts: np.ndarray = starts) -> object:
-            run, pullback = prehend.vjp(rollout, starts)
-            adjoints = np.zeros((len(starts), *states.shape))
+        def gradient(starts: prehend.State = starts, count: int = count) -> object:
+            _, pullback = prehend.vjp(rollout, starts)
+            adjoints = np.zeros((count, BALLS + 1, 13))
             adjoints[:, :, 0] = 1.0
-            return pullback(adjoints)
+            return pullback(prehend.Run(bodies=adjoints))
 
         runs = 21 if count < 256 else 5
         forward = 1e3 * median(lambda starts=starts: rollout(starts, end=True), runs)

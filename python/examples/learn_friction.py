@@ -6,13 +6,13 @@
 import numpy as np
 import prehend
 from numpy.typing import NDArray
-from prehend import POSITION, VELOCITY
+from prehend import POSITION
 
 TRUTH = 0.3
 
 
 def scene() -> tuple[prehend.Model, int, str]:
-    """A box over a floor: its row in states, and the name of their friction."""
+    """A box over a floor: its number, and the name of their friction."""
     model = prehend.Model()
     floor = model.add_body("floor", prehend.Shape.half_space(), fixed=True)
     box = model.add_body("box", prehend.Shape.cuboid([0.05, 0.04, 0.03], spacing=0.02), density=500.0)
@@ -26,17 +26,21 @@ def scene() -> tuple[prehend.Model, int, str]:
 def main() -> None:
     model, box, friction = scene()
     random = np.random.default_rng(1)
-    starts = np.repeat(model.neutral_states()[None], 8, 0)
-    starts[:, box, POSITION] = [0.0, 0.0, 0.035]
-    starts[:, box, VELOCITY] = random.normal(size=(8, 3)) * [0.5, 0.5, 0.0]
+    start = model.neutral_state()
+    model.set_pose(start, box, [0.0, 0.0, 0.035])
+    # Eight throws from one place: of what is no batch, all worlds have the same.
+    speeds = np.zeros((8, model.nv))
+    speeds[:, :3] = random.normal(size=(8, 3)) * [0.5, 0.5, 0.0]
+    throws = start._replace(v=speeds)
     rollout = model.rollout(0.02, 10, parameters=[friction])
-    seen = rollout(starts)[:, 1:, box, POSITION]
+    seen = rollout(throws).bodies[:, 1:, box, POSITION]
     seen += 1e-4 * random.normal(size=seen.shape)
 
     def linearized(value: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What is off, and its derivative by the friction."""
-        run, along = rollout.jvp((starts, [value], None), (None, [1.0], None))
-        return (run[:, 1:, box, POSITION] - seen).ravel(), along[:, 1:, box, POSITION].ravel()
+        run, along = rollout.jvp((throws, [value], None), (None, [1.0], None))
+        off, slope = run.bodies[:, 1:, box, POSITION] - seen, along.bodies[:, 1:, box, POSITION]
+        return off.ravel(), slope.ravel()
 
     value, steps = 0.5, 0
     for steps in range(1, 20):

@@ -2,9 +2,11 @@
 #![cfg(feature = "extension")]
 
 mod arrays;
+mod batch;
 mod copies;
 mod error;
 mod integrator;
+mod layout;
 mod link;
 mod model;
 mod python_law;

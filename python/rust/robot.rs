@@ -8,17 +8,17 @@ use prehend_sim::BodyId;
 use prehend_sim::robot::MjcfRobot;
 use pyo3::prelude::*;
 
-use crate::arrays::{Array, Numbers, array, in_order, pose as pose_of};
+use crate::arrays::{Array, Numbers, in_order, pose as pose_of};
 use crate::error::{Raise, wrong};
 use crate::model::Model;
 
 /// A robot that was added to a model.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Robot {
-    /// The row of each body by its name.
+    /// The number of each body by its name.
     #[pyo3(get)]
     bodies: BTreeMap<String, usize>,
-    /// The row of the link that each joint moves, and which axis of its joint.
+    /// The number of the link that each joint moves, and which axis of its joint.
     #[pyo3(get)]
     joints: BTreeMap<String, (usize, usize)>,
     /// The parameter that each actuator is driven by.
@@ -92,18 +92,18 @@ fn named(name: &str, number: usize) -> String {
 
 #[pymethods]
 impl Robot {
-    /// Puts the joints of a robot in MJCF to `positions` in MuJoCo's order, its `qpos`, or where the file has them, at rest.
-    #[pyo3(signature = (model, states, positions=None))]
+    /// Puts the joints of a robot in MJCF, in the arrays of `state`, to `positions` in MuJoCo's order, its `qpos`, or where the file has them, at rest.
+    #[pyo3(signature = (model, state, positions=None))]
     fn set_positions(
         &self,
         model: &Model,
-        states: &Bound<'_, PyAny>,
+        state: &Bound<'_, PyAny>,
         positions: Option<Numbers<'_>>,
     ) -> PyResult<()> {
         let robot = self.of_mujoco("positions in MuJoCo's order")?;
         let positions =
             positions.map_or_else(|| self.reference.clone(), |p| in_order(&p).into_owned());
-        crate::model::states::change(&model.model, states, |all| {
+        crate::model::states::change(&model.model, state, |all| {
             robot.set_positions(&model.model, all, &positions).raise()
         })
     }
@@ -118,32 +118,31 @@ impl Robot {
     /// The reading of a sensor, in MuJoCo's order and units, without noise.
     fn sensor<'py>(
         &self,
-        py: Python<'py>,
         model: &Model,
-        states: Numbers<'py>,
+        state: &Bound<'py, PyAny>,
         name: &str,
     ) -> PyResult<Array<'py>> {
-        let state = crate::model::states::state(&model.model, &states)?;
-        let reading = self.of_mujoco("sensors")?.sensor(&model.model, &state, name).raise()?;
-        let count = reading.len();
-        array(py, reading, &[count])
+        let robot = self.of_mujoco("sensors")?;
+        crate::model::states::measured(&model.model, state, None, |state| {
+            robot.sensor(&model.model, state, name).raise()
+        })
     }
 
-    /// Puts a mocap body of a robot in MJCF at `pose` (4 × 4 or a translation), between steps: it has no velocity.
+    /// Puts a mocap body of a robot in MJCF at `pose` (4 × 4 or a translation), in the arrays of `state`, between steps: it has no velocity.
     fn set_mocap(
         &self,
-        model: &mut Model,
-        states: &Bound<'_, PyAny>,
+        model: &Model,
+        state: &Bound<'_, PyAny>,
         name: &str,
         pose: Numbers<'_>,
     ) -> PyResult<()> {
-        let (robot, pose) = (self.of_mujoco("mocap bodies")?, pose_of(Some(&pose), "pose")?);
-        let mut moved = model.model.clone();
-        crate::model::states::change(&model.model, states, |all| {
-            robot.set_mocap(&mut moved, all, name, &pose).raise()
-        })?;
-        model.model = moved;
-        Ok(())
+        let robot = self.of_mujoco("mocap bodies")?;
+        let t_world_mocap = pose_of(Some(&pose), "pose")?;
+        // It may be a view of the state.
+        drop(pose);
+        crate::model::states::change(&model.model, state, |all| {
+            robot.set_mocap(&model.model, all, name, &t_world_mocap).raise()
+        })
     }
 
     fn __repr__(&self) -> String {

@@ -5,7 +5,7 @@ import prehend
 import pytest
 from prehend.laws import Dual, regularized_coulomb
 
-from scenes import thrown_ball
+from scenes import leaves, thrown_ball
 
 
 class Penalty:
@@ -21,7 +21,7 @@ class Penalty:
 
 
 def test_a_law_in_python_is_the_same_law():
-    model, states, _, contact = thrown_ball()
+    model, state, _, contact = thrown_ball()
     own = prehend.Model()
     floor = own.add_body("floor", prehend.Shape.half_space(), fixed=True)
     ball = own.add_body("ball", prehend.Shape.ball(0.03), mass=0.1)
@@ -32,9 +32,9 @@ def test_a_law_in_python_is_the_same_law():
     assert names == contact
     options = {"parameters": list(names.values()), "integrator": "semi_implicit_euler"}
     fast, slow = (w.rollout(2e-4, 200, **options) for w in (model, own))
-    np.testing.assert_allclose(slow(states), fast(states), rtol=1e-9, atol=1e-12)
-    weights = np.cos(np.arange(26.0)).reshape(2, 13)
-    gradients = [prehend.vjp(f, states)[1](weights) for f in (fast, slow)]
+    np.testing.assert_allclose(slow(state).bodies, fast(state).bodies, rtol=1e-9, atol=1e-12)
+    weights = prehend.Run(bodies=np.cos(np.arange(26.0)).reshape(2, 13))
+    gradients = [leaves(prehend.vjp(f, state)[1](weights)) for f in (fast, slow)]
     for a, b in zip(*gradients, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-8, atol=1e-8 * np.abs(a).max(initial=0.0))
 
@@ -63,7 +63,7 @@ def test_dual_numbers_have_their_derivatives():
 
 @pytest.mark.filterwarnings("ignore:a contact law in Python")
 def test_what_is_wrong_with_a_law_is_said():
-    model, states, _, _ = thrown_ball()
+    model, state, _, _ = thrown_ball()
     with pytest.raises(prehend.Error, match="a contact law is a name, or an object"):
         model.add_contact("ball", "floor", object())
     with pytest.raises(prehend.Error, match="parameter 'stiffness' is missing"):
@@ -74,12 +74,12 @@ def test_what_is_wrong_with_a_law_is_said():
             raise RuntimeError("this law is broken")
 
     model.add_contact("ball", "floor", Broken())
-    states[1, 2] = 0.029
+    state.q[2] = 0.029
     rollout = model.rollout(1e-3, 1, integrator="semi_implicit_euler")
     with pytest.raises(RuntimeError, match="this law is broken"):
-        rollout(states)
+        rollout(state)
     # A batch has more threads than one, and the next call knows nothing of it.
     with pytest.raises(RuntimeError, match="this law is broken"):
-        rollout(np.repeat(states[None], 4, 0))
-    states[1, 2] = 1.0
-    rollout(states)
+        rollout(state._replace(q=np.repeat(state.q[None], 4, 0)))
+    state.q[2] = 1.0
+    rollout(state)

@@ -4,19 +4,22 @@ import numpy as np
 import prehend
 import pytest
 
-from scenes import batch, bounce
+from scenes import batch, bounce, leaves
 
 torch = pytest.importorskip("torch")
 import prehend.torch  # noqa: E402
+from prehend import Run, State  # noqa: E402
 
 
 def tensors(inputs, **options):
-    return [torch.tensor(x, dtype=torch.float64, **options) for x in inputs]
+    """State, parameters and controls."""
+    *state, parameters, controls = (torch.tensor(x, dtype=torch.float64, **options) for x in leaves(inputs))
+    return State(*state), parameters, controls
 
 
 @pytest.mark.parametrize("end", [False, True])
 def test_gradcheck_in_double_precision(end):
-    model, states, ball = two_bodies()
+    model, state, ball = two_bodies()
     rollout = model.rollout(
         1e-3, 6, parameters=["ball/floor.friction", "ball.mass"], controls=["ball.force_y"],
         integrator="semi_implicit_euler",
@@ -24,10 +27,10 @@ def test_gradcheck_in_double_precision(end):
 
     def function(linear, parameters, controls):
         # Derivatives by quaternions mean something along their sphere alone.
-        rows = torch.from_numpy(states).clone()
-        rows[ball, 7:13] = linear
-        rows[ball, 0:3] = rows[ball, 0:3] + 1e-3 * linear[:3]
-        return prehend.torch.rollout(rollout, rows, parameters, controls, end=end)
+        q = torch.from_numpy(state.q).clone()
+        q[:3] = q[:3] + 1e-3 * linear[:3]
+        run = prehend.torch.rollout(rollout, State(q, linear), parameters, controls, end=end)
+        return run.state.q, run.state.v, run.bodies
 
     linear = torch.tensor([0.3, -0.1, -0.2, 1.0, 2.0, 3.0], dtype=torch.float64, requires_grad=True)
     parameters = torch.tensor([0.4, 0.1], dtype=torch.float64, requires_grad=True)
@@ -42,46 +45,61 @@ def two_bodies():
     model.add_contact(
         ball, floor, "penalty", smoothing=1e-3, stiffness=2e4, damping=1e2, friction=0.4, slip_scale=0.1
     )
-    states = model.neutral_states()
-    model.set_pose(states, ball, [0.0, 0.0, 0.0295])
-    return model, states, ball
+    state = model.neutral_state()
+    model.set_pose(state, ball, [0.0, 0.0, 0.0295])
+    return model, state, ball
 
 
 def test_gradients_are_those_of_numpy_to_the_bit():
     rollout, inputs = bounce()
     for own in (inputs, batch(inputs)):
         run, pullback = prehend.vjp(rollout, *own)
-        weights = np.cos(np.arange(run[..., -1, :, :].size)).reshape(run[..., -1, :, :].shape)
-        expected = pullback(weights)
-        leaves = tensors(own, requires_grad=True)
-        end = prehend.torch.rollout(rollout, *leaves, end=True)
-        np.testing.assert_array_equal(end.detach().numpy(), run[..., -1, :, :])
-        (end * torch.from_numpy(weights)).sum().backward()
-        for leaf, gradient in zip(leaves, expected, strict=True):
+        last = run.bodies[..., -1, :, :]
+        weights = np.cos(np.arange(last.size)).reshape(last.shape)
+        expected = pullback(Run(bodies=weights))
+        given = tensors(own, requires_grad=True)
+        end = prehend.torch.rollout(rollout, *given, end=True)
+        np.testing.assert_array_equal(end.bodies.detach().numpy(), last)
+        np.testing.assert_array_equal(end.state.q.detach().numpy(), run.state.q[..., -1, :])
+        (end.bodies * torch.from_numpy(weights)).sum().backward()
+        for leaf, gradient in zip(leaves(given), leaves(expected), strict=True):
             np.testing.assert_array_equal(leaf.grad.numpy(), gradient)
+
+
+def test_parameters_may_be_named():
+    rollout, inputs = bounce()
+    state, parameters, controls = tensors(inputs)
+    named = {name: x.clone().requires_grad_() for name, x in zip(rollout.parameters, parameters, strict=True)}
+    run = prehend.torch.rollout(rollout, state, named, controls)
+    (run.bodies[-1].sum() + run.state.v.sum()).backward()
+    values, pullback = prehend.vjp(rollout, *inputs)
+    by_bodies = np.zeros_like(values.bodies)
+    by_bodies[-1] = 1.0
+    expected = pullback(Run(State(v=np.ones_like(values.state.v)), by_bodies)).parameters
+    assert [own.grad.item() for own in named.values()] == expected.tolist()
 
 
 def test_single_precision_comes_back_as_such():
     rollout, inputs = bounce()
-    states, parameters, controls = (x.float() for x in tensors(inputs))
-    parameters.requires_grad_()
-    end = prehend.torch.rollout(rollout, states, parameters, controls, end=True)
-    assert end.dtype == torch.float32
-    end[1, 0].backward()
+    state, parameters, controls = tensors(inputs)
+    state, parameters = State(*(x.float() for x in state)), parameters.float().requires_grad_()
+    end = prehend.torch.rollout(rollout, state, parameters, controls.float(), end=True)
+    assert end.bodies.dtype == end.state.v.dtype == torch.float32
+    end.bodies[1, 0].backward()
     assert parameters.grad.dtype == torch.float32 and parameters.grad.abs().max() > 0
 
 
 def test_adam_finds_the_friction_of_a_throw():
-    model, states, ball = two_bodies()
+    model, state, ball = two_bodies()
     rollout = model.rollout(0.05, 1, parameters=["ball/floor.friction"])
-    rows = torch.from_numpy(states)
-    rows[ball, 7] = 1.0
-    target = prehend.torch.rollout(rollout, rows, torch.tensor([0.25], dtype=torch.float64))
+    state = State(*map(torch.from_numpy, state))
+    state.v[0] = 1.0
+    target = prehend.torch.rollout(rollout, state, torch.tensor([0.25], dtype=torch.float64)).state.v
     friction = torch.tensor([0.5], dtype=torch.float64, requires_grad=True)
     adam = torch.optim.Adam([friction], lr=0.03)
     for _ in range(150):
         adam.zero_grad()
-        loss = ((prehend.torch.rollout(rollout, rows, friction) - target)[..., ball, 7:10] ** 2).sum()
+        loss = ((prehend.torch.rollout(rollout, state, friction).state.v - target)[..., :3] ** 2).sum()
         loss.backward()
         adam.step()
     assert friction.item() == pytest.approx(0.25, abs=1e-3)
@@ -89,17 +107,17 @@ def test_adam_finds_the_friction_of_a_throw():
 
 def test_what_is_changed_before_going_back_is_noticed():
     rollout, inputs = bounce()
-    states, parameters, controls = tensors(inputs)
+    state, parameters, controls = tensors(inputs)
     parameters.requires_grad_()
-    end = prehend.torch.rollout(rollout, states, parameters, controls, end=True)
+    end = prehend.torch.rollout(rollout, state, parameters, controls, end=True)
     with torch.no_grad():
         parameters.mul_(2.0)
     with pytest.raises(RuntimeError, match="modified by an inplace operation"):
-        end.sum().backward()
+        end.bodies.sum().backward()
     # Of the result nothing is needed.
     parameters = tensors(inputs, requires_grad=True)[1]
-    run = prehend.torch.rollout(rollout, states, parameters, controls)
-    expected = prehend.vjp(rollout, *inputs)[1](np.ones((2, 13))).parameters
+    run = prehend.torch.rollout(rollout, state, parameters, controls).bodies
+    expected = prehend.vjp(rollout, *inputs)[1](Run(bodies=np.ones((2, 13)))).parameters
     run[:, 1, 2] += 0.02
     run[-1].sum().backward()
     np.testing.assert_array_equal(parameters.grad.numpy(), expected)
@@ -109,6 +127,7 @@ def test_whole_numbers_are_states_too():
     model = prehend.Model()
     model.add_body("stone", prehend.Shape.ball(0.1))
     rollout = model.rollout(0.1, 2)
-    row = torch.tensor([[0] * 6 + [1] + [0] * 6])
-    assert prehend.torch.rollout(rollout, row)[-1, 0, 9].item() == pytest.approx(-1.962)
-    assert prehend.torch.rollout(rollout, model.neutral_states(), end=True).dtype == torch.float64
+    state = State(torch.tensor([0] * 6 + [1]), torch.tensor([0] * 6))
+    assert prehend.torch.rollout(rollout, state).state.v[-1, 2].item() == pytest.approx(-1.962)
+    assert prehend.torch.rollout(rollout, model.neutral_state(), end=True).bodies.dtype == torch.float64
+    assert prehend.torch.rollout(rollout, State(), end=True).bodies.dtype == torch.float64

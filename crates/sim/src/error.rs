@@ -233,11 +233,11 @@ pub enum SimulationError {
         /// The name.
         name: String,
     },
-    /// A state whose rotation is no unit quaternion.
-    #[error("state {row}: its quaternion has the length {norm}, not 1")]
+    /// A body, or a link's joint, whose rotation is no unit quaternion.
+    #[error("the quaternion of '{body}' has the length {norm}, not 1")]
     Quaternion {
-        /// The number of the state.
-        row: usize,
+        /// Its name.
+        body: String,
         /// The length of its quaternion.
         norm: f64,
     },

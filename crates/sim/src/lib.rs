@@ -73,6 +73,7 @@ pub use model::body::{Body, Motion};
 pub use model::bushing::{Bushing, BushingStiffness};
 pub use model::contact_group::ContactGroup;
 pub use model::contact_pair::{ContactBodies, ContactPair};
+pub use model::generalized_coordinates::StatePlaces;
 pub use model::joint_force::{JointAxis, JointForce};
 pub use model::material::Material;
 pub use model::trajectory::Trajectory;

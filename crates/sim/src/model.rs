@@ -11,7 +11,7 @@ pub(crate) mod contact_pair;
 mod contacts_between;
 mod dynamics;
 mod failure;
-mod generalized_coordinates;
+pub(crate) mod generalized_coordinates;
 pub(crate) mod joint_force;
 mod linear_contacts;
 pub(crate) mod material;

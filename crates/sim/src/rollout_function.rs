@@ -225,7 +225,11 @@ impl<I: Integrator> RolloutFunction<I> {
             |row: &[S; STATE]| row[3..7].iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt();
         let norms = inputs.states.as_chunks().0.iter().map(norm).enumerate();
         match norms.into_iter().find(|(_, norm)| (norm - 1.0).abs() > UNIT) {
-            Some((row, norm)) => Err(SimulationError::Quaternion { row, norm }),
+            Some((row, norm)) => {
+                let body = self.model().bodies.get(self.model().body_of_row(row).index());
+                let body = body.map_or_else(String::new, |body| body.name.clone());
+                Err(SimulationError::Quaternion { body, norm })
+            }
             None => Ok(()),
         }
     }

@@ -1,7 +1,7 @@
 //! Articulations and robots.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
@@ -13,9 +13,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::laws::{joint_law, values_of};
-use super::{BodyKey, Model};
+use super::{BodyKey, GRAVITY, Model};
 use crate::arrays::{Numbers, pose};
-use crate::error::{Raise, wrong};
+use crate::error::Raise;
 use crate::link::Link;
 use crate::read_options::read_options;
 use crate::robot::Robot;
@@ -45,6 +45,38 @@ impl Model {
             AxisKey::Axis(link, index) => Ok(JointAxis { link: self.id(link)?, index: *index }),
         }
     }
+
+    fn insert_mjcf(
+        &mut self,
+        py: Python<'_>,
+        mjcf: &MjcfModel,
+        options: &MjcfOptions,
+    ) -> PyResult<Py<Robot>> {
+        let before = self.model.parameter_names();
+        let robot = detached(py, || self.model.add_mjcf(mjcf, options))?.raise()?;
+        self.keep(py, Robot::of_mjcf(mjcf, robot, &self.model, &before))
+    }
+
+    /// Puts a robot among those that were added.
+    fn keep(&mut self, py: Python<'_>, robot: Robot) -> PyResult<Py<Robot>> {
+        let robot = Py::new(py, robot)?;
+        self.robots.push(robot.clone_ref(py));
+        Ok(robot)
+    }
+}
+
+/// A file in MJCF, and options of adding it.
+fn read_mjcf(
+    path: &Path,
+    pose: Option<&Numbers<'_>>,
+    floating: bool,
+    shapes: bool,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(MjcfModel, MjcfOptions)> {
+    let (t_world_mjcf, read) = (self::pose(pose, "pose")?, read_options(options)?);
+    let (base, partial) = (base(floating), read.partial);
+    let options = MjcfOptions { t_world_mjcf, base, shapes, partial, ..MjcfOptions::default() };
+    Ok((MjcfModel::from_file_with(path, &read).raise()?, options))
 }
 
 fn base(floating: bool) -> Joint {
@@ -53,7 +85,7 @@ fn base(floating: bool) -> Joint {
 
 #[pymethods]
 impl Model {
-    /// Adds links, each after its parent, as bodies, and returns their rows in states.
+    /// Adds links, each after its parent, as bodies, and returns their numbers.
     fn add_articulation(&mut self, links: Vec<Py<Link>>) -> PyResult<Vec<usize>> {
         let own = links.iter().map(|link| link.get().link.clone()).collect();
         let bodies = self.model.add_articulation(own).raise()?;
@@ -98,14 +130,29 @@ impl Model {
         floating: bool,
         shapes: bool,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Robot> {
-        let (t_world_mjcf, read) = (self::pose(pose.as_ref(), "pose")?, read_options(options)?);
-        let (base, partial) = (base(floating), read.partial);
-        let options = MjcfOptions { t_world_mjcf, base, shapes, partial, ..MjcfOptions::default() };
-        let before = self.model.parameter_names();
-        let mjcf = MjcfModel::from_file_with(&path, &read).raise()?;
-        let robot = detached(py, || self.model.add_mjcf(&mjcf, &options))?.raise()?;
-        Ok(Robot::of_mjcf(&mjcf, robot, &self.model, &before))
+    ) -> PyResult<Py<Robot>> {
+        let (mjcf, options) = read_mjcf(&path, pose.as_ref(), floating, shapes, options)?;
+        self.insert_mjcf(py, &mjcf, &options)
+    }
+
+    /// Model of a robot or scene in MJCF under the gravity of its file, with contacts between all geoms that collide by `contype`, `conaffinity` and
+    /// `<exclude>`, by their sliding friction; options are those of `add_mjcf`.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true, **options))]
+    fn from_mjcf(
+        py: Python<'_>,
+        path: PathBuf,
+        pose: Option<Numbers<'_>>,
+        floating: bool,
+        shapes: bool,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let (mjcf, options) = read_mjcf(&path, pose.as_ref(), floating, shapes, options)?;
+        let built = detached(py, || prehend_sim::Model::from_mjcf(&mjcf, &options))?.raise()?;
+        let (mut own, robot) = (Self { model: built.0, robots: Vec::new() }, built.1);
+        let robot = Robot::of_mjcf(&mjcf, robot, &own.model, &[]);
+        own.keep(py, robot)?;
+        Ok(own)
     }
 
     /// Adds a robot in URDF with its joints, their limits, damping and friction; it has no motors. With `shapes`, its links get their collision
@@ -120,7 +167,7 @@ impl Model {
         floating: bool,
         shapes: bool,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Robot> {
+    ) -> PyResult<Py<Robot>> {
         let robot = KinematicTree::from_urdf_file_with(&path, &read_options(options)?).raise()?;
         let [spacing, margin] = LINK_GRID;
         let cache = user_cache();
@@ -132,20 +179,28 @@ impl Model {
         let t_world_base = self::pose(pose.as_ref(), "pose")?;
         let options = UrdfOptions { t_world_base, base: base(floating), ..UrdfOptions::default() };
         let bodies = self.model.add_articulated_robot(&robot, shape.as_ref(), &options).raise()?;
-        Ok(Robot::of_urdf(&robot, &bodies))
+        self.keep(py, Robot::of_urdf(&robot, &bodies))
     }
 
-    /// The row of a link's joint in states. Columns: coordinates of a joint with one axis are in column 0 and their velocity in column 7; of a
-    /// spherical joint its quaternion in 3:7 and its velocity in 10:13; of a floating one as of a body.
-    fn joint_row(&self, link: BodyKey) -> PyResult<usize> {
-        let link = self.id(&link)?;
-        let mut row = self.model.bodies.len();
-        for own in &self.model.articulations {
-            match own.bodies().iter().position(|body| *body == link) {
-                Some(place) => return Ok(row + place),
-                None => row += own.bodies().len(),
-            }
-        }
-        Err(wrong(format!("body '{}' is no link", self.model.bodies[link].name)))
+    /// A model of a robot in URDF under gravity −9.81 m/s² along z, with the options of `add_urdf`.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true, **options))]
+    fn from_urdf(
+        py: Python<'_>,
+        path: PathBuf,
+        pose: Option<Numbers<'_>>,
+        floating: bool,
+        shapes: bool,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut model = Self::under(GRAVITY.into());
+        model.add_urdf(py, path, pose, floating, shapes, options)?;
+        Ok(model)
+    }
+
+    /// The robots that were added, in their order.
+    #[getter]
+    pub(super) fn robots(&self, py: Python<'_>) -> Vec<Py<Robot>> {
+        self.robots.iter().map(|robot| robot.clone_ref(py)).collect()
     }
 }

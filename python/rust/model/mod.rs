@@ -1,4 +1,4 @@
-//! Worlds.
+//! Models.
 
 mod contacts;
 mod joints;
@@ -17,35 +17,46 @@ use crate::arrays::{Numbers, vector_or};
 use crate::error::{Raise, wrong};
 use crate::integrator::AnyIntegrator;
 use crate::link::Matter;
+use crate::robot::Robot;
 use crate::rollout::Rollout;
 use crate::shape::Shape;
 
 /// Bodies, their contacts, and gravity [m/s²].
 ///
-/// Bodies are told by their row in states, as an int, or by their name. `model["ball.mass"]` reads and writes a parameter.
+/// Bodies are told by their number, in the order in which they were added, or by their name. `model["ball.mass"]` reads and writes a parameter.
 #[pyclass(module = "prehend")]
-#[derive(Clone)]
 pub(crate) struct Model {
     pub(crate) model: prehend_sim::Model,
+    robots: Vec<Py<Robot>>,
 }
 
-/// A body: its row or its name.
+/// Gravity where none is given [m/s²].
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+
+/// A body: its number or its name.
 #[derive(FromPyObject)]
 pub(crate) enum BodyKey {
-    Row(usize),
+    Number(usize),
     Name(String),
 }
 
 impl Model {
+    /// A model without bodies under `gravity` [m/s²].
+    fn under(gravity: Vector3<f64>) -> Self {
+        Self { model: prehend_sim::Model::new(gravity), robots: Vec::new() }
+    }
+
     /// The body that Python means.
     pub(crate) fn id(&self, key: &BodyKey) -> PyResult<BodyId> {
         let found = match key {
-            BodyKey::Row(row) => self.model.body_ids().nth(*row),
+            BodyKey::Number(number) => self.model.body_ids().nth(*number),
             BodyKey::Name(name) => self.model.body_named(name),
         };
         let bodies = self.model.bodies.len();
         found.ok_or_else(|| match key {
-            BodyKey::Row(row) => wrong(format!("there is no body {row}: the model has {bodies}")),
+            BodyKey::Number(number) => {
+                wrong(format!("there is no body {number}: the model has {bodies}"))
+            }
             BodyKey::Name(name) => wrong(format!("there is no body '{name}'")),
         })
     }
@@ -88,11 +99,10 @@ impl Model {
     #[new]
     #[pyo3(signature = (gravity=None))]
     fn new(gravity: Option<Numbers<'_>>) -> PyResult<Self> {
-        let gravity: Vector3<f64> = vector_or(gravity.as_ref(), [0.0, 0.0, -9.81], "gravity")?;
-        Ok(Self { model: prehend_sim::Model::new(gravity) })
+        vector_or(gravity.as_ref(), GRAVITY, "gravity").map(Self::under)
     }
 
-    /// Adds a body and returns its row in states.
+    /// Adds a body and returns its number.
     ///
     /// With `fixed` it stays where its state says and moves at that state's velocity, whatever touches it. Otherwise forces move it: mass properties
     /// follow from `shape` and `density` [kg/m³] (1000 if nothing is given) or `mass` [kg], or are given as `mass`, `com` [m] and `inertia` [kg m²].
@@ -144,12 +154,12 @@ impl Model {
         Ok(self.model.add(body).index())
     }
 
-    /// The row of the body of that name.
+    /// The number of the body of that name.
     fn body(&self, name: String) -> PyResult<usize> {
         Ok(self.id(&BodyKey::Name(name))?.index())
     }
 
-    /// The names of the bodies, in the order of their rows.
+    /// The names of the bodies, in the order of their numbers.
     #[getter]
     fn bodies(&self) -> Vec<String> {
         self.model.bodies.iter().map(|body| body.name.clone()).collect()
@@ -186,19 +196,19 @@ impl Model {
     }
 
     /// A copy, which changes apart from this one.
-    fn copy(&self) -> Self {
-        self.clone()
+    fn copy(&self, py: Python<'_>) -> Self {
+        Self { model: self.model.clone(), robots: self.robots(py) }
     }
 
-    fn __copy__(&self) -> Self {
-        self.clone()
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        self.copy(py)
     }
 
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.clone()
+    fn __deepcopy__(&self, memo: &Bound<'_, PyAny>) -> Self {
+        self.copy(memo.py())
     }
 
-    /// The simulation of `steps` steps of `dt` [s] as a function of arrays, with derivatives by the initial states, by the parameters of these names,
+    /// The simulation of `steps` steps of `dt` [s] as a function of arrays, with derivatives by the initial state, by the parameters of these names,
     /// and by controls: parameters that are set anew before each step.
     ///
     /// `integrator` is "adaptive", which chooses steps within `dt` to hold an error (`tolerance`, 5e-6 of the motion), or one of fixed steps:

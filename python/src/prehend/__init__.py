@@ -10,6 +10,7 @@ from ._prehend import (
     Hand,
     Link,
     Mesh,
+    Model,
     Object,
     PoseLoss,
     PoseNetwork,
@@ -20,7 +21,6 @@ from ._prehend import (
     Rollout,
     Shape,
     Tracker,
-    Model,
     ambient_light,
     contact_laws,
     example_frame,
@@ -34,9 +34,10 @@ from ._prehend import (
 from ._version import __version__
 from .columns import ANGULAR_VELOCITY, POSITION, QUATERNION, VELOCITY
 from .evaluation import Scores, calibrate, evaluate
-from .pullback import Gradient, Pullback, vjp
+from .pullback import Pullback, vjp
 from .refinement import Estimate, Tracked, refine, search
 from .render import Image, LinearizedLoss, RenderGradient
+from .state import Gradient, Run, State
 
 __all__ = [
     "ANGULAR_VELOCITY",
@@ -52,6 +53,7 @@ __all__ = [
     "LinearizedLoss",
     "Link",
     "Mesh",
+    "Model",
     "Object",
     "PoseLoss",
     "PoseNetwork",
@@ -62,11 +64,12 @@ __all__ = [
     "Rig",
     "Robot",
     "Rollout",
+    "Run",
     "Scores",
     "Shape",
+    "State",
     "Tracked",
     "Tracker",
-    "Model",
     "__version__",
     "ambient_light",
     "calibrate",

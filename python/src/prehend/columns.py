@@ -1,4 +1,4 @@
-"""Columns of the rows of states. Those of links and fixed bodies are of the origin of their frame instead of the center of mass."""
+"""Columns of ``Run.bodies`` and ``State.fixed``. Those of links and fixed bodies are of the origin of their frame instead of the center of mass."""
 
 POSITION = slice(0, 3)
 """Center of mass, world frame [m]."""

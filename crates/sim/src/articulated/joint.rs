@@ -19,6 +19,7 @@ use crate::spatial::spatial;
 /// | spherical | quaternion (i, j, k, w) | angular velocity, link's axes \[rad/s\] |
 /// | one's own | 1 to 3 numbers | their rates |
 /// | floating | position \[m\], quaternion (i, j, k, w) | velocity of the link's origin \[m/s\] and angular velocity \[rad/s\], link's axes |
+/// | placed | position \[m\], quaternion (i, j, k, w), in the parent's frame | none |
 ///
 /// Quaternions are normalized where they are read. A joint that turns on and on is a revolute one: none has limits of its own.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub enum Joint {
     Spherical,
     /// Moving freely.
     Floating,
+    /// Held by nothing and moved by no force: the state tells its place, at first that of the joint's frame.
+    Placed,
     /// As a [`JointModel`] says.
     Custom(CustomJoint),
 }
@@ -60,7 +63,7 @@ impl Joint {
             Self::Fixed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 4,
-            Self::Floating => 7,
+            Self::Floating | Self::Placed => 7,
             Self::Custom(CustomJoint(model)) => model.nv(),
         }
     }
@@ -68,7 +71,7 @@ impl Joint {
     /// Number of degrees of freedom.
     pub fn nv(&self) -> usize {
         match self {
-            Self::Fixed => 0,
+            Self::Fixed | Self::Placed => 0,
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 3,
             Self::Floating => 6,
@@ -78,7 +81,7 @@ impl Joint {
 
     /// True if a rotation is among its coordinates.
     pub(crate) fn turns(&self) -> bool {
-        matches!(self, Self::Spherical | Self::Floating)
+        matches!(self, Self::Spherical | Self::Floating | Self::Placed)
     }
 
     /// The coordinates from which others are counted: link and joint frame coincide there, but for joint types of one's own.
@@ -87,7 +90,7 @@ impl Joint {
             Self::Fixed => &[],
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
-            Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            Self::Floating | Self::Placed => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
             Self::Custom(CustomJoint(model)) => &[0.0; MAX_NV][..model.nv().min(MAX_NV)],
         }
     }
@@ -100,7 +103,9 @@ impl Joint {
             Self::Revolute(axis) => (Some(turn(axis, q[0])), None),
             Self::Prismatic(axis) => (None, Some(axis.map(|a| q[0].times(a)))),
             Self::Spherical => (Some(rotation(q)), None),
-            Self::Floating => (Some(rotation(&q[3..])), Some(Vector3::new(q[0], q[1], q[2]))),
+            Self::Floating | Self::Placed => {
+                (Some(rotation(&q[3..])), Some(Vector3::new(q[0], q[1], q[2])))
+            }
         }
     }
 
@@ -108,7 +113,7 @@ impl Joint {
     #[inline]
     pub(super) fn axis(&self, dof: usize) -> Vector6<f64> {
         match self {
-            Self::Fixed | Self::Custom(_) => Vector6::zeros(),
+            Self::Fixed | Self::Placed | Self::Custom(_) => Vector6::zeros(),
             Self::Revolute(axis) => spatial(&Vector3::zeros(), axis),
             Self::Prismatic(axis) => spatial(axis, &Vector3::zeros()),
             Self::Spherical => Vector6::ith(3 + dof, 1.0),
@@ -119,7 +124,7 @@ impl Joint {
     /// Coordinates after moving on by `step`, velocities times a time.
     pub(crate) fn moved<S: Scalar>(&self, q: &[S], step: &[S], after: &mut Vec<S>) {
         match self {
-            Self::Fixed => {}
+            Self::Fixed | Self::Placed => after.extend(q),
             Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
                 after.extend(q.iter().zip(step).map(|(q, step)| *q + *step));
             }

@@ -2,11 +2,13 @@
 //!
 //! Numbers come first in place and velocity; a rotation and its angular velocity, along the link's axes, are those of the state.
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Unit, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 
-use super::joint::{Joint, quaternion};
+use super::joint::Joint;
 use crate::body_state::BodyState;
 
 /// Positions and velocities: of one joint, or of all that moves in a model.
@@ -19,44 +21,28 @@ pub struct JointState<S = f64> {
 }
 
 impl Joint {
+    /// Ranges of its coordinates and velocities among the [numbers](BodyState::coordinates) of its state.
+    pub(crate) fn places(&self) -> [Range<usize>; 2] {
+        let [q, v] = if matches!(self, Self::Spherical) { [3, 10] } else { [0, 7] };
+        [q..q + self.nq(), v..v + self.nv()]
+    }
+
     /// Appends the coordinates and velocities that `state` is.
     pub(crate) fn read<S: Scalar>(&self, state: &BodyState<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
-        let (place, turn) = (&state.pose.translation.vector, &state.pose.rotation.coords);
-        match self {
-            Self::Spherical => {
-                q.extend(turn.iter());
-                v.extend(state.angular.iter());
-            }
-            Self::Floating => {
-                q.extend(place.iter().chain(turn.iter()));
-                v.extend(state.linear.iter().chain(state.angular.iter()));
-            }
-            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                q.extend(place.iter().take(self.nq()));
-                v.extend(state.linear.iter().take(self.nv()));
-            }
-        }
+        let (numbers, [of_q, of_v]) = (state.coordinates(), self.places());
+        q.extend_from_slice(&numbers[of_q]);
+        v.extend_from_slice(&numbers[of_v]);
     }
 
     /// The state that coordinates and velocities are.
     pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> BodyState<S> {
-        let mut state = BodyState::at_rest(Isometry3::identity());
-        let copy = |to: &mut [S], from: &[S]| to[..from.len()].copy_from_slice(from);
-        match self {
-            Self::Spherical => {
-                state.pose.rotation = quaternion(q);
-                copy(state.angular.as_mut_slice(), v);
-            }
-            Self::Floating => {
-                copy(state.pose.translation.vector.as_mut_slice(), &q[..3]);
-                state.pose.rotation = quaternion(&q[3..]);
-                copy(state.linear.as_mut_slice(), &v[..3]);
-                copy(state.angular.as_mut_slice(), &v[3..]);
-            }
-            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                copy(state.pose.translation.vector.as_mut_slice(), q);
-                copy(state.linear.as_mut_slice(), v);
-            }
+        let [of_q, of_v] = self.places();
+        let mut numbers = BodyState::at_rest(Isometry3::identity()).coordinates();
+        numbers[of_q].copy_from_slice(q);
+        numbers[of_v].copy_from_slice(v);
+        let mut state = BodyState::from_coordinates(&numbers);
+        if self.turns() {
+            state.pose.rotation = Unit::new_normalize(state.pose.rotation.into_inner());
         }
         state
     }
@@ -74,9 +60,9 @@ impl Joint {
     }
 
     /// Range of the joint's own velocities among a state's six, linear and angular.
-    fn velocities(&self) -> std::ops::Range<usize> {
-        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        first..first + self.nv()
+    fn velocities(&self) -> Range<usize> {
+        let [_, numbers] = self.places();
+        numbers.start - 7..numbers.end - 7
     }
 
     /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.
@@ -84,6 +70,7 @@ impl Joint {
         match self {
             Self::Spherical => [state.linear, state.pose.rotation * state.angular],
             Self::Floating => [state.linear, state.angular].map(|v| state.pose.rotation * v),
+            Self::Placed => [Vector3::zeros(); 2],
             Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
                 [state.linear, state.angular]
             }

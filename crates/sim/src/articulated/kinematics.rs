@@ -81,8 +81,9 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
                 Some(motion) => (Some(motion.rotation), Some(motion.place)),
                 None => link.joint.placement(&q[coordinates]),
             };
-            let joint_rotation = link.t_parent_joint.rotation.to_rotation_matrix().into_inner();
-            let joint_place = link.t_parent_joint.translation.vector;
+            let joint_frame = link.joint_frame();
+            let joint_rotation = joint_frame.rotation.to_rotation_matrix().into_inner();
+            let joint_place = joint_frame.translation.vector;
             let (mut rotation, mut place) = match link.parent {
                 Some(parent) => {
                     let of_parent = at.rotations[parent];

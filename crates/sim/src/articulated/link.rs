@@ -123,11 +123,19 @@ impl<S: Scalar> Link<S> {
             if moments.min() > 1e-14 * moments.amax() { moments.min() } else { 0.0 }
         };
         match &self.joint {
-            Joint::Fixed | Joint::Custom(_) => f64::INFINITY,
+            Joint::Fixed | Joint::Placed | Joint::Custom(_) => f64::INFINITY,
             Joint::Revolute(axis) => axis.dot(&(about_joint * axis.into_inner())),
             Joint::Prismatic(axis) => mass * axis.norm_squared(),
             Joint::Spherical => least(about_joint),
             Joint::Floating => mass.min(least(inertia)),
+        }
+    }
+
+    /// Frame of its joint in its parent's, from which coordinates count.
+    pub(super) fn joint_frame(&self) -> Isometry3<S> {
+        match self.joint {
+            Joint::Placed => Isometry3::identity(),
+            _ => self.t_parent_joint,
         }
     }
 

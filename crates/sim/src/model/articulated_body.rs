@@ -109,6 +109,9 @@ impl<S: Scalar> Model<S> {
                 *row = rigid.at_rest(&origin);
             }
         }
+        for (row, link) in self.placed_links() {
+            rows[row].pose = self.link(link).map_or(origin, |link| link.t_parent_joint);
+        }
         for own in &self.transmissions.couplings {
             // Both are joints of this model.
             drop(self.move_followers(&mut rows, own.leader.link));
@@ -126,10 +129,10 @@ impl<S: Scalar> Model<S> {
         self.check_count(&state).map(|()| state)
     }
 
-    /// Puts the frame of a body that is no link at `t_world_body`. Its velocities stay.
+    /// Puts the frame of a body that is no link, or one with a [placed joint](Joint::Placed), at `t_world_body`. Its velocities stay.
     ///
     /// # Errors
-    /// If there is no such body, or it is a link.
+    /// If there is no such body, or it is another link.
     ///
     /// # Panics
     /// If it is no state of this model.
@@ -141,7 +144,11 @@ impl<S: Scalar> Model<S> {
     ) -> Result<(), BuildError> {
         let own = self.body(body)?;
         if let Motion::Link = own.motion {
-            return Err(BuildError::IsALink { body: own.name.clone() });
+            let placed = self.placed_links().find(|(_, link)| *link == body);
+            let (row, _) = placed.ok_or_else(|| BuildError::IsALink { body: own.name.clone() })?;
+            state.rows_mut()[row].pose = *t_world_body;
+            self.forward_kinematics(state.rows_mut());
+            return Ok(());
         }
         state[body].pose =
             own.rigid().map_or(*t_world_body, |rigid| rigid.at_rest(t_world_body).pose);

@@ -27,18 +27,21 @@ impl<S: Scalar> Model<S> {
         states: &Rows<S>,
         time: f64,
     ) -> SimulationError {
-        let links = self.articulations.iter().flat_map(|own| own.bodies()).copied();
-        let joint =
-            failed.checked_sub(self.bodies.len()).and_then(|joint| links.clone().nth(joint));
-        let body = match failed.checked_sub(self.joint_places().end) {
+        let (body, contact) = self.names(states, self.body_of_row(failed));
+        SimulationError::NotFinite { body, contact, time }
+    }
+
+    /// The body that a row is of: the link of a joint, the one with the samples of a contact.
+    pub(crate) fn body_of_row(&self, row: usize) -> BodyId {
+        let mut links = self.articulations.iter().flat_map(|own| own.bodies()).copied();
+        let joint = row.checked_sub(self.bodies.len()).and_then(|joint| links.nth(joint));
+        let body = match row.checked_sub(self.joint_places().end) {
             Some(deflection) => {
                 self.bristle_contacts().nth(deflection).map(|(pair, _)| pair.bodies.samples)
             }
-            None => joint.or(Some(BodyId(failed))),
+            None => joint.or(Some(BodyId(row))),
         };
-        let body = body.unwrap_or(BodyId(0));
-        let (body, contact) = self.names(states, body);
-        SimulationError::NotFinite { body, contact, time }
+        body.unwrap_or(BodyId(0))
     }
 
     /// The error of `states` at `time` \[s\] that are too large to measure, or have derivatives that are.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::io::Result;
+use crate::io::MeshError;
 use crate::mesh::TriMesh;
 
 impl TriMesh {
@@ -13,7 +13,7 @@ impl TriMesh {
     /// # Errors
     /// [`MeshError::Write`], and then no file has appeared or changed except, should only the last rename fail,
     /// the texture.
-    pub fn save_ply(&self, path: &Path) -> Result<()> {
+    pub fn save_ply(&self, path: &Path) -> Result<(), MeshError> {
         self.check_shape(path)?;
         let texture = self.texture_beside(path)?;
         let mut out = String::from("ply\nformat binary_little_endian 1.0\n");

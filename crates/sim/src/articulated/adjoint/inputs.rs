@@ -67,7 +67,10 @@ impl Kinematics<'_> {
                 None => (Matrix3::identity(), -self.origin),
             };
             let joint = place + rotation * link.t_parent_joint.translation.vector;
-            let (push, moment) = (linear(&adjoint.displacement), angular(&adjoint.displacement));
+            // The frame of a placed joint holds nothing.
+            let displacement =
+                adjoint.displacement * f64::from(!matches!(link.joint, Joint::Placed));
+            let (push, moment) = (linear(&displacement), angular(&displacement));
             let turn = rotation.tr_mul(&(moment - joint.cross(&push)));
             all.extend((rotation.tr_mul(&push)).iter());
             let turned = Quaternion::from_imag(turn) * link.t_parent_joint.rotation.into_inner();
@@ -92,7 +95,10 @@ impl Kinematics<'_> {
         adjoints: &mut [f64],
     ) {
         let [_, dofs] = self.tree.range(link);
-        let along: Vec<f64> = dofs.map(|k| self.axes[k].dot(displacement)).collect();
+        let along: Vec<f64> = match self.tree.links()[link].joint {
+            Joint::Placed => self.local(link, displacement).as_slice().to_vec(),
+            _ => dofs.map(|k| self.axes[k].dot(displacement)).collect(),
+        };
         let by_turn = |q: &[f64], turn: &[f64], adjoints: &mut [f64]| {
             let rotation = Quaternion::new(q[3], q[0], q[1], q[2]);
             let square = rotation.norm_squared();
@@ -101,7 +107,7 @@ impl Kinematics<'_> {
         };
         match &self.tree.links()[link].joint {
             Joint::Spherical => by_turn(q, &along, adjoints),
-            Joint::Floating => {
+            Joint::Floating | Joint::Placed => {
                 let place = quaternion(&q[3..]) * Vector3::from_column_slice(&along[..3]);
                 adjoints.iter_mut().zip(&place).for_each(|(a, x)| *a += x);
                 by_turn(&q[3..], &along[3..], &mut adjoints[3..]);
@@ -124,21 +130,23 @@ impl Kinematics<'_> {
     ) {
         let Joint::Custom(CustomJoint(model)) = &self.tree.links()[link].joint else { return };
         let (_, jacobian) = model.linearized(inputs(q, v));
-        let local = |force: &Vector6<f64>| {
-            let (push, moment) = (linear(force), angular(force));
-            let moment = moment - self.places[link].cross(&push);
-            let rotation = &self.rotations[link];
-            spatial(&rotation.tr_mul(&push), &rotation.tr_mul(&moment))
-        };
         let mut add = |first: usize, force: Vector6<f64>| {
             for (row, force) in jacobian[first..].iter().zip(&force) {
                 q_adjoint.iter_mut().zip(row).for_each(|(a, slope)| *a += slope * force);
                 v_adjoint.iter_mut().zip(&row[MAX_NV..]).for_each(|(a, slope)| *a += slope * force);
             }
         };
-        by_axes.iter().enumerate().for_each(|(k, force)| add(12 + 6 * k, local(force)));
+        by_axes.iter().enumerate().for_each(|(k, force)| add(12 + 6 * k, self.local(link, force)));
         if let Some(force) = by_drift {
-            add(12 + 6 * MAX_NV, local(force));
+            add(12 + 6 * MAX_NV, self.local(link, force));
         }
+    }
+
+    /// A force about the origin as one in a link's frame.
+    fn local(&self, link: usize, force: &Vector6<f64>) -> Vector6<f64> {
+        let (push, moment) = (linear(force), angular(force));
+        let moment = moment - self.places[link].cross(&push);
+        let rotation = &self.rotations[link];
+        spatial(&rotation.tr_mul(&push), &rotation.tr_mul(&moment))
     }
 }

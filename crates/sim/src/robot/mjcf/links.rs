@@ -79,6 +79,7 @@ impl LinkChain {
                 None if parent.is_none() && !body.is_mocap => {
                     self.push(&body.name, None, place, base.clone())
                 }
+                None if body.is_mocap => self.push(&body.name, None, place, Joint::Placed),
                 None => self.push(&body.name, parent, place, Joint::Fixed),
             };
         let own = &mut self.links[link];

@@ -90,7 +90,7 @@ impl MjcfRobot {
     /// If the model has no such mocap body, or it is no state of the model.
     pub fn set_mocap(
         &self,
-        model: &mut Model,
+        model: &Model,
         state: &mut State,
         name: &str,
         t_world_mjcf: &Isometry3<f64>,
@@ -98,10 +98,7 @@ impl MjcfRobot {
         let none = || MjcfError::NoMocap { name: name.to_owned() };
         let body = self.body(name).filter(|body| self.mocaps.contains(body)).ok_or_else(none)?;
         model.joint_place(state.rows(), body)?;
-        let (articulation, link) = model.link_of(body)?;
-        model.articulations[articulation].tree.links_mut()[link].t_parent_joint = *t_world_mjcf;
-        model.forward_kinematics(state.rows_mut());
-        Ok(())
+        Ok(model.set_pose(state, body, t_world_mjcf)?)
     }
 
     /// The actuator of that name.

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::KinematicTree;
 use prehend_sim::robot::{MjcfError, MjcfOptions, MjcfRobot, UrdfOptions};
-use prehend_sim::{Model, RungeKutta4, State, TimeSteps};
+use prehend_sim::{Model, RolloutFunction, RolloutInputs, RungeKutta4, State, TimeSteps};
 use serde_json::Value;
 
 use super::golden::numbers;
@@ -207,7 +207,7 @@ fn mocap_bodies_lead() {
     let mut states = model.neutral_state();
     robot.set_positions(&model, &mut states, &mjcf.reference_positions()).unwrap();
     let pose = Isometry3::new(Vector3::new(0.05, -0.02, 1.1), Vector3::new(0.1, 0.0, 0.2));
-    robot.set_mocap(&mut model, &mut states, "hand", &pose).unwrap();
+    robot.set_mocap(&model, &mut states, "hand", &pose).unwrap();
     let apart = |states: &State, name: &str| {
         let found = states[robot.body(name).unwrap()].pose;
         (found.to_homogeneous() - pose.to_homogeneous()).amax()
@@ -215,8 +215,62 @@ fn mocap_bodies_lead() {
     assert!(apart(&states, "hand") < 1e-12);
     let end = model.simulate(&states, 0.3).unwrap();
     assert!(apart(&end, "thing") < 5e-3, "{}", apart(&end, "thing"));
-    let wrong = robot.set_mocap(&mut model, &mut states, "thing", &pose);
+    let wrong = robot.set_mocap(&model, &mut states, "thing", &pose);
     assert_eq!(wrong, Err(MjcfError::NoMocap { name: "thing".to_owned() }));
+}
+
+#[test]
+fn the_pose_of_a_mocap_body_has_its_derivatives() {
+    let xml = "<mujoco><worldbody>
+        <body name='hand' mocap='true' pos='.1 0 1' euler='0 20 0'>
+            <body pos='0 0 -.1'><joint axis='0 1 0'/><geom size='.02' pos='.1 0 0'/>
+                <body pos='.1 .1 0'><joint type='ball'/><geom size='.02' pos='.1 0 .1'/></body></body></body>
+        <body name='thing' pos='0 0 1'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody>
+        <equality><weld body1='hand' body2='thing'/></equality></mujoco>";
+    let mjcf = MjcfModel::from_str(xml, None).unwrap();
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let robot = model.add_mjcf(&mjcf, &MjcfOptions::default()).unwrap();
+    let mut start = model.neutral_state();
+    robot.set_positions(&model, &mut start, &mjcf.reference_positions()).unwrap();
+    let hand = robot.body("hand").unwrap();
+    let places = model.state_places();
+    assert_eq!((places.positions.len(), places.velocities.len()), (12, 10));
+    assert_eq!((places.fixed.len(), model.fixed_row(hand)), (13, Some(0)));
+    assert_eq!(model.coordinate_ranges(hand), None);
+    let thing = robot.body("thing").unwrap();
+    assert_eq!(model.coordinate_ranges(thing), Some([5..12, 4..10]));
+
+    let time_steps = TimeSteps { dt: 1e-5, steps: 30 };
+    let function =
+        RolloutFunction::with_integrator(RungeKutta4, &model, time_steps, &[], &[]).unwrap();
+    let states: Vec<f64> = start.rows().iter().flat_map(|row| row.coordinates()).collect();
+    let inputs = RolloutInputs { states: &states, parameters: &[], controls: &[] };
+    let run = function.evaluate(inputs).unwrap();
+    // What forces do not move stays, to the bit.
+    let last = &run[run.len() - states.len()..];
+    assert!(places.fixed.iter().all(|place| last[*place] == states[*place]));
+    let adjoints: Vec<f64> = (0..run.len()).map(|k| (k as f64).cos()).collect();
+    let by_states = function.vjp(inputs, &run, &adjoints).unwrap().states;
+    // Each number by forward mode, those of quaternions along their sphere.
+    for place in places.fixed.iter().take(7).chain(&places.positions[..1]) {
+        let mut along = vec![0.0; states.len()];
+        along[*place] = 1.0;
+        let first = places.fixed[3];
+        if (first..first + 4).contains(place) {
+            let turn = &states[first..first + 4];
+            let radial = turn[place - first];
+            turn.iter().enumerate().for_each(|(k, x)| along[first + k] -= radial * x);
+        }
+        let tangents = RolloutInputs { states: &along, parameters: &[], controls: &[] };
+        let [_, slopes] = function.jvp(inputs, tangents).unwrap();
+        let forward: f64 = slopes.iter().zip(&adjoints).map(|(a, b)| a * b).sum();
+        let backward: f64 = along.iter().zip(&by_states).map(|(a, b)| a * b).sum();
+        assert!(
+            (forward - backward).abs() < 1e-9 * (1.0 + forward.abs()),
+            "{place}: {forward} {backward}"
+        );
+        assert!(forward.abs() > 1e-3, "{place}");
+    }
 }
 
 #[test]

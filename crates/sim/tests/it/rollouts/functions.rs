@@ -155,7 +155,8 @@ fn what_is_no_input_is_refused() {
     stretched[13 + 6] = 1.1;
     let inputs = RolloutInputs { states: &stretched, parameters: &[0.2], controls: &[0.0; 2] };
     let refused = function.evaluate(inputs).unwrap_err();
-    assert!(matches!(refused, SimulationError::Quaternion { row: 1, .. }), "{refused}");
+    let named = matches!(&refused, SimulationError::Quaternion { body, .. } if body == "egg");
+    assert!(named, "{refused}");
     let long =
         RolloutFunction::new(&model, TimeSteps { dt: 1e-3, steps: 1 << 60 }, &[], &[]).unwrap();
     let inputs = RolloutInputs { states: &start, parameters: &[], controls: &[] };

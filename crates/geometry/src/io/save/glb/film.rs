@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::chunk::Chunk;
 use super::primitive::{ColorSpace, Parts};
 use super::tracks::{Tracks, quaternion};
-use crate::io::Result;
+use crate::io::MeshError;
 use crate::mesh::TriMesh;
 
 /// Where something is at a moment.
@@ -66,7 +66,7 @@ impl GlbFilm {
     /// # Errors
     /// [`MeshError::Write`], and then no file has appeared or changed: also if a body has no key, times do not ascend or a number is not finite in
     /// single precision; and those of [`TriMesh::save_glb`].
-    pub fn save(&self, path: &Path) -> Result<()> {
+    pub fn save(&self, path: &Path) -> Result<(), MeshError> {
         let (mut chunk, mut parts) = (Chunk::default(), Parts::default());
         let mut meshes = Vec::new();
         let mut tracks = Tracks::default();

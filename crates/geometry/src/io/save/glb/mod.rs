@@ -12,7 +12,7 @@ use serde_json::json;
 use self::chunk::Chunk;
 pub use self::film::{FilmBody, FilmCamera, FilmKey, GlbFilm};
 use self::primitive::{ColorSpace, Parts};
-use crate::io::Result;
+use crate::io::MeshError;
 use crate::mesh::TriMesh;
 
 impl TriMesh {
@@ -24,7 +24,7 @@ impl TriMesh {
     /// # Errors
     /// [`MeshError::Write`], and then no file has appeared or changed; also for coordinates that single
     /// precision does not hold, and for more than 4 GiB.
-    pub fn save_glb(&self, path: &Path) -> Result<()> {
+    pub fn save_glb(&self, path: &Path) -> Result<(), MeshError> {
         let (mut chunk, mut parts) = (Chunk::default(), Parts::default());
         let primitive = parts.add(self, [1.0; 3], ColorSpace::AsStored, &mut chunk, path)?;
         let mut document = json!({
