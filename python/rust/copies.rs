@@ -2,9 +2,9 @@
 
 use pyo3::prelude::*;
 
-use crate::refine::{Mesh, Object};
+use crate::refine::{PyMesh, PyObject};
 use crate::rollout::Rollout;
-use crate::shape::Shape;
+use crate::shape::PyShape;
 
 macro_rules! immutable {
     ($($class:ident),*) => {$(
@@ -21,4 +21,4 @@ macro_rules! immutable {
     )*};
 }
 
-immutable!(Mesh, Object, Rollout, Shape);
+immutable!(PyMesh, PyObject, Rollout, PyShape);

@@ -26,30 +26,30 @@ mod _prehend {
     #[pymodule_export]
     use super::error::Error;
     #[pymodule_export]
-    use super::link::Link;
+    use super::link::PyLink;
     #[pymodule_export]
-    use super::model::Model;
+    use super::model::PyModel;
     #[pymodule_export]
     use super::model::laws::{contact_laws, joint_laws};
     #[pymodule_export]
     use super::refine::{
-        _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, PoseNetwork, Rig, Tracker,
-        example_frame, example_sequence, methods, refine_batch,
+        _calibrate, _score, PyDataset, PyFrame, PyHand, PyMesh, PyObject, PyPoseNetwork, PyRig,
+        PyTracker, example_frame, example_sequence, methods, refine_batch,
     };
     #[pymodule_export]
     use super::render::light::{ambient_light, headlight};
     #[pymodule_export]
     use super::render::pose::perturb;
     #[pymodule_export]
-    use super::render::pose_loss::PoseLoss;
+    use super::render::pose_loss::PyPoseLoss;
     #[pymodule_export]
     use super::render::pullback::RenderPullback;
     #[pymodule_export]
-    use super::render::renderer::Renderer;
+    use super::render::renderer::PyRenderer;
     #[pymodule_export]
     use super::robot::Robot;
     #[pymodule_export]
     use super::rollout::Rollout;
     #[pymodule_export]
-    use super::shape::Shape;
+    use super::shape::PyShape;
 }

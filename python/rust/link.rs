@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, inertia, pose, vector_or};
 use crate::error::{Raise, wrong};
-use crate::shape::Shape;
+use crate::shape::PyShape;
 
 /// A link of an articulation and the joint that it hangs on.
 ///
@@ -14,14 +14,14 @@ use crate::shape::Shape;
 /// in the list given to `Model.add_articulation`, None for the world; `at` is the pose of the joint in the parent's frame (4 × 4 or a
 /// translation). Mass properties are given as `mass` [kg], `com` [m] and `inertia` [kg m²] about the center of mass (3 × 3 or its diagonal), or
 /// follow from `shape` and `density` [kg/m³] or `mass`; with a shape the link touches others.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Link {
+#[pyclass(name = "Link", frozen, module = "prehend")]
+pub(crate) struct PyLink {
     pub(crate) link: SimLink,
     pub(crate) shape: Option<prehend_sim::Shape>,
 }
 
 #[pymethods]
-impl Link {
+impl PyLink {
     #[new]
     #[pyo3(signature = (name, joint="revolute", *, axis=None, parent=None, at=None, mass=None, com=None, inertia=None, shape=None, density=None, armature=0.0))]
     #[allow(clippy::too_many_arguments)] // as many as Python names
@@ -34,7 +34,7 @@ impl Link {
         mass: Option<f64>,
         com: Option<Numbers<'_>>,
         inertia: Option<Numbers<'_>>,
-        shape: Option<&Shape>,
+        shape: Option<&PyShape>,
         density: Option<f64>,
         armature: f64,
     ) -> PyResult<Self> {

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Array, Numbers, in_order, pose as pose_of};
 use crate::error::{Raise, wrong};
-use crate::model::Model;
+use crate::model::PyModel;
 
 /// A robot that was added to a model.
 #[pyclass(frozen, module = "prehend")]
@@ -96,7 +96,7 @@ impl Robot {
     #[pyo3(signature = (model, state, positions=None))]
     fn set_positions(
         &self,
-        model: &Model,
+        model: &PyModel,
         state: &Bound<'_, PyAny>,
         positions: Option<Numbers<'_>>,
     ) -> PyResult<()> {
@@ -118,7 +118,7 @@ impl Robot {
     /// The reading of a sensor, in MuJoCo's order and units, without noise.
     fn sensor<'py>(
         &self,
-        model: &Model,
+        model: &PyModel,
         state: &Bound<'py, PyAny>,
         name: &str,
     ) -> PyResult<Array<'py>> {
@@ -131,7 +131,7 @@ impl Robot {
     /// Puts a mocap body of a robot in MJCF at `pose` (4 × 4 or a translation), in the arrays of `state`, between steps: it has no velocity.
     fn set_mocap(
         &self,
-        model: &Model,
+        model: &PyModel,
         state: &Bound<'_, PyAny>,
         name: &str,
         pose: Numbers<'_>,

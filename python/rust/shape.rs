@@ -17,14 +17,14 @@ use crate::threads::detached;
 ///
 /// `rounding` is the radius of the edges of sharp shapes (2 % of the smallest extent if not given), `spacing` the distance of the samples of
 /// a surface, `cell` that of the distance grid of a mesh.
-#[pyclass(frozen, module = "prehend")]
+#[pyclass(name = "Shape", frozen, module = "prehend")]
 #[derive(Clone)]
-pub(crate) struct Shape {
+pub(crate) struct PyShape {
     parry: SharedShape,
     pub(crate) shape: prehend_sim::Shape,
 }
 
-impl Shape {
+impl PyShape {
     fn new(
         parry: SharedShape,
         rounding: Option<f64>,
@@ -47,7 +47,7 @@ fn sizes(named: &[(&str, f64)]) -> PyResult<()> {
 }
 
 #[pymethods]
-impl Shape {
+impl PyShape {
     /// A ball.
     #[staticmethod]
     fn ball(radius: f64) -> PyResult<Self> {
@@ -187,7 +187,7 @@ impl Shape {
     #[staticmethod]
     #[pyo3(signature = (parts, *, rounding=None, spacing=None, cell=None))]
     fn compound(
-        parts: Vec<(Py<Shape>, Numbers<'_>)>,
+        parts: Vec<(Py<PyShape>, Numbers<'_>)>,
         rounding: Option<f64>,
         spacing: Option<f64>,
         cell: Option<f64>,

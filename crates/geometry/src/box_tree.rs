@@ -59,7 +59,7 @@ impl Bounds {
 const LEAF: usize = 4;
 
 #[derive(Clone, Debug)]
-struct Node {
+struct BoxNode {
     bounds: Bounds,
     /// Boxes of a leaf, as places in the tree's order.
     first: u32,
@@ -68,7 +68,7 @@ struct Node {
     children: u32,
 }
 
-impl Node {
+impl BoxNode {
     fn is_leaf(&self) -> bool {
         self.children == 0
     }
@@ -82,7 +82,7 @@ impl Node {
 #[derive(Clone, Debug)]
 pub(crate) struct BoxTree {
     /// A parent comes before its children.
-    nodes: Vec<Node>,
+    nodes: Vec<BoxNode>,
     /// Boxes by their places, in the tree's order.
     order: Vec<u32>,
     /// Boxes in the order of `order`.
@@ -97,7 +97,8 @@ impl BoxTree {
             0.5 * b.low[axis] + 0.5 * b.high[axis]
         };
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        let root = Node { bounds: Bounds::EMPTY, first: 0, count: order.len() as u32, children: 0 };
+        let root =
+            BoxNode { bounds: Bounds::EMPTY, first: 0, count: order.len() as u32, children: 0 };
         let mut nodes = vec![root];
         let mut next = 0;
         while next < nodes.len() {
@@ -119,7 +120,7 @@ impl BoxTree {
                 nodes[next].children = nodes.len() as u32;
                 let middle = half as u32;
                 for (first, count) in [(first, middle), (first + middle, count - middle)] {
-                    nodes.push(Node { bounds: Bounds::EMPTY, first, count, children: 0 });
+                    nodes.push(BoxNode { bounds: Bounds::EMPTY, first, count, children: 0 });
                 }
             }
             next += 1;
@@ -158,7 +159,7 @@ impl BoxTree {
     ) {
         let mut open = vec![0];
         while let Some(n) = open.pop() {
-            let node: &Node = &self.nodes[n];
+            let node: &BoxNode = &self.nodes[n];
             if !wanted(&node.bounds) {
                 continue;
             }
@@ -178,7 +179,7 @@ impl BoxTree {
     pub(crate) fn each_meeting(&self, other: &Self, mut visit: impl FnMut(usize, usize)) {
         let mut open = vec![(0, 0)];
         while let Some((i, j)) = open.pop() {
-            let (a, b): (&Node, &Node) = (&self.nodes[i], &other.nodes[j]);
+            let (a, b): (&BoxNode, &BoxNode) = (&self.nodes[i], &other.nodes[j]);
             if !a.bounds.meets(&b.bounds) {
                 continue;
             }
@@ -209,7 +210,7 @@ impl BoxTree {
             if most <= longest {
                 continue;
             }
-            let (a, b): (&Node, &Node) = (&self.nodes[i], &self.nodes[j]);
+            let (a, b): (&BoxNode, &BoxNode) = (&self.nodes[i], &self.nodes[j]);
             if a.is_leaf() && b.is_leaf() {
                 for x in a.places() {
                     for y in b.places() {
@@ -218,7 +219,7 @@ impl BoxTree {
                 }
                 continue;
             }
-            let halves = |node: &Node| [node.children as usize, node.children as usize + 1];
+            let halves = |node: &BoxNode| [node.children as usize, node.children as usize + 1];
             let bound = |i: usize, j: usize| {
                 (self.nodes[i].bounds.span_squared(&self.nodes[j].bounds), i, j)
             };

@@ -21,6 +21,9 @@ use crate::time::TimeSteps;
 /// each again, side by side as well; runs on which the loss does not depend are left out. Results and derivatives are the same, to
 /// the last bit, for any number of threads.
 ///
+/// Many short runs with friction take a tenth of the time with [`SemiImplicitEuler`](crate::SemiImplicitEuler) and [`Coulomb`](crate::Coulomb) of what they
+/// take with the default steps and a [`Material`](crate::Material), whose friction holds.
+///
 /// Whatever [`Model::parameters`] lists may differ, and may carry derivatives; so may states.
 ///
 /// ```

@@ -355,7 +355,7 @@ pub enum SimulationError {
     /// for.
     #[error(
         "the force between '{body}' and '{contact}' jumps at touch, so that derivatives through impacts would be wrong: let it \
-         fade in (GapSmoothing::Softplus), or choose a law whose damping grows with penetration (HuntCrossley)"
+         fade in (GapSmoothing::Softplus), or choose a law whose damping and friction grow with penetration (HuntCrossley, Coulomb)"
     )]
     ForceJumps {
         /// The body with the samples.

@@ -4,7 +4,7 @@
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and
 //! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`](contact::NormalLaw) and a
 //! [`FrictionLaw`](contact::FrictionLaw). Forces and their derivatives are gathered into one wrench a step, so that a
-//! rollout of a [`Model`] carries exact derivatives by its initial states and by every number of the model.
+//! rollout of a [`Model`] carries exact derivatives by its initial states and by all [parameters](Model::parameters) of the model.
 //!
 //! Links that joints hold together are [`articulated`]: they are bodies of a model like others, with laws along their joints
 //! ([`JointLaw`](joint_law::JointLaw)), contacts, loops ([`Bushing`]) and sensors, from code, URDF or MJCF.

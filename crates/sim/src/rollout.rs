@@ -26,7 +26,8 @@ pub struct Simulation<T> {
     pub resolution: Resolution,
 }
 
-/// Result of a controller: nothing, whether to go on, or a result of either, whose error ends the simulation.
+/// Result of a controller: nothing, whether to go on, or a result of either, whose error ends the simulation. An error is a [`SimulationError`] or
+/// becomes one; that of `anyhow` does not: end such a controller with `Ok::<_, SimulationError>(())`.
 pub trait ControlResult {
     /// Decision whether the simulation goes on.
     ///

@@ -7,12 +7,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::laws::{Begins, contact_law, values_of};
-use super::{BodyKey, Model};
+use super::{BodyKey, PyModel};
 use crate::arrays::{Numbers, pose};
 use crate::error::Raise;
 
 #[pymethods]
-impl Model {
+impl PyModel {
     /// Lets the samples of a body touch the field of another, under a law of that name (`prehend.contact_laws()`) with its parameters, or one written in
     /// Python (`prehend.laws`). Returns the names of its parameters.
     ///

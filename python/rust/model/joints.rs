@@ -13,10 +13,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::laws::{joint_law, values_of};
-use super::{BodyKey, GRAVITY, Model};
+use super::{BodyKey, GRAVITY, PyModel};
 use crate::arrays::{Numbers, pose};
 use crate::error::Raise;
-use crate::link::Link;
+use crate::link::PyLink;
 use crate::read_options::read_options;
 use crate::robot::Robot;
 use crate::threads::detached;
@@ -38,7 +38,7 @@ enum Axes {
     Sum(Vec<(AxisKey, f64)>),
 }
 
-impl Model {
+impl PyModel {
     fn axis(&self, key: &AxisKey) -> PyResult<JointAxis> {
         match key {
             AxisKey::Link(link) => Ok(self.id(link)?.into()),
@@ -84,9 +84,9 @@ fn base(floating: bool) -> Joint {
 }
 
 #[pymethods]
-impl Model {
+impl PyModel {
     /// Adds links, each after its parent, as bodies, and returns their numbers.
-    fn add_articulation(&mut self, links: Vec<Py<Link>>) -> PyResult<Vec<usize>> {
+    fn add_articulation(&mut self, links: Vec<Py<PyLink>>) -> PyResult<Vec<usize>> {
         let own = links.iter().map(|link| link.get().link.clone()).collect();
         let bodies = self.model.add_articulation(own).raise()?;
         for (body, link) in bodies.iter().zip(&links) {

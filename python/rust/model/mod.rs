@@ -19,13 +19,13 @@ use crate::integrator::AnyIntegrator;
 use crate::link::Matter;
 use crate::robot::Robot;
 use crate::rollout::Rollout;
-use crate::shape::Shape;
+use crate::shape::PyShape;
 
 /// Bodies, their contacts, and gravity [m/s²].
 ///
 /// Bodies are told by their number, in the order in which they were added, or by their name. `model["ball.mass"]` reads and writes a parameter.
-#[pyclass(module = "prehend")]
-pub(crate) struct Model {
+#[pyclass(name = "Model", module = "prehend")]
+pub(crate) struct PyModel {
     pub(crate) model: prehend_sim::Model,
     robots: Vec<Py<Robot>>,
 }
@@ -40,7 +40,7 @@ pub(crate) enum BodyKey {
     Name(String),
 }
 
-impl Model {
+impl PyModel {
     /// A model without bodies under `gravity` [m/s²].
     fn under(gravity: Vector3<f64>) -> Self {
         Self { model: prehend_sim::Model::new(gravity), robots: Vec::new() }
@@ -95,7 +95,7 @@ fn unknown(name: &str, names: &[String]) -> String {
 }
 
 #[pymethods]
-impl Model {
+impl PyModel {
     #[new]
     #[pyo3(signature = (gravity=None))]
     fn new(gravity: Option<Numbers<'_>>) -> PyResult<Self> {
@@ -111,7 +111,7 @@ impl Model {
     fn add_body(
         &mut self,
         name: &str,
-        shape: Option<&Shape>,
+        shape: Option<&PyShape>,
         fixed: bool,
         mass: Option<f64>,
         density: Option<f64>,

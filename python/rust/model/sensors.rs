@@ -4,13 +4,13 @@ use prehend_sim::{Integrator, State};
 use pyo3::prelude::*;
 
 use super::states::measured;
-use super::{BodyKey, Model};
+use super::{BodyKey, PyModel};
 use crate::arrays::{Array, Numbers, in_order, vector};
 use crate::error::Raise;
 use crate::integrator::AnyIntegrator;
 
 #[pymethods]
-impl Model {
+impl PyModel {
     /// Wrench of contacts and bushings on a body, world frame: force [N] and torque [N m] about its center of mass, of a link about its frame's origin.
     fn contact_wrench<'py>(
         &self,

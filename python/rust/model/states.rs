@@ -7,7 +7,7 @@ use prehend_sim::{BodyState, Motion, State};
 use pyo3::prelude::*;
 use pyo3::types::{PyEllipsis, PySlice};
 
-use super::{BodyKey, Model};
+use super::{BodyKey, PyModel};
 use crate::arrays::{Array, Numbers, array, in_order, pose, rows, vector_or};
 use crate::batch::{joined, with_batch};
 use crate::error::{Raise, wrong};
@@ -65,7 +65,7 @@ pub(crate) fn change(
     Ok(())
 }
 
-impl Model {
+impl PyModel {
     /// Ranges of a body's coordinates among positions and velocities.
     fn ranges(&self, body: &BodyKey) -> PyResult<[Range<usize>; 2]> {
         let id = self.id(body)?;
@@ -80,7 +80,7 @@ fn slice<'py>(py: Python<'py>, range: &Range<usize>) -> Bound<'py, PySlice> {
 }
 
 #[pymethods]
-impl Model {
+impl PyModel {
     /// Number of generalized positions, `state.q`: seven of each free body, and those of joints.
     #[getter]
     fn nq(&self) -> usize {

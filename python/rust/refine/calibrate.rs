@@ -8,9 +8,9 @@ use prehend_refine::data::{AssetError, Assets, Target, user_cache};
 use prehend_refine::data::{Calibrated, CalibrationFrames};
 use pyo3::prelude::*;
 
-use super::dataset::Dataset;
+use super::dataset::PyDataset;
 use super::poses::poses;
-use super::rig::Rig;
+use super::rig::PyRig;
 use super::run::at_least_one;
 use super::settings::settings;
 use crate::arrays::Numbers;
@@ -24,13 +24,13 @@ use crate::threads::detached;
 #[allow(clippy::type_complexity, clippy::too_many_arguments)] // as Python has it
 pub(crate) fn _calibrate(
     py: Python<'_>,
-    dataset: &Dataset,
+    dataset: &PyDataset,
     ids: Vec<(u32, u32, u32, usize)>,
     poses: Numbers<'_>,
     passes: usize,
     window: Option<usize>,
     settings: Option<Bound<'_, PyAny>>,
-) -> PyResult<(Rig, Vec<String>, Vec<String>)> {
+) -> PyResult<(PyRig, Vec<String>, Vec<String>)> {
     let poses = self::poses(&poses, "poses")?;
     if poses.len() != ids.len() {
         return Err(wrong(format!("{} poses of {} objects in images", poses.len(), ids.len())));
@@ -62,6 +62,6 @@ pub(crate) fn _calibrate(
     if done.poses.is_empty() {
         return Err(wrong(format!("no frame could be used: {}", failed.join("; "))));
     }
-    let rig = Rig { rig: Arc::new(done.calibrator.rig().clone()) };
+    let rig = PyRig { rig: Arc::new(done.calibrator.rig().clone()) };
     Ok((rig, done.left_out.into_values().collect(), failed))
 }

@@ -7,34 +7,34 @@ use prehend_refine::data::bop::{self, Detections, GroundTruth};
 use prehend_refine::data::{Assets, MaskSource, Target, find_targets, user_cache};
 use pyo3::prelude::*;
 
-use super::frame::Frame;
-use super::object::Object;
-use super::rig::Rig;
+use super::frame::PyFrame;
+use super::object::PyObject;
+use super::rig::PyRig;
 use crate::arrays::{Array, matrix};
 use crate::error::Raise;
 use crate::threads::detached;
 
 /// A split of a BOP dataset: `prehend.datasets.Bop` is made of it.
-#[pyclass(frozen, subclass, module = "prehend")]
-pub(crate) struct Dataset {
+#[pyclass(name = "Dataset", frozen, subclass, module = "prehend")]
+pub(crate) struct PyDataset {
     pub(super) dataset: bop::Dataset,
     assets: Mutex<Assets>,
 }
 
-impl Dataset {
+impl PyDataset {
     pub(super) fn assets(&self) -> MutexGuard<'_, Assets> {
         self.assets.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 #[pymethods]
-impl Dataset {
+impl PyDataset {
     #[new]
     #[pyo3(signature = (path, split=None, *, rig=None, detections=None, seed=0))]
     fn new(
         path: PathBuf,
         split: Option<&str>,
-        rig: Option<&Rig>,
+        rig: Option<&PyRig>,
         detections: Option<PathBuf>,
         seed: u64,
     ) -> PyResult<Self> {
@@ -72,9 +72,9 @@ impl Dataset {
     }
 
     /// The object of that number, prepared once.
-    fn object(&self, py: Python<'_>, object: u32) -> PyResult<Object> {
+    fn object(&self, py: Python<'_>, object: u32) -> PyResult<PyObject> {
         let object = detached(py, || self.assets().object(object))?.raise()?;
-        Ok(Object { object })
+        Ok(PyObject { object })
     }
 
     /// Targets that the dataset lists, by the numbers of scene, image, object and mask.
@@ -92,11 +92,11 @@ impl Dataset {
         image: u32,
         object: u32,
         instance: usize,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let target = Target { scene_id: scene, im_id: image, obj_id: object, instance };
         // Python's lock first let go: another thread may wait for it with the assets in hand.
         let input = detached(py, || self.assets().load(&target, None, &[]))?.raise()?;
-        Ok(Frame { input, target: Some(target) })
+        Ok(PyFrame { input, target: Some(target) })
     }
 
     /// The true poses in an image, with the numbers of their objects, in the order of their masks: (object, 4 × 4, camera ← object [m]).

@@ -5,7 +5,7 @@ use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::metrics::{ScoredRow, Statistic, summarize};
 use pyo3::prelude::*;
 
-use super::dataset::Dataset;
+use super::dataset::PyDataset;
 use super::poses::poses;
 use crate::arrays::{Array, Numbers, array};
 use crate::error::wrong;
@@ -19,7 +19,7 @@ type Scores<'py> = (Vec<&'static str>, Array<'py>, Array<'py>, Array<'py>, Vec<(
 #[pyfunction]
 pub(crate) fn _score<'py>(
     py: Python<'py>,
-    dataset: &Dataset,
+    dataset: &PyDataset,
     ids: Vec<(u32, u32, u32)>,
     poses: Numbers<'py>,
 ) -> PyResult<Scores<'py>> {

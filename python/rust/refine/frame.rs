@@ -11,12 +11,12 @@ use prehend_refine::{Estimator, EstimatorInput, PoseFinder, RefineError};
 use prehend_render::{Camera, DepthImage, Distortion, Mask, Remap, RgbImage};
 use pyo3::prelude::*;
 
-use super::hand::Hand;
+use super::hand::PyHand;
 use super::measured::{Joints, measured};
-use super::network::PoseNetwork;
+use super::network::PyPoseNetwork;
 use super::object::prepared;
 use super::poses::{hypotheses, pose};
-use super::rig::Rig;
+use super::rig::PyRig;
 use super::run::{self, Noise};
 use super::settings::settings;
 use super::{estimate, images};
@@ -33,14 +33,14 @@ use crate::threads::detached;
 /// name, or in the order of `hand.joints` [rad; m of prismatic ones]. touch: taxels × 3, the force of the object on each in the frame of its link [N],
 /// NaN where nothing is known. gravity: in the camera frame [m/s²]. lens: ("brown_conrady" or "kannala_brandt", coefficients in OpenCV's order),
 /// through which the images were taken; they are made those of a pinhole. rig: what corrects the frame; its object is corrected by `rig.corrected`.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Frame {
+#[pyclass(name = "Frame", frozen, module = "prehend")]
+pub(crate) struct PyFrame {
     pub(super) input: FrameInput,
     pub(super) target: Option<Target>,
 }
 
 #[pymethods]
-impl Frame {
+impl PyFrame {
     #[new]
     #[pyo3(signature = (rgb, depth, K, object, *, mask=None, hand=None, hand_pose=None, joints=None, touch=None, gravity=None, depth_scale=None,
                         lens=None, rig=None))]
@@ -51,14 +51,14 @@ impl Frame {
         K: Numbers<'_>,
         object: Bound<'_, PyAny>,
         mask: Option<Bound<'_, PyAny>>,
-        hand: Option<&Hand>,
+        hand: Option<&PyHand>,
         hand_pose: Option<Numbers<'_>>,
         joints: Option<Joints<'_>>,
         touch: Option<Numbers<'_>>,
         gravity: Option<Numbers<'_>>,
         depth_scale: Option<f64>,
         lens: Option<(String, Vec<f64>)>,
-        rig: Option<&Rig>,
+        rig: Option<&PyRig>,
     ) -> PyResult<Self> {
         let color = rgb.as_ref().map(images::color).transpose()?;
         let depth = depth.map(|depth| images::depth(&depth, depth_scale)).transpose()?;
@@ -127,7 +127,7 @@ impl Frame {
     fn load<'py>(
         py: Python<'py>,
         path: PathBuf,
-        rig: Option<&Rig>,
+        rig: Option<&PyRig>,
     ) -> PyResult<(Self, Array<'py>)> {
         let rig = rig.map(|rig| Arc::clone(&rig.rig));
         let load = || load_frame_file(&path, 0, user_cache().as_ref(), rig);
@@ -168,7 +168,7 @@ impl Frame {
         &self,
         py: Python<'py>,
         settings: Option<Bound<'py, PyAny>>,
-        network: Option<&PoseNetwork>,
+        network: Option<&PyPoseNetwork>,
     ) -> PyResult<(Array<'py>, Array<'py>)> {
         let settings = self::settings(settings.as_ref())?;
         let network = network.map(|network| Arc::clone(&network.network) as Arc<dyn PoseFinder>);

@@ -7,16 +7,16 @@ use prehend_refine::evaluate::report::outline_picture;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::frame::Frame;
-use super::hand::Hand;
+use super::frame::PyFrame;
+use super::hand::PyHand;
 use super::images;
-use super::object::Object;
+use super::object::PyObject;
 use super::poses::pose;
 use crate::arrays::{Array, Numbers, array, matrix};
 use crate::threads::detached;
 
 #[pymethods]
-impl Frame {
+impl PyFrame {
     /// H × W × 3 of uint8.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, u8>> {
@@ -55,15 +55,15 @@ impl Frame {
 
     /// The object.
     #[getter]
-    fn object(&self) -> Object {
-        Object { object: Arc::clone(&self.input.object) }
+    fn object(&self) -> PyObject {
+        PyObject { object: Arc::clone(&self.input.object) }
     }
 
     /// The hand, where it is known.
     #[getter]
-    fn hand(&self) -> Option<Hand> {
+    fn hand(&self) -> Option<PyHand> {
         let measured = self.input.frame.hand.as_ref();
-        measured.map(|measured| Hand { hand: Arc::clone(&measured.hand) })
+        measured.map(|measured| PyHand { hand: Arc::clone(&measured.hand) })
     }
 
     /// 4 × 4, camera ← base of the hand [m], where it is known.

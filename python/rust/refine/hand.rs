@@ -15,13 +15,13 @@ use crate::threads::detached;
 /// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
 ///
 /// Options of reading are those of `Model.add_urdf`. What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Hand {
+#[pyclass(name = "Hand", frozen, module = "prehend")]
+pub(crate) struct PyHand {
     pub(super) hand: Arc<prehend_refine::Hand>,
 }
 
 #[pymethods]
-impl Hand {
+impl PyHand {
     #[new]
     #[pyo3(signature = (path, taxels=None, **options))]
     fn new(

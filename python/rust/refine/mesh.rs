@@ -16,13 +16,13 @@ use crate::error::{Raise, wrong};
 ///
 /// vertices: n × 3 [m]; faces: m × 3, counter-clockwise seen from outside; colors: n × 3 in 0..1, sRGB; or uvs: n × 2, (0, 0) the lower left corner
 /// of texture, H × W × 3 of uint8.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Mesh {
+#[pyclass(name = "Mesh", frozen, module = "prehend")]
+pub(crate) struct PyMesh {
     pub(crate) mesh: TriMesh,
 }
 
 #[pymethods]
-impl Mesh {
+impl PyMesh {
     #[new]
     #[pyo3(signature = (vertices, faces, *, colors=None, uvs=None, texture=None))]
     fn new(

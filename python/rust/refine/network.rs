@@ -11,14 +11,14 @@ use crate::threads::detached;
 
 /// Network that proposes poses of one object, of a safetensors file that `prehend-learn` or others have made: for `Frame.search` and `Tracker`. `settings`
 /// are as `Frame.refine` has them.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct PoseNetwork {
+#[pyclass(name = "PoseNetwork", frozen, module = "prehend")]
+pub(crate) struct PyPoseNetwork {
     pub(super) network: Arc<prehend_refine::network::PoseNetwork>,
     file: PathBuf,
 }
 
 #[pymethods]
-impl PoseNetwork {
+impl PyPoseNetwork {
     #[new]
     #[pyo3(signature = (file, *, settings=None))]
     fn new(py: Python<'_>, file: PathBuf, settings: Option<Bound<'_, PyAny>>) -> PyResult<Self> {

@@ -8,7 +8,7 @@ use prehend_refine::scene::Inertial;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use super::mesh::Mesh;
+use super::mesh::PyMesh;
 use crate::arrays::{Numbers, inertia, vector};
 use crate::error::{Raise, wrong};
 use crate::threads::detached;
@@ -17,17 +17,17 @@ use crate::threads::detached;
 ///
 /// Its mass [kg], or density [kg/m³] (500, if neither is given), is spread evenly, which needs a closed mesh; or mass, center of mass `com` [m] and
 /// `inertia` about it [kg m²] are all given, in the mesh's frame. `seed` decides where the surface is sampled.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Object {
+#[pyclass(name = "Object", frozen, module = "prehend")]
+pub(crate) struct PyObject {
     pub(super) object: Arc<prehend_refine::Object>,
 }
 
 /// The object that Python gave; a mesh is prepared, with a mass that is assumed.
 pub(super) fn prepared(given: &Bound<'_, PyAny>) -> PyResult<Arc<prehend_refine::Object>> {
-    if let Ok(object) = given.cast::<Object>() {
+    if let Ok(object) = given.cast::<PyObject>() {
         return Ok(Arc::clone(&object.get().object));
     }
-    let Ok(mesh) = given.cast::<Mesh>() else {
+    let Ok(mesh) = given.cast::<PyMesh>() else {
         let kind = given.get_type();
         let text = format!(
             "an Object or a Mesh is expected, not {}; Mesh.load(path) reads one from a file",
@@ -43,13 +43,13 @@ pub(super) fn prepared(given: &Bound<'_, PyAny>) -> PyResult<Arc<prehend_refine:
 }
 
 #[pymethods]
-impl Object {
+impl PyObject {
     #[new]
     #[pyo3(signature = (mesh, *, mass=None, density=None, com=None, inertia=None, name="object", seed=0))]
     #[allow(clippy::too_many_arguments)] // as many as Python names
     fn new(
         py: Python<'_>,
-        mesh: &Mesh,
+        mesh: &PyMesh,
         mass: Option<f64>,
         density: Option<f64>,
         com: Option<Numbers<'_>>,
@@ -91,8 +91,8 @@ impl Object {
 
     /// Its mesh, as it was given.
     #[getter]
-    fn mesh(&self) -> Mesh {
-        Mesh { mesh: self.object.mesh.clone() }
+    fn mesh(&self) -> PyMesh {
+        PyMesh { mesh: self.object.mesh.clone() }
     }
 
     /// The center of its bounding box [m], about which twists of an estimate turn.

@@ -8,19 +8,19 @@ use numpy::ndarray::IxDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::object::Object;
+use super::object::PyObject;
 use crate::arrays::array;
 use crate::error::Raise;
 use crate::threads::detached;
 
 /// Calibration of a rig of camera and hand: errors that all of its frames share, as `calibrate` has found them.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Rig {
+#[pyclass(name = "Rig", frozen, module = "prehend")]
+pub(crate) struct PyRig {
     pub(super) rig: Arc<prehend_refine::rig::Rig>,
 }
 
 #[pymethods]
-impl Rig {
+impl PyRig {
     /// Reads a rig from a JSON file.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
@@ -33,10 +33,10 @@ impl Rig {
     }
 
     /// The object of that number with the surface that the rig has found and its own mass; as it is, if the rig does not know the number.
-    fn corrected(&self, py: Python<'_>, object: &Object, object_id: u32) -> PyResult<Object> {
+    fn corrected(&self, py: Python<'_>, object: &PyObject, object_id: u32) -> PyResult<PyObject> {
         let given = Arc::clone(&object.object);
         let corrected = detached(py, || self.rig.corrected_object(object_id, &given))?.raise()?;
-        Ok(Object { object: corrected.map_or(given, Arc::new) })
+        Ok(PyObject { object: corrected.map_or(given, Arc::new) })
     }
 
     /// Corrections by name [m, rad; focal lengths], without the smooth field of depth offsets.

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use super::estimate;
-use super::frame::Frame;
+use super::frame::PyFrame;
 use super::poses::poses;
 use super::settings::settings;
 use crate::arrays::Numbers;
@@ -134,7 +134,7 @@ pub(crate) fn methods() -> BTreeMap<&'static str, &'static str> {
 #[allow(clippy::too_many_arguments)] // as Python has it
 pub(crate) fn refine_batch<'py>(
     py: Python<'py>,
-    frames: Vec<Py<Frame>>,
+    frames: Vec<Py<PyFrame>>,
     poses: Numbers<'py>,
     method: &str,
     iterations: Option<usize>,
@@ -152,7 +152,7 @@ pub(crate) fn refine_batch<'py>(
         return Err(wrong(format!("poses: {count} are expected, one a frame, not {given}")));
     }
     let job = |(frame, initial): (_, &Isometry3<f64>)| {
-        let Frame { input, .. } = Py::get(frame);
+        let PyFrame { input, .. } = Py::get(frame);
         let estimator = input.estimator(&method).supported_by(&input.frame);
         RefineJob { estimator, frame: &input.frame, hypotheses: (*initial).into() }
     };

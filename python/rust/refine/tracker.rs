@@ -7,11 +7,11 @@ use prehend_refine::tracker::Recovery;
 use pyo3::prelude::*;
 
 use super::estimate;
-use super::frame::Frame;
-use super::network::PoseNetwork;
+use super::frame::PyFrame;
+use super::network::PyPoseNetwork;
 use super::object::prepared;
 use super::poses::pose;
-use super::rig::Rig;
+use super::rig::PyRig;
 use super::settings::settings;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
@@ -22,8 +22,8 @@ use crate::threads::detached;
 /// `pose` (4 × 4, camera ← object [m]) is where to begin; without it the first frame is searched. `budget` [s] is what following may take in a frame.
 /// `recovery` is what is done about an object that is lost: "off", "near" (look about where it should be) or "anywhere", the default. Of a `rig`, frames
 /// and the object are corrected already. A `network` of the object, a `PoseNetwork`, is asked where the object is before any search. `settings` are a dict or the path of a TOML file, as `Frame.refine` has them.
-#[pyclass(module = "prehend")]
-pub(crate) struct Tracker {
+#[pyclass(name = "Tracker", module = "prehend")]
+pub(crate) struct PyTracker {
     tracker: prehend_refine::tracker::Tracker,
 }
 
@@ -33,17 +33,17 @@ fn seconds(seconds: f64, what: &str) -> PyResult<Duration> {
 }
 
 #[pymethods]
-impl Tracker {
+impl PyTracker {
     #[new]
     #[allow(clippy::too_many_arguments)] // as Python has it
     #[pyo3(signature = (object, *, pose=None, rig=None, budget=None, recovery=None, network=None, settings=None))]
     fn new(
         object: Bound<'_, PyAny>,
         pose: Option<Numbers<'_>>,
-        rig: Option<&Rig>,
+        rig: Option<&PyRig>,
         budget: Option<f64>,
         recovery: Option<&str>,
-        network: Option<&PoseNetwork>,
+        network: Option<&PyPoseNetwork>,
         settings: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let recovery = recovery.map(|name| name.parse::<Recovery>().raise()).transpose()?;
@@ -73,7 +73,7 @@ impl Tracker {
     fn push<'py>(
         &mut self,
         py: Python<'py>,
-        frame: &Frame,
+        frame: &PyFrame,
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let tracked = detached(py, || self.tracker.track_at(&frame.input.frame, time))?.raise()?;

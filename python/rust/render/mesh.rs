@@ -48,7 +48,7 @@ fn read(mesh: &Bound<'_, PyAny>) -> PyResult<TriMesh> {
         let faces = self::faces(&faces, vertices.len())?;
         return Ok(TriMesh::new(vertices, faces));
     }
-    if let Ok(mesh) = mesh.cast::<crate::refine::Mesh>() {
+    if let Ok(mesh) = mesh.cast::<crate::refine::PyMesh>() {
         return Ok(mesh.get().mesh.clone());
     }
     let Ok(path) = mesh.extract::<PathBuf>() else {

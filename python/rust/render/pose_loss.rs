@@ -31,13 +31,13 @@ use crate::threads::detached;
 /// The loss is a mean over the mask's pixels and three channels: of half the squared difference of color (`color_weight`; `kernel` "squared", "huber",
 /// "cauchy", "geman_mcclure" or "tukey" with `kernel_scale`), of coverage (`mask_weight`), and of depth in units of `depth_scale` [m] up to
 /// `depth_truncation` [m] (`depth_weight`). Each pixel is drawn with `samples` × `samples` samples. Pixels are computed in single precision.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct PoseLoss {
+#[pyclass(name = "PoseLoss", frozen, module = "prehend")]
+pub(crate) struct PyPoseLoss {
     problem: PoseProblem,
     light: Light,
 }
 
-impl PoseLoss {
+impl PyPoseLoss {
     /// Poses, each under its light, and the length of the batch.
     fn hypotheses(
         &self,
@@ -59,7 +59,7 @@ impl PoseLoss {
 }
 
 #[pymethods]
-impl PoseLoss {
+impl PyPoseLoss {
     #[new]
     #[pyo3(signature = (
         mesh, K, image, mask, *, depth=None, occluder=None, colors=None, uvs=None, texture=None, light=None,

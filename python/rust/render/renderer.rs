@@ -29,8 +29,8 @@ use crate::threads::detached;
 ///
 /// Vertices of the mesh at one place are one: `vertices` and `faces` are those that the renderer has. Shapes and colors are kept in single precision, all else is
 /// computed in double.
-#[pyclass(frozen, module = "prehend")]
-pub(crate) struct Renderer {
+#[pyclass(name = "Renderer", frozen, module = "prehend")]
+pub(crate) struct PyRenderer {
     pub(super) model: Arc<RenderModel>,
     pub(super) camera: Camera,
     pub(super) mode: Mode,
@@ -38,7 +38,7 @@ pub(crate) struct Renderer {
     pub(super) background: [f64; 3],
 }
 
-impl Renderer {
+impl PyRenderer {
     /// The pictures, and what carries derivatives back.
     fn rendered(
         &self,
@@ -56,7 +56,7 @@ impl Renderer {
 }
 
 #[pymethods]
-impl Renderer {
+impl PyRenderer {
     #[new]
     #[pyo3(signature = (mesh, K, size, *, colors=None, uvs=None, texture=None, light=None, background=None, mode="contour", **settings))]
     #[expect(non_snake_case, clippy::too_many_arguments)] // Python's own

@@ -11,7 +11,7 @@ use super::inputs::{Input, batch_of};
 use super::light::light;
 use super::mesh::single;
 use super::pose::pose;
-use super::renderer::Renderer;
+use super::renderer::PyRenderer;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
 
@@ -36,7 +36,7 @@ impl Inputs<'_> {
     }
 }
 
-impl Renderer {
+impl PyRenderer {
     pub(super) fn inputs<'a>(
         &self,
         pose: &'a Numbers<'_>,

@@ -10,7 +10,7 @@ use wide::f32x8;
 
 use super::bvh::{Bvh, Child, child};
 use super::pack::Point8;
-use super::triangle::Foot;
+use super::triangle::TriangleFoot;
 
 /// Triangles kept for the last word.
 const KEPT: usize = 16;
@@ -27,7 +27,7 @@ impl Bvh {
         p: &Vector3<f64>,
         limit: f64,
         hint: Option<u32>,
-    ) -> Option<(usize, Foot)> {
+    ) -> Option<(usize, TriangleFoot)> {
         let local = p - self.center;
         let far = local.amax();
         let mut last = LastWord { p, limit, face: u32::MAX, found: None };
@@ -191,7 +191,7 @@ struct LastWord<'a> {
     /// Squared distance of the nearest \[m²\]; what is to be found is nearer at first.
     limit: f64,
     face: u32,
-    found: Option<(usize, Foot)>,
+    found: Option<(usize, TriangleFoot)>,
 }
 
 impl LastWord<'_> {

@@ -32,7 +32,7 @@ pub(crate) struct Triangle {
 
 /// Where on a triangle the closest point lies.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Foot {
+pub(crate) struct TriangleFoot {
     /// Squared distance \[m²\].
     pub(crate) distance_squared: f64,
     /// Weights of the second and third corner.
@@ -56,15 +56,15 @@ impl Triangle {
     }
 
     #[inline]
-    fn foot(&self, ap: &Vector3<f64>, v: f64, w: f64, feature: Feature) -> Foot {
+    fn foot(&self, ap: &Vector3<f64>, v: f64, w: f64, feature: Feature) -> TriangleFoot {
         let d = ap - self.ab * v - self.ac * w;
-        Foot { distance_squared: d.norm_squared(), v, w, feature }
+        TriangleFoot { distance_squared: d.norm_squared(), v, w, feature }
     }
 
     /// The closest point, by the Voronoi region of the triangle that `p` projects into
     /// (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
     #[inline]
-    pub(crate) fn closest(&self, p: &Vector3<f64>) -> Foot {
+    pub(crate) fn closest(&self, p: &Vector3<f64>) -> TriangleFoot {
         let ap = p - self.a;
         if self.sliver {
             return self.closest_of_edges(&ap);
@@ -103,7 +103,7 @@ impl Triangle {
     }
 
     /// The closest of the three edges and, if `p` projects inside, of the plane.
-    fn closest_of_edges(&self, ap: &Vector3<f64>) -> Foot {
+    fn closest_of_edges(&self, ap: &Vector3<f64>) -> TriangleFoot {
         let corners = [Vector3::zeros(), self.ab, self.ac];
         let weights = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
         let mut best = self.foot(ap, 0.0, 0.0, Feature::Vertex(0));

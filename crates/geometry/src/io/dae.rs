@@ -22,7 +22,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let document = Document::parse(text).map_err(|e| malformed(&e))?;
     let root = document.root_element();
     let ids = document.descendants().filter_map(|node| Some((node.attribute("id")?, node)));
-    let mut reader = Reader { path, ids: ids.collect(), mesh: TriMesh::default() };
+    let mut reader = ColladaReader { path, ids: ids.collect(), mesh: TriMesh::default() };
     let unit = children(root, "asset").flat_map(|asset| children(asset, "unit")).next();
     let unit = unit.and_then(|unit| unit.attribute("meter")?.parse().ok()).unwrap_or(1.0);
     let scenes = children(root, "scene").flat_map(|s| children(s, "instance_visual_scene"));
@@ -37,13 +37,13 @@ fn children<'a, 'i>(node: Node<'a, 'i>, tag: &'a str) -> impl Iterator<Item = No
     node.children().filter(move |child| child.tag_name().name() == tag)
 }
 
-struct Reader<'a, 'i> {
+struct ColladaReader<'a, 'i> {
     path: &'a Path,
     ids: BTreeMap<&'a str, Node<'a, 'i>>,
     mesh: TriMesh,
 }
 
-impl<'a, 'i> Reader<'a, 'i> {
+impl<'a, 'i> ColladaReader<'a, 'i> {
     fn fault(&self, node: Node<'a, 'i>, reason: impl ToString) -> MeshError {
         let line = node.document().text_pos_at(node.range().start).row;
         let element = format!("line {line}: {}", node.tag_name().name());

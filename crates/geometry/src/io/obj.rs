@@ -19,7 +19,7 @@ type Corner = [u32; 3];
 const NONE: u32 = u32::MAX;
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
-    let content = Content::parse(bytes, path)?;
+    let content = ObjContent::parse(bytes, path)?;
     let library = content.library(path);
     let unknown = content.unknown_materials(&library);
     if !unknown.is_empty() {
@@ -30,7 +30,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let find = |name: &String| mtl::without_comment(name).find_map(|name| library.get(name));
     let materials: Vec<_> = content.materials.iter().map(find).collect();
     // A mesh has texture coordinates at all corners or at none.
-    let run = |face: &Face, corners: &[Corner]| {
+    let run = |face: &ObjFace, corners: &[Corner]| {
         let is_painted = corners.iter().all(|[_, uv, _]| *uv != NONE);
         (face.group, face.material.filter(|&m| materials[m].is_some()), is_painted)
     };
@@ -51,7 +51,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
 
 /// Positions and faces alone; corners share their position whatever their normals are. Without faces all positions that are finite.
 pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh> {
-    let mut content = Content::parse(bytes, path)?;
+    let mut content = ObjContent::parse(bytes, path)?;
     let mut whole = TriMesh::default();
     for (_, mesh) in content.meshes(|face, _| face.group, |[at, _, _]| [at, NONE, NONE]) {
         whole.append(&TriMesh::new(mesh.vertices, mesh.faces));
@@ -65,7 +65,7 @@ pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh> {
 
 /// Statements of a file.
 #[derive(Default)]
-struct Content {
+struct ObjContent {
     positions: Vec<Point3<f64>>,
     /// Colors of the positions.
     colors: Vec<Option<[f32; 3]>>,
@@ -73,7 +73,7 @@ struct Content {
     normals: Vec<Vector3<f64>>,
     polygons: Polygons<Corner>,
     /// Places of the polygons.
-    faces: Vec<Face>,
+    faces: Vec<ObjFace>,
     /// Names that stand behind `usemtl`.
     materials: Vec<String>,
     /// Names that stand behind `mtllib`, in their order.
@@ -81,7 +81,7 @@ struct Content {
 }
 
 /// Place of a polygon.
-struct Face {
+struct ObjFace {
     /// Line of the file, from 1.
     line: usize,
     /// Number of objects and groups above it.
@@ -90,7 +90,7 @@ struct Face {
     material: Option<usize>,
 }
 
-impl Content {
+impl ObjContent {
     fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let fault =
             |line: usize, reason| MeshError::malformed(path, format!("line {line}"), reason);
@@ -117,7 +117,7 @@ impl Content {
                     // Of two corners it is a line.
                     if corners.len() > 2 {
                         all.polygons.push(corners);
-                        all.faces.push(Face { line: number, group, material });
+                        all.faces.push(ObjFace { line: number, group, material });
                     }
                 }
                 "v" | "vt" | "vn" => {
@@ -211,7 +211,7 @@ impl Content {
     /// Meshes of successive faces of one `run`, with that run. Corners of one `identity` are one vertex.
     fn meshes<R: PartialEq>(
         &self,
-        run: impl Fn(&Face, &[Corner]) -> R,
+        run: impl Fn(&ObjFace, &[Corner]) -> R,
         identity: impl Fn(Corner) -> Corner,
     ) -> Vec<(R, TriMesh)> {
         let mut meshes = Vec::new();
@@ -385,7 +385,7 @@ mod tests {
         assert_eq!(mesh.faces, [[0, 1, 2], [3, 4, 5]]);
         let colors = mesh.colors.unwrap();
         assert_eq!((colors[0], colors[3]), ([1.0, 0.0, 0.0], [1.0; 3]));
-        let content = Content::parse(text.as_bytes(), &path).unwrap();
+        let content = ObjContent::parse(text.as_bytes(), &path).unwrap();
         let unknown = content.unknown_materials(&content.library(&path));
         assert_eq!(unknown, BTreeSet::from(["gone"]));
     }

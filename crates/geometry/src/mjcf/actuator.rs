@@ -127,7 +127,7 @@ const ACTIVATION_RANGE: [&str; 2] = ["actlimited", "actrange"];
 
 /// Attributes of an actuator: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
-pub(super) struct Spec {
+pub(super) struct ActuatorSpec {
     gear: [f64; 6],
     /// Length of a crank's rod \[m\].
     rod: f64,
@@ -140,7 +140,7 @@ pub(super) struct Spec {
     length_range: Option<[f64; 2]>,
 }
 
-impl Default for Spec {
+impl Default for ActuatorSpec {
     fn default() -> Self {
         let free = Limits::default();
         Self {
@@ -157,7 +157,7 @@ impl Default for Spec {
     }
 }
 
-impl Spec {
+impl ActuatorSpec {
     /// Reads an element of a default class, if it is an actuator that is read.
     pub(super) fn read_default(&mut self, e: &Element) -> Result<bool> {
         let Some(kind) = DriveKind::of(&e.tag) else { return Ok(false) };
@@ -287,7 +287,7 @@ fn build(
 /// The transmission of the actuator `e`; `None`, after a refusal, where it is not read.
 fn transmission(
     e: &Element,
-    spec: &Spec,
+    spec: &ActuatorSpec,
     model: &Model,
     names: &Names,
 ) -> Result<Option<Transmission>> {

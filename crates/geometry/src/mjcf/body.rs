@@ -6,7 +6,7 @@ use super::class::{Classes, MAIN};
 use super::compiler::{Compilers, InertiaFrom};
 use super::element::{Element, Use};
 use super::error::{MjcfError, Result};
-use super::geom::{Assets, Geom};
+use super::geom::{Geom, GeomAssets};
 use super::inertial;
 use super::joint::{self, Joint, JointKind};
 use super::names::Taken;
@@ -63,7 +63,7 @@ pub(super) fn read(
     root: &Element,
     compilers: &Compilers,
     classes: &Classes,
-    assets: &Assets<'_>,
+    assets: &GeomAssets<'_>,
 ) -> Result<Tree> {
     let mut reader = Reader {
         compilers,
@@ -104,7 +104,7 @@ impl Tree {
 struct Reader<'a> {
     compilers: &'a Compilers,
     classes: &'a Classes,
-    assets: &'a Assets<'a>,
+    assets: &'a GeomAssets<'a>,
     tree: Tree,
     /// Mass and inertia of the geoms of each body, in its frame; `None` where its own `inertial` element counts.
     weights: Vec<Option<Vec<Inertial>>>,
@@ -192,7 +192,7 @@ impl Reader<'_> {
             return Err(e.misplaced("the world has no joints"));
         };
         let joint = if e.tag == "freejoint" {
-            joint::Spec::free(e, self.compilers.of(e))?
+            joint::JointSpec::free(e, self.compilers.of(e))?
         } else {
             let mut spec = self.classes.of(e, spot.class)?.joint.clone();
             spec.read(e, self.compilers.of(e))?;

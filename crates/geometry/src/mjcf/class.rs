@@ -14,14 +14,14 @@ pub(super) const MAIN: usize = 0;
 /// The state in which elements of a class begin.
 #[derive(Clone, Default)]
 pub(super) struct Class {
-    pub(super) joint: joint::Spec,
-    pub(super) geom: geom::Spec,
-    pub(super) site: site::Spec,
-    pub(super) mesh: mesh::Spec,
-    pub(super) material: material::Spec,
-    pub(super) tendon: tendon::Spec,
-    pub(super) equality: equality::Spec,
-    pub(super) actuator: actuator::Spec,
+    pub(super) joint: joint::JointSpec,
+    pub(super) geom: geom::GeomSpec,
+    pub(super) site: site::SiteSpec,
+    pub(super) mesh: mesh::MeshSpec,
+    pub(super) material: material::MaterialSpec,
+    pub(super) tendon: tendon::TendonSpec,
+    pub(super) equality: equality::EqualitySpec,
+    pub(super) actuator: actuator::ActuatorSpec,
 }
 
 /// All classes of a model.

@@ -37,7 +37,7 @@ impl DriveKind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Form {
+enum DriveForm {
     /// No force at all, for biases.
     None,
     /// The first parameter.
@@ -62,9 +62,9 @@ enum Activation {
 /// How an actuator makes force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drive {
-    gain_form: Form,
+    gain_form: DriveForm,
     gain: [f64; 3],
-    bias_form: Form,
+    bias_form: DriveForm,
     /// The last, where it is positive and the others are those of a spring, is a damping ratio.
     bias: [f64; 3],
     activation: Activation,
@@ -77,9 +77,9 @@ pub(super) struct Drive {
 
 impl Drive {
     const GENERAL: Self = Self {
-        gain_form: Form::Fixed,
+        gain_form: DriveForm::Fixed,
         gain: [1.0, 0.0, 0.0],
-        bias_form: Form::None,
+        bias_form: DriveForm::None,
         bias: [0.0; 3],
         activation: Activation::None,
         time_constant: 1.0,
@@ -90,10 +90,10 @@ impl Drive {
     /// Gain, bias and dynamics; `None` where they are of a form that is not read.
     pub(super) fn resolved(&self) -> Option<([f64; 3], [f64; 3], Dynamics)> {
         let of = |form, values: [f64; 3]| match form {
-            Form::None | Form::Muscle => Some([0.0; 3]),
-            Form::Fixed => Some([values[0], 0.0, 0.0]),
-            Form::Affine => Some(values),
-            Form::Other => None,
+            DriveForm::None | DriveForm::Muscle => Some([0.0; 3]),
+            DriveForm::Fixed => Some([values[0], 0.0, 0.0]),
+            DriveForm::Affine => Some(values),
+            DriveForm::Other => None,
         };
         let dynamics = match self.activation {
             Activation::None => Dynamics::Direct,
@@ -126,8 +126,8 @@ impl Drive {
     /// True if its gain, bias or dynamics are a muscle's, and whether all are.
     pub(super) fn is_muscle(&self) -> [bool; 2] {
         let parts = [
-            self.gain_form == Form::Muscle,
-            self.bias_form == Form::Muscle,
+            self.gain_form == DriveForm::Muscle,
+            self.bias_form == DriveForm::Muscle,
             self.activation == Activation::Muscle,
         ];
         [parts.contains(&true), !parts.contains(&false)]
@@ -140,22 +140,22 @@ impl Drive {
 
     /// Whether the last bias is the damping ratio of a servo of positions.
     pub(super) fn has_damping_ratio(&self) -> bool {
-        let is_servo = self.gain_form == Form::Fixed && self.bias_form == Form::Affine;
+        let is_servo = self.gain_form == DriveForm::Fixed && self.bias_form == DriveForm::Affine;
         is_servo && self.bias[2] > 0.0 && self.gain[0] >= 0.0 && self.gain[0] == -self.bias[1]
     }
 
     fn read_general(&mut self, e: &Element) -> Result<()> {
         let gains = [
-            ("fixed", Form::Fixed),
-            ("affine", Form::Affine),
-            ("muscle", Form::Muscle),
-            ("user", Form::Other),
+            ("fixed", DriveForm::Fixed),
+            ("affine", DriveForm::Affine),
+            ("muscle", DriveForm::Muscle),
+            ("user", DriveForm::Other),
         ];
         let biases = [
-            ("none", Form::None),
-            ("affine", Form::Affine),
-            ("muscle", Form::Muscle),
-            ("user", Form::Other),
+            ("none", DriveForm::None),
+            ("affine", DriveForm::Affine),
+            ("muscle", DriveForm::Muscle),
+            ("user", DriveForm::Other),
         ];
         let dynamics = [
             ("none", Activation::None),
@@ -186,7 +186,7 @@ impl Drive {
     }
 
     fn read_muscle(&mut self, e: &Element) -> Result<()> {
-        (self.gain_form, self.bias_form) = (Form::Muscle, Form::Muscle);
+        (self.gain_form, self.bias_form) = (DriveForm::Muscle, DriveForm::Muscle);
         self.activation = Activation::Muscle;
         let (times, gain) = &mut self.muscle;
         e.leading("timeconst", &mut times[..2])?;
@@ -211,8 +211,8 @@ impl Drive {
             return Err(e.invalid("kp", "must not be negative beside a damping ratio"));
         }
         let last = damping.or(ratio).unwrap_or(self.bias[2]);
-        (self.gain_form, self.gain) = (Form::Fixed, [stiffness, 0.0, 0.0]);
-        (self.bias_form, self.bias) = (Form::Affine, [0.0, -stiffness, last]);
+        (self.gain_form, self.gain) = (DriveForm::Fixed, [stiffness, 0.0, 0.0]);
+        (self.bias_form, self.bias) = (DriveForm::Affine, [0.0, -stiffness, last]);
         self.inherit_range = e.magnitude("inheritrange")?.unwrap_or(self.inherit_range);
         Ok(())
     }
@@ -250,7 +250,7 @@ impl Drives {
                 let damping = e.number("kv")?.unwrap_or(drive.gain[0]);
                 *drive = Drive {
                     gain: [damping, 0.0, 0.0],
-                    bias_form: Form::Affine,
+                    bias_form: DriveForm::Affine,
                     bias: [0.0, 0.0, -damping],
                     ..Drive::GENERAL
                 };
@@ -265,7 +265,7 @@ impl Drives {
                 let diameter = e.magnitude("diameter")?;
                 let area = diameter.map(|d| 0.25 * std::f64::consts::PI * d * d);
                 drive.gain[0] = area.or(e.magnitude("area")?).unwrap_or(drive.gain[0]);
-                (drive.gain_form, drive.bias_form) = (Form::Fixed, Form::Affine);
+                (drive.gain_form, drive.bias_form) = (DriveForm::Fixed, DriveForm::Affine);
                 e.leading("bias", &mut drive.bias)?;
             }
             DriveKind::Adhesion => {
@@ -276,7 +276,7 @@ impl Drives {
             DriveKind::Damper => {
                 let damping = e.magnitude("kv")?.unwrap_or(-drive.gain[2]);
                 let gain = [0.0, 0.0, -damping];
-                *drive = Drive { gain_form: Form::Affine, gain, ..Drive::GENERAL };
+                *drive = Drive { gain_form: DriveForm::Affine, gain, ..Drive::GENERAL };
             }
         }
         let drive = *drive;

@@ -63,18 +63,18 @@ pub enum EqualityKind {
 
 /// Attributes of an equality constraint: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
-pub(super) struct Spec {
+pub(super) struct EqualitySpec {
     active: bool,
     solver: SolverParameters,
 }
 
-impl Default for Spec {
+impl Default for EqualitySpec {
     fn default() -> Self {
         Self { active: true, solver: SolverParameters::default() }
     }
 }
 
-impl Spec {
+impl EqualitySpec {
     pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.active = e.switch("active")?.unwrap_or(self.active);
         self.solver.read(e, ["solref", "solimp"])
@@ -88,7 +88,7 @@ pub(super) fn read(
     model: &Model,
     names: &Names,
 ) -> Result<Vec<Equality>> {
-    let reader = Reader { names, model, t_world_bodies: model.reference_poses() };
+    let reader = EqualityReader { names, model, t_world_bodies: model.reference_poses() };
     let mut all = Vec::new();
     for e in root.in_sections("equality") {
         e.take();
@@ -118,13 +118,13 @@ pub(super) fn read(
 
 type Sites = ([Option<usize>; 2], [Isometry3<f64>; 2]);
 
-struct Reader<'a> {
+struct EqualityReader<'a> {
     names: &'a Names,
     model: &'a Model,
     t_world_bodies: Vec<Isometry3<f64>>,
 }
 
-impl Reader<'_> {
+impl EqualityReader<'_> {
     fn bodies(&self, e: &Element) -> Result<[Option<usize>; 2]> {
         let first = self.names.bodies.get(e, "body1")?;
         let second = if e.has("body2") { self.names.bodies.get(e, "body2")? } else { None };

@@ -52,7 +52,7 @@ impl Geom {
 
 /// Attributes of a geom: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
-pub(super) struct Spec {
+pub(super) struct GeomSpec {
     kind: Kind,
     size: [f64; 3],
     position: Option<Vector3<f64>>,
@@ -76,7 +76,7 @@ pub(super) struct Spec {
     rgba: Option<[f32; 4]>,
 }
 
-impl Default for Spec {
+impl Default for GeomSpec {
     fn default() -> Self {
         Self {
             kind: Kind::Sphere,
@@ -104,7 +104,7 @@ impl Default for Spec {
     }
 }
 
-impl Spec {
+impl GeomSpec {
     pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<()> {
         self.kind = e.keyword("type", &Kind::WORDS)?.unwrap_or(self.kind);
         e.leading("size", &mut self.size)?;
@@ -139,7 +139,7 @@ impl Spec {
         self,
         e: &Element,
         compiler: &Compiler,
-        assets: &Assets<'_>,
+        assets: &GeomAssets<'_>,
         t_body_frame: &Isometry3<f64>,
         weighs: bool,
     ) -> Result<(Geom, Option<Inertial>)> {
@@ -203,7 +203,7 @@ impl Spec {
     fn inertial(
         &self,
         e: &Element,
-        assets: &Assets<'_>,
+        assets: &GeomAssets<'_>,
         shape: &Shape,
     ) -> Result<Option<Inertial>> {
         let unit = match (&self.mesh, self.kind) {
@@ -251,7 +251,7 @@ impl Spec {
 }
 
 /// Assets that geoms refer to by name; `materials` are their colors.
-pub(super) struct Assets<'a> {
+pub(super) struct GeomAssets<'a> {
     pub(super) meshes: Meshes<'a>,
     pub(super) height_fields: HeightFields<'a>,
     pub(super) materials: BTreeMap<String, [f32; 4]>,

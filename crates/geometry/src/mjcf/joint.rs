@@ -86,7 +86,7 @@ pub struct Joint {
 
 /// Attributes of a joint: the defaults of its class, replaced by those of its element.
 #[derive(Clone, Default)]
-pub(super) struct Spec {
+pub(super) struct JointSpec {
     kind: JointKind,
     anchor: Vector3<f64>,
     /// Without one, z.
@@ -106,7 +106,7 @@ pub(super) struct Spec {
     spring_damper: Option<[f64; 2]>,
 }
 
-impl Spec {
+impl JointSpec {
     pub(super) fn read(&mut self, e: &Element, _: &Compiler) -> Result<()> {
         let kinds = [
             ("hinge", JointKind::Hinge),

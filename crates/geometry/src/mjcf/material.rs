@@ -8,17 +8,17 @@ use super::error::Result;
 
 /// The color of a material.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spec {
+pub(super) struct MaterialSpec {
     pub(super) rgba: [f32; 4],
 }
 
-impl Default for Spec {
+impl Default for MaterialSpec {
     fn default() -> Self {
         Self { rgba: [1.0; 4] }
     }
 }
 
-impl Spec {
+impl MaterialSpec {
     pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.rgba = rgba(e)?.unwrap_or(self.rgba);
         Ok(())

@@ -19,21 +19,21 @@ use crate::mesh::TriMesh;
 
 /// Attributes of a mesh asset: the defaults of its class, replaced by those of its element.
 #[derive(Clone)]
-pub(super) struct Spec {
+pub(super) struct MeshSpec {
     scale: Vector3<f64>,
     /// The frame, in the file's coordinates, that becomes the mesh's own.
     t_file_mesh: Isometry3<f64>,
     inertia: MeshInertia,
 }
 
-impl Default for Spec {
+impl Default for MeshSpec {
     fn default() -> Self {
         let (scale, inertia) = (Vector3::repeat(1.0), MeshInertia::Legacy);
         Self { scale, t_file_mesh: Isometry3::identity(), inertia }
     }
 }
 
-impl Spec {
+impl MeshSpec {
     pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.scale = e.numbers("scale")?.map_or(self.scale, Vector3::from);
         if let Some(position) = e.numbers("refpos")? {
@@ -93,7 +93,7 @@ impl<'a> Meshes<'a> {
         Ok(meshes)
     }
 
-    fn spec(&self, e: &Element) -> Result<Spec> {
+    fn spec(&self, e: &Element) -> Result<MeshSpec> {
         let mut spec = self.classes.of(e, MAIN)?.mesh.clone();
         spec.read(e)?;
         Ok(spec)

@@ -14,7 +14,7 @@ use super::element::Element;
 use super::equality::{self, Equality};
 use super::error::MjcfError;
 use super::flags::Flags;
-use super::geom::{Assets, Geom};
+use super::geom::{Geom, GeomAssets};
 use super::height_field::HeightFields;
 use super::joint::{Joint, JointKind};
 use super::keyframe::{self, Keyframe};
@@ -123,7 +123,7 @@ impl Model {
         let root = &root;
         let classes = Classes::read(root, &compilers)?;
         let files = Files { folder, compilers: &compilers };
-        let assets = Assets {
+        let assets = GeomAssets {
             meshes: Meshes::new(root, &classes, files)?,
             height_fields: HeightFields::new(root, files)?,
             materials: material::read(root, &classes)?,

@@ -6,7 +6,7 @@ use super::element::Element;
 
 /// Kind of an element that others refer to by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Named {
+pub(super) enum NamedReference {
     Body,
     Joint,
     Geom,
@@ -22,32 +22,32 @@ pub(super) enum Named {
 }
 
 /// Names of one tree, by what has them.
-pub(super) type Names = BTreeSet<(Named, String)>;
+pub(super) type Names = BTreeSet<(NamedReference, String)>;
 
 /// Kind of element that the attribute `field` of `e` refers to; `None` where it is no reference.
-pub(super) fn referred(e: &Element, field: &str) -> Option<Named> {
+pub(super) fn referred(e: &Element, field: &str) -> Option<NamedReference> {
     let of_object = |field: &str| match e.peek(field)? {
-        "body" | "xbody" => Some(Named::Body),
-        "joint" => Some(Named::Joint),
-        "geom" => Some(Named::Geom),
-        "site" => Some(Named::Site),
-        "camera" => Some(Named::Camera),
-        "tendon" => Some(Named::Tendon),
-        "actuator" => Some(Named::Actuator),
+        "body" | "xbody" => Some(NamedReference::Body),
+        "joint" => Some(NamedReference::Joint),
+        "geom" => Some(NamedReference::Geom),
+        "site" => Some(NamedReference::Site),
+        "camera" => Some(NamedReference::Camera),
+        "tendon" => Some(NamedReference::Tendon),
+        "actuator" => Some(NamedReference::Actuator),
         _ => None,
     };
     Some(match field {
-        "body" | "body1" | "body2" | "target" | "bodyname" => Named::Body,
-        "joint" | "joint1" | "joint2" | "jointinparent" => Named::Joint,
+        "body" | "body1" | "body2" | "target" | "bodyname" => NamedReference::Body,
+        "joint" | "joint1" | "joint2" | "jointinparent" => NamedReference::Joint,
         "site" | "site1" | "site2" | "refsite" | "slidersite" | "cranksite" | "sidesite" => {
-            Named::Site
+            NamedReference::Site
         }
-        "geom" | "geom1" | "geom2" => Named::Geom,
-        "tendon" | "tendon1" | "tendon2" => Named::Tendon,
-        "actuator" => Named::Actuator,
-        "camera" => Named::Camera,
-        "class" | "childclass" | "alias" => Named::Class,
-        "mesh" | "material" | "hfield" | "texture" => Named::Asset,
+        "geom" | "geom1" | "geom2" => NamedReference::Geom,
+        "tendon" | "tendon1" | "tendon2" => NamedReference::Tendon,
+        "actuator" => NamedReference::Actuator,
+        "camera" => NamedReference::Camera,
+        "class" | "childclass" | "alias" => NamedReference::Class,
+        "mesh" | "material" | "hfield" | "texture" => NamedReference::Asset,
         "objname" => of_object("objtype")?,
         "refname" => of_object("reftype")?,
         _ => return None,
@@ -55,19 +55,19 @@ pub(super) fn referred(e: &Element, field: &str) -> Option<Named> {
 }
 
 /// Kind of the element `e`, which is in `section`.
-pub(super) fn named(e: &Element, section: &str) -> Named {
+pub(super) fn named(e: &Element, section: &str) -> NamedReference {
     match (section, e.tag.as_str()) {
-        ("worldbody", "body") => Named::Body,
-        ("worldbody", "joint" | "freejoint") => Named::Joint,
-        ("worldbody", "geom") => Named::Geom,
-        ("worldbody", "site") => Named::Site,
-        ("worldbody", "frame") => Named::Frame,
-        ("worldbody", "camera") => Named::Camera,
-        ("worldbody", "light") => Named::Light,
-        ("tendon", _) => Named::Tendon,
-        ("actuator", _) => Named::Actuator,
-        ("asset", _) => Named::Asset,
-        _ => Named::Other,
+        ("worldbody", "body") => NamedReference::Body,
+        ("worldbody", "joint" | "freejoint") => NamedReference::Joint,
+        ("worldbody", "geom") => NamedReference::Geom,
+        ("worldbody", "site") => NamedReference::Site,
+        ("worldbody", "frame") => NamedReference::Frame,
+        ("worldbody", "camera") => NamedReference::Camera,
+        ("worldbody", "light") => NamedReference::Light,
+        ("tendon", _) => NamedReference::Tendon,
+        ("actuator", _) => NamedReference::Actuator,
+        ("asset", _) => NamedReference::Asset,
+        _ => NamedReference::Other,
     }
 }
 
@@ -83,14 +83,15 @@ pub(super) fn collect(e: &Element, section: &str, names: &mut Names) {
 pub(super) fn refers(e: &Element, names: &Names) -> (bool, bool) {
     let (mut any, mut all) = (false, true);
     for (field, _) in e.attributes() {
-        let Some(kind) = referred(e, field).filter(|k| !matches!(k, Named::Class | Named::Asset))
+        let Some(kind) = referred(e, field)
+            .filter(|k| !matches!(k, NamedReference::Class | NamedReference::Asset))
         else {
             continue;
         };
         let name = e.peek(field).unwrap_or_default();
         let known = names.contains(&(kind, name.to_owned()));
         any |= known;
-        all &= known || (kind == Named::Body && name == "world");
+        all &= known || (kind == NamedReference::Body && name == "world");
     }
     for child in &e.children {
         let (some, every) = refers(child, names);
@@ -111,7 +112,7 @@ pub(super) fn rename(e: &mut Element, names: Option<&Names>, change: &dyn Fn(&st
         let Some(kind) = referred(e, &field) else { continue };
         // The default class of an element that names a class is itself a name.
         let name = e.peek(&field).unwrap_or_default().to_owned();
-        let is_world = kind == Named::Body && name == "world";
+        let is_world = kind == NamedReference::Body && name == "world";
         let known = names.is_none_or(|names| names.contains(&(kind, name.clone())));
         if known && !is_world && !name.is_empty() {
             e.set(&field, change(&name));

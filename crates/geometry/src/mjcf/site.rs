@@ -18,13 +18,13 @@ pub struct Site {
 
 /// Attributes of a site: the defaults of its class, replaced by those of its element.
 #[derive(Clone, Default)]
-pub(super) struct Spec {
+pub(super) struct SiteSpec {
     position: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
     ends: Option<[f64; 6]>,
 }
 
-impl Spec {
+impl SiteSpec {
     pub(super) fn read(&mut self, e: &Element, compiler: &Compiler) -> Result<()> {
         self.position = e.numbers("pos")?.map_or(self.position, Vector3::from);
         self.rotation = orientation::read(e, compiler)?.unwrap_or(self.rotation);

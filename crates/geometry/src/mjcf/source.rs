@@ -22,7 +22,7 @@ pub(super) fn read(path: &Path) -> Result<String> {
 ///
 /// They are looked for in `folder`, then beside the file that names them, and never outside of `folder`.
 pub(super) fn parse(xml: &str, file: Option<&Path>, folder: Option<&Folder>) -> Result<Element> {
-    let mut source = Source { folder, included: BTreeSet::new(), bytes: 0, elements: 0 };
+    let mut source = MjcfSource { folder, included: BTreeSet::new(), bytes: 0, elements: 0 };
     let root = source.document(xml, file.map(Arc::from), Path::new(""), 0)?;
     if root.tag != "mujoco" {
         let message = format!("the outermost element is '{}', not 'mujoco'", root.tag);
@@ -32,7 +32,7 @@ pub(super) fn parse(xml: &str, file: Option<&Path>, folder: Option<&Folder>) -> 
     Ok(root)
 }
 
-struct Source<'a> {
+struct MjcfSource<'a> {
     folder: Option<&'a Folder>,
     /// Files that have been included, with respect to the folder.
     included: BTreeSet<PathBuf>,
@@ -44,7 +44,7 @@ fn within(what: &'static str, count: usize, limit: usize) -> Result<()> {
     if count <= limit { Ok(()) } else { Err(MjcfError::TooLarge { what, count, limit }) }
 }
 
-impl Source<'_> {
+impl MjcfSource<'_> {
     /// The outermost element of `xml`, which lies in `beside` within the folder.
     fn document(
         &mut self,

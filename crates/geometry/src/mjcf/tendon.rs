@@ -83,7 +83,7 @@ pub struct Tendon {
 
 /// Attributes of a tendon: the defaults of its class, replaced by those of its element.
 #[derive(Clone, Default)]
-pub(super) struct Spec {
+pub(super) struct TendonSpec {
     range: Limits,
     force_range: Limits,
     stiffness: [f64; 3],
@@ -95,7 +95,7 @@ pub(super) struct Spec {
     limit: SolverParameters,
 }
 
-impl Spec {
+impl TendonSpec {
     pub(super) fn read(&mut self, e: &Element) -> Result<()> {
         self.range.read(e, RANGE)?;
         self.force_range.read(e, FORCE_RANGE)?;

@@ -37,7 +37,8 @@ impl<S: Scalar> Moments<S> {
     /// Edges with a triangle on one side only, and those of triangles without area, are left out: the surface must be closed.
     pub fn round_convex(vertices: &[Point3<S>], triangles: &[[usize; 3]], border: S) -> Self {
         let corners = |triangle: &[usize; 3]| triangle.map(|i| vertices[i]);
-        let faces: Vec<Face<S>> = triangles.iter().map(|t| Face::new(corners(t))).collect();
+        let faces: Vec<PolyhedronFace<S>> =
+            triangles.iter().map(|t| PolyhedronFace::new(corners(t))).collect();
         let mut sum = Self::enclosed(triangles.iter().map(corners));
         let mut tips: Vec<Tip<S>> = vertices.iter().map(|_| Tip::new()).collect();
         let mut sides: BTreeMap<[usize; 2], usize> = BTreeMap::new();
@@ -66,14 +67,14 @@ impl<S: Scalar> Moments<S> {
 }
 
 /// A triangle: its area \[m²\] and first moments \[m³\], \[m⁴\].
-struct Face<S: Scalar> {
+struct PolyhedronFace<S: Scalar> {
     normal: Vector3<S>,
     area: S,
     first: Vector3<S>,
     second: Matrix3<S>,
 }
 
-impl<S: Scalar> Face<S> {
+impl<S: Scalar> PolyhedronFace<S> {
     fn new(corners: [Point3<S>; 3]) -> Self {
         let [a, b, c] = corners.map(|p| p.coords);
         let cross = (b - a).cross(&(c - a));

@@ -18,7 +18,7 @@ const GAUSS: [(f64, f64); 6] = [
 ];
 
 /// A piece of the outline, in distance from the axis and height \[m\].
-enum Piece<S> {
+enum ProfilePiece<S> {
     Line {
         from: [S; 2],
         to: [S; 2],
@@ -34,7 +34,7 @@ enum Piece<S> {
 impl<S: Scalar> Moments<S> {
     /// A cylinder around the y axis from −`half_height` to `half_height`.
     pub fn cylinder(half_height: S, radius: S) -> Self {
-        let side = Piece::Line { from: [radius, -half_height], to: [radius, half_height] };
+        let side = ProfilePiece::Line { from: [radius, -half_height], to: [radius, half_height] };
         side.moments()
     }
 
@@ -45,14 +45,15 @@ impl<S: Scalar> Moments<S> {
 
     /// A cone around the y axis with its base at −`half_height` and its tip at `half_height`.
     pub fn cone(half_height: S, radius: S) -> Self {
-        let side = Piece::Line { from: [radius, -half_height], to: [S::zero(), half_height] };
+        let side =
+            ProfilePiece::Line { from: [radius, -half_height], to: [S::zero(), half_height] };
         side.moments()
     }
 
     /// All within `border` of a cylinder.
     pub fn round_cylinder(half_height: S, radius: S, border: S) -> Self {
         let right = S::constant(FRAC_PI_2);
-        let edge = |height: S, angles: [S; 2]| Piece::Arc {
+        let edge = |height: S, angles: [S; 2]| ProfilePiece::Arc {
             center: [radius, height],
             radius: border,
             angles,
@@ -60,10 +61,10 @@ impl<S: Scalar> Moments<S> {
         let wide = radius + border;
         let pieces = [
             edge(-half_height, [-right, S::zero()]),
-            Piece::Line { from: [wide, -half_height], to: [wide, half_height] },
+            ProfilePiece::Line { from: [wide, -half_height], to: [wide, half_height] },
             edge(half_height, [S::zero(), right]),
         ];
-        pieces.iter().map(Piece::moments).sum()
+        pieces.iter().map(ProfilePiece::moments).sum()
     }
 
     /// All within `border` of a cone.
@@ -73,21 +74,22 @@ impl<S: Scalar> Moments<S> {
         let flat = radius.value() == 0.0 && half_height.value() == 0.0;
         let tilt = S::zero().select(flat, radius.atan2(half_height.times(2.0)));
         let shift = [border * tilt.cos(), border * tilt.sin()];
-        let arc = |center: [S; 2], angles: [S; 2]| Piece::Arc { center, radius: border, angles };
+        let arc =
+            |center: [S; 2], angles: [S; 2]| ProfilePiece::Arc { center, radius: border, angles };
         let [base, tip] = [[radius, -half_height], [S::zero(), half_height]];
         let pieces = [
             arc(base, [-right, tilt]),
-            Piece::Line {
+            ProfilePiece::Line {
                 from: [base[0] + shift[0], base[1] + shift[1]],
                 to: [tip[0] + shift[0], tip[1] + shift[1]],
             },
             arc(tip, [tilt, right]),
         ];
-        pieces.iter().map(Piece::moments).sum()
+        pieces.iter().map(ProfilePiece::moments).sum()
     }
 }
 
-impl<S: Scalar> Piece<S> {
+impl<S: Scalar> ProfilePiece<S> {
     /// The moments of what is between the axis and this piece: ∫π r² dy and so on, exact to rounding.
     fn moments(&self) -> Moments<S> {
         let nodes = GAUSS.iter().flat_map(|&(x, w)| [(-x, w), (x, w)]);

@@ -48,7 +48,7 @@ impl KinematicTree {
     /// [`RobotError::UnsupportedJoint`] of balls, and of free bodies beside others; [`RobotError::Structure`] of joints that follow each other, and
     /// where a body or joint without a name cannot be told from another; [`RobotError::Limits`].
     pub fn from_mjcf(model: &Model) -> Result<Self> {
-        let mut reader = Reader { links: Vec::new(), joints: Vec::new(), bodies: Vec::new() };
+        let mut reader = RobotReader { links: Vec::new(), joints: Vec::new(), bodies: Vec::new() };
         let mut hanging = model.bodies.iter().filter(|body| body.parent.is_none());
         let only = hanging.next().filter(|_| hanging.next().is_none());
         let is_base =
@@ -58,7 +58,7 @@ impl KinematicTree {
             reader.links.push(Link { name: "world".to_owned(), parts, inertial: None });
         }
         for (number, body) in model.bodies.iter().enumerate() {
-            let body = Named { body, name: named(&body.name, "body", number) };
+            let body = NamedJoint { body, name: named(&body.name, "body", number) };
             if is_base && body.body.parent.is_none() {
                 reader.add_link(&body);
                 reader.bodies.push(0);
@@ -66,7 +66,7 @@ impl KinematicTree {
                 reader.add(&body)?;
             }
         }
-        let Reader { links, mut joints, .. } = reader;
+        let RobotReader { links, mut joints, .. } = reader;
         tree::unique("link", links.iter().map(|link| &link.name))?;
         tree::unique("joint", joints.iter().map(|(joint, _)| &joint.name))?;
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
@@ -80,13 +80,13 @@ impl KinematicTree {
 }
 
 /// A body with the name that its link has.
-struct Named<'a> {
+struct NamedJoint<'a> {
     body: &'a Body,
     name: String,
 }
 
 /// The tree as far as it is read.
-struct Reader {
+struct RobotReader {
     links: Vec<Link>,
     /// Joints, with their place in the model.
     joints: Vec<(Joint, Option<JointIndex>)>,
@@ -94,10 +94,10 @@ struct Reader {
     bodies: Vec<usize>,
 }
 
-impl Reader {
+impl RobotReader {
     /// Adds a body that hangs on another or on the world, with a link for each joint but the last, and one more where the last joint's frame is not the body's.
-    fn add(&mut self, named: &Named<'_>) -> Result<()> {
-        let Named { body, name } = named;
+    fn add(&mut self, named: &NamedJoint<'_>) -> Result<()> {
+        let NamedJoint { body, name } = named;
         let mut parent = body.parent.map_or(0, |parent| self.bodies[parent]);
         // The next joint's frame, where it is at its reference, in the frame of the link that it is mounted on.
         let mut place = body.t_parent_body;
@@ -174,7 +174,7 @@ impl Reader {
     }
 
     /// Adds the link that a body is.
-    fn add_link(&mut self, Named { body, name }: &Named<'_>) -> usize {
+    fn add_link(&mut self, NamedJoint { body, name }: &NamedJoint<'_>) -> usize {
         let (name, parts) = (name.clone(), parts(&body.geoms));
         self.links.push(Link { name, parts, inertial: body.inertial });
         self.links.len() - 1

@@ -42,7 +42,7 @@ impl SdfGrid {
 }
 
 /// A mesh of a union, and what was found at the last samples.
-struct Part<'a> {
+struct UnionPart<'a> {
     mesh: &'a ClosestPoints,
     /// Face of the last answer.
     face: Option<u32>,
@@ -55,7 +55,7 @@ fn sample(meshes: &[ClosestPoints], block: &Block, values: &mut [f64]) {
     let mut parts = Vec::with_capacity(meshes.len());
     for mesh in meshes {
         let count = if mesh.is_closed() { 0 } else { values.len() };
-        parts.push(Part { mesh, face: None, unsigned: vec![f64::NAN; count] });
+        parts.push(UnionPart { mesh, face: None, unsigned: vec![f64::NAN; count] });
     }
     // What is nearest may be outside of one and inside of another, unknown yet.
     let is_bounded = meshes.len() == 1 || meshes.iter().all(ClosestPoints::is_closed);

@@ -17,7 +17,7 @@ pub(super) struct Piercing {
 
 /// Where a side of a face enters or leaves the other body.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing {
+pub(super) struct EdgeCrossing {
     /// The side of a face, three a face.
     pub(super) side: u32,
     /// Where along the edge, from 0 at the smaller vertex to 1 at the larger.
@@ -32,7 +32,7 @@ pub(super) struct Crossing {
 /// On the first face, the inside of the second body lies to the left of the way `from` → `to`; on the
 /// second face, the inside of the first body lies to its right.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
+pub(super) struct FaceSegment {
     pub(super) faces: [u32; 2],
     pub(super) from: Piercing,
     pub(super) to: Piercing,
@@ -40,9 +40,9 @@ pub(super) struct Segment {
 
 /// How the other surface lies to one of the two.
 #[derive(Debug)]
-pub(super) struct Cut {
+pub(super) struct FaceCut {
     /// Crossings of the sides of faces, by side, and in the order in which the side meets them.
-    pub(super) crossings: Vec<Crossing>,
+    pub(super) crossings: Vec<EdgeCrossing>,
     /// How often the other surface winds about each vertex.
     pub(super) windings: Vec<i32>,
 }
@@ -50,8 +50,8 @@ pub(super) struct Cut {
 /// How two surfaces cross.
 #[derive(Debug)]
 pub(super) struct Arrangement {
-    pub(super) cuts: [Cut; 2],
-    pub(super) segments: Vec<Segment>,
+    pub(super) cuts: [FaceCut; 2],
+    pub(super) segments: Vec<FaceSegment>,
 }
 
 impl Arrangement {
@@ -69,7 +69,7 @@ impl Arrangement {
     }
 }
 
-fn cut(own: &Chain, other: &Chain, mut crossings: Vec<Crossing>, other_is_a: bool) -> Cut {
+fn cut(own: &Chain, other: &Chain, mut crossings: Vec<EdgeCrossing>, other_is_a: bool) -> FaceCut {
     crossings.sort_unstable_by(|x, y| {
         // Both faces at an edge must agree on the order along it, also where points fall together.
         let order = x.along.total_cmp(&y.along).then(x.at.key.2.cmp(&y.at.key.2));
@@ -81,15 +81,15 @@ fn cut(own: &Chain, other: &Chain, mut crossings: Vec<Crossing>, other_is_a: boo
         change[crossing.side as usize] += crossing.change;
     }
     let windings = own.windings(other, &change, other_is_a);
-    Cut { crossings, windings }
+    FaceCut { crossings, windings }
 }
 
 /// Crosses face `i` of the first surface with face `j` of the second.
 fn meet(
     chains: [&Chain; 2],
     [i, j]: [usize; 2],
-    crossings: &mut [Vec<Crossing>; 2],
-) -> Option<Segment> {
+    crossings: &mut [Vec<EdgeCrossing>; 2],
+) -> Option<FaceSegment> {
     let (ta, tb) = (chains[0].triangle(i), chains[1].triangle(j));
     let plane = Plane::new(tb, false);
     let sides_a = ta.map(|p| plane.side(p));
@@ -128,7 +128,7 @@ fn meet(
         }
     }
     let [Some(from), Some(to)] = ends else { return None };
-    Some(Segment { faces: [i as u32, j as u32], from, to })
+    Some(FaceSegment { faces: [i as u32, j as u32], from, to })
 }
 
 /// All on one side; a triangle without area has none, yet its sides may pierce others.
@@ -137,7 +137,14 @@ fn are_apart(sides: &[Side; 3]) -> bool {
 }
 
 /// The crossing of `side` with `face` of the other surface, given on which sides of it its ends lie.
-fn pierce(own: &Chain, owner: u8, side: usize, face: usize, start: Side, end: Side) -> Crossing {
+fn pierce(
+    own: &Chain,
+    owner: u8,
+    side: usize,
+    face: usize,
+    start: Side,
+    end: Side,
+) -> EdgeCrossing {
     let [from, to] = own.side(side as u32);
     let change = i32::from(start.sign);
     // From the smaller vertex, so that both faces at the edge find the same point.
@@ -149,5 +156,5 @@ fn pierce(own: &Chain, owner: u8, side: usize, face: usize, start: Side, end: Si
     let [p, q] = vertices.map(|v| own.positions[v as usize]);
     let point = if along < 0.5 { p + (q - p) * along } else { q + (p - q) * (1.0 - along) };
     let at = Piercing { key: (owner, vertices, face as u32), point };
-    Crossing { side: side as u32, along, change, at }
+    EdgeCrossing { side: side as u32, along, change, at }
 }

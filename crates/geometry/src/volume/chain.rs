@@ -16,11 +16,11 @@ pub(super) struct Chain {
     /// A vertex of every connected piece.
     roots: Vec<u32>,
     /// The sides of faces that lead from the roots to all other vertices, every vertex after the one it is reached from.
-    steps: Vec<Step>,
+    steps: Vec<ChainStep>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Step {
+struct ChainStep {
     from: u32,
     to: u32,
     /// The side of a face between them, three a face.
@@ -92,7 +92,7 @@ pub(super) fn volume(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> f64 {
     faces.iter().map(of).sum()
 }
 
-fn spanning_forest(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<Step>) {
+fn spanning_forest(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<ChainStep>) {
     // Sides at each vertex, by counting.
     let mut start = vec![0_u32; vertices + 1];
     for v in faces.iter().flatten() {
@@ -130,7 +130,7 @@ fn spanning_forest(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<Step>)
                 let to = if a == from { b } else { a };
                 if !seen[to as usize] {
                     seen[to as usize] = true;
-                    steps.push(Step { from, to, side });
+                    steps.push(ChainStep { from, to, side });
                 }
             }
             let Some(step) = steps.get(next) else { break };

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::arrangement::{Arrangement, Cut, Piercing};
+use super::arrangement::{Arrangement, FaceCut, Piercing};
 use super::chain::{Chain, SIDES};
 use super::polygon::fill;
 use crate::mesh::TriMesh;
@@ -62,7 +62,7 @@ impl Points {
 /// `segments` are the cuts through faces, by face; vertices are numbered from `offset`.
 fn outside(
     chain: &Chain,
-    cut: &Cut,
+    cut: &FaceCut,
     segments: &[(u32, [u32; 2])],
     offset: u32,
     points: &mut Points,

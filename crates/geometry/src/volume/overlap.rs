@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::arrangement::{Arrangement, Cut};
+use super::arrangement::{Arrangement, FaceCut};
 use super::chain::{Chain, SIDES};
 
 /// Intersection volume ∫ w_a w_b of `a` and `b` with winding numbers w \[m³\].
@@ -39,7 +39,7 @@ fn cone([o, p, q]: [Vector3<f64>; 3], weight: f64) -> f64 {
 }
 
 /// The integral over the faces' sides as far as they run inside the other body.
-fn inside(chain: &Chain, cut: &Cut, origin: &Point3<f64>) -> f64 {
+fn inside(chain: &Chain, cut: &FaceCut, origin: &Point3<f64>) -> f64 {
     let mut sum = 0.0;
     let mut crossings = cut.crossings.as_slice();
     for (f, face) in chain.faces.iter().enumerate() {

@@ -17,11 +17,11 @@ pub(super) fn fill(
     let flip = if normal[axis] < 0.0 { -1.0 } else { 1.0 };
     let flat = |id: u32| {
         let p = point(id);
-        Corner { id, at: Point2::new(p[i], flip * p[j]) }
+        PolygonCorner { id, at: Point2::new(p[i], flip * p[j]) }
     };
     let (mut outer, mut holes) = (Vec::new(), Vec::new());
     for ring in rings(edges) {
-        let ring: Vec<Corner> = ring.into_iter().map(flat).collect();
+        let ring: Vec<PolygonCorner> = ring.into_iter().map(flat).collect();
         let area = area(&ring);
         if area < 0.0 { holes.push((area, ring)) } else { outer.push((area, ring)) }
     }
@@ -43,17 +43,17 @@ pub(super) fn fill(
 }
 
 #[derive(Clone, Copy)]
-struct Corner {
+struct PolygonCorner {
     id: u32,
     at: Point2<f64>,
 }
 
 /// Twice the area of the triangle, positive where it turns left.
-fn turn(a: &Corner, b: &Corner, c: &Corner) -> f64 {
+fn turn(a: &PolygonCorner, b: &PolygonCorner, c: &PolygonCorner) -> f64 {
     (b.at - a.at).perp(&(c.at - a.at))
 }
 
-fn area(ring: &[Corner]) -> f64 {
+fn area(ring: &[PolygonCorner]) -> f64 {
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(p, q)| turn(&ring[0], p, q)).sum()
 }
@@ -86,8 +86,8 @@ fn rings(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
 }
 
 /// Whether most corners of `hole` lie inside `ring`: one may lie on it.
-fn contains(ring: &[Corner], hole: &[Corner]) -> bool {
-    let is_inside = |p: &Corner| {
+fn contains(ring: &[PolygonCorner], hole: &[PolygonCorner]) -> bool {
+    let is_inside = |p: &PolygonCorner| {
         let next = ring.iter().cycle().skip(1);
         let crossed = ring.iter().zip(next).filter(|(a, b)| {
             let upward = a.at.y <= p.at.y;
@@ -99,7 +99,7 @@ fn contains(ring: &[Corner], hole: &[Corner]) -> bool {
 }
 
 /// One ring of a ring and its holes, by bridges that are passed twice.
-fn joined(mut ring: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<Corner> {
+fn joined(mut ring: Vec<PolygonCorner>, mut holes: Vec<Vec<PolygonCorner>>) -> Vec<PolygonCorner> {
     while !holes.is_empty() {
         let mut bridges = Vec::new();
         for (h, hole) in holes.iter().enumerate() {
@@ -127,7 +127,7 @@ fn joined(mut ring: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<Corner> {
 }
 
 /// Whether `p` is seen from the inside of the corner `r`: a corner that a bridge has made two opens to either side.
-fn opens_to(ring: &[Corner], r: usize, p: &Corner) -> bool {
+fn opens_to(ring: &[PolygonCorner], r: usize, p: &PolygonCorner) -> bool {
     let n = ring.len();
     let (before, here, after) = (&ring[(r + n - 1) % n], &ring[r], &ring[(r + 1) % n]);
     let (left_of_in, left_of_out) = (turn(before, here, p) > 0.0, turn(here, after, p) > 0.0);
@@ -139,7 +139,7 @@ fn opens_to(ring: &[Corner], r: usize, p: &Corner) -> bool {
 }
 
 /// Whether two segments without a common point cross.
-fn cross([p, q]: [&Corner; 2], [a, b]: [&Corner; 2]) -> bool {
+fn cross([p, q]: [&PolygonCorner; 2], [a, b]: [&PolygonCorner; 2]) -> bool {
     if [p.id, q.id].iter().any(|id| *id == a.id || *id == b.id) {
         return false;
     }
@@ -148,8 +148,8 @@ fn cross([p, q]: [&Corner; 2], [a, b]: [&Corner; 2]) -> bool {
 }
 
 /// Cuts ears off `ring`: the best-shaped of those that hold no other corner.
-fn clip(mut ring: Vec<Corner>, triangles: &mut Vec<[u32; 3]>) {
-    let ear = |ring: &[Corner], k: usize| -> f64 {
+fn clip(mut ring: Vec<PolygonCorner>, triangles: &mut Vec<[u32; 3]>) {
+    let ear = |ring: &[PolygonCorner], k: usize| -> f64 {
         let n = ring.len();
         let (a, b, c) = (&ring[(k + n - 1) % n], &ring[k], &ring[(k + 1) % n]);
         let area = turn(a, b, c);
@@ -157,7 +157,7 @@ fn clip(mut ring: Vec<Corner>, triangles: &mut Vec<[u32; 3]>) {
             .map(|(p, q)| (p.at - q.at).norm_squared())
             .into_iter()
             .fold(0.0, f64::max);
-        let holds = |p: &Corner| {
+        let holds = |p: &PolygonCorner| {
             ![a, b, c].iter().any(|q| q.id == p.id || q.at == p.at)
                 && turn(a, b, p) >= 0.0
                 && turn(b, c, p) >= 0.0

@@ -12,7 +12,7 @@ use crate::spatial::spatial;
 pub(super) const MAX_NV: usize = 3;
 
 /// A joint type of one's own, up to three coordinates whose rates are its velocities: where it puts the link. Everything else follows, derivatives
-/// too.
+/// too. Numbers of its own, such as a pitch, are constants.
 ///
 /// ```
 /// use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

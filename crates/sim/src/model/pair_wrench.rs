@@ -39,7 +39,7 @@ impl<S: Scalar> Default for PairWrench<S> {
 
 impl<S: Scalar> Model<S> {
     /// External and contact wrenches on every body (force \[N\], torque about the center of mass \[N m\],
-    /// world frame), without gravity. `step` matters to leaks in the first step only.
+    /// world frame), without gravity; those of contacts alone: [`Model::contact_wrench`]. `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
     ///

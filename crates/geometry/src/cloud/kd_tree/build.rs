@@ -18,13 +18,13 @@ pub(super) struct Leaf {
 
 /// The boxes of four children, lane by lane, in single precision rounded outwards.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
+pub(super) struct KdNode {
     pub(super) lo: [[f32; 4]; 3],
     pub(super) hi: [[f32; 4]; 3],
 }
 
 /// The nodes of a complete four-way tree in breadth-first order, and its leaves.
-pub(super) fn build(points: &[Point3<f64>]) -> (Vec<Node>, Vec<Leaf>) {
+pub(super) fn build(points: &[Point3<f64>]) -> (Vec<KdNode>, Vec<Leaf>) {
     let mut depth = 0;
     while points.len() > LEAF << (2 * depth) {
         depth += 1;
@@ -47,7 +47,7 @@ pub(super) fn build(points: &[Point3<f64>]) -> (Vec<Node>, Vec<Leaf>) {
         boxes.push(bounds(points, part));
     });
 
-    let mut nodes = vec![Node { lo: [[0.0; 4]; 3], hi: [[0.0; 4]; 3] }; (count - 1) / 3];
+    let mut nodes = vec![KdNode { lo: [[0.0; 4]; 3], hi: [[0.0; 4]; 3] }; (count - 1) / 3];
     for level in (0..depth).rev() {
         let first = ((1 << (2 * level)) - 1) / 3;
         let mut joined = Vec::with_capacity(boxes.len() / 4);

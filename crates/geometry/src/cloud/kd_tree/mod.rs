@@ -6,10 +6,10 @@ mod search;
 
 use nalgebra::Point3;
 
-use self::build::{Leaf, Node};
-use self::probe::Probe;
+use self::build::{KdNode, Leaf};
+use self::probe::KdProbe;
 pub use self::search::Neighbor;
-use self::search::{Collect, KNearest, Nearest, WithinRadius, search};
+use self::search::{CollectNear, KNearest, NearestPoint, WithinRadius, search};
 use super::CloudError;
 
 /// A balanced k-d tree over points: exact neighbors of points.
@@ -32,7 +32,7 @@ use super::CloudError;
 pub struct KdTree {
     points: Vec<Point3<f64>>,
     /// A complete tree in breadth-first order: the children of node i are 4i + 1 to 4i + 4.
-    nodes: Vec<Node>,
+    nodes: Vec<KdNode>,
     leaves: Vec<Leaf>,
 }
 
@@ -57,8 +57,8 @@ impl KdTree {
     /// that is not finite or farther than 1e18 m, whose square leaves single precision.
     #[inline]
     pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbor> {
-        let probe = Probe::new(query)?;
-        search(&self.nodes, &self.leaves, &probe, Nearest::within(max_distance)?).found()
+        let probe = KdProbe::new(query)?;
+        search(&self.nodes, &self.leaves, &probe, NearestPoint::within(max_distance)?).found()
     }
 
     /// As [`Self::nearest`], trying the point `hint` first: the answer for a nearby query spares most of the
@@ -70,8 +70,8 @@ impl KdTree {
         max_distance: f64,
         hint: usize,
     ) -> Option<Neighbor> {
-        let probe = Probe::new(query)?;
-        let mut best = Nearest::within(max_distance)?;
+        let probe = KdProbe::new(query)?;
+        let mut best = NearestPoint::within(max_distance)?;
         if let Some(point) = self.points.get(hint) {
             best.offer((query - point).norm_squared(), hint as u32);
         }
@@ -81,7 +81,7 @@ impl KdTree {
     /// The `k` points nearest to `query`, nearest first; fewer where the cloud has fewer.
     pub fn k_nearest(&self, query: &Point3<f64>, k: usize) -> Vec<Neighbor> {
         let limit = k.min(self.points.len());
-        match Probe::new(query) {
+        match KdProbe::new(query) {
             Some(probe) if limit > 0 => {
                 search(&self.nodes, &self.leaves, &probe, KNearest::new(limit)).found()
             }
@@ -91,7 +91,7 @@ impl KdTree {
 
     /// Every point within `radius` \[m\] of `query`, nearest first.
     pub fn within(&self, query: &Point3<f64>, radius: f64) -> Vec<Neighbor> {
-        match (Probe::new(query), WithinRadius::new(radius)) {
+        match (KdProbe::new(query), WithinRadius::new(radius)) {
             (Some(probe), Some(every)) => search(&self.nodes, &self.leaves, &probe, every).found(),
             _ => Vec::new(),
         }

@@ -2,16 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::build::{LEAF, Leaf, Node, above, below};
+use super::build::{KdNode, LEAF, Leaf, above, below};
 
 /// A point, and the box around it in single precision, rounded outwards.
-pub(super) struct Probe {
+pub(super) struct KdProbe {
     point: Vector3<f64>,
     lo: [f32; 3],
     hi: [f32; 3],
 }
 
-impl Probe {
+impl KdProbe {
     /// `None` for a point that is not finite.
     #[inline]
     pub(super) fn new(point: &Point3<f64>) -> Option<Self> {
@@ -24,7 +24,7 @@ impl Probe {
 
     /// Squared distances from the four boxes of `node`.
     #[inline]
-    pub(super) fn to_boxes(&self, node: &Node) -> [f32; 4] {
+    pub(super) fn to_boxes(&self, node: &KdNode) -> [f32; 4] {
         let mut sum = [0.0_f32; 4];
         for axis in 0..3 {
             let (lo, hi) = (&node.lo[axis], &node.hi[axis]);

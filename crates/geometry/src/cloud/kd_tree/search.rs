@@ -1,7 +1,7 @@
 //! Branch and bound over the tree, and what may be collected on the way.
 
-use super::build::{Leaf, Node};
-use super::probe::Probe;
+use super::build::{KdNode, Leaf};
+use super::probe::KdProbe;
 
 /// A point of a cloud near a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Neighbor {
 const STACK: usize = 3 * 16 + 4;
 
 /// Keeps the points that are wanted of those that are offered.
-pub(super) trait Collect {
+pub(super) trait CollectNear {
     /// Squared distance beyond which nothing is wanted any more \[m²\].
     fn limit(&self) -> f64;
     /// Considers the point `index` at squared distance `d2` \[m²\].
@@ -25,10 +25,10 @@ pub(super) trait Collect {
 
 /// Offers `collect` the points of every leaf within its limit.
 #[inline]
-pub(super) fn search<C: Collect>(
-    nodes: &[Node],
+pub(super) fn search<C: CollectNear>(
+    nodes: &[KdNode],
     leaves: &[Leaf],
-    probe: &Probe,
+    probe: &KdProbe,
     mut collect: C,
 ) -> C {
     let mut bound = prune_bound(collect.limit());
@@ -83,12 +83,12 @@ fn squared(limit: f64) -> Option<f64> {
 }
 
 /// The nearest point.
-pub(super) struct Nearest {
+pub(super) struct NearestPoint {
     d2: f64,
     index: u32,
 }
 
-impl Nearest {
+impl NearestPoint {
     #[inline]
     pub(super) fn within(max_distance: f64) -> Option<Self> {
         Some(Self { d2: squared(max_distance)?, index: u32::MAX })
@@ -101,7 +101,7 @@ impl Nearest {
     }
 }
 
-impl Collect for Nearest {
+impl CollectNear for NearestPoint {
     #[inline]
     fn limit(&self) -> f64 {
         self.d2
@@ -132,7 +132,7 @@ impl KNearest {
     }
 }
 
-impl Collect for KNearest {
+impl CollectNear for KNearest {
     fn limit(&self) -> f64 {
         if self.found.len() < self.k { f64::MAX } else { self.found[self.k - 1].0 }
     }
@@ -166,7 +166,7 @@ impl WithinRadius {
     }
 }
 
-impl Collect for WithinRadius {
+impl CollectNear for WithinRadius {
     fn limit(&self) -> f64 {
         self.limit
     }

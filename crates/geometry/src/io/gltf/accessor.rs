@@ -12,12 +12,12 @@ use crate::io::limits::MAX_ELEMENTS;
 use crate::io::{MeshError, Result};
 
 /// The content of a file's buffers.
-pub(super) struct Buffers<'a> {
+pub(super) struct GltfBuffers<'a> {
     pub(super) path: &'a Path,
     pub(super) content: Vec<Vec<u8>>,
 }
 
-impl Buffers<'_> {
+impl GltfBuffers<'_> {
     /// The bytes of a view; `None` where it reaches outside its buffer.
     pub(super) fn view(&self, view: &buffer::View) -> Option<&[u8]> {
         let end = view.offset().checked_add(view.length())?;

@@ -16,7 +16,7 @@ use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use nalgebra::{Matrix4, Point3, Vector3};
 
-use self::accessor::Buffers;
+use self::accessor::GltfBuffers;
 use super::folder::percent_decoded;
 use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
@@ -51,9 +51,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
         size = size.saturating_add(content[content.len() - 1].len());
         MeshError::within(path, "buffers, bytes", size, MAX_FILE_BYTES)?;
     }
-    let mut reader = Reader {
+    let mut reader = GltfReader {
         path,
-        buffers: Buffers { path, content },
+        buffers: GltfBuffers { path, content },
         images: Images::new(path),
         parts: Vec::new(),
         size: 0,
@@ -159,16 +159,16 @@ fn load_buffer(buffer: &buffer::Buffer, blob: Option<&[u8]>, path: &Path) -> Res
     Ok(bytes)
 }
 
-struct Reader<'a> {
+struct GltfReader<'a> {
     path: &'a Path,
-    buffers: Buffers<'a>,
+    buffers: GltfBuffers<'a>,
     images: Images<'a>,
     parts: Vec<Part>,
     size: usize,
     visited: BTreeSet<usize>,
 }
 
-impl Reader<'_> {
+impl GltfReader<'_> {
     /// Reads what hangs on `node` itself; returns its frame.
     fn node(&mut self, node: &Node, t_scene_parent: &Matrix4<f64>) -> Result<Matrix4<f64>> {
         // Nodes form a tree; a cycle would never end.

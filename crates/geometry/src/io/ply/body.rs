@@ -3,19 +3,19 @@
 use std::path::Path;
 use std::str::SplitAsciiWhitespace;
 
-use super::header::{Element, Encoding, Header, Number, Property};
+use super::header::{Encoding, Header, PlyElement, PlyNumber, Property};
 use crate::io::limits::MAX_ELEMENTS;
 use crate::io::{MeshError, Result};
 
 /// Values that are still to be read.
-pub(super) struct Body<'a> {
+pub(super) struct PlyBody<'a> {
     pub(super) path: &'a Path,
     bytes: &'a [u8],
     encoding: Encoding,
     line: SplitAsciiWhitespace<'a>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> PlyBody<'a> {
     pub(super) fn new(file: &'a [u8], header: &Header, path: &'a Path) -> Self {
         let bytes = file.get(header.length..).unwrap_or_default();
         Self { path, bytes, encoding: header.encoding, line: "".split_ascii_whitespace() }
@@ -25,7 +25,7 @@ impl<'a> Body<'a> {
     /// becomes an error that names the row.
     pub(super) fn rows(
         &mut self,
-        element: &Element,
+        element: &PlyElement,
         mut use_row: impl FnMut(usize, &[Vec<f64>]) -> Result<(), String>,
     ) -> Result<()> {
         // An element without properties occupies no bytes, whatever its count says.
@@ -67,7 +67,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    fn value(&mut self, number: Number) -> Option<f64> {
+    fn value(&mut self, number: PlyNumber) -> Option<f64> {
         match self.encoding {
             Encoding::Ascii => self.line.next()?.parse().ok(),
             Encoding::Binary { big_endian } => {

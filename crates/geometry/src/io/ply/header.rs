@@ -9,7 +9,7 @@ use crate::io::{MeshError, Result};
 const MAX_KINDS: usize = 256;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Number {
+pub(super) enum PlyNumber {
     I8,
     U8,
     I16,
@@ -20,7 +20,7 @@ pub(super) enum Number {
     F64,
 }
 
-impl Number {
+impl PlyNumber {
     pub(super) fn named(name: &str) -> Option<Self> {
         Some(match name {
             "char" | "int8" => Self::I8,
@@ -78,11 +78,11 @@ impl Number {
 pub(super) struct Property {
     pub(super) name: String,
     /// The type of the length, for a list.
-    pub(super) count: Option<Number>,
-    pub(super) item: Number,
+    pub(super) count: Option<PlyNumber>,
+    pub(super) item: PlyNumber,
 }
 
-pub(super) struct Element {
+pub(super) struct PlyElement {
     pub(super) name: String,
     pub(super) count: usize,
     pub(super) properties: Vec<Property>,
@@ -96,14 +96,14 @@ pub(super) enum Encoding {
 
 pub(super) struct Header {
     pub(super) encoding: Encoding,
-    pub(super) elements: Vec<Element>,
+    pub(super) elements: Vec<PlyElement>,
     pub(super) texture: Option<String>,
     pub(super) length: usize,
 }
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let bad = |reason: String| MeshError::malformed(path, "header", reason);
-    let (mut encoding, mut elements, mut textures) = (None, Vec::<Element>::new(), Vec::new());
+    let (mut encoding, mut elements, mut textures) = (None, Vec::<PlyElement>::new(), Vec::new());
     let mut at = 0;
     let mut first = true;
     loop {
@@ -148,14 +148,14 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
                 if elements.iter().any(|e| e.name == *name) {
                     return Err(bad(format!("element {name} declared twice")));
                 }
-                elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
+                elements.push(PlyElement { name: (*name).into(), count, properties: Vec::new() });
             }
             ["property", rest @ ..] => {
                 let property = match rest {
                     ["list", count, item, name] => {
-                        (Some(Number::named(count)), Number::named(item), name)
+                        (Some(PlyNumber::named(count)), PlyNumber::named(item), name)
                     }
-                    [item, name] => (None, Number::named(item), name),
+                    [item, name] => (None, PlyNumber::named(item), name),
                     _ => return Err(bad(format!("cannot read `{line}`"))),
                 };
                 let (count, Some(item), name) = property else {

@@ -12,8 +12,8 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
-use self::body::Body;
-use self::header::Element;
+use self::body::PlyBody;
+use self::header::PlyElement;
 use super::images::Images;
 use super::limits::MAX_ELEMENTS;
 use super::polygon::{Polygons, triangles};
@@ -29,7 +29,7 @@ struct VertexLayout {
 }
 
 impl VertexLayout {
-    fn of(element: &Element, path: &Path) -> Result<Self> {
+    fn of(element: &PlyElement, path: &Path) -> Result<Self> {
         let find = |name: &str| {
             element.properties.iter().position(|p| p.count.is_none() && p.name == name)
         };
@@ -52,7 +52,7 @@ impl VertexLayout {
 
 pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     let header = header::parse(bytes, path)?;
-    let mut body = Body::new(bytes, &header, path);
+    let mut body = PlyBody::new(bytes, &header, path);
     let mut mesh = TriMesh::default();
     let mut faces = Faces::default();
     // Checked before any is read: what a header claims must not cost more than the file is worth.
@@ -76,7 +76,7 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh> {
     Ok(mesh)
 }
 
-fn read_vertices(body: &mut Body, element: &Element, mesh: &mut TriMesh) -> Result<()> {
+fn read_vertices(body: &mut PlyBody, element: &PlyElement, mesh: &mut TriMesh) -> Result<()> {
     let layout = VertexLayout::of(element, body.path)?;
     mesh.normals = layout.normal.map(|_| Vec::new());
     mesh.colors = layout.color.map(|_| Vec::new());
@@ -105,7 +105,7 @@ struct Faces {
 }
 
 impl Faces {
-    fn read(body: &mut Body, element: &Element) -> Result<Self> {
+    fn read(body: &mut PlyBody, element: &PlyElement) -> Result<Self> {
         let list = |names: &[&str]| {
             element
                 .properties
