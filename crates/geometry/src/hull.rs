@@ -8,7 +8,7 @@ use crate::mesh::TriMesh;
 use crate::predicates::Plane;
 
 /// A triangle of a hull that grows.
-struct Facet {
+struct HullFacet {
     /// Counterclockwise from outside.
     corners: [usize; 3],
     /// Across the edge from each corner to the next.
@@ -55,7 +55,7 @@ impl TriMesh {
                 begins.insert(from, first + k);
                 let across = facets[beyond].corners.iter().position(|c| *c == to)?;
                 facets[beyond].neighbors[across] = first + k;
-                facets.push(Facet {
+                facets.push(HullFacet {
                     corners: [from, to, peak],
                     neighbors: [beyond, usize::MAX, usize::MAX],
                     outside: Vec::new(),
@@ -85,13 +85,13 @@ impl TriMesh {
 }
 
 /// Six times the volume between a facet and a point, positive where the facet sees it, zero where the point is in its plane.
-fn side(points: &[Point3<f64>], facet: &Facet, point: usize) -> f64 {
+fn side(points: &[Point3<f64>], facet: &HullFacet, point: usize) -> f64 {
     let [a, b, c] = facet.corners.map(|c| &points[c]);
     Plane::new([a, b, c], true).side(&points[point]).value
 }
 
 /// Gives each of `left` to the first of `facets` that sees it; the others are inside.
-fn give(points: &[Point3<f64>], facets: &mut [Facet], left: impl Iterator<Item = usize>) {
+fn give(points: &[Point3<f64>], facets: &mut [HullFacet], left: impl Iterator<Item = usize>) {
     for point in left {
         if let Some(facet) = facets.iter_mut().find(|f| side(points, f, point) > 0.0) {
             facet.outside.push(point);
@@ -104,14 +104,14 @@ type Edge = (usize, usize, usize);
 /// The facets around `start` that see `peak` or lie in its plane, and the edges around them, from and to which corner, with the facet beyond.
 fn seen_from(
     points: &[Point3<f64>],
-    facets: &[Facet],
+    facets: &[HullFacet],
     start: usize,
     peak: usize,
 ) -> (Vec<usize>, Vec<Edge>) {
     let mut seen = BTreeMap::from([(start, true)]);
     let (mut open, mut horizon) = (vec![start], Vec::new());
     while let Some(index) = open.pop() {
-        let Facet { corners, neighbors, .. } = &facets[index];
+        let HullFacet { corners, neighbors, .. } = &facets[index];
         for k in 0..3 {
             let neighbor = neighbors[k];
             let known = seen.get(&neighbor).copied();
@@ -131,7 +131,7 @@ fn seen_from(
 }
 
 /// A tetrahedron of far points, with all others that its facets see.
-fn first_facets(points: &[Point3<f64>]) -> Option<Vec<Facet>> {
+fn first_facets(points: &[Point3<f64>]) -> Option<Vec<HullFacet>> {
     let all = || 0..points.len();
     let farthest = |measure: &dyn Fn(usize) -> f64| {
         all().max_by(|a, b| measure(*a).total_cmp(&measure(*b))).filter(|p| measure(*p) > 0.0)
@@ -140,7 +140,8 @@ fn first_facets(points: &[Point3<f64>]) -> Option<Vec<Facet>> {
     let b = farthest(&|p| (points[p] - points[a]).norm_squared())?;
     let along: Vector3<f64> = points[b] - points[a];
     let c = farthest(&|p| along.cross(&(points[p] - points[a])).norm_squared())?;
-    let base = |corners| Facet { corners, neighbors: [0; 3], outside: Vec::new(), is_gone: false };
+    let base =
+        |corners| HullFacet { corners, neighbors: [0; 3], outside: Vec::new(), is_gone: false };
     let d = farthest(&|p| side(points, &base([a, b, c]), p).abs())?;
     let (b, c) = if side(points, &base([a, b, c]), d) > 0.0 { (c, b) } else { (b, c) };
     // The base does not see d.

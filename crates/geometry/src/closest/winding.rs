@@ -68,18 +68,18 @@ impl Dipoles {
 pub(super) struct Winding {
     dipoles: Vec<Dipoles>,
     /// Edges at which the surface ends; none where they are more than [`MOST_ENDS`].
-    ends: Option<Vec<End>>,
+    ends: Option<Vec<MeshEnd>>,
 }
 
 /// An edge at which more faces end that run along it one way than the other.
 #[derive(Clone, Copy, Debug)]
-struct End {
+struct MeshEnd {
     vertices: [Vector3<f64>; 2],
     /// By how many.
     surplus: f64,
 }
 
-impl End {
+impl MeshEnd {
     /// Distance r from `p` \[m\], and a bound of ∫ dl/|x − p|² along the edge, times the surplus \[1/m\].
     fn seen_from(&self, p: &Vector3<f64>) -> [f64; 2] {
         let [a, b] = self.vertices.map(|v| v - p);
@@ -205,7 +205,7 @@ impl Winding {
     }
 }
 
-fn ends(mesh: &TriMesh) -> Option<Vec<End>> {
+fn ends(mesh: &TriMesh) -> Option<Vec<MeshEnd>> {
     let weld = mesh.weld_within(0.0);
     let mut ends = Vec::new();
     for edge in edges(&weld.faces(mesh)) {
@@ -213,7 +213,7 @@ fn ends(mesh: &TriMesh) -> Option<Vec<End>> {
         let surplus = forward.abs_diff(edge.uses.len() - forward);
         let vertices = edge.vertices.map(|v| weld.positions[v as usize].coords);
         if surplus > 0 {
-            ends.push(End { vertices, surplus: surplus as f64 });
+            ends.push(MeshEnd { vertices, surplus: surplus as f64 });
         }
     }
     (ends.len() <= MOST_ENDS).then_some(ends)

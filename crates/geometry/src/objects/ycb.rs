@@ -38,7 +38,7 @@ pub enum YcbObject {
 /// How an object is painted on its sheet.
 type Print = fn(&mut Canvas, &Form);
 
-struct Entry {
+struct YcbEntry {
     name: &'static str,
     bop_id: u32,
     mass: f64,
@@ -91,7 +91,7 @@ impl YcbObject {
         TriMesh { texture: Some(Arc::new(entry.texture())), ..entry.form.mesh() }
     }
 
-    fn entry(self) -> Entry {
+    fn entry(self) -> YcbEntry {
         let carton = |size, bulge, radius| Form::Carton { size, bulge, radius };
         let (name, bop_id, mass, form, base, print): (_, _, _, _, _, Print) = match self {
             Self::SugarBox => {
@@ -131,11 +131,11 @@ impl YcbObject {
                 ("061_foam_brick", 21, 0.028, form, 0xa9452f, cartons::foam)
             }
         };
-        Entry { name, bop_id, mass, form, base, print }
+        YcbEntry { name, bop_id, mass, form, base, print }
     }
 }
 
-impl Entry {
+impl YcbEntry {
     fn texture(&self) -> Texture {
         let mut canvas = Canvas::new(self.form.sheet(), TEXTURE_PIXELS, self.base);
         (self.print)(&mut canvas, &self.form);

@@ -19,12 +19,12 @@ pub struct PosedRobot {
     shape: Arc<RobotShape>,
     t_world_links: Vec<Isometry3<f64>>,
     /// Links that have a shape.
-    solid: Vec<Solid>,
+    solid: Vec<LinkSolid>,
 }
 
 /// A link with a shape, ready for queries.
 #[derive(Clone, Debug)]
-struct Solid {
+struct LinkSolid {
     link: usize,
     t_link_world: Isometry3<f64>,
     /// Sphere around the link's box, in the world \[m\].
@@ -61,7 +61,7 @@ impl PosedRobot {
             .filter_map(|(link, s)| {
                 let bounds = s.grid()?.bounds();
                 let t = &t_world_links[link];
-                Some(Solid {
+                Some(LinkSolid {
                     link,
                     t_link_world: t.inverse(),
                     center: t * nalgebra::center(&bounds.0, &bounds.1),
@@ -114,7 +114,7 @@ impl PosedRobot {
         reach: f64,
         query: impl Fn(&SdfGrid, &Point3<f64>, f64) -> Option<T>,
         distance: impl Fn(&T) -> f64,
-    ) -> Option<(&Solid, T)> {
+    ) -> Option<(&LinkSolid, T)> {
         let mut best = None;
         let mut limit = reach;
         for solid in &self.solid {
@@ -156,7 +156,7 @@ impl PosedRobot {
     }
 
     /// Signed distance to one link, or `None` if its box is farther than `limit`.
-    fn link_distance(&self, solid: &Solid, point: &Point3<f64>, limit: f64) -> Option<f64> {
+    fn link_distance(&self, solid: &LinkSolid, point: &Point3<f64>, limit: f64) -> Option<f64> {
         let local = solid.t_link_world * point;
         let near = box_distance(&solid.bounds, &local) <= limit.max(0.0);
         near.then(|| self.shape.links()[solid.link].signed_distance(&local))

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::sides::{Block, add_insides};
+use super::sides::{SampleBlock, add_insides};
 use super::{Lattice, SdfError, SdfGrid};
 use crate::closest::{ClosestPoints, box_distance};
 
@@ -35,7 +35,7 @@ impl SdfGrid {
         let planes = if meshes.iter().all(ClosestPoints::is_closed) { 1 } else { PLANES };
         let mut values = vec![0.0; lattice.dims().iter().product()];
         values.par_chunks_mut(planes * ny * nz).enumerate().for_each(|(block, values)| {
-            sample(meshes, &Block::new(&lattice, block * planes, values.len()), values);
+            sample(meshes, &SampleBlock::new(&lattice, block * planes, values.len()), values);
         });
         Self::from_samples(lattice, &values, bounds)
     }
@@ -51,7 +51,7 @@ struct UnionPart<'a> {
 }
 
 /// The smallest signed distance to any of the meshes at the samples of a block.
-fn sample(meshes: &[ClosestPoints], block: &Block, values: &mut [f64]) {
+fn sample(meshes: &[ClosestPoints], block: &SampleBlock, values: &mut [f64]) {
     let mut parts = Vec::with_capacity(meshes.len());
     for mesh in meshes {
         let count = if mesh.is_closed() { 0 } else { values.len() };

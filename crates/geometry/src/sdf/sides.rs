@@ -6,13 +6,13 @@ use super::Lattice;
 use crate::closest::ClosestPoints;
 
 /// Whole planes of samples along x.
-pub(super) struct Block<'a> {
+pub(super) struct SampleBlock<'a> {
     lattice: &'a Lattice,
     first: usize,
     dims: [usize; 3],
 }
 
-impl<'a> Block<'a> {
+impl<'a> SampleBlock<'a> {
     /// `count` samples from plane `first` on.
     pub(super) fn new(lattice: &'a Lattice, first: usize, count: usize) -> Self {
         let [_, ny, nz] = lattice.dims();
@@ -72,7 +72,7 @@ impl<'a> Block<'a> {
 /// are on the same side.
 pub(super) fn add_insides(
     mesh: &ClosestPoints,
-    block: &Block,
+    block: &SampleBlock,
     unsigned: &[f64],
     values: &mut [f64],
 ) {

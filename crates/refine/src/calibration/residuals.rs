@@ -9,7 +9,7 @@ use crate::error::RefineError;
 use crate::factor::TactileFactor;
 use crate::problem::State;
 use crate::scene::{PreparedFrame, median};
-use crate::strategy::{FusedSettings, Pixels};
+use crate::strategy::{FusedPixels, FusedSettings};
 
 /// Residuals of one frame at its given calibrations, by sensor.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ impl FrameResiduals {
         has_mask: bool,
     ) -> Result<Self, RefineError> {
         let state = State::new(frame, t_cam_object)?;
-        let pixels = Pixels::new(frame, &state, settings.hand_depth.margin);
+        let pixels = FusedPixels::new(frame, &state, settings.hand_depth.margin);
         let feels = frame.hand().is_some_and(|hand| !hand.forces.is_empty());
         let touch = feels.then(|| TactileFactor::new(frame, &settings.tactile)).transpose()?;
         Ok(Self {
@@ -106,7 +106,7 @@ const PIXELS: &str = "px";
 /// Width and height of a cell \[px\].
 const CELL: usize = 16;
 
-/// Pixels that a cell must have.
+/// FusedPixels that a cell must have.
 const FULL: usize = 50;
 
 /// Limit to which residuals of depth are clamped in a cell \[m\].

@@ -13,5 +13,5 @@ pub use fused::{
     Nuisance, Posterior, PosteriorMode, PosteriorSettings, PosteriorSummary, Stage,
     UnobservableDirection,
 };
-pub(crate) use fused::{Pixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
+pub(crate) use fused::{FusedPixels, ScaleMixture, chi_square_z, problem_of, surface_patches};
 pub use trace::{Iteration, Trace};

@@ -16,7 +16,7 @@ use super::files::{
 };
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
-use super::plan::{SynthObject, SynthSettings, Use, check_plan, seed, sequence};
+use super::plan::{FrameUse, SynthObject, SynthSettings, check_plan, seed, sequence};
 use super::pose_noise::NoiseLevel;
 use super::sensor::{SensorRig, SimulatedLens};
 use crate::data::bop::{
@@ -86,7 +86,7 @@ where
     remove_temporary(dir)?;
     hand.write(dir)?;
     let told = |s: &SynthObject| {
-        let mut noise = sequence(settings.seed, Use::Model, s.obj_id, 0);
+        let mut noise = sequence(settings.seed, FrameUse::Model, s.obj_id, 0);
         settings.sensor.model.perturb_model(&s.object.mesh, &mut noise)
     };
     let models = |s: &'s SynthObject, mesh| (s.obj_id, mesh, &s.object.inertial);
@@ -96,7 +96,7 @@ where
     let lens = settings.lens.map(|model| SimulatedLens::new(model, settings));
     let lens = lens.as_ref();
     if settings.sensor.calibration.shared > 0 {
-        let mut noise = sequence(settings.seed, Use::Rig, 0, 0);
+        let mut noise = sequence(settings.seed, FrameUse::Rig, 0, 0);
         let rig = SensorRig::new(settings, &subjects[0].object, &hand.robot, lens, &mut noise);
         write_atomically(&dir.join("rig_gt.json"), format!("{}\n", rig.faults()).as_bytes())?;
     }
@@ -111,8 +111,8 @@ where
     }
     if summary.frames > 0 {
         for (name, purpose, noise) in [
-            ("init_low.csv", Use::InitialLow, NoiseLevel::Low),
-            ("init_high.csv", Use::InitialHigh, NoiseLevel::High),
+            ("init_low.csv", FrameUse::InitialLow, NoiseLevel::Low),
+            ("init_high.csv", FrameUse::InitialHigh, NoiseLevel::High),
         ] {
             let rows = initial_poses(dir, settings.seed, purpose, noise)?;
             write_results(&dir.join(name), &rows)?;
@@ -197,7 +197,8 @@ impl SceneJob<'_> {
 
     /// The moments of a grasp, if they are of this hand.
     fn moments(&self, source: &impl Fn(u64) -> Moments, grasp: u32) -> Moments {
-        let moments = source(seed(self.settings.seed, Use::Grasp, self.subject.obj_id, grasp))?;
+        let moments =
+            source(seed(self.settings.seed, FrameUse::Grasp, self.subject.obj_id, grasp))?;
         if moments.is_empty() {
             return Err("the grasp has no moments".into());
         }
@@ -221,16 +222,17 @@ impl SceneJob<'_> {
         let &SynthObject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
         let lasting = if sensor.calibration.shared > 0 { (0, 0) } else { (obj_id, grasp) };
-        let mut noise = sequence(seed, Use::Rig, lasting.0, lasting.1);
+        let mut noise = sequence(seed, FrameUse::Rig, lasting.0, lasting.1);
         let rig = SensorRig::new(self.settings, object, robot, self.lens, &mut noise);
-        let mut noise = sequence(seed, Use::Film, obj_id, grasp);
+        let mut noise = sequence(seed, FrameUse::Film, obj_id, grasp);
         let film = film.as_ref().map(|film| rig.film(film, moments, &mut noise));
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
             let share = im_id as usize % shares;
             let moment = &moments[(2 * share + 1) * moments.len() / (2 * shares)];
             let film = film.as_ref().map(|film| (film, share));
-            let shot = rig.capture(moment, film, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
+            let shot =
+                rig.capture(moment, film, &mut sequence(seed, FrameUse::Frame, obj_id, im_id))?;
             let quality = sensor.color.jpeg_quality;
             let entries = shot.write(&self.dir, im_id, obj_id, quality)?;
             {
@@ -255,7 +257,7 @@ fn write_targets(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
 fn initial_poses(
     dir: &Path,
     from: u64,
-    purpose: Use,
+    purpose: FrameUse,
     level: NoiseLevel,
 ) -> Result<Vec<ResultRow>, SynthError> {
     let dataset = Dataset::open_split(dir, "test")?;

@@ -134,7 +134,7 @@ fn mesh_bytes(mesh: &TriMesh) -> impl Iterator<Item = u8> + '_ {
 
 /// Purpose of a random sequence: each purpose has a sequence of its own, so that none depends on how many numbers another uses.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Use {
+pub(super) enum FrameUse {
     /// The object model that the estimator is given, by object.
     Model = 1,
     /// The grasp and its trajectory, by object and grasp.
@@ -152,7 +152,7 @@ pub(super) enum Use {
 }
 
 /// A seed for one `purpose`, one object and one number.
-pub(super) fn seed(seed: u64, purpose: Use, obj_id: u32, number: u32) -> u64 {
+pub(super) fn seed(seed: u64, purpose: FrameUse, obj_id: u32, number: u32) -> u64 {
     // The finalizer of SplitMix64 after each word, so that near words give unrelated seeds.
     let words = [seed, purpose as u64, u64::from(obj_id), u64::from(number)];
     words.into_iter().fold(0_u64, |state, word| {
@@ -164,7 +164,7 @@ pub(super) fn seed(seed: u64, purpose: Use, obj_id: u32, number: u32) -> u64 {
 }
 
 /// The sequence of [`seed`].
-pub(super) fn sequence(from: u64, purpose: Use, obj_id: u32, number: u32) -> SplitMix64 {
+pub(super) fn sequence(from: u64, purpose: FrameUse, obj_id: u32, number: u32) -> SplitMix64 {
     SplitMix64::new(seed(from, purpose, obj_id, number))
 }
 
@@ -188,7 +188,13 @@ mod tests {
     fn seeds_differ_in_every_argument() {
         let mut seen = std::collections::BTreeSet::new();
         for from in 0..4 {
-            for purpose in [Use::Model, Use::Grasp, Use::Rig, Use::Frame, Use::InitialHigh] {
+            for purpose in [
+                FrameUse::Model,
+                FrameUse::Grasp,
+                FrameUse::Rig,
+                FrameUse::Frame,
+                FrameUse::InitialHigh,
+            ] {
                 for obj_id in 1..10 {
                     (0..50).for_each(|n| assert!(seen.insert(seed(from, purpose, obj_id, n))));
                 }

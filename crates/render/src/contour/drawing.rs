@@ -7,14 +7,14 @@ use crate::mode::ContourOptions;
 
 /// How coverage falls across a contour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Step {
+pub(crate) enum DrawStep {
     /// Smoothly, from 1 at −w to 0 at +w \[px\].
     Smooth(f32),
     /// As the part of a square pixel that lies on this side of a straight contour.
     Square,
 }
 
-impl Step {
+impl DrawStep {
     /// Coverage is one or zero farther away than this \[px\].
     pub(crate) fn reach(self) -> f32 {
         match self {
@@ -64,7 +64,7 @@ fn square_step(s: f32, normal: Vec2) -> (f32, f32) {
 /// How the contour mode draws the pixels of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Drawing {
-    pub(crate) step: Step,
+    pub(crate) step: DrawStep,
     /// Whether creases are blended.
     pub(crate) creases: bool,
     /// Slopes of the image are those between the sides of a pixel; otherwise those at its center.
@@ -81,9 +81,9 @@ impl ContourOptions {
         let half_width = f64::from(self.drawn_half_width());
         let left = s2 * half_width * half_width - least * (s2 - 1.0);
         let step = match samples {
-            1 => Step::Smooth(self.drawn_half_width()),
-            _ if left > 1.01 * least => Step::Smooth(left.sqrt() as f32),
-            _ => Step::Square,
+            1 => DrawStep::Smooth(self.drawn_half_width()),
+            _ if left > 1.01 * least => DrawStep::Smooth(left.sqrt() as f32),
+            _ => DrawStep::Square,
         };
         Drawing { step, creases: self.creases && samples == 1, footprint: samples > 1 }
     }
@@ -105,10 +105,10 @@ mod tests {
                 let inside =
                     (0..n * n).filter(|i| normal.dot(vec2(place(i % n), place(i / n))) < -s);
                 let area = inside.count() as f32 / (n * n) as f32;
-                let (value, slope) = Step::Square.at(s, normal);
+                let (value, slope) = DrawStep::Square.at(s, normal);
                 assert!((value - area).abs() < 2e-3, "{angle} {s}: {value} {area}");
                 let d = 1e-3;
-                let at = |s: f32| Step::Square.at(s, normal).0;
+                let at = |s: f32| DrawStep::Square.at(s, normal).0;
                 let difference = (at(s + d) - at(s - d)) / (2.0 * d);
                 assert!((difference - slope).abs() < 2e-2, "{angle} {s}: {slope} {difference}");
             }
@@ -118,12 +118,12 @@ mod tests {
     #[test]
     fn parts_of_pixels_blur_as_much_as_the_pixel() {
         let options = ContourOptions { half_width: 1.2, creases: false };
-        assert_eq!(options.drawing(1).step, Step::Smooth(1.2));
-        let Step::Smooth(w) = options.drawing(4).step else { panic!() };
+        assert_eq!(options.drawing(1).step, DrawStep::Smooth(1.2));
+        let DrawStep::Smooth(w) = options.drawing(4).step else { panic!() };
         let variance = f64::from(w * w) / 5.0 / 16.0 + 15.0 / (12.0 * 16.0);
         assert!((variance - 1.44 / 5.0).abs() < 1e-6);
         for half_width in [0.645, 0.0, -3.0] {
-            assert_eq!(ContourOptions { half_width, ..options }.drawing(4).step, Step::Square);
+            assert_eq!(ContourOptions { half_width, ..options }.drawing(4).step, DrawStep::Square);
         }
         let wide = |half_width| ContourOptions { half_width, ..options }.drawing(2).step;
         assert_eq!(wide(f64::INFINITY), wide(64.0));

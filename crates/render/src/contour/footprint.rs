@@ -3,10 +3,10 @@
 use glam::{Vec2, vec2};
 
 use super::contours::ContourView;
-use super::drawing::Step;
+use super::drawing::DrawStep;
 use super::inner::Inner;
 use super::interior::add_level;
-use super::near::{Hit, Place};
+use super::near::{NearHit, NearPlace};
 use super::outline::Foot;
 use super::scene::ContourScene;
 use crate::projected::barycentric;
@@ -23,7 +23,13 @@ const STEPS: [Vec2; 4] = [Vec2::NEG_X, Vec2::X, Vec2::NEG_Y, Vec2::Y];
 
 impl ContourView<'_> {
     /// Faces around a pixel that shows `face` at depth `z` \[m\], near this inner contour, if any.
-    pub(super) fn around(&self, place: &Place, face: u32, z: f32, inner: Option<&Inner>) -> Around {
+    pub(super) fn around(
+        &self,
+        place: &NearPlace,
+        face: u32,
+        z: f32,
+        inner: Option<&Inner>,
+    ) -> Around {
         STEPS.map(|step| {
             let (dx, dy) = (step.x as i64, step.y as i64);
             let (x, y) = (place.x as i64 + dx, place.y as i64 + dy);
@@ -46,7 +52,7 @@ impl ContourView<'_> {
     }
 
     /// The near and the far surface at an inner contour, where `face` is seen at this depth.
-    pub(super) fn layers(&self, place: &Place, face: u32, z: f32, inner: &Inner) -> Layers {
+    pub(super) fn layers(&self, place: &NearPlace, face: u32, z: f32, inner: &Inner) -> Layers {
         let (_, behind, inverse_z) = inner.behind;
         let beyond = z > inner.split;
         let [near, far] = if beyond { [inner.piece.face, face] } else { [face, behind] };
@@ -59,9 +65,9 @@ impl ContourView<'_> {
         Layers { near: layer(near, 0.0), far: layer(far, f32::INFINITY), far_z }
     }
 
-    fn seen_at(&self, x: i64, y: i64) -> Option<Hit> {
+    fn seen_at(&self, x: i64, y: i64) -> Option<NearHit> {
         let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        Visible::at(&self.visible, x, y).map(|(face, inverse_z)| Hit { face, inverse_z })
+        Visible::at(&self.visible, x, y).map(|(face, inverse_z)| NearHit { face, inverse_z })
     }
 }
 
@@ -147,7 +153,7 @@ impl ContourScene<'_> {
         let [left, right, top, bottom] = sides;
         let point = self.posed.ray(at) * z;
         let arm = self.level_arm();
-        let area = cut.map_or(1.0, |cut| Step::Square.at(cut.distance, cut.outward).0);
+        let area = cut.map_or(1.0, |cut| DrawStep::Square.at(cut.distance, cut.outward).0);
         std::array::from_fn(|k| {
             let slope = vec2(right[k] - left[k], bottom[k] - top[k]);
             let mut row = self.image_motion(slope, point).map(|v| -v);
@@ -198,7 +204,7 @@ impl ContourScene<'_> {
         let complement = Cut { distance: -distance, outward: -outward, color: beyond };
         let cut = Some(&complement);
         let behind = self.rows_over_footprint(at, *far_z, far.face, &far.around, &shaded, cut);
-        let (_, slope) = Step::Square.at(distance, outward);
+        let (_, slope) = DrawStep::Square.at(distance, outward);
         for k in 0..3 {
             let jump = slope * (here[k] - beyond[k]);
             let moved = scaled_sum(1.0, &behind[k], jump, ds);

@@ -15,7 +15,7 @@ pub(crate) fn row(linear: Vec3, angular: Vec3) -> Row {
 }
 
 /// How what a fixed pixel shows of a face changes with the pose.
-pub(crate) struct Motion {
+pub(crate) struct InteriorMotion {
     /// Gradients of the barycentric coordinates of corners 1 and 2 by the surface's own motion, reversed.
     gradients: [Vec3; 2],
     arm: Vec3,
@@ -23,7 +23,7 @@ pub(crate) struct Motion {
     pub(crate) z_row: Row,
 }
 
-impl Motion {
+impl InteriorMotion {
     /// At barycentric coordinates `b` and depth `z` on the viewing ray `ray` (X/Z) of a face with corners `p` (camera frame
     /// \[m\]).
     ///

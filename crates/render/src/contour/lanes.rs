@@ -8,7 +8,7 @@
 use glam::{Vec3, vec2, vec3};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::interior::{Motion, add_level};
+use super::interior::{InteriorMotion, add_level};
 use super::scene::ContourScene;
 use crate::model::{Albedo, Cell, Mipmap, Texel};
 use crate::projected::barycentric;
@@ -256,7 +256,7 @@ impl Waiting {
             if DERIVATIVES {
                 let corners = triple(get(&self.corners, l));
                 let ray = posed.ray(vec2(self.x[l], self.y[l]));
-                let motion = Motion::new(&corners, b, ray, self.patch.z[l], twist_center);
+                let motion = InteriorMotion::new(&corners, b, ray, self.patch.z[l], twist_center);
                 for k in 0..3 {
                     let mut row = motion.color_row(&shaded, k);
                     add_level(&mut row, shaded.level[k] * posed.level_dz, arm);

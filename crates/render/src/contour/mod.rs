@@ -24,7 +24,7 @@ mod walk;
 
 pub(crate) use contours::ContourView;
 pub(crate) use crease::{Crease, creases};
-pub(crate) use drawing::{Step, falling_step};
+pub(crate) use drawing::{DrawStep, falling_step};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
 pub(crate) use outline::{Band, Piece, outline};
@@ -34,13 +34,13 @@ use glam::vec2;
 use crate::projected::Region;
 use crate::view::{Seen, Sink, View};
 use footprint::Beside;
-use near::{Bands, Found, Hit, Place};
+use near::{Bands, Found, NearHit, NearPlace};
 use walk::Walk;
 
 impl ContourView<'_> {
     /// Values of the pixel at `place`, given the face and contours there; `None` without the object.
     #[inline]
-    fn seen<const DERIVATIVES: bool>(&self, place: Place, found: Found) -> Option<Seen> {
+    fn seen<const DERIVATIVES: bool>(&self, place: NearPlace, found: Found) -> Option<Seen> {
         let scene = &self.scene;
         let at = vec2(place.x as f32, place.y as f32);
         let footprint = DERIVATIVES && scene.drawing.footprint;
@@ -53,14 +53,14 @@ impl ContourView<'_> {
                 (scene.outside::<DERIVATIVES>(at, piece, around.as_ref()), false, true)
             }
             Found::Face(hit) => {
-                let Hit { face, inverse_z } = hit;
+                let NearHit { face, inverse_z } = hit;
                 let around = around(face, 1.0 / inverse_z, None);
                 (scene.interior::<DERIVATIVES>(at, face, inverse_z, around.as_ref()), true, false)
             }
             Found::Border(hit, near) => {
-                let Hit { face, inverse_z } = hit;
+                let NearHit { face, inverse_z } = hit;
                 let z = 1.0 / inverse_z;
-                let cut = scene.drawing.step == Step::Square;
+                let cut = scene.drawing.step == DrawStep::Square;
                 let beside = match near.inner.filter(|_| footprint && cut) {
                     Some(inner) => Some(Beside::Layers(self.layers(&place, face, z, inner))),
                     None => around(face, z, near.inner).map(Beside::Surface),

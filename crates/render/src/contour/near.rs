@@ -10,7 +10,7 @@ use crate::raster::{MISS, Visible};
 
 /// A pixel, and the outline near it and its neighbors.
 #[derive(Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct NearPlace<'a> {
     pub(super) x: usize,
     pub(super) y: usize,
     pub(super) band: &'a Band,
@@ -25,9 +25,9 @@ pub(super) enum Found<'a> {
     /// The object is not here, but its outline is near.
     Outside(&'a Piece),
     /// A face, far from contours.
-    Face(Hit),
+    Face(NearHit),
     /// A face near contours or a crease.
-    Border(Hit, Near<'a>),
+    Border(NearHit, Near<'a>),
 }
 
 /// The contours and the crease within whose bands a pixel lies.
@@ -40,7 +40,7 @@ pub(super) struct Near<'a> {
 
 /// A visible face.
 #[derive(Clone, Copy)]
-pub(super) struct Hit {
+pub(super) struct NearHit {
     pub(super) face: u32,
     pub(super) inverse_z: f32,
 }
@@ -92,16 +92,16 @@ impl<'a> Bands<'a> {
 
     /// Face and contours at pixel (x, y) of the image, within the block.
     #[inline]
-    pub(super) fn found(&self, x: usize, y: usize) -> (Place<'_>, Found<'a>) {
+    pub(super) fn found(&self, x: usize, y: usize) -> (NearPlace<'_>, Found<'a>) {
         let Region { x0, y0, .. } = self.visible.region;
         let i = (y - y0) * self.visible.region.width() + x - x0;
-        let place = Place { x, y, band: &self.outline, at: self.start + i };
+        let place = NearPlace { x, y, band: &self.outline, at: self.start + i };
         let index_in =
             |band: &Option<Band>| band.as_ref().map_or(NONE, |band| band.piece[i]) as usize;
         let edge = self.view.pieces.get(self.outline.piece[place.at] as usize);
         let inner = self.view.inner.get(index_in(&self.inner));
         let crease = self.view.creases.get(index_in(&self.crease));
-        let hit = Hit { face: self.visible.face[i], inverse_z: self.visible.inverse_z[i] };
+        let hit = NearHit { face: self.visible.face[i], inverse_z: self.visible.inverse_z[i] };
         let found = match (hit.face, edge, inner, crease) {
             (MISS, None, ..) => Found::Nothing,
             (MISS, Some(piece), ..) => Found::Outside(piece),

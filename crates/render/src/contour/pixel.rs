@@ -2,9 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
-use super::drawing::{Step, falling_step};
+use super::drawing::{DrawStep, falling_step};
 use super::footprint::{Around, Beside, Cut};
-use super::interior::{Motion, add_level, row};
+use super::interior::{InteriorMotion, add_level, row};
 use super::near::Near;
 use super::outline::{Foot, Piece};
 use super::scene::ContourScene;
@@ -30,7 +30,7 @@ impl ContourScene<'_> {
         };
         // Of a pixel through which a contour runs only a part counts, whose rows come below.
         let cut = around.filter(|_| inner.is_none() && edge.is_some());
-        let cut = cut.filter(|_| self.drawing.step == Step::Square);
+        let cut = cut.filter(|_| self.drawing.step == DrawStep::Square);
         let whole = around.filter(|_| cut.is_none());
         let mut pixel = self.interior::<DERIVATIVES>(at, face, inverse_z, whole);
         if let Some(crease) = crease {
@@ -57,7 +57,7 @@ impl ContourScene<'_> {
     ) -> Pixel {
         let foot = piece.foot(at);
         let mut pixel = self.at_foot::<DERIVATIVES>(piece, &foot);
-        let cut = around.filter(|_| self.drawing.step == Step::Square);
+        let cut = around.filter(|_| self.drawing.step == DrawStep::Square);
         let cut = cut.map(|around| (piece.face, around));
         self.blend::<DERIVATIVES>(at, piece, &foot, 1.0, cut, &mut pixel);
         pixel
@@ -81,7 +81,7 @@ impl ContourScene<'_> {
         if DERIVATIVES {
             let corners = self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
             let ray = self.posed.ray(at);
-            let motion = Motion::new(&corners, b, ray, z, self.twist_center);
+            let motion = InteriorMotion::new(&corners, b, ray, z, self.twist_center);
             let arm = self.level_arm();
             for k in 0..3 {
                 pixel.color_rows[k] = motion.color_row(&shaded, k);

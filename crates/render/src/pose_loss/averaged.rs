@@ -110,7 +110,7 @@ impl Accumulated {
 
 /// The pixels that a block of the finer view contributes to, row by row from `top`.
 #[derive(Default)]
-struct Part {
+struct SampledPart {
     top: usize,
     rows: Vec<Vec<(usize, Accumulated)>>,
 }
@@ -121,8 +121,8 @@ impl<V: View> Averaged<V> {
         Self { fine, samples }
     }
 
-    fn part<const DERIVATIVES: bool>(&self, block: usize) -> Part {
-        let mut part = Part::default();
+    fn part<const DERIVATIVES: bool>(&self, block: usize) -> SampledPart {
+        let mut part = SampledPart::default();
         self.fine.visit::<DERIVATIVES>(block, |x, y, seen| {
             let (x, y) = (x / self.samples, y / self.samples);
             if part.rows.is_empty() {
@@ -161,7 +161,7 @@ impl<V: View> View for Averaged<V> {
         mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
         let blocks = 0..self.fine.blocks();
-        let parts: Vec<Part> =
+        let parts: Vec<SampledPart> =
             blocks.into_par_iter().map(|block| self.part::<DERIVATIVES>(block)).collect();
         let count = self.samples * self.samples;
         let mut finish = |y: usize, row: Vec<(usize, Accumulated)>| {
@@ -192,7 +192,7 @@ impl<V: View> View for Averaged<V> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{Noise, camera, full_options, lamp, pose, target_of, textured_box};
-    use crate::contour::{ContourView, Step};
+    use crate::contour::{ContourView, DrawStep};
     use crate::mode::{ContourOptions, Mode, SoftRasOptions};
     use crate::model::RenderModel;
     use crate::pose_loss::PoseLoss;
@@ -208,7 +208,9 @@ mod tests {
         let loss = PoseLoss::default();
         for samples in [2, 3] {
             let coarse = loss.with_samples(samples).render(&model, &pose, &camera(), &lamp());
-            let Step::Smooth(w) = ContourOptions::default().drawing(samples).step else { panic!() };
+            let DrawStep::Smooth(w) = ContourOptions::default().drawing(samples).step else {
+                panic!()
+            };
             let fine = ContourOptions { half_width: w.into(), ..ContourOptions::default() };
             let fine = PoseLoss::new(Mode::Contour(fine), full_options());
             let fine = fine.render(&model, &pose, &camera().scaled(samples as f64), &lamp());

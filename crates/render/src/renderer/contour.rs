@@ -7,9 +7,9 @@ use prehend_autodiff::{Fwd, LocalFunction};
 use rayon::prelude::*;
 
 use super::frame::{Flat, Frame};
-use super::geometry::{Foot, Hit, hit, hit_adjoint};
+use super::geometry::{Hit, ScreenFoot, hit, hit_adjoint};
 use super::sums::Sums;
-use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
+use super::visibility::{BlendAdjoint, PartAdjoint, PixelBlend, Visibility, VisiblePart};
 use crate::contour::{
     Band, Crease, Inner, LEAST_STEP, Piece, creases, falling_step, inner_contours, outline,
 };
@@ -60,7 +60,7 @@ enum Site {
 #[derive(Clone, Copy)]
 struct Step {
     piece: Piece,
-    foot: Foot,
+    foot: ScreenFoot,
     /// Share of the edge in space at the foot.
     share: f64,
     /// Weight of the near side, and its derivative by the signed distance.
@@ -187,7 +187,8 @@ impl Contours {
     #[inline]
     fn step(&self, frame: &Frame, piece: &Piece, pixel: [f64; 2], side: f64) -> Step {
         let range = piece.range.map(f64::from);
-        let foot = Foot { pixel, range, outward: piece.outward.to_array().map(f64::from), side };
+        let foot =
+            ScreenFoot { pixel, range, outward: piece.outward.to_array().map(f64::from), side };
         let [share, distance] = foot.evaluate(foot_inputs(frame, piece));
         let (alpha, slope) = falling_step(distance, self.half_width);
         Step { piece: *piece, foot, share, alpha, slope }
@@ -224,7 +225,7 @@ fn is_near(frame: &Frame, inner: &Inner, own: usize, z: f64) -> bool {
     }
 }
 
-/// Inputs of [`Foot`]: both ends of the edge, camera frame \[m\], and fx, fy, cx, cy \[px\].
+/// Inputs of [`ScreenFoot`]: both ends of the edge, camera frame \[m\], and fx, fy, cx, cy \[px\].
 #[inline]
 fn foot_inputs(frame: &Frame, piece: &Piece) -> [f64; 10] {
     let corners = frame.corners(piece.face as usize);
@@ -235,18 +236,18 @@ fn foot_inputs(frame: &Frame, piece: &Piece) -> [f64; 10] {
 
 /// The part of weight `weight` where the ray through an image position meets a face.
 #[inline]
-fn at_pixel(frame: &Frame, face: usize, at: [f64; 2], weight: f64) -> (Part, Hit) {
+fn at_pixel(frame: &Frame, face: usize, at: [f64; 2], weight: f64) -> (VisiblePart, Hit) {
     let hit = hit(&frame.corners(face), &frame.camera.ray(at[0], at[1]));
-    (Part { face, b: hit.b, weight }, hit)
+    (VisiblePart { face, b: hit.b, weight }, hit)
 }
 
 /// That at the foot on a contour.
 #[inline]
-fn at_foot(piece: &Piece, share: f64, weight: f64) -> Part {
+fn at_foot(piece: &Piece, share: f64, weight: f64) -> VisiblePart {
     let mut b = [0.0; 3];
     b[piece.corners[0] as usize] = 1.0 - share;
     b[piece.corners[1] as usize] = share;
-    Part { face: piece.face as usize, b, weight }
+    VisiblePart { face: piece.face as usize, b, weight }
 }
 
 /// The adjoint of the foot's share of its edge, from those of its barycentric coordinates.
@@ -308,14 +309,18 @@ impl Visibility for Contours {
         i: usize,
         at: [f64; 2],
         trace: &mut Trace,
-        parts: &mut Vec<Part>,
-    ) -> Option<Blend> {
+        parts: &mut Vec<VisiblePart>,
+    ) -> Option<PixelBlend> {
         let decision = self.decision(block, i);
         let Some(face) = decision.face else {
             let edge = self.step(frame, decision.edge?, at, 1.0);
             *trace = Trace { own: Some(Site::Foot), edge: Some(edge), ..Trace::default() };
             parts.push(at_foot(&edge.piece, edge.share, edge.alpha));
-            return Some(Blend { background: 1.0 - edge.alpha, alpha: edge.alpha, center: None });
+            return Some(PixelBlend {
+                background: 1.0 - edge.alpha,
+                alpha: edge.alpha,
+                center: None,
+            });
         };
         let (own, hit) = at_pixel(frame, face, at, 1.0);
         *trace = Trace { own: Some(Site::Ray(at, hit)), ..Trace::default() };
@@ -346,7 +351,7 @@ impl Visibility for Contours {
         for (part, share) in parts.iter_mut().zip(trace.shares()) {
             part.weight = alpha * share;
         }
-        Some(Blend { background: 1.0 - alpha, alpha, center: Some((0, hit.z)) })
+        Some(PixelBlend { background: 1.0 - alpha, alpha, center: Some((0, hit.z)) })
     }
 
     #[inline]
@@ -354,7 +359,7 @@ impl Visibility for Contours {
         &self,
         frame: &Frame,
         trace: &Trace,
-        parts: &[Part],
+        parts: &[VisiblePart],
         by_parts: &[PartAdjoint],
         by: &BlendAdjoint,
         sums: &mut Sums,

@@ -64,7 +64,7 @@ pub(super) fn hit_adjoint(
 /// The point of a contour edge next to a pixel, as a function of the ends of the edge (A, B; camera frame \[m\]) and of
 /// fx, fy, cx, cy \[px\]: its share of the edge in space, from A, and the signed distance of the pixel from it \[px\].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
+pub(super) struct ScreenFoot {
     pub(super) pixel: [f64; 2],
     /// The part of the edge (share of its screen length) that belongs to the contour.
     pub(super) range: [f64; 2],
@@ -74,7 +74,7 @@ pub(super) struct Foot {
     pub(super) side: f64,
 }
 
-impl LocalFunction<10, 2> for Foot {
+impl LocalFunction<10, 2> for ScreenFoot {
     #[inline]
     fn evaluate<S: Scalar>(&self, x: [S; 10]) -> [S; 2] {
         let [fx, fy, cx, cy] = [x[6], x[7], x[8], x[9]];
@@ -172,7 +172,7 @@ mod tests {
     fn the_foot_has_derivatives_at_the_contour_and_beyond_its_ends() {
         let edge = [-0.1, -0.05, 0.5, 0.12, -0.02, 0.6, 300.0, 310.0, 64.0, 48.0];
         let mut foot =
-            Foot { pixel: [64.0, 30.0], range: [0.0, 1.0], outward: [0.0, 1.0], side: 1.0 };
+            ScreenFoot { pixel: [64.0, 30.0], range: [0.0, 1.0], outward: [0.0, 1.0], side: 1.0 };
         for (pixel, range) in
             [([64.0, 30.0], [0.0, 1.0]), ([64.0, 30.0], [0.7, 0.9]), ([0.0, 20.0], [0.0, 1.0])]
         {
@@ -198,7 +198,7 @@ mod tests {
         let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
         let at = |distance: f64| {
             let pixel = [middle[0] + distance * normal[0], middle[1] + distance * normal[1]];
-            let foot = Foot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 };
+            let foot = ScreenFoot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 };
             foot.evaluate(Fwd::<10>::variables(edge))
         };
         let (on, beside) = (at(0.0), at(0.01));

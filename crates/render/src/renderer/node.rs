@@ -108,12 +108,12 @@ impl Input {
     }
 }
 
-struct Node<Sh> {
+struct ImageNode<Sh> {
     rendering: Rendering<Sh>,
     inputs: Vec<Input>,
 }
 
-impl<Sh: Shader + 'static> CustomVjp for Node<Sh> {
+impl<Sh: Shader + 'static> CustomVjp for ImageNode<Sh> {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
         let pixels = self.rendering.buffers.alpha.len();
         let (color, rest) = output_adjoints.split_at(3 * pixels);
@@ -216,7 +216,7 @@ impl<Sh: Shader + Clone + 'static> Renderer<Sh> {
         let mut outputs = buffers.color.as_flattened().to_vec();
         outputs.extend(&buffers.alpha);
         outputs.extend(&buffers.depth);
-        let images = custom(&numbers, &outputs, Node { rendering, inputs });
+        let images = custom(&numbers, &outputs, ImageNode { rendering, inputs });
         Ok(BufferVars {
             color: images[..3 * pixels].as_chunks().0.to_vec(),
             alpha: images[3 * pixels..4 * pixels].to_vec(),

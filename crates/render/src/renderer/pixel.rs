@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::sums::Sums;
 use super::surface::Lit;
-use super::visibility::{BlendAdjoint, Part, PartAdjoint, Visibility};
+use super::visibility::{BlendAdjoint, PartAdjoint, Visibility, VisiblePart};
 use crate::shading::{Chunks, Shader};
 
 /// A rendered pixel.
@@ -47,7 +47,7 @@ pub(super) struct Place {
 
 /// Room for the pixel at hand.
 pub(super) struct Scratch<V: Visibility> {
-    parts: Vec<Part>,
+    parts: Vec<VisiblePart>,
     by_parts: Vec<PartAdjoint>,
     trace: V::Trace,
 }

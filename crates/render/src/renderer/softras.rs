@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::fragment::Fragment;
 use super::frame::{Flat, Frame};
 use super::sums::Sums;
-use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
+use super::visibility::{BlendAdjoint, PartAdjoint, PixelBlend, Visibility, VisiblePart};
 use crate::model::NONE;
 use crate::projected::Region;
 use crate::softras::{
@@ -147,8 +147,8 @@ impl Visibility for SoftFaces {
         i: usize,
         at: [f64; 2],
         trace: &mut Trace,
-        parts: &mut Vec<Part>,
-    ) -> Option<Blend> {
+        parts: &mut Vec<VisiblePart>,
+    ) -> Option<PixelBlend> {
         let (faces, inside) = self.decision(block, i);
         if faces.is_empty() {
             return None;
@@ -178,7 +178,7 @@ impl Visibility for SoftFaces {
             let Fragment { b, z, .. } = spread.fragment;
             let weight = spread.presence * ((reference - z) * rate).exp();
             sum += weight;
-            parts.push(Part { face: face as usize, b, weight });
+            parts.push(VisiblePart { face: face as usize, b, weight });
         }
         for part in parts.iter_mut() {
             let share = part.weight / sum;
@@ -191,13 +191,13 @@ impl Visibility for SoftFaces {
             place.unwrap_or_else(|| {
                 // Hidden behind as many faces as count.
                 let fragment = self.fragment(frame, face as usize, at);
-                parts.push(Part { face: face as usize, b: fragment.b, weight: 0.0 });
+                parts.push(VisiblePart { face: face as usize, b: fragment.b, weight: 0.0 });
                 trace.spreads.push(Spread { fragment, presence: 0.0, absence: 1.0 });
                 parts.len() - 1
             })
         });
         let center = trace.center.map(|k| (k, trace.spreads[k].fragment.z));
-        Some(Blend { background: trace.background, alpha: 1.0 - trace.clear, center })
+        Some(PixelBlend { background: trace.background, alpha: 1.0 - trace.clear, center })
     }
 
     /// With the shares ω: d ln w = −(1 − p)/σ dd − dz/(γ (z_far − z_near)), dω_k = ω_k (d ln w_k − Σ ω_j d ln w_j), and
@@ -207,7 +207,7 @@ impl Visibility for SoftFaces {
         &self,
         frame: &Frame,
         trace: &Trace,
-        parts: &[Part],
+        parts: &[VisiblePart],
         by_parts: &[PartAdjoint],
         by: &BlendAdjoint,
         sums: &mut Sums,

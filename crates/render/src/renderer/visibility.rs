@@ -6,7 +6,7 @@ use crate::projected::Region;
 
 /// A place on a face that a pixel shows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct VisiblePart {
     pub(super) face: usize,
     /// Perspective-correct barycentric coordinates, unless the mode's options say otherwise.
     pub(super) b: [f64; 3],
@@ -16,7 +16,7 @@ pub(super) struct Part {
 
 /// Blend of the parts of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Blend {
+pub(super) struct PixelBlend {
     /// Weight of the background's color.
     pub(super) background: f64,
     pub(super) alpha: f64,
@@ -24,14 +24,14 @@ pub(super) struct Blend {
     pub(super) center: Option<(usize, f64)>,
 }
 
-/// Derivatives of a loss by a [`Part`].
+/// Derivatives of a loss by a [`VisiblePart`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartAdjoint {
     pub(super) b: [f64; 3],
     pub(super) weight: f64,
 }
 
-/// Derivatives of a loss by a [`Blend`].
+/// Derivatives of a loss by a [`PixelBlend`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlendAdjoint {
     pub(super) background: f64,
@@ -59,15 +59,15 @@ pub(super) trait Visibility: Sync {
         i: usize,
         at: [f64; 2],
         trace: &mut Self::Trace,
-        parts: &mut Vec<Part>,
-    ) -> Option<Blend>;
+        parts: &mut Vec<VisiblePart>,
+    ) -> Option<PixelBlend>;
 
     /// Carries the derivatives by the parts of the traced pixel and by their blend back into `sums`.
     fn trace_back(
         &self,
         frame: &Frame,
         trace: &Self::Trace,
-        parts: &[Part],
+        parts: &[VisiblePart],
         by_parts: &[PartAdjoint],
         by: &BlendAdjoint,
         sums: &mut Sums,

@@ -15,7 +15,7 @@ use crate::{LossOptions, Mode, PoseLoss, Target};
 const CAMERA: Camera = Camera { fx: 150.0, fy: 150.0, cx: 31.0, cy: 33.0, width: 64, height: 64 };
 
 /// A coarse body under a wide blur, compared with its own picture from elsewhere.
-struct Problem {
+struct JumpProblem {
     model: RenderModel,
     options: SoftRasOptions,
     target: Target,
@@ -23,7 +23,7 @@ struct Problem {
     center: Point3<f64>,
 }
 
-impl Problem {
+impl JumpProblem {
     /// Problem with weights below e⁻³⁵ beyond the blur radius, and with the most faces a pixel.
     fn new(sigma: f64, gamma: f64) -> Self {
         let model = RenderModel::new(&painted(lump(0.045, 9), 0.05)).unwrap();
@@ -115,7 +115,7 @@ fn compare(name: &str, a: Vector6<f64>, b: Vector6<f64>) -> (f64, f64) {
 #[test]
 fn the_gradient_and_the_jumps_make_the_differences() {
     for (sigma, gamma) in [(2e-4, 0.1), (1e-3, 1e-3)] {
-        let problem = Problem::new(sigma, gamma);
+        let problem = JumpProblem::new(sigma, gamma);
         assert!(problem.naive(0, 0.0).1 < SoftRasOptions::MOST_FACES, "some are dropped");
         let gradient = problem.gradient(&problem.guess);
         let small = Vector6::from_fn(|axis, _| problem.difference(axis, -1e-7, 1e-7) / 2e-7);

@@ -143,18 +143,18 @@ impl View for SoftRasView<'_> {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        self.arch.dispatch(Walk::<DERIVATIVES, _> { view: self, block, each });
+        self.arch.dispatch(TileWalk::<DERIVATIVES, _> { view: self, block, each });
     }
 }
 
 /// The work on one row of pixels, compiled for each set of vector instructions.
-struct Walk<'a, const DERIVATIVES: bool, F> {
+struct TileWalk<'a, const DERIVATIVES: bool, F> {
     view: &'a SoftRasView<'a>,
     block: usize,
     each: F,
 }
 
-impl<const DERIVATIVES: bool, F> pulp::WithSimd for Walk<'_, DERIVATIVES, F>
+impl<const DERIVATIVES: bool, F> pulp::WithSimd for TileWalk<'_, DERIVATIVES, F>
 where
     F: FnMut(usize, usize, Option<Seen>),
 {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::Fwd;
 
-use super::motions::{Motion, of_free_body, of_link};
+use super::motions::{BodyMotion, of_free_body, of_link};
 use super::pair::Between;
 use crate::articulated::Kinematics;
 use crate::articulated::tree_factor::TreeFactor;
@@ -75,7 +75,7 @@ impl Generalized {
         let contacts = contacts.filter_map(|pair| Between::contact(model, pair, states, step));
         let bushings =
             model.bushings.iter().map(|bushing| Between::bushing(model, bushing, states));
-        let mut motions: Vec<Option<Vec<Motion>>> = Vec::new();
+        let mut motions: Vec<Option<Vec<BodyMotion>>> = Vec::new();
         motions.resize_with(model.bodies.len(), || None);
         let mut own = Vec::new();
         if !(model.contacts.is_empty() && model.bushings.is_empty()) {
@@ -104,11 +104,11 @@ impl Generalized {
     }
 
     /// Adds, along the motions of one body, the change of a wrench with those of another.
-    fn add_slopes(&mut self, by: &SMatrix<f64, 6, 12>, of: &[Motion], moving: &[Motion]) {
-        for Motion { dof: column, displaced, unit } in moving {
+    fn add_slopes(&mut self, by: &SMatrix<f64, 6, 12>, of: &[BodyMotion], moving: &[BodyMotion]) {
+        for BodyMotion { dof: column, displaced, unit } in moving {
             let by_displacement = by * displaced;
             let by_velocity = by.fixed_columns::<6>(6) * unit;
-            for Motion { dof: row, unit, .. } in of {
+            for BodyMotion { dof: row, unit, .. } in of {
                 self.by_position[(*row, *column)] += unit.dot(&by_displacement);
                 self.by_velocity[(*row, *column)] += unit.dot(&by_velocity);
             }
@@ -116,11 +116,11 @@ impl Generalized {
     }
 
     /// Adds the change of the coordinates' share in a wrench on a link as its point moves; that by the turn of axes follows for the sum.
-    fn add_turns(&mut self, wrench: &Vector6<f64>, motions: &[Motion]) {
+    fn add_turns(&mut self, wrench: &Vector6<f64>, motions: &[BodyMotion]) {
         let force = linear(wrench);
-        for Motion { dof: column, unit: moved, .. } in motions {
+        for BodyMotion { dof: column, unit: moved, .. } in motions {
             let change = linear(moved).cross(&force);
-            for Motion { dof: row, unit, .. } in motions {
+            for BodyMotion { dof: row, unit, .. } in motions {
                 self.by_position[(*row, *column)] += angular(unit).dot(&change);
             }
         }

@@ -6,7 +6,7 @@ use crate::articulated::Kinematics;
 use crate::spatial::{angular, cross_motion, linear, spatial};
 
 /// Changes of a body's state, in the order of [`BodyState::tangent`](crate::BodyState::tangent), by one coordinate.
-pub(super) struct Motion {
+pub(super) struct BodyMotion {
     /// Index of the coordinate.
     pub(super) dof: usize,
     /// By its displacement.
@@ -16,8 +16,8 @@ pub(super) struct Motion {
 }
 
 /// Motions of a free body whose first coordinate is `first`.
-pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
-    let motion = |k: usize| Motion {
+pub(super) fn of_free_body(first: usize) -> Vec<BodyMotion> {
+    let motion = |k: usize| BodyMotion {
         dof: first + k,
         displaced: SVector::ith(k, 1.0),
         unit: Vector6::ith(k, 1.0),
@@ -26,7 +26,7 @@ pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
 }
 
 /// Motions of a link of a tree whose first coordinate is `first`.
-pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Motion> {
+pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<BodyMotion> {
     let place = at.places[link];
     let spin = angular(&at.velocities[link]);
     let mut motions = Vec::with_capacity(at.axes.len());
@@ -43,7 +43,7 @@ pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Mot
         let mut displaced = SVector::<f64, 12>::zeros();
         displaced.fixed_rows_mut::<6>(0).copy_from(&spatial(&moved, &turned));
         displaced.fixed_rows_mut::<6>(6).copy_from(&spatial(&velocity, &angular(&change)));
-        motions.push(Motion { dof: first + dof, displaced, unit: spatial(&moved, &turned) });
+        motions.push(BodyMotion { dof: first + dof, displaced, unit: spatial(&moved, &turned) });
     }
     motions
 }

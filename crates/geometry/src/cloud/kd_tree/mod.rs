@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use self::build::{KdNode, Leaf};
 use self::probe::KdProbe;
 pub use self::search::Neighbor;
-use self::search::{CollectNear, KNearest, NearestPoint, WithinRadius, search};
+use self::search::{CollectNear, KNearest, KdNearest, WithinRadius, search};
 use super::CloudError;
 
 /// A balanced k-d tree over points: exact neighbors of points.
@@ -58,7 +58,7 @@ impl KdTree {
     #[inline]
     pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbor> {
         let probe = KdProbe::new(query)?;
-        search(&self.nodes, &self.leaves, &probe, NearestPoint::within(max_distance)?).found()
+        search(&self.nodes, &self.leaves, &probe, KdNearest::within(max_distance)?).found()
     }
 
     /// As [`Self::nearest`], trying the point `hint` first: the answer for a nearby query spares most of the
@@ -71,7 +71,7 @@ impl KdTree {
         hint: usize,
     ) -> Option<Neighbor> {
         let probe = KdProbe::new(query)?;
-        let mut best = NearestPoint::within(max_distance)?;
+        let mut best = KdNearest::within(max_distance)?;
         if let Some(point) = self.points.get(hint) {
             best.offer((query - point).norm_squared(), hint as u32);
         }

@@ -83,12 +83,12 @@ fn squared(limit: f64) -> Option<f64> {
 }
 
 /// The nearest point.
-pub(super) struct NearestPoint {
+pub(super) struct KdNearest {
     d2: f64,
     index: u32,
 }
 
-impl NearestPoint {
+impl KdNearest {
     #[inline]
     pub(super) fn within(max_distance: f64) -> Option<Self> {
         Some(Self { d2: squared(max_distance)?, index: u32::MAX })
@@ -101,7 +101,7 @@ impl NearestPoint {
     }
 }
 
-impl CollectNear for NearestPoint {
+impl CollectNear for KdNearest {
     #[inline]
     fn limit(&self) -> f64 {
         self.d2

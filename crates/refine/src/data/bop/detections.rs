@@ -47,7 +47,7 @@ enum DetectionShape {
 
 /// Scene, image and object of an entry of the file.
 #[derive(Deserialize)]
-struct Place {
+struct ImagePlace {
     scene_id: u32,
     image_id: u32,
     category_id: u32,
@@ -94,7 +94,7 @@ impl Detections {
         let mut by_object: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for (k, text) in entries.iter().enumerate() {
             let name = format!("[{k}]");
-            let Place { scene_id, image_id, category_id } = convert(file, &name, text)?;
+            let ImagePlace { scene_id, image_id, category_id } = convert(file, &name, text)?;
             let found = match Detection::read(file, &name, text) {
                 Err(error) if serde_json::from_str::<Value>(text.get()).is_err() => Err(error),
                 read => Ok(read?),

@@ -29,7 +29,7 @@ pub struct Runner<'a> {
 type Fault = Option<(Sweep, u32)>;
 
 /// The result of a method on a frame.
-struct RefinedFrame {
+struct StudyFrame {
     /// Poses after the numbers of iterations that the study compares.
     poses: Vec<(usize, Isometry3<f64>)>,
     /// Pose in the end, and the iteration that it comes from.
@@ -39,7 +39,7 @@ struct RefinedFrame {
     posterior: Option<(Posterior, Arc<Object>)>,
 }
 
-impl RefinedFrame {
+impl StudyFrame {
     /// A pose that no method has found.
     fn given(pose: Isometry3<f64>) -> Self {
         Self { poses: Vec::new(), last: (None, pose), seconds: None, posterior: None }
@@ -61,7 +61,7 @@ impl<'a> Runner<'a> {
     /// Fills in `rows`, which are of this initial pose. What fails is in their status.
     pub fn run(&mut self, initial: &InitialPose, mut rows: Vec<Record>) -> Vec<Record> {
         // Rows of one run: several numbers of steps, or sweeps that all begin without a fault.
-        let mut runs: Vec<(String, Fault, Result<RefinedFrame, String>)> = Vec::new();
+        let mut runs: Vec<(String, Fault, Result<StudyFrame, String>)> = Vec::new();
         for row in &mut rows {
             let (method, fault) = (row.key.method.clone(), row.key.fault());
             let known = runs.iter().position(|run| run.0 == method && run.1 == fault);
@@ -84,10 +84,10 @@ impl<'a> Runner<'a> {
         initial: &InitialPose,
         method: &str,
         fault: Fault,
-    ) -> Result<RefinedFrame, AssetError> {
+    ) -> Result<StudyFrame, AssetError> {
         match method {
-            TRUTH => self.scorer.true_pose(&initial.row).map(RefinedFrame::given),
-            INITIAL => Ok(RefinedFrame::given(initial.row.t_cam_model)),
+            TRUTH => self.scorer.true_pose(&initial.row).map(StudyFrame::given),
+            INITIAL => Ok(StudyFrame::given(initial.row.t_cam_model)),
             _ => match self.design.methods.iter().find(|(name, _)| name == method) {
                 Some((_, method)) => self.refine(initial, method, fault),
                 None => {
@@ -104,7 +104,7 @@ impl<'a> Runner<'a> {
         initial: &InitialPose,
         method: &Method,
         fault: Fault,
-    ) -> Result<RefinedFrame, AssetError> {
+    ) -> Result<StudyFrame, AssetError> {
         let row = &initial.row;
         let ResultRow { scene_id, im_id, obj_id, .. } = *row;
         let target = Target { scene_id, im_id, obj_id, instance: initial.instance };
@@ -128,11 +128,11 @@ impl<'a> Runner<'a> {
         let estimate = refined.estimate;
         let last = (Some(estimate.iteration), *estimate.t_cam_object());
         let posterior = estimate.posterior.map(|posterior| (posterior, refined.input.object));
-        Ok(RefinedFrame { poses, last, seconds: Some(refined.seconds), posterior })
+        Ok(StudyFrame { poses, last, seconds: Some(refined.seconds), posterior })
     }
 
     /// Fills in a row of the frame whose initial pose is `initial`.
-    fn fill(&mut self, row: &mut Record, initial: &ResultRow, refined: &RefinedFrame) {
+    fn fill(&mut self, row: &mut Record, initial: &ResultRow, refined: &StudyFrame) {
         let (iteration, pose) = refined.pose(row.key.steps);
         (row.iteration, row.seconds) = (iteration, refined.seconds);
         let plain = PlainPose::from(&pose);

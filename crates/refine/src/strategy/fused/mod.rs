@@ -25,7 +25,7 @@ pub use self::fit::{Consistency, Fit, FitSettings};
 use self::hypotheses::conventions;
 pub use self::model_scale::{ModelScale, ModelScaleSettings};
 pub use self::nominal::NominalSizeError;
-pub(crate) use self::pixels::Pixels;
+pub(crate) use self::pixels::FusedPixels;
 pub use self::posterior::{
     Inconsistency, Posterior, PosteriorMode, PosteriorSettings, UnobservableDirection,
 };

@@ -6,14 +6,14 @@ use crate::problem::State;
 use crate::scene::{CameraCalibrationError, Pixel, PreparedFrame, View, eroded};
 
 /// The object and the hand of a state in the image of a frame, with what is wrong with the camera corrected.
-pub(crate) struct Pixels<'a> {
+pub(crate) struct FusedPixels<'a> {
     view: View<'a>,
     camera_error: CameraCalibrationError,
     /// Pixels beside an edge that do not count, nor outlines beside the hand, onto which masks leak \[px\].
     margin: usize,
 }
 
-impl<'a> Pixels<'a> {
+impl<'a> FusedPixels<'a> {
     pub(crate) fn new(frame: &PreparedFrame<'a>, state: &State, margin: usize) -> Self {
         let observation = frame.observation();
         let camera = state.camera.corrected(&observation.camera);

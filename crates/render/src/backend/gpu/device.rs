@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 
-use super::passes::{self, Pass, READ_ONLY, READ_WRITE};
+use super::passes::{self, GpuPass, READ_ONLY, READ_WRITE};
 use super::shaders;
 use crate::backend::BackendError;
 
@@ -15,7 +15,7 @@ pub(super) struct Device {
     pub(super) queue: wgpu::Queue,
     pub(super) limits: wgpu::Limits,
     pub(super) layout: wgpu::BindGroupLayout,
-    pipelines: Vec<(Pass, wgpu::ComputePipeline)>,
+    pipelines: Vec<(GpuPass, wgpu::ComputePipeline)>,
     /// Why the device was lost, if it was.
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -87,7 +87,7 @@ impl Device {
     }
 
     /// The pipeline of a pass; every pass has one.
-    pub(super) fn pipeline(&self, pass: Pass) -> Option<&wgpu::ComputePipeline> {
+    pub(super) fn pipeline(&self, pass: GpuPass) -> Option<&wgpu::ComputePipeline> {
         self.pipelines.iter().find(|(other, _)| *other == pass).map(|(_, pipeline)| pipeline)
     }
 }

@@ -6,29 +6,31 @@ use super::shaders::{Composed, DERIVATIVES};
 
 /// A compute pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Pass {
+pub(super) struct GpuPass {
     /// Entry point of its shader module.
     pub(super) entry: &'static str,
     /// With or without the computation of derivatives.
     pub(super) derivatives: bool,
 }
 
-const fn pass(entry: &'static str) -> Pass {
-    Pass { entry, derivatives: false }
+const fn pass(entry: &'static str) -> GpuPass {
+    GpuPass { entry, derivatives: false }
 }
 
-pub(super) const PROJECT: Pass = pass("project");
-pub(super) const COUNT_FACES: Pass = pass("count_faces");
-pub(super) const SCAN_BINS: Pass = pass("scan_bins");
-pub(super) const SCATTER_FACES: Pass = pass("scatter_faces");
-pub(super) const RASTER: Pass = pass("raster");
-pub(super) const FIND_SEGMENTS: Pass = pass("find_segments");
-pub(super) const FIND_PIECES: Pass = pass("find_pieces");
-pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
-pub(super) const CONTOUR_DERIVATIVES: Pass = Pass { entry: "contour_residuals", derivatives: true };
-pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
-pub(super) const SOFTRAS_DERIVATIVES: Pass = Pass { entry: "softras_residuals", derivatives: true };
-pub(super) const TOTAL: Pass = pass("total");
+pub(super) const PROJECT: GpuPass = pass("project");
+pub(super) const COUNT_FACES: GpuPass = pass("count_faces");
+pub(super) const SCAN_BINS: GpuPass = pass("scan_bins");
+pub(super) const SCATTER_FACES: GpuPass = pass("scatter_faces");
+pub(super) const RASTER: GpuPass = pass("raster");
+pub(super) const FIND_SEGMENTS: GpuPass = pass("find_segments");
+pub(super) const FIND_PIECES: GpuPass = pass("find_pieces");
+pub(super) const CONTOUR_VALUE: GpuPass = pass("contour_residuals");
+pub(super) const CONTOUR_DERIVATIVES: GpuPass =
+    GpuPass { entry: "contour_residuals", derivatives: true };
+pub(super) const SOFTRAS_VALUE: GpuPass = pass("softras_residuals");
+pub(super) const SOFTRAS_DERIVATIVES: GpuPass =
+    GpuPass { entry: "softras_residuals", derivatives: true };
+pub(super) const TOTAL: GpuPass = pass("total");
 
 /// Bindings of group 0: the settings, then buffers that are only read, then buffers that are written too.
 pub(super) const READ_ONLY: std::ops::Range<u32> = 1..8;
@@ -61,7 +63,7 @@ pub(super) fn pipelines(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     Composed { entry, module }: Composed,
-) -> Vec<(Pass, wgpu::ComputePipeline)> {
+) -> Vec<(GpuPass, wgpu::ComputePipeline)> {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("prehend"),
         bind_group_layouts: &[Some(layout)],
@@ -88,7 +90,7 @@ pub(super) fn pipelines(
             },
             cache: None,
         });
-        (Pass { entry, derivatives }, pipeline)
+        (GpuPass { entry, derivatives }, pipeline)
     };
     variants.iter().map(pipeline).collect()
 }

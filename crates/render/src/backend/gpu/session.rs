@@ -6,7 +6,7 @@ use super::answer;
 use super::device::Device;
 use super::layout::{Params, SUM_COLUMNS, Usage};
 use super::passes::{
-    CONTOUR_DERIVATIVES, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS, PROJECT, Pass,
+    CONTOUR_DERIVATIVES, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS, GpuPass, PROJECT,
     RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES, SOFTRAS_VALUE, TOTAL,
 };
 use super::readback::receive;
@@ -186,7 +186,7 @@ impl GpuSession {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_bind_group(0, &work.bind_group, &[]);
             let p = &self.params;
-            let mut run = |stage: Pass, x: u32, y: u32| {
+            let mut run = |stage: GpuPass, x: u32, y: u32| {
                 if let Some(pipeline) = self.device.pipeline(stage) {
                     pass.set_pipeline(pipeline);
                     pass.dispatch_workgroups(x, y, p.hypotheses);

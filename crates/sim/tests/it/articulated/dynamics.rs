@@ -30,7 +30,7 @@ fn floating(gravity: Vector3<f64>) -> (Model, State) {
     let mut random = SplitMix64::new(3);
     let mut model = Model::new(gravity);
     let root = Matrix3::new(0.03, 0.01, 0.0, 0.0, 0.02, 0.01, 0.01, 0.0, 0.04);
-    let inertia = root * root.transpose();
+    let inertia = root * root.transpose() + Matrix3::identity() * 1e-3;
     let body = RigidBody::new(0.7, inertia, Point3::new(0.02, -0.01, 0.03)).unwrap();
     let free = model.add(Body::dynamic("free", body));
     let links = (0..12).map(|index| {
