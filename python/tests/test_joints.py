@@ -221,6 +221,7 @@ LED = """<mujoco><worldbody>
         <body name="finger" pos="0 0 -0.1"><joint name="hinge" axis="0 1 0" damping="0.1"/>
             <geom size="0.02" pos="0.1 0 0"/></body></body>
     <body name="thing" pos="0.1 0 1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
+    <contact><exclude body1="finger" body2="thing"/></contact>
     <equality><weld body1="hand" body2="thing"/></equality></mujoco>"""
 
 
