@@ -188,7 +188,7 @@ def test_errors_say_what_is_wrong() -> None:
         prehend.Renderer(3.0, K, SIZE)
     with pytest.raises(prehend.Error, match="absent.obj"):
         prehend.Renderer("absent.obj", K, SIZE)
-    with pytest.raises(prehend.Error, match="7 colors given for 8 vertices"):
+    with pytest.raises(prehend.Error, match="7 colors given, expected 8"):
         renderer(colors=COLORS[:7])
     with pytest.raises(prehend.Error, match="no texture coordinates"):
         renderer(texture=np.zeros((2, 2, 3)))
