@@ -46,7 +46,7 @@ enum Parameters<'py> {
     All(Numbers<'py>),
 }
 
-/// What Python gives: a state's arrays, parameters and controls.
+/// Inputs from Python: a state's arrays, parameters and controls.
 type Given<'py> = ([Option<Numbers<'py>>; 4], Option<Parameters<'py>>, Option<Numbers<'py>>);
 
 /// An array with its name and its shape without a batch.

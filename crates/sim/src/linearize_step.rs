@@ -87,8 +87,7 @@ impl Model {
     ) {
         let n = forces.count;
         let gravity = self.gravity.map(Fwd::<18>::constant);
-        for (slot, body) in self.free_bodies().into_iter().enumerate() {
-            let Some(rigid) = self.bodies[body].rigid() else { continue };
+        for (slot, (body, rigid)) in self.rigid_bodies().enumerate() {
             let inputs = Fwd::<18>::variables([0.0; 18]);
             let state = states[body].retract(&std::array::from_fn(|i| inputs[i]));
             let wrench = Vector6::from_fn(|i, _| inputs[12 + i].plus(forces.wrenches[body][i]));

@@ -35,6 +35,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use crate::body::RigidBody;
 use crate::body_state::Rows;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
@@ -187,10 +188,14 @@ impl<S: Scalar> Model<S> {
         moved.map(|(index, _)| BodyId(index))
     }
 
+    /// Bodies that forces move by themselves, no links, with their masses.
+    pub(crate) fn rigid_bodies(&self) -> impl Iterator<Item = (BodyId, &RigidBody<S>)> {
+        self.body_ids().filter_map(|id| Some((id, self.bodies[id].rigid()?)))
+    }
+
     /// The bodies that forces move by themselves: no links.
     pub(crate) fn free_bodies(&self) -> Vec<BodyId> {
-        let free = |id: &BodyId| self.bodies[*id].rigid().is_some();
-        self.body_ids().filter(free).collect()
+        self.rigid_bodies().map(|(id, _)| id).collect()
     }
 
     /// Sets the parameter called `name`, such as `"friction"`, of contacts that were added together: to differentiate by it, put in a

@@ -47,7 +47,7 @@ impl<S: Scalar> State<S> {
         Self { time: 0.0, bodies: rows.len(), rows }
     }
 
-    /// State of a model of so many bodies.
+    /// State of a model with that number of bodies.
     pub(crate) fn from_rows(rows: Vec<BodyState<S>>, bodies: usize, time: f64) -> Self {
         Self { time, bodies: bodies.min(rows.len()), rows }
     }

@@ -46,17 +46,6 @@ impl PyModel {
         }
     }
 
-    fn insert_mjcf(
-        &mut self,
-        py: Python<'_>,
-        mjcf: &MjcfModel,
-        options: &MjcfOptions,
-    ) -> PyResult<Py<Robot>> {
-        let before = self.model.parameter_names();
-        let robot = detached(py, || self.model.add_mjcf(mjcf, options))?.raise()?;
-        self.keep(py, Robot::of_mjcf(mjcf, robot, &self.model, &before))
-    }
-
     /// Puts a robot among those that were added.
     fn keep(&mut self, py: Python<'_>, robot: Robot) -> PyResult<Py<Robot>> {
         let robot = Py::new(py, robot)?;
@@ -132,7 +121,9 @@ impl PyModel {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<Robot>> {
         let (mjcf, options) = read_mjcf(&path, pose.as_ref(), floating, shapes, options)?;
-        self.insert_mjcf(py, &mjcf, &options)
+        let before = self.model.parameter_names();
+        let robot = detached(py, || self.model.add_mjcf(&mjcf, &options))?.raise()?;
+        self.keep(py, Robot::of_mjcf(&mjcf, robot, &self.model, &before))
     }
 
     /// Model of a robot or scene in MJCF under the gravity of its file, with contacts between all geoms that collide by `contype`, `conaffinity` and

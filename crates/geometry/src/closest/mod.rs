@@ -189,7 +189,7 @@ impl ClosestPoints {
         Some(self.signed(point, Some(closest)))
     }
 
-    /// Whether signs of distances are those of pseudo-normals, as they are for closed meshes unless winding numbers were asked for.
+    /// True if signs of distances are those of pseudo-normals, as they are for closed meshes unless winding numbers were asked for.
     pub(crate) fn is_closed(&self) -> bool {
         matches!(self.sign, Sign::PseudoNormal(..))
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use wide::{f32x8, f64x4};
 
 use super::bvh::{Bvh, Child, child};
@@ -114,8 +114,7 @@ impl Winding {
     pub(super) fn new(mesh: &TriMesh, bvh: &Bvh) -> Self {
         let mut dipoles = vec![Dipoles::new(&[]); bvh.nodes.len()];
         // Rounding of a point among the vertices, and of a center, to single precision.
-        let reach = |reach: f64, v: &Point3<f64>| reach.max((v.coords - bvh.center).norm());
-        let slack = 2.0 * f64::from(f32::EPSILON) * mesh.vertices.iter().fold(0.0, reach);
+        let slack = 4.0 * f64::from(f32::EPSILON) * bvh.reach;
         // (area, area-weighted center, area vector) of each node; children come after their parents.
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {

@@ -32,7 +32,7 @@ pub(crate) struct Face {
 }
 
 impl Face {
-    /// Whether the face may be kept at pixels of row `y`.
+    /// True if the face may be kept at pixels of row `y`.
     #[inline(always)]
     pub(crate) fn touches_row(&self, y: usize) -> bool {
         let [.., top, bottom] = self.bounds;

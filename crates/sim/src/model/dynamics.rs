@@ -20,8 +20,7 @@ impl<S: Scalar> Model<S> {
         self.check_count(state)?;
         let count = self.degrees_of_freedom();
         let (mut matrix, mut first) = (DMatrix::zeros(count, count), 0);
-        for body in self.free_bodies() {
-            let Some(rigid) = self.bodies[body].rigid() else { continue };
+        for (body, rigid) in self.rigid_bodies() {
             (0..3).for_each(|k| matrix[(first + k, first + k)] = rigid.mass());
             let inertia = rigid.world_inertia(&state[body].pose.rotation);
             matrix.fixed_view_mut::<3, 3>(first + 3, first + 3).copy_from(&inertia);
@@ -44,8 +43,7 @@ impl<S: Scalar> Model<S> {
         let state = self.sensed(state)?;
         let rates = self.wrenches_of(state.rows(), 0);
         let mut all = Vec::with_capacity(self.degrees_of_freedom());
-        for body in self.free_bodies() {
-            let Some(rigid) = self.bodies[body].rigid() else { continue };
+        for (body, rigid) in self.rigid_bodies() {
             let BodyState { pose, angular: spin, .. } = &state[body];
             let torque = angular(&rates[body.index()]);
             let momentum = rigid.momentum(&pose.rotation, spin);
@@ -71,8 +69,7 @@ impl<S: Scalar> Model<S> {
         let velocity = DVector::from_vec(self.generalized_coordinates(state).velocity);
         let kinetic = velocity.dot(&(mass * &velocity)).times(0.5);
         let mut potential = S::zero();
-        for body in self.free_bodies() {
-            let Some(rigid) = self.bodies[body].rigid() else { continue };
+        for (body, rigid) in self.rigid_bodies() {
             potential -= rigid.mass() * self.gravity.dot(&state[body].pose.translation.vector);
         }
         for (own, joints) in self.articulated(state.rows()) {
@@ -89,8 +86,7 @@ impl<S: Scalar> Model<S> {
     pub fn momentum(&self, state: &State<S>) -> Result<Vector6<S>> {
         self.check_count(state)?;
         let mut sum = Vector6::zeros();
-        for body in self.free_bodies() {
-            let Some(rigid) = self.bodies[body].rigid() else { continue };
+        for (body, rigid) in self.rigid_bodies() {
             let BodyState { pose, linear, angular } = &state[body];
             let along = linear * rigid.mass();
             let about =

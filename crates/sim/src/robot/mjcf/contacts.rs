@@ -1,5 +1,9 @@
 //! Contacts between the geoms of a file.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+
 use prehend_geometry::mjcf::{Geom, Model as MjcfModel};
 
 use super::{MjcfError, MjcfOptions, MjcfRobot};
@@ -54,18 +58,25 @@ impl Model {
         let fixed = fixed.map(|(geom, id)| (*id, None, std::slice::from_ref(geom)));
         let all: Vec<Touching<'_>> = bodies.chain(fixed).collect();
         let ids: Vec<BodyId> = all.iter().map(|(id, ..)| *id).collect();
+        let excluded = |a: Option<usize>, b: Option<usize>| {
+            mjcf.exclusions.iter().any(|pair| *pair == [a, b] || *pair == [b, a])
+        };
+        let mut laws = BTreeMap::new();
         for (k, a) in all.iter().enumerate() {
             for b in &all[k + 1..] {
-                let excluded = mjcf
-                    .exclusions
-                    .iter()
-                    .any(|[x, y]| [*x, *y] == [a.1, b.1] || [*x, *y] == [b.1, a.1]);
+                let Some(friction) = friction(a.2, b.2) else { continue };
                 let can = self.moves_against(a.0, b.0) && self.sides(a.0, b.0).is_ok();
-                if let Some(friction) = friction(a.2, b.2).filter(|_| can && !excluded) {
-                    let material = Material { friction, ..Material::default() };
-                    let (law, smoothing) = self.material_law(&ids, material)?;
-                    self.add_contacts_between(&[a.0], &[b.0], law, smoothing)?;
+                if !can || excluded(a.1, b.1) {
+                    continue;
                 }
+                let (law, smoothing) = match laws.entry(friction.to_bits()) {
+                    Entry::Occupied(known) => known.into_mut(),
+                    Entry::Vacant(new) => {
+                        let material = Material { friction, ..Material::default() };
+                        new.insert(self.material_law(&ids, material)?)
+                    }
+                };
+                self.add_contacts_between(&[a.0], &[b.0], Arc::clone(law), *smoothing)?;
             }
         }
         Ok(())

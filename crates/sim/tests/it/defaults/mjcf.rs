@@ -1,4 +1,4 @@
-//! What an MJCF file says of gravity, friction and of what collides.
+//! Gravity, friction and collision masks of an MJCF file.
 
 use nalgebra::Vector3;
 use prehend_geometry::mjcf;
