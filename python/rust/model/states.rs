@@ -59,7 +59,8 @@ pub(crate) fn change(
         array.try_readwrite().raise()
     });
     let arrays = arrays.into_iter().collect::<PyResult<Vec<_>>>()?;
-    for (mut array, numbers) in arrays.into_iter().zip(changed) {
+    // `as_array_mut` panics at the strides of an empty array in debug builds.
+    for (mut array, numbers) in arrays.into_iter().zip(changed).filter(|(_, numbers)| !numbers.is_empty()) {
         array.as_array_mut().iter_mut().zip(numbers).for_each(|(to, x)| *to = x);
     }
     Ok(())
