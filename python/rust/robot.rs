@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::{KinematicTree, Motion};
-use prehend_sim::BodyId;
 use prehend_sim::robot::MjcfRobot;
+use prehend_sim::{BodyId, State};
 use pyo3::prelude::*;
 
 use crate::arrays::{Array, Numbers, in_order, pose as pose_of};
@@ -106,6 +106,33 @@ impl Robot {
         crate::model::states::change(&model.model, state, |all| {
             robot.set_positions(&model.model, all, &positions).raise()
         })
+    }
+
+    /// Names of the keyframes of a robot in MJCF.
+    #[getter]
+    fn keyframes(&self) -> Vec<String> {
+        let robot = self.mjcf.as_ref();
+        robot.into_iter().flat_map(|own| &own.keyframes).map(|key| key.name.clone()).collect()
+    }
+
+    /// Puts joints, activations and controls of a robot in MJCF, in the arrays of `state` and the model's parameters, where the file starts, or to a
+    /// keyframe: MuJoCo's `mj_resetData` and `mj_resetDataKeyframe`.
+    #[pyo3(signature = (model, state, keyframe=None))]
+    fn reset(
+        &self,
+        model: &mut PyModel,
+        state: &Bound<'_, PyAny>,
+        keyframe: Option<&str>,
+    ) -> PyResult<()> {
+        let robot = self.of_mujoco("keyframes")?;
+        let mut with_controls = model.model.clone();
+        let put = |all: &mut State| match keyframe {
+            Some(name) => robot.reset_to(&mut with_controls, all, name).raise(),
+            None => robot.reset(&mut with_controls, all).raise(),
+        };
+        crate::model::states::change(&model.model, state, put)?;
+        model.model = with_controls;
+        Ok(())
     }
 
     /// Names of the sensors of a robot in MJCF whose readings follow from states.

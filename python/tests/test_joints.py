@@ -132,6 +132,16 @@ def test_mjcf_and_urdf_become_robots(tmp_path):
     state = moon.neutral_state()
     moon.robots[0].set_positions(moon, state, [0.4])
     assert moon.rollout(0.1, 1)(state, end=True).state.q[0] < 0.4
+    keyed = tmp_path / "keyed.xml"
+    keyed.write_text(scene.read_text().replace("</mujoco>", '<keyframe><key name="up" qpos="1" ctrl="2"/></keyframe></mujoco>'))
+    model = prehend.Model.from_mjcf(keyed)
+    state, robot = model.neutral_state(), model.robots[0]
+    robot.reset(model, state, "up")
+    assert robot.keyframes == ["up"] and state.q == [1.0] and model["arm.joint.control"] == 2.0
+    robot.reset(model, state)
+    assert state.q == [0.0] and model["arm.joint.control"] == 0.0
+    with pytest.raises(prehend.Error, match="no keyframe 'down'"):
+        robot.reset(model, state, "down")
     turned = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     turned = prehend.Model.from_mjcf(scene, pose=turned)
     heap = tmp_path / "heap.xml"

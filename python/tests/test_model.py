@@ -28,6 +28,10 @@ def test_a_ball_falls_and_comes_to_rest():
     assert np.abs(end.bodies[ball, VELOCITY]).max() < 1e-2
     weight = model["ball.mass"] * 9.81
     assert model.contact_wrench(end.state, ball)[2] == pytest.approx(weight, rel=2e-2)
+    points = model.point_contacts(end.state)
+    assert points.bodies.tolist() == [[ball, floor]] and points.gap[0] < 0.0
+    assert points.normal[0] == pytest.approx([0, 0, 1]) and points.position[0, 2] == pytest.approx(0.0, abs=3e-3)
+    assert points.force.sum(0) == pytest.approx(model.contact_wrench(end.state, ball)[:3])
     # At rest an accelerometer shows what holds the body up.
     assert model.accelerometer(end.state, ball, [0, 0, 0])[2] == pytest.approx(9.81, rel=2e-2)
 

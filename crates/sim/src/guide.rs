@@ -1,9 +1,44 @@
 //! From a model in twenty lines to gradients of long rollouts.
 //!
 //! # A model
-//! Bodies, what touches what, gravity. Samples of one body's surface touch the distance field of another; a field is a
-//! grid made of a mesh ([`SdfGrid`](prehend_geometry::SdfGrid)), one of [`fields`](crate::fields), or a
-//! [`DistanceField`](prehend_geometry::DistanceField) of your own:
+//! Gravity, bodies with shapes, and a [`Material`](crate::Material) for all contacts between them:
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use prehend_autodiff::Fwd;
+//! use prehend_sim::{Body, Material, Model, Shape};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+//! model.add(Body::fixed_from_shape("floor", &Shape::half_space(Vector3::z_axis())?));
+//! // Half extents [m], density [kg/m³].
+//! let cube = model.add(Body::from_shape("box", &Shape::cuboid([0.02; 3])?, 500.0)?);
+//! model.add_contacts(Material { friction: 0.4, ..Material::default() })?;
+//!
+//! let mut start = model.neutral_state();
+//! start[cube].pose.translation.z = 0.02;
+//! start[cube].linear.x = 0.5;
+//! let end = model.simulate(&start, 0.3)?;
+//! // It slides to a halt within v²/2μg.
+//! let distance = 0.5 * 0.5 / (2.0 * 0.4 * 9.81);
+//! assert!((end[cube].pose.translation.x / distance - 1.0).abs() < 0.02);
+//!
+//! // By the initial speed: v/μg.
+//! let mut start = start.cast::<Fwd<1>>();
+//! start[cube].linear.x = Fwd::variable(0.5, 0);
+//! let end = model.cast().simulate(&start, 0.3)?;
+//! let slope = end[cube].pose.translation.x.derivative[0];
+//! assert!((slope / (0.5 / (0.4 * 9.81)) - 1.0).abs() < 0.02);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Points of contact with their forces: [`Model::point_contacts`]; scenes of files: [`Model::from_mjcf`].
+//!
+//! # Samples, fields and laws of your own
+//! Samples of one body's surface touch the distance field of another; a field is a grid made of a mesh
+//! ([`SdfGrid`](prehend_geometry::SdfGrid)), one of [`fields`](crate::fields), or a [`DistanceField`](prehend_geometry::DistanceField) of your
+//! own:
 //!
 //! ```
 //! use std::sync::Arc;

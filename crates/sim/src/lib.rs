@@ -76,6 +76,7 @@ pub use model::contact_pair::{ContactBodies, ContactPair};
 pub use model::generalized_coordinates::StatePlaces;
 pub use model::joint_force::{JointAxis, JointForce};
 pub use model::material::Material;
+pub use model::point_contact::PointContact;
 pub use model::trajectory::Trajectory;
 pub use model::transmission::Transmissions;
 pub use rollout::{ControlResult, Simulation, StepError};

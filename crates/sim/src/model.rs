@@ -21,6 +21,7 @@ mod pair_wrench;
 mod parameter_names;
 mod parameters;
 pub(crate) mod path;
+pub(crate) mod point_contact;
 mod relative_state;
 pub(crate) mod sample_culling;
 mod sensors;

@@ -1,13 +1,17 @@
 //! Sensors of a model, and its longest stable step.
 
-use prehend_sim::{Integrator, State};
+use nalgebra::Vector3;
+use numpy::ndarray::IxDyn;
+use numpy::{PyArray, PyArrayMethods};
+use prehend_sim::{BodyId, Integrator, PointContact, State};
 use pyo3::prelude::*;
 
 use super::states::measured;
 use super::{BodyKey, PyModel};
-use crate::arrays::{Array, Numbers, in_order, vector};
-use crate::error::Raise;
+use crate::arrays::{Array, Numbers, array, in_order, vector};
+use crate::error::{Raise, wrong};
 use crate::integrator::AnyIntegrator;
+use crate::layout::{StateLayout, States, state_arrays};
 
 #[pymethods]
 impl PyModel {
@@ -21,6 +25,32 @@ impl PyModel {
         let wrench =
             |state: &State| Ok(self.model.contact_wrench(id, state).raise()?.as_slice().to_vec());
         measured(&self.model, state, Some(&[6]), wrench)
+    }
+
+    /// Points at which bodies touch at a state, `PointContacts`: MuJoCo's `contact` with `mj_contactForce`. Two bodies with samples and a field each
+    /// touch at those of both, with half the force each.
+    fn point_contacts<'py>(&self, state: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let py = state.py();
+        let (layout, arrays) = (StateLayout::new(&self.model), state_arrays(state)?);
+        let states = States::new(&self.model, &layout, &arrays)?;
+        if states.batch.is_some() {
+            return Err(wrong("point_contacts: one state is expected, not a batch".to_owned()));
+        }
+        let state = states.each().next().transpose()?.unwrap_or_else(|| self.model.neutral_state());
+        let points = self.model.point_contacts(&state).raise()?;
+        let count = points.len();
+        let bodies =
+            points.iter().flat_map(|p| [p.bodies.samples, p.bodies.field].map(BodyId::index));
+        let bodies = PyArray::from_vec(py, bodies.collect()).reshape(IxDyn(&[count, 2]))?;
+        let rows = |of: fn(&PointContact) -> Vector3<f64>| {
+            let all = points.iter().flat_map(|point| <[f64; 3]>::from(of(point))).collect();
+            array(py, all, &[count, 3])
+        };
+        let positions = rows(|point| point.position.coords)?;
+        let (normals, forces) = (rows(|point| point.normal)?, rows(|point| point.force)?);
+        let gaps = array(py, points.iter().map(|point| point.gap).collect(), &[count])?;
+        let fields = (bodies, positions, normals, gaps, forces);
+        py.import("prehend.state")?.getattr("PointContacts")?.call1(fields)
     }
 
     /// Acceleration of a point of a body less that of free fall [m/s²], as an accelerometer measures it; point and result in the body's frame.

@@ -33,7 +33,7 @@ pub(crate) fn measured<'py>(
 pub(crate) fn change(
     model: &prehend_sim::Model,
     state: &Bound<'_, PyAny>,
-    edit: impl Fn(&mut State) -> PyResult<()>,
+    mut edit: impl FnMut(&mut State) -> PyResult<()>,
 ) -> PyResult<()> {
     let layout = StateLayout::new(model);
     let changed = {
@@ -60,7 +60,9 @@ pub(crate) fn change(
     });
     let arrays = arrays.into_iter().collect::<PyResult<Vec<_>>>()?;
     // `as_array_mut` panics at the strides of an empty array in debug builds.
-    for (mut array, numbers) in arrays.into_iter().zip(changed).filter(|(_, numbers)| !numbers.is_empty()) {
+    for (mut array, numbers) in
+        arrays.into_iter().zip(changed).filter(|(_, numbers)| !numbers.is_empty())
+    {
         array.as_array_mut().iter_mut().zip(numbers).for_each(|(to, x)| *to = x);
     }
     Ok(())

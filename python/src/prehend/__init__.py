@@ -37,7 +37,7 @@ from .evaluation import Scores, calibrate, evaluate
 from .pullback import Pullback, vjp
 from .refinement import Estimate, Tracked, refine, search
 from .render import Image, LinearizedLoss, RenderGradient
-from .state import Gradient, Run, State
+from .state import Gradient, PointContacts, Run, State
 
 __all__ = [
     "ANGULAR_VELOCITY",
@@ -55,6 +55,7 @@ __all__ = [
     "Mesh",
     "Model",
     "Object",
+    "PointContacts",
     "PoseLoss",
     "PoseNetwork",
     "Pullback",

@@ -33,6 +33,21 @@ class Run(NamedTuple):
     of mass, of links and fixed bodies of the origin of their frame."""
 
 
+class PointContacts(NamedTuple):
+    """Points at which bodies touch, arrays of NumPy."""
+
+    bodies: Array
+    """Numbers of the body with the samples and of that with the field (n, 2)."""
+    position: Array
+    """Positions on the surface of the samples [m] (n, 3), world frame."""
+    normal: Array
+    """Unit normals out of the body with the field (n, 3), world frame."""
+    gap: Array
+    """Gaps [m] (n), negative in penetration."""
+    force: Array
+    """Forces on the body with the samples [N] (n, 3), world frame."""
+
+
 class Gradient(NamedTuple):
     """Derivatives by the inputs of a rollout, each in the shape of its input."""
 

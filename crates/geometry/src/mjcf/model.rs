@@ -212,6 +212,19 @@ impl Model {
         poses
     }
 
+    /// State that the model starts in, MuJoCo's after `mj_resetData`: joints at their references and at rest, controls zero.
+    pub fn reference_state(&self) -> Keyframe {
+        let velocities =
+            self.bodies.iter().flat_map(|b| &b.joints).map(|j| j.kind.velocities()).sum();
+        Keyframe {
+            name: String::new(),
+            time: 0.0,
+            positions: self.reference_positions(),
+            velocities: vec![0.0; velocities],
+            controls: vec![0.0; self.actuators.len()],
+        }
+    }
+
     /// Positions of all joints at their references, laid out as in [`Keyframe::positions`].
     pub fn reference_positions(&self) -> Vec<f64> {
         let mut positions = Vec::new();

@@ -146,7 +146,7 @@ impl BristleFunction<'_> {
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
-            contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
+            contact.slip += bristles.slip(&deflected);
             let response = law.force(&contact);
             let force = contact.normal * response.normal + response.tangential;
             let torque = lever.cross(&force);
@@ -165,7 +165,7 @@ impl BristleFunction<'_> {
 }
 
 /// The motion of a sample across the normal by a twist about the center of mass.
-fn across<T: Scalar>(normal: &Vector3<T>, lever: &Vector3<T>) -> Matrix3x6<T> {
+pub(crate) fn across<T: Scalar>(normal: &Vector3<T>, lever: &Vector3<T>) -> Matrix3x6<T> {
     let basis: [Vector3<T>; 3] = std::array::from_fn(|i| Vector3::ith(i, T::one()));
     let columns: [Vector3<T>; 6] =
         std::array::from_fn(|i| if i < 3 { basis[i] } else { basis[i - 3].cross(lever) });

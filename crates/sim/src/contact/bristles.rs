@@ -40,6 +40,11 @@ impl Bristles {
         5.0 * self.slip_speed / self.deflection
     }
 
+    /// Slip that the law sees of bristles deflected by u \[m/s\].
+    pub(crate) fn slip<T: Scalar>(&self, deflected: &Vector3<T>) -> Vector3<T> {
+        deflected.map(|u| u.times(self.slip_speed / self.deflection))
+    }
+
     /// u' of bristles deflected by u and slip.
     pub(super) fn rate<T: Scalar>(&self, slip: &Vector3<T>, deflected: &Vector3<T>) -> Vector3<T> {
         let (s2, u2) = (slip.dot(slip), deflected.dot(deflected));

@@ -123,7 +123,7 @@ impl<S: Scalar> Model<S> {
     }
 
     /// The samples of `pair` beside its field in a step, if there are both.
-    fn contact_query_at<'a>(
+    pub(super) fn contact_query_at<'a>(
         &'a self,
         pair: &'a ContactPair<S>,
         states: &Rows<S>,

@@ -30,9 +30,9 @@ impl Model {
     ///     <body name="box" pos="0 0 .1"><freejoint/><geom type="box" size=".05 .05 .05"/></body></worldbody></mujoco>"#,
     ///     None,
     /// )?;
-    /// let (model, scene) = Model::from_mjcf(&file, &MjcfOptions::default())?;
+    /// let (mut model, scene) = Model::from_mjcf(&file, &MjcfOptions::default())?;
     /// let mut start = model.neutral_state();
-    /// scene.set_positions(&model, &mut start, &file.reference_positions())?;
+    /// scene.reset(&mut model, &mut start)?;
     /// let end = model.simulate(&start, 0.5)?;
     /// assert!((end[scene.bodies[0]].pose.translation.z - 0.05).abs() < 1e-3);
     /// # Ok(())

@@ -11,7 +11,7 @@ mod sensors;
 mod shapes;
 
 use nalgebra::Isometry3;
-use prehend_geometry::mjcf::{Dynamics, JointKind, Model as MjcfModel, Transmission};
+use prehend_geometry::mjcf::{Dynamics, JointKind, Keyframe, Model as MjcfModel, Transmission};
 use thiserror::Error;
 
 use crate::articulated::Joint;
@@ -66,6 +66,10 @@ pub struct MjcfRobot {
     pub warnings: Vec<String>,
     /// The link of each actuator with a state, whose velocity is that state, in the order of MuJoCo's `act`.
     pub activations: Vec<BodyId>,
+    /// Keyframes of the file, for [`MjcfRobot::reset_to`].
+    pub keyframes: Vec<Keyframe>,
+    /// State that the file starts in.
+    initial: Keyframe,
     names: Vec<String>,
     mocaps: Vec<BodyId>,
     sensors: sensors::Sensors,
@@ -95,7 +99,7 @@ impl MjcfRobot {
         name: &str,
         t_world_mjcf: &Isometry3<f64>,
     ) -> Result<(), MjcfError> {
-        let none = || MjcfError::NoMocap { name: name.to_owned() };
+        let none = || MjcfError::NoSuch { kind: "mocap body", name: name.to_owned() };
         let body = self.body(name).filter(|body| self.mocaps.contains(body)).ok_or_else(none)?;
         model.joint_place(state.rows(), body)?;
         Ok(model.set_pose(state, body, t_world_mjcf)?)
@@ -134,9 +138,11 @@ pub enum MjcfError {
         /// How many it has.
         expected: usize,
     },
-    /// A body that is no mocap body of the model.
-    #[error("'{name}' is no mocap body")]
-    NoMocap {
+    /// A mocap body, actuator or keyframe that the file has not.
+    #[error("there is no {kind} '{name}'")]
+    NoSuch {
+        /// Kind of the element.
+        kind: &'static str,
         /// Its name.
         name: String,
     },
@@ -156,8 +162,8 @@ pub enum MjcfError {
 
 impl Model {
     /// Adds the bodies of an MJCF file as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops.
-    /// Geoms of the file's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
-    /// [`reference_positions`](MjcfModel::reference_positions) puts it where the file has it.
+    /// Geoms of the file's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::reset`] puts it where the
+    /// file has it.
     ///
     /// Gravity stays that of this model, and contacts are the caller's to add ([`Model::add_contacts`], [`Model::add_contacts_between`]);
     /// [`Model::from_mjcf`] takes both from the file.
@@ -206,6 +212,8 @@ impl Model {
             actuators: Vec::new(),
             warnings,
             activations: links[first..].to_vec(),
+            keyframes: mjcf.keyframes.clone(),
+            initial: mjcf.reference_state(),
             names: mjcf.bodies.iter().map(|body| body.name.clone()).collect(),
             sensors: sensors::Sensors::default(),
             mocaps: chain.mocaps.iter().map(|link| links[*link]).collect(),

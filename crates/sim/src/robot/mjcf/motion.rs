@@ -1,10 +1,11 @@
 //! Positions, velocities and accelerations of all joints in MuJoCo's order and axes.
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, Unit, Vector3};
-use prehend_geometry::mjcf::{JointKind, Model as MjcfModel};
+use prehend_geometry::mjcf::{JointKind, Keyframe, Model as MjcfModel};
 
 use super::{MjcfError, MjcfRobot};
 use crate::body_state::BodyState;
+use crate::error::BuildError;
 use crate::model::Model;
 use crate::state::State;
 
@@ -15,6 +16,70 @@ fn check(what: &'static str, numbers: &[f64], expected: usize) -> Result<(), Mjc
 }
 
 impl MjcfRobot {
+    /// Puts joints, activations and controls where the file starts, as MuJoCo's `mj_resetData` does; other bodies of the model stay.
+    ///
+    /// # Errors
+    /// If it is no state of the model.
+    pub fn reset(&self, model: &mut Model, state: &mut State) -> Result<(), MjcfError> {
+        self.put(model, state, &self.initial)
+    }
+
+    /// [`MjcfRobot::reset`] to the keyframe of that name, as MuJoCo's `mj_resetDataKeyframe` does.
+    ///
+    /// # Errors
+    /// If the file has no such keyframe, or it is no state of the model.
+    pub fn reset_to(
+        &self,
+        model: &mut Model,
+        state: &mut State,
+        keyframe: &str,
+    ) -> Result<(), MjcfError> {
+        let none = || MjcfError::NoSuch { kind: "keyframe", name: keyframe.to_owned() };
+        let found = self.keyframes.iter().find(|own| own.name == keyframe).ok_or_else(none)?;
+        self.put(model, state, found)
+    }
+
+    fn put(
+        &self,
+        model: &mut Model,
+        state: &mut State,
+        keyframe: &Keyframe,
+    ) -> Result<(), MjcfError> {
+        self.set_positions(model, state, &keyframe.positions)?;
+        self.set_velocities(model, state, &keyframe.velocities)?;
+        self.set_activations(model, state, &vec![0.0; self.activations.len()])?;
+        self.set_controls(model, &keyframe.controls)?;
+        state.time = keyframe.time;
+        Ok(())
+    }
+
+    /// Sets the controls of all actuators, in the file's order and units, MuJoCo's `ctrl`.
+    ///
+    /// # Errors
+    /// If they are too few or too many.
+    pub fn set_controls(&self, model: &mut Model, controls: &[f64]) -> Result<(), MjcfError> {
+        check("controls", controls, self.actuators.len())?;
+        for ((_, id), control) in self.actuators.iter().zip(controls) {
+            model.joint_force_mut(*id).set_param("control", *control).map_err(BuildError::Law)?;
+        }
+        Ok(())
+    }
+
+    /// Sets the control of the actuator of that name, in the file's units.
+    ///
+    /// # Errors
+    /// If the file has no such actuator.
+    pub fn set_control(
+        &self,
+        model: &mut Model,
+        actuator: &str,
+        control: f64,
+    ) -> Result<(), MjcfError> {
+        let none = || MjcfError::NoSuch { kind: "actuator", name: actuator.to_owned() };
+        let force = model.joint_force_mut(self.actuator(actuator).ok_or_else(none)?);
+        Ok(force.set_param("control", control).map_err(BuildError::Law)?)
+    }
+
     /// Sets all joints to positions in MuJoCo's order, its `qpos`, at rest: a keyframe's, for instance.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use prehend_geometry::mjcf;
-use prehend_sim::robot::MjcfOptions;
+use prehend_sim::robot::{MjcfError, MjcfOptions};
 use prehend_sim::{Model, State};
 
 /// Boxes on a floor that is as steep as 0.3: which slide, which hold, which fall through.
@@ -45,4 +45,40 @@ fn friction_masks_exclusions_and_gravity_of_a_file_are_applied() {
     }
     // Bits of the box below it are others: it comes to rest on the floor.
     assert!(at("within").z < 0.1, "{}", at("within"));
+}
+
+#[test]
+fn a_scene_is_reset_to_its_start_and_to_keyframes() {
+    let file = mjcf::Model::from_str(
+        r#"<mujoco><worldbody><body><joint name="q" axis="0 1 0" ref="30"/><geom size=".1" pos="0 0 .2"/></body>
+        <body pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody>
+        <actuator><motor name="m" joint="q"/><position name="p" joint="q" kp="3"/></actuator>
+        <keyframe><key name="home" time="2" qpos=".4 1 2 3 0 1 0 0" qvel=".5 1 0 0 0 0 2" ctrl="6 7"/></keyframe></mujoco>"#,
+        None,
+    )
+    .unwrap();
+    let (mut model, scene) = Model::from_mjcf(&file, &MjcfOptions::default()).unwrap();
+    let control = |model: &mut Model, name: &str| {
+        let id = scene.actuator(name).unwrap();
+        let force = model.joint_force_mut(id);
+        force.params()[force.law().param_names().iter().position(|p| *p == "control").unwrap()]
+    };
+    let mut state: State = model.neutral_state();
+    scene.reset_to(&mut model, &mut state, "home").unwrap();
+    let axis = scene.joint("q").unwrap();
+    assert_eq!((state.time, model.joint_motion(&state, axis).unwrap()), (2.0, [0.4, 0.5]));
+    let free = &state[scene.bodies[1]];
+    assert!((free.pose.translation.vector - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-15);
+    assert!((free.linear - Vector3::x()).norm() < 1e-15);
+    // About z of a body that is turned by half about x.
+    assert!((free.angular + Vector3::z() * 2.0).norm() < 1e-15, "{}", free.angular);
+    assert_eq!([control(&mut model, "m"), control(&mut model, "p")], [6.0, 7.0]);
+    scene.set_control(&mut model, "p", 1.0).unwrap();
+    assert_eq!([control(&mut model, "m"), control(&mut model, "p")], [6.0, 1.0]);
+    scene.reset(&mut model, &mut state).unwrap();
+    let expected = (0.0, [30.0_f64.to_radians(), 0.0]);
+    assert_eq!((state.time, model.joint_motion(&state, axis).unwrap()), expected);
+    assert_eq!([control(&mut model, "m"), control(&mut model, "p")], [0.0; 2]);
+    let none = scene.reset_to(&mut model, &mut state, "away");
+    assert_eq!(none, Err(MjcfError::NoSuch { kind: "keyframe", name: "away".to_owned() }));
 }

@@ -216,7 +216,7 @@ fn mocap_bodies_lead() {
     let end = model.simulate(&states, 0.3).unwrap();
     assert!(apart(&end, "thing") < 5e-3, "{}", apart(&end, "thing"));
     let wrong = robot.set_mocap(&model, &mut states, "thing", &pose);
-    assert_eq!(wrong, Err(MjcfError::NoMocap { name: "thing".to_owned() }));
+    assert_eq!(wrong, Err(MjcfError::NoSuch { kind: "mocap body", name: "thing".to_owned() }));
 }
 
 #[test]
