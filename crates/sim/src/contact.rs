@@ -24,7 +24,6 @@ pub(crate) mod range;
 pub(crate) mod registry;
 pub mod restitution;
 pub(crate) mod wrench;
-pub(crate) mod wrench_function;
 
 pub use self::bristles::Bristles;
 pub use self::calibration::ContactCalibration;

@@ -5,7 +5,6 @@ mod displacement;
 mod generalized;
 mod joint_advance;
 mod motions;
-mod pair;
 
 use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::{Fwd, Scalar};

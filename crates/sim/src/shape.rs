@@ -157,7 +157,7 @@ impl Shape {
     ///
     /// let shape = Shape::from_mesh(&sphere(0.03, 24))?;
     /// let ball = Body::from_shape("ball", &shape, 1e3)?;
-    /// # Ok::<(), prehend_sim::ShapeError>(())
+    /// # Ok::<(), prehend_sim::error::ShapeError>(())
     /// ```
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_geometry::robot::{KinematicTree, RobotShape};
 use prehend_refine::data::user_cache;
-use prehend_sim::JointAxis;
+use prehend_sim::model::JointAxis;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::{MjcfOptions, UrdfOptions};
 use pyo3::prelude::*;

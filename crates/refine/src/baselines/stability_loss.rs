@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_autodiff::{Fwd, Quadratic, Scalar};
-use prehend_sim::StepError;
+use prehend_sim::rollout::StepError;
 use prehend_sim::prelude::*;
 use rayon::prelude::*;
 

@@ -117,7 +117,7 @@ macro_rules! law_part {
             $($param:ident [$unit:tt] $range:ident $meaning:tt;)*
         }
         $(constants { $($constant:ident [$c_unit:tt] $c_range:ident $c_meaning:tt;)* })?
-        $(where $relation:path)?
+        $(where $relation:ident($($own:ident),*))?
     ) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,7 +144,9 @@ macro_rules! law_part {
                 let constants: <Self as Tabulated>::Constants<f64> = [$($(self.$constant),*)?];
                 Self::PARAMETERS.iter().zip(values).try_for_each(|(p, x)| p.check(*x))?;
                 Self::CONSTANTS.iter().zip(constants).try_for_each(|(p, x)| p.check(x))?;
-                $($relation(values)?;)?
+                #[allow(unused_variables)]
+                let [$($param),*] = *values;
+                $($relation($($own),*)?;)?
                 Ok(())
             }
         }

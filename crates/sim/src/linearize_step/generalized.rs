@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::Fwd;
 
 use super::motions::{BodyMotion, of_free_body, of_link};
-use super::pair::Between;
 use crate::articulated::Kinematics;
 use crate::articulated::tree_factor::TreeFactor;
 use crate::body_state::Rows;
@@ -71,17 +70,13 @@ impl Generalized {
 
     /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
     fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[PosedTree<'_>], step: usize) {
-        let contacts = model.contacts.iter();
-        let contacts = contacts.filter_map(|pair| Between::contact(model, pair, states, step));
-        let bushings =
-            model.bushings.iter().map(|bushing| Between::bushing(model, bushing, states));
         let mut motions: Vec<Option<Vec<BodyMotion>>> = Vec::new();
         motions.resize_with(model.bodies.len(), || None);
         let mut own = Vec::new();
         if !(model.contacts.is_empty() && model.bushings.is_empty()) {
             own = places(model, trees);
         }
-        for between in contacts.chain(bushings) {
+        for between in model.pair_jacobians(states, step) {
             for body in between.bodies {
                 motions[body].get_or_insert_with(|| match own[body.index()] {
                     Dofs::Free(first) => of_free_body(first),
