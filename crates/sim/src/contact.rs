@@ -17,7 +17,6 @@ pub(crate) mod law;
 pub(crate) mod law_checks;
 pub(crate) mod moved;
 pub(crate) mod normal;
-pub(crate) mod param_values;
 pub(crate) mod parameters;
 pub(crate) mod point;
 pub(crate) mod range;

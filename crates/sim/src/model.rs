@@ -15,7 +15,6 @@ pub(crate) mod generalized_coordinates;
 pub(crate) mod joint_force;
 mod linear_contacts;
 pub(crate) mod material;
-mod matter;
 pub(crate) mod pair_jacobian;
 mod pair_wrench;
 mod parameter_names;

@@ -1,7 +1,12 @@
 //! Parameters of laws: their values, and the one table that checks, registry, error messages and docs read.
 
+use smallvec::SmallVec;
+
 use super::error::LawError;
 use super::range::ParameterRange;
+
+/// Copy of the parameters of a law; up to eight without allocation.
+pub(crate) type ParamValues<T> = SmallVec<[T; 8]>;
 
 /// One of the numbers that a law is made from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

@@ -8,7 +8,7 @@ use super::contact_query::{ContactPoint, ContactQuery};
 use super::dynamic::DynContactLaw;
 use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedQuery};
-use super::param_values::ParamValues;
+use super::parameters::ParamValues;
 use super::point::ContactKinematics;
 use crate::spatial::spatial;
 
@@ -232,7 +232,7 @@ mod tests {
 
     use crate::contact::LeakSteps;
     use crate::contact::contact_query::ContactQuery;
-    use crate::contact::dynamic::QueryWrench;
+    use crate::contact::dynamic::DynContactLaw;
     use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
     use crate::{BodyState, ContactLaw, GapSmoothing, Model, State, Surface};

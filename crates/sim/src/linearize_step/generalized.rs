@@ -35,7 +35,7 @@ impl Generalized {
             bodies.zip(at.link_states()).for_each(|(body, state)| states[*body] = state);
         }
         let mut all = Self::empty(model, &trees);
-        all.add_forces(model, states, &trees, step);
+        let rates = all.add_forces(model, states, &trees, step);
         let efforts = all.add_joint_forces(model, states, &trees);
         for (tree, efforts) in trees.iter().zip(&efforts) {
             let accelerations = all.accelerate(tree, efforts);
@@ -44,6 +44,7 @@ impl Generalized {
                 all.wrenches.push(link.joint.rate_of_velocities(&accelerations[dofs]));
             }
         }
+        all.wrenches.extend(rates);
         all
     }
 
@@ -68,8 +69,15 @@ impl Generalized {
         Self { count, joints, wrenches, by_position, by_velocity, by_effort }
     }
 
-    /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
-    fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[PosedTree<'_>], step: usize) {
+    /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates. Returns the rates of deflections.
+    fn add_forces(
+        &mut self,
+        model: &Model,
+        states: &Rows,
+        trees: &[PosedTree<'_>],
+        step: usize,
+    ) -> Vec<Vector6<f64>> {
+        let mut rates = Vec::new();
         let mut motions: Vec<Option<Vec<BodyMotion>>> = Vec::new();
         motions.resize_with(model.bodies.len(), || None);
         let mut own = Vec::new();
@@ -77,6 +85,7 @@ impl Generalized {
             own = places(model, trees);
         }
         for between in model.pair_jacobians(states, step) {
+            rates.extend(between.rate);
             for body in between.bodies {
                 motions[body].get_or_insert_with(|| match own[body.index()] {
                     Dofs::Free(first) => of_free_body(first),
@@ -96,6 +105,7 @@ impl Generalized {
                 }
             }
         }
+        rates
     }
 
     /// Adds, along the motions of one body, the change of a wrench with those of another.

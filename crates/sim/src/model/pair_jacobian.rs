@@ -19,6 +19,8 @@ pub(crate) struct PairJacobian {
     pub(crate) on: [Vector6<f64>; 2],
     /// Derivatives of both by the tangents of both states: `by[of][by]`.
     pub(crate) by: [[SMatrix<f64, 6, 12>; 2]; 2],
+    /// Rate of the deflection of a contact with bristles.
+    pub(crate) rate: Option<Vector6<f64>>,
 }
 
 impl Model {
@@ -38,7 +40,7 @@ impl Model {
 }
 
 impl PairJacobian {
-    /// Wrenches of a contact with its `deflection`, if it has bristles; none where nothing touches.
+    /// Wrenches of a contact with its `deflection`, if it has bristles; none of others where nothing touches.
     pub(crate) fn contact(
         model: &Model,
         pair: &ContactPair,
@@ -47,17 +49,24 @@ impl PairJacobian {
         step: usize,
     ) -> Option<Self> {
         let bodies = [pair.bodies.samples, pair.bodies.field];
-        let query = &model.contact_query_at(pair, states, step)?;
         let (law, p) = (pair.law().as_ref(), &pair.param_values());
+        let Some(query) = &model.contact_query_at(pair, states, step) else {
+            let nothing = Self::new(bodies, &[Vector6::zeros(); 2]);
+            return law.bristles().map(|_| Self { rate: Some(Vector6::zeros()), ..nothing });
+        };
         let motion = RelativeMotion::new(bodies.map(|body| states[body]));
         let ends = variables(bodies, states);
         let both = [&ends[0], &ends[1]];
+        let mut rate = None;
         let [force, torque] = match law.bristles() {
             Some(bristles) => {
                 let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
                 let function = BristleFunction { law, p, query, bristles, deflection };
                 let held = deflection.map(Fwd::constant);
-                bristle_wrench(&function, pair.weight, &motion, both, None, &held).0
+                let (own, change) =
+                    bristle_wrench(&function, pair.weight, &motion, both, None, &held);
+                rate = Some(change.map(|x| x.value));
+                own
             }
             None => {
                 let found = law.wrench_jacobian(p, query, false);
@@ -68,7 +77,7 @@ impl PairJacobian {
             }
         };
         let offset = ends[0].pose.translation.vector - ends[1].pose.translation.vector;
-        Some(Self::new(bodies, &reaction(&force, &torque, &offset)))
+        Some(Self { rate, ..Self::new(bodies, &reaction(&force, &torque, &offset)) })
     }
 
     fn bushing(model: &Model, bushing: &Bushing, states: &Rows) -> Self {
@@ -81,7 +90,7 @@ impl PairJacobian {
         let by = on.map(|wrench| {
             [0, 12].map(|lane| SMatrix::from_fn(|i, j| wrench[i].derivative[lane + j]))
         });
-        Self { bodies, on: on.map(|wrench| wrench.map(|x| x.value)), by }
+        Self { bodies, on: on.map(|wrench| wrench.map(|x| x.value)), by, rate: None }
     }
 }
 

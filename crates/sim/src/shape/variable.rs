@@ -7,7 +7,6 @@ use crate::contact::bristle_function::BristleFunction;
 use crate::contact::contact_query::{ContactPoint, ContactQuery};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::moved::LiftedContact;
-use crate::contact::point::ContactKinematics;
 use crate::contact::wrench::sum_forces;
 use crate::shape::lifted::LiftedField;
 use crate::shape::solid::RoundSample;
@@ -64,20 +63,11 @@ impl VariableShapes<'_> {
         let (distance, gradient) = self.field.at(&place).unwrap_or_else(nowhere);
         let change = distance - radius;
         let change = change.plus(-change.value);
-        let smoothed = |value: f64, slope: f64| change.times(slope).plus(value);
         let normal = gradient / gradient.norm();
         let lever = arm - normal * radius;
         let velocity =
             constant(&self.query.state.linear) + constant(&self.query.state.angular).cross(&lever);
-        let speed = velocity.dot(&normal);
-        let s = &touch.smoothing;
-        let contact = ContactKinematics {
-            gap: smoothed(cutoff + s.gap, s.slope),
-            normal_speed: smoothed(s.activation, s.activation_slope) * speed,
-            slip: velocity - normal * speed,
-            normal,
-            area,
-        };
+        let contact = touch.moved(cutoff, change, normal, velocity, area);
         LiftedContact { contact, lever }
     }
 }

@@ -154,7 +154,8 @@ impl Equations for ImplicitStep<'_> {
         let mut wrenches: Vec<Vector6<f64>> =
             self.model.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
-        for PairJacobian { bodies, on, by } in self.leaky.pair_jacobians(&ends, self.step.index) {
+        for PairJacobian { bodies, on, by, .. } in self.leaky.pair_jacobians(&ends, self.step.index)
+        {
             for ((body, on), by) in bodies.into_iter().zip(on).zip(by) {
                 wrenches[body] += on;
                 let Some((row, _)) = slots[body] else { continue };
