@@ -14,7 +14,11 @@ use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations}
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
 use prehend::sim::fields::{Cuboid, HalfSpace};
-use prehend::sim::{Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model, Motion, RigidBody, SimulationError, State, Surface, TimeSteps, model::Trajectory};
+use prehend::sim::{
+    Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, Law, Model, Motion, RigidBody, SimulationError, State, Surface, TimeSteps,
+    model::Trajectory,
+};
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].
 const HALF: [f64; 3] = [0.05, 0.04, 0.03];

@@ -1,7 +1,10 @@
 //! Integrators by name.
 
 use prehend_autodiff::Scalar;
-use prehend_sim::{Adaptive, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step, integrator::BackwardEuler};
+use prehend_sim::{
+    Adaptive, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
+    integrator::BackwardEuler,
+};
 use pyo3::prelude::*;
 
 use crate::error::wrong;

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Quadratic;
 use prehend_sim::contact::LeakSteps;
-use prehend_sim::{Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, Model, RigidBody, Surface, TimeSteps, rollout::StepError};
+use prehend_sim::{
+    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, Model,
+    RigidBody, Surface, TimeSteps, rollout::StepError,
+};
 
 use super::stability_loss::{StabilityLoss, weights_relative_to_fall};
 use crate::error::RefineError;

@@ -10,6 +10,7 @@ use super::pair_wrench::bristle_wrench;
 use super::relative_motion::{RelativeMotion, reaction};
 use crate::body_state::{BodyState, Rows};
 use crate::contact::bristle_function::BristleFunction;
+use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 
 /// Linearized wrenches between two bodies.
@@ -54,27 +55,31 @@ impl PairJacobian {
             let nothing = Self::new(bodies, &[Vector6::zeros(); 2]);
             return law.bristles().map(|_| Self { rate: Some(Vector6::zeros()), ..nothing });
         };
-        let motion = RelativeMotion::new(bodies.map(|body| states[body]));
+        let found = law.bristles().is_none().then(|| law.wrench_jacobian(p, query, false));
+        let is_zero = |found: &WrenchJacobian| {
+            found.wrench == Vector6::zeros() && found.by_state == [[0.0; 12]; 6]
+        };
+        if found.as_ref().is_some_and(is_zero) {
+            return None;
+        }
         let ends = variables(bodies, states);
         let both = [&ends[0], &ends[1]];
         let mut rate = None;
-        let [force, torque] = match law.bristles() {
-            Some(bristles) => {
+        let [force, torque] = match (law.bristles(), found) {
+            (Some(bristles), _) => {
                 let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
                 let function = BristleFunction { law, p, query, bristles, deflection };
                 let held = deflection.map(Fwd::constant);
-                let (own, change) =
-                    bristle_wrench(&function, pair.weight, &motion, both, None, &held);
+                let com = model.bodies[bodies[1]].com().coords;
+                let (own, change) = bristle_wrench(&function, pair.weight, &com, both, None, &held);
                 rate = Some(change.map(|x| x.value));
                 own
             }
-            None => {
-                let found = law.wrench_jacobian(p, query, false);
-                if found.wrench == Vector6::zeros() && found.by_state == [[0.0; 12]; 6] {
-                    return None;
-                }
+            (None, Some(found)) => {
+                let motion = RelativeMotion::new(bodies.map(|body| states[body]));
                 motion.wrench(&found, pair.weight, both)
             }
+            (None, None) => return None,
         };
         let offset = ends[0].pose.translation.vector - ends[1].pose.translation.vector;
         Some(Self { rate, ..Self::new(bodies, &reaction(&force, &torque, &offset)) })

@@ -120,7 +120,8 @@ impl<S: Scalar> Model<S> {
         let (mut rate, at) = (Vector6::zeros(), deflection.map(S::value));
         let ([mut force, mut torque], slopes) = if let Some(bristles) = law.bristles() {
             let function = BristleFunction { law, p, query, bristles, deflection: at };
-            let own = bristle_wrench(&function, pair.weight, &motion, ends, from_com, &deflection);
+            let com = self.bodies[pair.bodies.field].com().coords.map(S::value);
+            let own = bristle_wrench(&function, pair.weight, &com, ends, from_com, &deflection);
             rate = own.1;
             let by_params = if varies { function.by_parameters() } else { Vec::new() };
             (own.0, self.slopes(pair, query, &at, &by_params))
@@ -285,27 +286,30 @@ fn wrench_and_rate<S: Scalar>(
 }
 
 /// Force and torque of a contact with bristles on the body with the samples, and the rate of its deflection, by what states, the place of
-/// their point `from_com` and the deflection carry.
+/// their point `from_com` and the deflection carry; the field's center of mass is `com` of its body frame.
+///
+/// The tangent is that of [`BodyState::relative_to`]: default steps follow its last digits.
 pub(super) fn bristle_wrench<T: Scalar>(
     function: &BristleFunction<'_>,
     weight: f64,
-    motion: &RelativeMotion,
+    com: &Vector3<f64>,
     ends: [&BodyState<T>; 2],
     from_com: Option<&Vector3<T>>,
     deflection: &Vector6<T>,
 ) -> ([Vector3<T>; 2], Vector6<T>) {
-    let seen = motion.seen(ends).tangent;
+    let frame = ends[1].shifted(&com.map(|x| T::constant(-x)));
+    let seen = ends[0].relative_to(&frame).tangent();
     let at = &function.deflection;
     let change = |i: usize| if i < 12 { seen[i] } else { deflection[i - 12].plus(-at[i - 12]) };
-    let local = match from_com.map(|from_com| motion.to_field(from_com)) {
+    let axes = &ends[1].pose.rotation;
+    let local = match from_com.map(|from_com| axes.inverse_transform_vector(from_com)) {
         None => T::local(function, std::array::from_fn::<T, 18, _>(change)),
         Some(from_com) => {
             let change = |i: usize| if i < 18 { change(i) } else { from_com[i - 18] };
             T::local(function, std::array::from_fn::<T, 21, _>(change))
         }
     };
-    let own = along_axes(&ends[1].pose.rotation, &local, weight);
-    (own, Vector6::from_column_slice(&local[6..]))
+    (along_axes(axes, &local, weight), Vector6::from_column_slice(&local[6..]))
 }
 
 /// Force and torque along the axes of the model, weighted, of those along the `axes` of a field.

@@ -98,8 +98,8 @@ impl Change {
 }
 
 /// Tangent of the state that the field sees, a zero that carries derivatives.
-pub(super) struct Seen<S: Scalar> {
-    pub(super) tangent: [S; 12],
+struct Seen<S: Scalar> {
+    tangent: [S; 12],
     /// Turn of the field, if it is not constant.
     turn: Option<Vector3<S>>,
 }
@@ -121,7 +121,7 @@ impl RelativeMotion {
 
     /// Tangent that the field sees, by what `samples` and `field` carry, whose values are the states here.
     #[inline(always)]
-    pub(super) fn seen<S: Scalar>(&self, [samples, field]: [&BodyState<S>; 2]) -> Seen<S> {
+    fn seen<S: Scalar>(&self, [samples, field]: [&BodyState<S>; 2]) -> Seen<S> {
         let (samples, field) = (samples.coordinates(), field.coordinates());
         let moves = !field.iter().all(|x| x.is_constant());
         self.seen_by(&samples, moves.then_some(&field))
@@ -139,9 +139,10 @@ impl RelativeMotion {
             seen[2] += cross(&self.r, &f.angular) + cross(&self.u, &f.turn) - f.linear;
             seen[3] += cross(&self.spin, &f.turn) - f.angular;
         }
+        let to_field = self.axes.transpose();
         let mut tangent = [S::zero(); 12];
         for (tangent, seen) in tangent.chunks_exact_mut(3).zip(&seen) {
-            tangent.copy_from_slice(self.to_field(seen).as_slice());
+            tangent.copy_from_slice(times(&to_field, seen).as_slice());
         }
         Seen { tangent, turn: f.map(|f| f.turn) }
     }
@@ -163,12 +164,6 @@ impl RelativeMotion {
     pub(super) fn weighted<S: Scalar>(&self, local: &[S; 12], weight: f64) -> [Vector3<S>; 2] {
         let axes = self.axes.map(S::constant);
         [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
-    }
-
-    /// Vector along the axes of the field.
-    #[inline(always)]
-    pub(super) fn to_field<S: Scalar>(&self, v: &Vector3<S>) -> Vector3<S> {
-        times(&self.axes.transpose(), v)
     }
 
     /// Force and torque on the body with the samples along the axes of the model, of a `wrench` along those of the field.

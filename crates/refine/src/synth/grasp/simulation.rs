@@ -6,7 +6,11 @@ use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics, DynContactLaw, GapSmoothing, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, Surface, integrator::{BackwardEuler, SubStepped}};
+use prehend_sim::{
+    Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
+    GapSmoothing, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, Surface,
+    integrator::{BackwardEuler, SubStepped},
+};
 
 use super::grasper::Grasper;
 
