@@ -23,6 +23,13 @@ pub struct WrenchJacobian {
     pub by_params: Vec<Vector6<f64>>,
 }
 
+impl WrenchJacobian {
+    /// True without a wrench and derivatives by the state.
+    pub(crate) fn is_zero(&self) -> bool {
+        self.wrench == Vector6::zeros() && self.by_state == [[0.0; 12]; 6]
+    }
+}
+
 /// Wrench as a function of the state's tangent, to first order about where it was found.
 impl LocalFunction<12, 6> for WrenchJacobian {
     #[inline]

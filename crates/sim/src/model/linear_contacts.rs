@@ -5,9 +5,9 @@ use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::Model;
 use super::contact_pair::ContactPair;
+use super::pair_wrench::weighted;
 use super::relative_motion::{LinearWrench, RelativeMotion, reaction};
 use crate::body_state::{BodyState, Rows, STATE};
-use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 use crate::spatial::spatial;
 
@@ -56,22 +56,19 @@ impl LinearContacts {
         let varies = pair.params().iter().any(|x| !x.is_constant());
         let found = pair.law().wrench_jacobian(&pair.param_values(), &query, varies);
         let slopes = model.slopes(pair, &query, &Vector6::zeros(), &found.by_params);
-        let WrenchJacobian { wrench, by_state, .. } = found;
         let [samples, field] = ids.map(|id| states[id].value().pose);
         let axes = field.rotation.to_rotation_matrix();
         let offset = samples.translation.vector - field.translation.vector;
         if let Some(slopes) = slopes {
-            let motion = RelativeMotion::new(ids.map(|id| states[id].value()));
-            let [force, torque] = motion.weighted(&slopes, pair.weight);
+            let [force, torque] = weighted(&axes, &slopes, pair.weight);
             let [on_samples, on_field] = reaction(&force, &torque, &offset.map(S::constant));
             wrenches[ids[0].index()] += on_samples;
             wrenches[ids[1].index()] += on_field;
         }
-        if wrench == Vector6::zeros() && by_state == [[0.0; 12]; 6] {
+        if found.is_zero() {
             return;
         }
-        let along = |from: usize| axes * (wrench.fixed_rows::<3>(from) * pair.weight);
-        let (force, torque) = (along(0), along(3));
+        let wrench = LinearWrench::new(&found, &axes, pair.weight);
         let ends = ids.map(|id| {
             *self.places[id.index()].get_or_insert_with(|| {
                 let (state, wrench) = (states[id].value(), Vector6::zeros());
@@ -79,10 +76,9 @@ impl LinearContacts {
                 self.bodies.len() - 1
             })
         });
-        for (end, wrench) in ends.into_iter().zip(reaction(&force, &torque, &offset)) {
+        for (end, wrench) in ends.into_iter().zip(wrench.on_both(&offset)) {
             self.bodies[end].wrench += wrench;
         }
-        let wrench = LinearWrench { wrench: [force, torque], by_state, weight: pair.weight };
         self.contacts.push(LinearContact { ends, wrench });
     }
 

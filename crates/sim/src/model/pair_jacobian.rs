@@ -7,10 +7,9 @@ use super::Model;
 use super::bushing::Bushing;
 use super::contact_pair::ContactPair;
 use super::pair_wrench::bristle_wrench;
-use super::relative_motion::{RelativeMotion, reaction};
+use super::relative_motion::{LinearWrench, RelativeMotion, reaction};
 use crate::body_state::{BodyState, Rows};
 use crate::contact::bristle_function::BristleFunction;
-use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 
 /// Linearized wrenches between two bodies.
@@ -55,33 +54,27 @@ impl PairJacobian {
             let nothing = Self::new(bodies, &[Vector6::zeros(); 2]);
             return law.bristles().map(|_| Self { rate: Some(Vector6::zeros()), ..nothing });
         };
-        let found = law.bristles().is_none().then(|| law.wrench_jacobian(p, query, false));
-        let is_zero = |found: &WrenchJacobian| {
-            found.wrench == Vector6::zeros() && found.by_state == [[0.0; 12]; 6]
-        };
-        if found.as_ref().is_some_and(is_zero) {
-            return None;
-        }
-        let ends = variables(bodies, states);
-        let both = [&ends[0], &ends[1]];
-        let mut rate = None;
-        let [force, torque] = match (law.bristles(), found) {
-            (Some(bristles), _) => {
-                let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
-                let function = BristleFunction { law, p, query, bristles, deflection };
-                let held = deflection.map(Fwd::constant);
-                let com = model.bodies[bodies[1]].com().coords;
-                let (own, change) = bristle_wrench(&function, pair.weight, &com, both, None, &held);
-                rate = Some(change.map(|x| x.value));
-                own
+        let [samples, field] = bodies.map(|body| states[body]);
+        let Some(bristles) = law.bristles() else {
+            let found = law.wrench_jacobian(p, query, false);
+            if found.is_zero() {
+                return None;
             }
-            (None, Some(found)) => {
-                let motion = RelativeMotion::new(bodies.map(|body| states[body]));
-                motion.wrench(&found, pair.weight, both)
-            }
-            (None, None) => return None,
+            let axes = field.pose.rotation.to_rotation_matrix();
+            let wrench = LinearWrench::new(&found, &axes, pair.weight);
+            let offset = samples.pose.translation.vector - field.pose.translation.vector;
+            let by = RelativeMotion::new([samples, field]).jacobian(&wrench);
+            return Some(Self { bodies, on: wrench.on_both(&offset), by, rate: None });
         };
-        let offset = ends[0].pose.translation.vector - ends[1].pose.translation.vector;
+        let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
+        let function = BristleFunction { law, p, query, bristles, deflection };
+        let held = deflection.map(Fwd::constant);
+        let com = &model.bodies[bodies[1]].com().coords;
+        let [a, b] = &variables(bodies, states);
+        let ([force, torque], rate) =
+            bristle_wrench(&function, pair.weight, com, [a, b], None, &held);
+        let offset = a.pose.translation.vector - b.pose.translation.vector;
+        let rate = Some(rate.map(|x| x.value));
         Some(Self { rate, ..Self::new(bodies, &reaction(&force, &torque, &offset)) })
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::Model;
@@ -99,56 +99,69 @@ impl<S: Scalar> Model<S> {
         let Some(query) = &self.contact_query_at(pair, states, step) else {
             return PairWrench::default();
         };
-        let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
-        if S::ORDER == 0 {
-            let local = wrench_and_rate(pair, query, deflection.map(S::value)).map(S::constant);
-            let axes = &states[pair.bodies.field].pose.rotation;
-            let [force, torque] = along_axes(axes, &local, pair.weight);
-            let rate = Vector6::from_column_slice(&local[6..]);
-            return PairWrench { rate, ..Self::on_both(pair, states, force, torque) };
-        }
+        let (law, p) = (pair.law().as_ref(), &pair.param_values());
         let ids = [pair.bodies.samples, pair.bodies.field];
+        if S::ORDER == 0 && law.bristles().is_none() {
+            let local: [S; 6] = law.wrench(p, query).map(S::constant).into();
+            let [force, torque] = along_axes(&states[ids[1]].pose.rotation, &local, pair.weight);
+            return Self::on_both(pair, states, force, torque);
+        }
         let shifted = ids.map(|id| self.shifted(id, states));
         let ends = [0, 1].map(|end| match &shifted[end] {
             Some((state, _)) => state,
             None => &states[ids[end]],
         });
-        let motion = RelativeMotion::new(ends.map(BodyState::value));
         let from_com = shifted[0].as_ref().map(|(_, from_com)| from_com);
-        let (law, p) = (pair.law().as_ref(), &pair.param_values());
+        let axes = || ends[1].value().pose.rotation.to_rotation_matrix();
         let varies = pair.params().iter().any(|x| !x.is_constant());
-        let (mut rate, at) = (Vector6::zeros(), deflection.map(S::value));
-        let ([mut force, mut torque], slopes) = if let Some(bristles) = law.bristles() {
+        if let Some(bristles) = law.bristles() {
+            let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
+            let at = deflection.map(S::value);
             let function = BristleFunction { law, p, query, bristles, deflection: at };
-            let com = self.bodies[pair.bodies.field].com().coords.map(S::value);
-            let own = bristle_wrench(&function, pair.weight, &com, ends, from_com, &deflection);
-            rate = own.1;
+            let com = self.bodies[ids[1]].com().coords.map(S::value);
+            let ([mut force, mut torque], mut rate) =
+                bristle_wrench(&function, pair.weight, &com, ends, from_com, &deflection);
             let by_params = if varies { function.by_parameters() } else { Vec::new() };
-            (own.0, self.slopes(pair, query, &at, &by_params))
-        } else if varies {
+            if let Some(slopes) = self.slopes(pair, query, &at, &by_params) {
+                let [by_force, by_torque] = weighted(&axes(), &slopes, pair.weight);
+                (force, torque) = (force + by_force, torque + by_torque);
+                rate += Vector6::from_column_slice(&slopes[6..]);
+            }
+            return PairWrench { rate, ..Self::on_both(pair, states, force, torque) };
+        }
+        let motion = RelativeMotion::new(ends.map(BodyState::value));
+        let none = &Vector6::zeros();
+        let ([mut force, mut torque], slopes) = if varies {
             let jacobian = law.wrench_jacobian(p, query, true);
             let own = motion.wrench(&jacobian, pair.weight, ends);
-            (own, self.slopes(pair, query, &at, &jacobian.by_params))
+            (own, self.slopes(pair, query, none, &jacobian.by_params))
         } else {
             let own = motion.wrench(&WrenchFunction { law, p, query }, pair.weight, ends);
-            (own, self.slopes::<6>(pair, query, &at, &[]))
+            (own, self.slopes::<6>(pair, query, none, &[]))
         };
         if let Some(slopes) = slopes {
-            let [by_force, by_torque] = motion.weighted(&slopes, pair.weight);
+            let [by_force, by_torque] = weighted(&axes(), &slopes, pair.weight);
             (force, torque) = (force + by_force, torque + by_torque);
-            rate += Vector6::from_column_slice(&slopes[6..]);
         }
-        if let Some(from_com) = from_com.filter(|_| law.bristles().is_none()) {
+        if let Some(from_com) = from_com {
             torque += from_com.cross(&force);
         }
-        PairWrench { rate, ..Self::on_both(pair, states, force, torque) }
+        Self::on_both(pair, states, force, torque)
     }
 
     /// Force of `pair` with undeflected bristles \[N\].
     pub(crate) fn force(&self, pair: &ContactPair<S>, states: &Rows<S>) -> f64 {
         let Some(query) = &self.contact_query_at(pair, states, 1) else { return 0.0 };
-        let [x, y, z, ..] = wrench_and_rate(pair, query, Vector6::zeros());
-        pair.weight * Vector3::new(x, y, z).norm()
+        let (law, p) = (pair.law().as_ref(), &pair.param_values());
+        let wrench = match law.bristles() {
+            None => law.wrench(p, query),
+            Some(bristles) => {
+                let deflection = Vector6::zeros();
+                let function = BristleFunction { law, p, query, bristles, deflection };
+                Vector6::from_column_slice(&f64::local(&function, [0.0; 18])[..6])
+            }
+        };
+        pair.weight * wrench.fixed_rows::<3>(0).norm()
     }
 
     /// Samples of `pair` beside its field in a step, if there are both.
@@ -269,22 +282,6 @@ impl<S: Scalar> Model<S> {
     }
 }
 
-/// Wrench of `pair`, which is `query`, and rate of its deflection, along the axes of the field.
-fn wrench_and_rate<S: Scalar>(
-    pair: &ContactPair<S>,
-    query: &ContactQuery<'_>,
-    deflection: Vector6<f64>,
-) -> [f64; 12] {
-    let (law, p) = (pair.law().as_ref(), &pair.param_values());
-    if let Some(bristles) = law.bristles() {
-        let function = BristleFunction { law, p, query, bristles, deflection };
-        return f64::local(&function, [0.0; 18]);
-    }
-    let mut local = [0.0; 12];
-    local[..6].copy_from_slice(law.wrench(p, query).as_slice());
-    local
-}
-
 /// Force and torque of a contact with bristles on the body with the samples, and the rate of its deflection, by what states, the place of
 /// their point `from_com` and the deflection carry; the field's center of mass is `com` of its body frame.
 ///
@@ -313,11 +310,18 @@ pub(super) fn bristle_wrench<T: Scalar>(
 }
 
 /// Force and torque along the axes of the model, weighted, of those along the `axes` of a field.
-fn along_axes<T: Scalar>(
-    axes: &UnitQuaternion<T>,
-    local: &[T; 12],
+#[inline]
+fn along_axes<T: Scalar>(axes: &UnitQuaternion<T>, local: &[T], weight: f64) -> [Vector3<T>; 2] {
+    [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
+}
+
+/// Force and torque along the axes of the model, weighted, of tangents along the `axes` of a field.
+pub(super) fn weighted<S: Scalar>(
+    axes: &Rotation3<f64>,
+    local: &[S; 12],
     weight: f64,
-) -> [Vector3<T>; 2] {
+) -> [Vector3<S>; 2] {
+    let axes = axes.cast::<S>();
     [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
 }
 

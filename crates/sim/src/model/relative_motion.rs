@@ -1,11 +1,12 @@
 //! Relative motion of the two bodies of a contact, and its derivative forward and backward.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, RowSVector, SMatrix, Vector3, Vector6};
 use prehend_autodiff::{LocalFunction, Scalar};
 
 use super::Model;
 use super::contact_pair::ContactPair;
 use crate::body_state::{BodyState, Rows, STATE};
+use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 use crate::spatial::spatial;
 
@@ -160,12 +161,6 @@ impl RelativeMotion {
         self.to_model(&S::local(wrench, seen.tangent), weight, &seen)
     }
 
-    /// Force and torque along the axes of the model, weighted, of a tangent `local` along those of the field.
-    pub(super) fn weighted<S: Scalar>(&self, local: &[S; 12], weight: f64) -> [Vector3<S>; 2] {
-        let axes = self.axes.map(S::constant);
-        [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
-    }
-
     /// Force and torque on the body with the samples along the axes of the model, of a `wrench` along those of the field.
     #[inline(always)]
     fn to_model<S: Scalar>(&self, wrench: &[S; 6], weight: f64, seen: &Seen<S>) -> [Vector3<S>; 2] {
@@ -212,6 +207,23 @@ impl RelativeMotion {
     }
 }
 
+impl RelativeMotion {
+    /// Derivatives of the wrenches on both bodies by the tangents of both states, `by[of][by]`.
+    pub(super) fn jacobian(&self, wrench: &LinearWrench) -> [[SMatrix<f64, 6, 12>; 2]; 2] {
+        let mut by = [[SMatrix::<f64, 6, 12>::zeros(); 2]; 2];
+        for (of, row) in (0..12).map(|k| (k / 6, k % 6)) {
+            let mut on = [[Vector3::zeros(); 2]; 2];
+            on[of][row / 3][row % 3] = 1.0;
+            for (by, change) in by[of].iter_mut().zip(self.adjoints(wrench, on)) {
+                let Change { place, turn, linear, angular } = change;
+                let numbers = [place, turn, linear, angular];
+                by.set_row(row, &RowSVector::from_fn(|_, k| numbers[k / 3][k % 3]));
+            }
+        }
+        by
+    }
+}
+
 /// Wrench of a contact on the body with the samples, with its derivatives.
 pub(super) struct LinearWrench {
     /// Force and torque along the axes of the model.
@@ -220,6 +232,19 @@ pub(super) struct LinearWrench {
     pub(super) by_state: [[f64; 12]; 6],
     /// Factor on those derivatives, which `wrench` has already.
     pub(super) weight: f64,
+}
+
+impl LinearWrench {
+    /// Wrench of a contact of this `weight`, `found` along the `axes` of its field.
+    pub(super) fn new(found: &WrenchJacobian, axes: &Rotation3<f64>, weight: f64) -> Self {
+        let along = |from: usize| axes * (found.wrench.fixed_rows::<3>(from) * weight);
+        Self { wrench: [along(0), along(3)], by_state: found.by_state, weight }
+    }
+
+    /// Wrenches on both bodies.
+    pub(super) fn on_both(&self, offset: &Vector3<f64>) -> [Vector6<f64>; 2] {
+        reaction(&self.wrench[0], &self.wrench[1], offset)
+    }
 }
 
 /// Wrenches on the bodies with the samples and with the field, each about its own center of mass, of a force and torque on the first
