@@ -18,7 +18,7 @@ use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::joint_law::Motor;
 use prehend::sim::{
     Adaptive, BodyId, Integrator, JointForceId, Model, RigidBody, RungeKutta4, SimulationError,
-    State, Step, StepCheckpointed, TimeSteps,
+    State, Step, TimeSteps, integrator::StepCheckpointed,
 };
 
 /// Length of the rod \[m\], and mass of the ball at its end \[kg\].

@@ -17,7 +17,7 @@ use prehend::sim::fields::{Cuboid, HalfSpace};
 use prehend::sim::{
     Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
     HuntCrossley, Law, Model, Motion, RigidBody, SimulationError, State, Surface, TimeSteps,
-    Trajectory,
+    model::Trajectory,
 };
 
 /// Half of the edges of the box, and how deep it sinks into the table \[m\].

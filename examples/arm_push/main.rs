@@ -15,8 +15,8 @@ use nalgebra::Vector2;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Scalar, Var, jacobian};
 use prehend::sim::{
-    Adaptive, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, StepCheckpointed,
-    TimeSteps,
+    Adaptive, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, TimeSteps,
+    integrator::StepCheckpointed,
 };
 use scene::Scene;
 

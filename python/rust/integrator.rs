@@ -2,8 +2,8 @@
 
 use prehend_autodiff::Scalar;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError,
-    State, Step,
+    Adaptive, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
+    integrator::BackwardEuler,
 };
 use pyo3::prelude::*;
 

@@ -11,9 +11,9 @@ use parry3d_f64::utils::Array2;
 use prehend_autodiff::{Recording, Var};
 use prehend_sim::contact::Bounce;
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, BodyState, ContactBodies, ContactCalibration, Coulomb,
-    GapSmoothing, HuntCrossley, Integrator, Law, Model, RungeKutta4, SemiImplicitEuler, Shape,
-    State, TimeSteps,
+    Body, BodyId, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing,
+    HuntCrossley, Integrator, Law, Model, RungeKutta4, SemiImplicitEuler, Shape, State, TimeSteps,
+    integrator::BackwardEuler,
 };
 
 /// Radius of the balls \[m\].

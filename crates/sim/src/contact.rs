@@ -17,14 +17,12 @@ pub(crate) mod law;
 pub(crate) mod law_checks;
 pub(crate) mod moved;
 pub(crate) mod normal;
-pub(crate) mod param_values;
 pub(crate) mod parameters;
 pub(crate) mod point;
 pub(crate) mod range;
 pub(crate) mod registry;
 pub mod restitution;
 pub(crate) mod wrench;
-pub(crate) mod wrench_function;
 
 pub use self::bristles::Bristles;
 pub use self::calibration::ContactCalibration;

@@ -1,12 +1,13 @@
 //! Errors of building a model, and of simulating it.
 
+pub use crate::body::error::BodyError;
+pub use crate::contact::error::LawError;
+pub use crate::shape::error::ShapeError;
+
 use thiserror::Error;
 
 use crate::articulated::ArticulationError;
-use crate::body::error::BodyError;
-use crate::contact::error::LawError;
 use crate::handle::BodyId;
-use crate::shape::error::ShapeError;
 
 /// Result of what simulates.
 pub type Result<T, E = SimulationError> = std::result::Result<T, E>;

@@ -91,7 +91,7 @@
 //! from depth at rest: [`ContactCalibration`](crate::ContactCalibration).
 //!
 //! # Bodies on a trajectory
-//! The pose and velocity of a [`Body::kinematic`], such as a robot's link, are those of a [`Trajectory`](crate::Trajectory); its
+//! The pose and velocity of a [`Body::kinematic`], such as a robot's link, are those of a [`Trajectory`](crate::model::Trajectory); its
 //! initial state is ignored. Velocities must be the time derivatives of the pose; far from these, they are an error. Their own
 //! derivatives are not checked: if the pose has a variable speed and the velocity is a constant, derivatives of all that touches
 //! the body are wrong. Adaptive steps sample the trajectory at least every millisecond, and may miss shorter motions.
@@ -212,9 +212,9 @@
 //! An energy gain by contacts of more than a quarter of the largest kinetic energy is an error, as by default; it is not tested
 //! with motors, kinematic bodies, or fixed ones with a velocity.
 //!
-//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for every
+//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::integrator::BackwardEuler) is stable for every
 //! step, except where friction sticks, and damps faster motions: with steps of a millisecond it simulates a stack at rest two to
-//! three times faster than the default. [`SubStepped`](crate::SubStepped) divides the steps of any integrator where contacts and
+//! three times faster than the default. [`SubStepped`](crate::integrator::SubStepped) divides the steps of any integrator where contacts and
 //! imminent impacts demand it. With steps that are too long, derivatives are exactly those of the steps and far from the motion's,
 //! even where values look right.
 //!
@@ -350,7 +350,7 @@
 //! | call | a step | in all |
 //! |---|--:|--:|
 //! | `simulate_with(&SemiImplicitEuler, …)` over [`Var`](prehend_autodiff::Var) | 10 kB | 100 MB |
-//! | the same, [`StepCheckpointed::new(SemiImplicitEuler, &model)?`](crate::StepCheckpointed) | 0.5 to 1.3 kB | 5 to 13 MB |
+//! | the same, [`StepCheckpointed::new(SemiImplicitEuler, &model)?`](crate::integrator::StepCheckpointed) | 0.5 to 1.3 kB | 5 to 13 MB |
 //! | [`RolloutFunction`](crate::RolloutFunction): `evaluate`, `vjp` | 104 bytes a body | 2 MB |
 //!
 //! The last two record one step of the rollout at a time, with [`Adaptive`](crate::Adaptive) all its substeps: give it many steps.

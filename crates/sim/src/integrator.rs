@@ -8,6 +8,13 @@ pub(crate) mod semi_implicit;
 pub(crate) mod step_checkpointed;
 pub(crate) mod sub_stepped;
 
+pub use self::adaptive::Adaptive;
+pub use self::backward_euler::BackwardEuler;
+pub use self::runge_kutta::classic::RungeKutta4;
+pub use self::semi_implicit::SemiImplicitEuler;
+pub use self::step_checkpointed::StepCheckpointed;
+pub use self::sub_stepped::SubStepped;
+
 use prehend_autodiff::Scalar;
 
 use crate::error::Result;

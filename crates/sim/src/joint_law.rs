@@ -1,38 +1,25 @@
-//! Laws along a joint: springs, dampers, friction, limits, motors and servos, one a file.
+//! Laws along a joint: springs, dampers, friction, limits, motors and servos.
 
 pub(crate) mod affine_actuator;
-pub(crate) mod damper;
 pub(crate) mod dynamic;
 pub(crate) mod friction;
-pub(crate) mod limits;
-pub(crate) mod motor;
+pub(crate) mod linear;
 pub(crate) mod muscle;
-pub(crate) mod polynomial;
-pub(crate) mod position_servo;
+pub(crate) mod range;
 pub(crate) mod registry;
-pub(crate) mod slack_spring;
-pub(crate) mod spring;
 #[cfg(test)]
 mod tests;
-pub(crate) mod velocity_servo;
 
 pub use self::affine_actuator::AffineActuator;
-pub use self::damper::JointDamper;
 pub use self::dynamic::DynJointLaw;
-pub use self::friction::JointFriction;
-pub use self::limits::JointLimits;
-pub use self::motor::Motor;
+pub use self::friction::{JointFriction, PolynomialDamper};
+pub use self::linear::{JointDamper, JointSpring, Motor, PositionServo, VelocityServo};
 pub use self::muscle::{Muscle, MuscleActivation};
-pub use self::polynomial::{PolynomialDamper, PolynomialSpring};
-pub use self::position_servo::PositionServo;
+pub use self::range::{JointLimits, PolynomialSpring, SlackSpring};
 pub use self::registry::{JointLawEntry, joint_laws};
-pub use self::slack_spring::SlackSpring;
-pub use self::spring::JointSpring;
-pub use self::velocity_servo::VelocityServo;
 
 use prehend_autodiff::Scalar;
 
-use crate::contact::error::LawError;
 use crate::contact::parameters::Parameters;
 
 /// The effort along a joint, or along a weighted sum of joints, by its position and velocity: \[N m\] by \[rad\], or \[N\] by \[m\]. One
@@ -77,16 +64,4 @@ pub trait JointLaw: Parameters + 'static {
     fn is_passive(&self) -> bool {
         false
     }
-}
-
-/// Checks that the ends of a range, the parameters `lower` and `upper`, are in order.
-fn in_order(lower: f64, upper: f64) -> Result<(), LawError> {
-    let (name, range) = ("upper", "no less than lower");
-    if lower <= upper { Ok(()) } else { Err(LawError::Range { name, range, value: upper }) }
-}
-
-/// `effort`, but no more than `most` either way.
-#[inline]
-fn saturated<S: Scalar>(effort: S, most: f64) -> S {
-    if effort.value().abs() > most { S::constant(most.copysign(effort.value())) } else { effort }
 }

@@ -22,19 +22,19 @@ mod body;
 mod body_state;
 pub mod contact;
 mod diagnostics;
-mod error;
+pub mod error;
 pub mod fields;
 mod first_order;
 pub mod guide;
 mod handle;
-mod integrator;
+pub mod integrator;
 pub mod joint_law;
 mod linearize_step;
 mod magnitude;
-mod model;
+pub mod model;
 pub mod prelude;
 pub mod robot;
-mod rollout;
+pub mod rollout;
 mod rollout_function;
 #[cfg(test)]
 mod scenes;
@@ -47,10 +47,8 @@ mod time;
 /// The version of parry whose shapes [`Shape::from_parry`] reads.
 pub use parry3d_f64 as parry;
 
-pub use articulated::JointState;
 pub use batch::Batch;
 pub use body::RigidBody;
-pub use body::error::BodyError;
 pub use body_state::BodyState;
 pub use contact::{
     BristleFriction, ContactCalibration, ContactForce, ContactKinematics, ContactLaw, Coulomb,
@@ -59,30 +57,12 @@ pub use contact::{
 pub use diagnostics::Resolution;
 pub use error::{BuildError, Result, SimulationError};
 pub use handle::{BodyId, BushingId, ContactId, JointForceId};
-pub use integrator::Integrator;
-pub use integrator::adaptive::Adaptive;
-pub use integrator::backward_euler::BackwardEuler;
-pub use integrator::runge_kutta::classic::RungeKutta4;
-pub use integrator::semi_implicit::SemiImplicitEuler;
-pub use integrator::step_checkpointed::StepCheckpointed;
-pub use integrator::sub_stepped::SubStepped;
+pub use integrator::{Adaptive, Integrator, RungeKutta4, SemiImplicitEuler};
 pub use linearize_step::LinearizedStep;
-pub use model::Model;
-pub use model::articulated_body::ArticulatedBody;
-pub use model::body::{Body, Motion};
-pub use model::bushing::{Bushing, BushingStiffness};
-pub use model::contact_group::ContactGroup;
-pub use model::contact_pair::{ContactBodies, ContactPair};
-pub use model::generalized_coordinates::StatePlaces;
-pub use model::joint_force::{JointAxis, JointForce};
-pub use model::material::Material;
-pub use model::point_contact::PointContact;
-pub use model::trajectory::Trajectory;
-pub use model::transmission::Transmissions;
-pub use rollout::{ControlResult, Simulation, StepError};
+pub use model::{Body, Bushing, ContactBodies, JointForce, Material, Model, Motion};
+pub use rollout::Simulation;
 pub use rollout_function::{RolloutFunction, RolloutGradient, RolloutInputs};
 pub use shape::Shape;
-pub use shape::error::ShapeError;
 pub use shape::options::ShapeOptions;
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};

@@ -5,7 +5,6 @@ mod displacement;
 mod generalized;
 mod joint_advance;
 mod motions;
-mod pair;
 
 use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
@@ -42,8 +41,8 @@ pub struct LinearizedStep {
 impl Model {
     /// A step of [`SemiImplicitEuler`] with its Jacobian. The step says when it begins, whatever `state.time` is.
     ///
-    /// Contacts with bristles are as they are given, their deflections are no rows. Where there are such contacts, laws along spherical joints or joint
-    /// types of one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
+    /// Deflections of contacts with bristles are as they are given, and no rows. Where there are laws along spherical joints or joint types of
+    /// one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
     ///
     /// # Errors
     /// As [`Model::step`].
@@ -59,6 +58,7 @@ impl Model {
         }
         let forces = Generalized::new(&near, state.rows_mut(), step.index);
         let mut next = moved(&near, state.rows(), &forces.wrenches, step.dt);
+        near.integrate_bristles(&mut next, &forces.wrenches, step.dt);
         near.finish_step(state.rows(), &mut next, step.end())?;
         let n = forces.count;
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));
@@ -152,8 +152,7 @@ impl Model {
         let curved = |(axis, _): &(JointAxis, f64)| {
             self.link(axis.link).is_ok_and(|link| matches!(link.joint, Joint::Spherical))
         };
-        self.bristle_contacts().next().is_none()
-            && !self.joints().any(|joint| matches!(joint, Joint::Custom(_)))
+        !self.joints().any(|joint| matches!(joint, Joint::Custom(_)))
             && !self.joint_forces.iter().flat_map(|force| &force.axes).any(curved)
             && !self.joint_forces.iter().any(|force| force.path.is_some() || force.input.is_some())
             && self.transmissions.is_empty()

@@ -15,20 +15,31 @@ pub(crate) mod generalized_coordinates;
 pub(crate) mod joint_force;
 mod linear_contacts;
 pub(crate) mod material;
-mod matter;
-mod pair_function;
+pub(crate) mod pair_jacobian;
 mod pair_wrench;
 mod parameter_names;
 mod parameters;
 pub(crate) mod path;
-pub(crate) mod point_contact;
-mod relative_state;
+mod point_contact;
+mod relative_motion;
 pub(crate) mod sample_culling;
 mod sensors;
 mod shaped_body;
 pub(crate) mod trajectory;
 mod trajectory_checks;
 pub(crate) mod transmission;
+
+pub use self::articulated_body::ArticulatedBody;
+pub use self::body::{Body, Motion};
+pub use self::bushing::{Bushing, BushingStiffness};
+pub use self::contact_group::ContactGroup;
+pub use self::contact_pair::{ContactBodies, ContactPair};
+pub use self::generalized_coordinates::StatePlaces;
+pub use self::joint_force::{JointAxis, JointForce};
+pub use self::material::Material;
+pub use self::point_contact::PointContact;
+pub use self::trajectory::Trajectory;
+pub use self::transmission::Transmissions;
 
 use std::fmt;
 use std::sync::Arc;
@@ -44,13 +55,6 @@ use crate::contact::gap_smoothing::GapSmoothing;
 use crate::error::BuildError;
 use crate::handle::{BodyId, ContactId, ContactPlace};
 use crate::state::State;
-use articulated_body::ArticulatedBody;
-use body::{Body, Motion};
-use bushing::Bushing;
-use contact_group::ContactGroup;
-use contact_pair::{ContactBodies, ContactPair};
-use joint_force::JointForce;
-use transmission::Transmissions;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
@@ -311,7 +315,7 @@ impl<S: Scalar> fmt::Debug for Model<S> {
             .contacts
             .iter()
             .map(|pair| [pair.bodies.samples, pair.bodies.field].map(|id| names[id]));
-        f.debug_struct("World")
+        f.debug_struct("Model")
             .field("bodies", &names)
             .field("contacts", &pairs.collect::<Vec<_>>())
             .field("gravity", &self.gravity)

@@ -12,9 +12,10 @@ pub use crate::joint_law::{
 };
 pub use crate::robot::{MjcfOptions, MjcfRobot, UrdfOptions};
 pub use crate::{
-    Adaptive, BackwardEuler, Batch, Body, BodyId, BodyState, BuildError, Bushing, BushingId,
-    BushingStiffness, ContactBodies, ContactId, Integrator, JointAxis, JointForceId, Material,
-    Model, Motion, RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler,
-    Shape, ShapeOptions, SimulationError, State, Step, StepCheckpointed, SubStepped, Surface,
-    TimeSteps,
+    Adaptive, Batch, Body, BodyId, BodyState, BuildError, Bushing, BushingId, ContactBodies,
+    ContactId, Integrator, JointForceId, Material, Model, Motion, RigidBody, RolloutFunction,
+    RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, ShapeOptions, SimulationError, State,
+    Step, Surface, TimeSteps,
+    integrator::{BackwardEuler, StepCheckpointed, SubStepped},
+    model::{BushingStiffness, JointAxis},
 };

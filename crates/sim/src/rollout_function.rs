@@ -237,7 +237,7 @@ impl<I: Integrator> RolloutFunction<I> {
     /// The product of `adjoints`, one for each number of [`RolloutFunction::evaluate`], and its Jacobian, by one sweep back through the `run` that
     /// it gave: each step is recorded again, and no more than one is held at once.
     ///
-    /// The derivatives are those of [`StepCheckpointed`](crate::StepCheckpointed).
+    /// The derivatives are those of [`StepCheckpointed`](crate::integrator::StepCheckpointed).
     ///
     /// # Errors
     /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, the integrator's steps have no derivatives in this model, or

@@ -12,8 +12,6 @@ pub(crate) mod height_field;
 mod kind;
 mod lattice;
 pub(crate) mod lifted;
-pub(crate) mod matter;
-mod mesh;
 mod nearest;
 pub(crate) mod options;
 mod polyhedron;
@@ -36,6 +34,7 @@ use prehend_geometry::{DistanceField, Moments, TriMesh};
 use crate::body::RigidBody;
 use crate::surface::Surface;
 use error::ShapeError;
+use ground::Ground;
 use kind::ShapeKind;
 use lifted::LiftedField;
 use options::ShapeOptions;
@@ -157,7 +156,7 @@ impl Shape {
     ///
     /// let shape = Shape::from_mesh(&sphere(0.03, 24))?;
     /// let ball = Body::from_shape("ball", &shape, 1e3)?;
-    /// # Ok::<(), prehend_sim::ShapeError>(())
+    /// # Ok::<(), prehend_sim::error::ShapeError>(())
     /// ```
     ///
     /// # Errors
@@ -171,7 +170,7 @@ impl Shape {
     /// # Errors
     /// See there, and for lengths that are not positive and finite.
     pub fn from_mesh_with(mesh: &TriMesh, options: &ShapeOptions) -> Result<Self, ShapeError> {
-        let ground = mesh::mesh(mesh, options)?;
+        let ground = Ground::mesh(mesh, options)?;
         let built = Arc::new(Built::new(Arc::new(ShapeKind::Ground(ground)), Vec::new())?);
         Ok(Self { built, dimensions: Vec::new() })
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use prehend_sim::{Bushing, BushingStiffness, ContactBodies, Material};
+use prehend_sim::{Bushing, ContactBodies, Material, model::BushingStiffness};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

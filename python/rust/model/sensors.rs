@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use numpy::ndarray::IxDyn;
 use numpy::{PyArray, PyArrayMethods};
-use prehend_sim::{BodyId, Integrator, PointContact, State};
+use prehend_sim::model::PointContact;
+use prehend_sim::{BodyId, Integrator, State};
 use pyo3::prelude::*;
 
 use super::states::measured;

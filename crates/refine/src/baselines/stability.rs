@@ -7,7 +7,7 @@ use prehend_autodiff::Quadratic;
 use prehend_sim::contact::LeakSteps;
 use prehend_sim::{
     Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, KelvinVoigt, Law, Model,
-    RigidBody, StepError, Surface, TimeSteps,
+    RigidBody, Surface, TimeSteps, rollout::StepError,
 };
 
 use super::stability_loss::{StabilityLoss, weights_relative_to_fall};

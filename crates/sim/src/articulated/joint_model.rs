@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
+use crate::first_order::{Linearized, first_order, linearized};
 use crate::spatial::spatial;
 
 /// Coordinates of a joint type of one's own at most.
@@ -54,7 +55,7 @@ pub(super) trait DynJointModel: fmt::Debug + Send + Sync {
     fn nv(&self) -> usize;
     /// Values of a [`CustomMotion`] at coordinates and velocities, and their Jacobian.
     fn motion(&self, x: [f64; 2 * MAX_NV]) -> [f64; MOTION];
-    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> ([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION]);
+    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> Linearized<{ 2 * MAX_NV }, MOTION>;
 }
 
 impl<J: JointModel> DynJointModel for J {
@@ -66,9 +67,8 @@ impl<J: JointModel> DynJointModel for J {
         motion(self, x)
     }
 
-    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> ([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION]) {
-        let all = motion(self, Fwd::<{ 2 * MAX_NV }>::variables(x));
-        (all.map(|x| x.value), all.map(|x| x.derivative))
+    fn linearized(&self, x: [f64; 2 * MAX_NV]) -> Linearized<{ 2 * MAX_NV }, MOTION> {
+        linearized(motion(self, Fwd::variables(x)))
     }
 }
 
@@ -103,8 +103,7 @@ impl<S: Scalar> CustomMotion<S> {
             return Self::of(&model.motion(values).map(S::constant));
         }
         const { assert!(S::ORDER <= 1, "joints of one's own have first derivatives only") };
-        let (value, jacobian) = model.linearized(values);
-        Self::of(&S::local(&LinearizedMotion { at: values, value, jacobian }, x))
+        Self::of(&S::local(&LinearizedMotion(model.linearized(values)), x))
     }
 
     /// Motion of numbers in their order.
@@ -120,27 +119,15 @@ impl<S: Scalar> CustomMotion<S> {
 }
 
 /// A motion about where it was linearized.
-struct LinearizedMotion {
-    at: [f64; 2 * MAX_NV],
-    value: [f64; MOTION],
-    jacobian: [[f64; 2 * MAX_NV]; MOTION],
-}
+struct LinearizedMotion(Linearized<{ 2 * MAX_NV }, MOTION>);
 
 impl LocalFunction<{ 2 * MAX_NV }, MOTION> for LinearizedMotion {
     fn evaluate<S: Scalar>(&self, x: [S; 2 * MAX_NV]) -> [S; MOTION] {
-        std::array::from_fn(|row| {
-            let slopes = self.jacobian[row].iter().zip(&x).zip(&self.at);
-            slopes.fold(S::constant(self.value[row]), |sum, ((slope, x), at)| {
-                sum + x.plus(-at).times(*slope)
-            })
-        })
+        first_order(&self.0, &x)
     }
 
-    fn linearize(
-        &self,
-        _: [f64; 2 * MAX_NV],
-    ) -> Option<([f64; MOTION], [[f64; 2 * MAX_NV]; MOTION])> {
-        Some((self.value, self.jacobian))
+    fn linearize(&self, _: [f64; 2 * MAX_NV]) -> Option<Linearized<{ 2 * MAX_NV }, MOTION>> {
+        Some(self.0)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Wrench and rate of the deflection of a contact with bristles.
 
-use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3x6, Matrix6, SVector, Vector3, Vector6};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
@@ -8,6 +8,7 @@ use super::bristles::Bristles;
 use super::contact_query::{ContactPoint, ContactQuery};
 use super::dynamic::DynContactLaw;
 use super::moved::{LiftedContact, MovedQuery};
+use super::wrench::sum_forces;
 use crate::first_order::{Linearized, first_order, linearized};
 
 /// Depth over which bristles take hold, in multiples of their deflection.
@@ -88,7 +89,7 @@ impl BristleFunction<'_> {
     }
 
     /// The derivatives by each parameter.
-    pub(crate) fn by_parameters(&self) -> Vec<[f64; 12]> {
+    pub(crate) fn by_parameters(&self) -> Vec<SVector<f64, 12>> {
         const LANES: usize = 6;
         let mut columns = Vec::with_capacity(self.p.len());
         for from in (0..self.p.len()).step_by(LANES) {
@@ -99,7 +100,7 @@ impl BristleFunction<'_> {
             let p: Vec<_> = self.p.iter().enumerate().map(seeded).collect();
             let results = self.wrench(&p, &[Fwd::constant(0.0); 18], None);
             let lanes = LANES.min(self.p.len() - from);
-            columns.extend((0..lanes).map(|lane| results.map(|y| y.derivative[lane])));
+            columns.extend((0..lanes).map(|k| SVector::from(results.map(|y| y.derivative[k]))));
         }
         columns
     }
@@ -139,28 +140,24 @@ impl BristleFunction<'_> {
     ) -> [T; 12] {
         let Self { query, bristles, .. } = *self;
         let (cutoff, law) = (self.law.cutoff(), BristleLaw::new(self.law, p));
-        let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
-        let sound = query.for_each_contact(cutoff, T::ORDER == 0, |touch| {
+        let wrench = sum_forces(query, cutoff, T::ORDER == 0, |touch| {
             let LiftedContact { mut contact, lever } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
             contact.slip += bristles.slip(&deflected);
-            let response = law.force(&contact);
-            let force = contact.normal * response.normal + response.tangential;
-            let torque = lever.cross(&force);
-            wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+            let force = law.force(&contact).along(&contact.normal);
             // By depth, which ends smoothly where a contact does; the force of a damper may end before.
             let depth = -contact.gap.plus(-cutoff);
             if depth.value() > 0.0 {
                 fit.add(&across, depth * contact.area, depth, bristles.rate(&slip, &deflected));
             }
+            (lever, force)
         });
+        let Some(wrench) = wrench else { return [T::constant(f64::NAN); 12] };
         let rate = fit.rate(deflection, bristles);
-        let failed = T::constant(f64::NAN);
-        let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
-        std::array::from_fn(|i| if sound { all(i) } else { failed })
+        std::array::from_fn(|i| if i < 6 { wrench[i] } else { rate[i - 6] })
     }
 }
 

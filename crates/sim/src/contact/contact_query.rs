@@ -241,6 +241,29 @@ impl ContactPoint {
         }
     }
 
+    /// Kinematics that the law sees with this `normal` and `velocity` where the distance is larger by `change`, a zero that carries
+    /// derivatives.
+    #[inline(always)]
+    pub(crate) fn moved<T: Scalar>(
+        &self,
+        cutoff: f64,
+        change: T,
+        normal: Vector3<T>,
+        velocity: Vector3<T>,
+        area: T,
+    ) -> ContactKinematics<T> {
+        let SmoothedGap { gap, slope, activation, activation_slope } = self.smoothing;
+        let smoothed = |value: f64, slope: f64| change.times(slope).plus(value);
+        let speed = velocity.dot(&normal);
+        ContactKinematics {
+            gap: smoothed(cutoff + gap, slope),
+            normal_speed: smoothed(activation, activation_slope) * speed,
+            slip: velocity - normal * speed,
+            normal,
+            area,
+        }
+    }
+
     /// Kinematics that the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
     #[inline(always)]
     pub(crate) fn lifted(&self, cutoff: f64) -> ContactKinematics<Fwd<6>> {

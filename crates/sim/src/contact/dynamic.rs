@@ -9,30 +9,9 @@ use super::law::ContactLaw;
 use super::point::{ContactForce, ContactKinematics};
 use super::wrench::{self, WrenchJacobian};
 
-/// Wrenches of all contacts of a query: loops over contacts are inside, where the law is known.
-pub trait QueryWrench {
-    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `query`, in the field's frame.
-    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64>;
-
-    /// [`QueryWrench::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
-    fn wrench_jacobian(
-        &self,
-        p: &[f64],
-        query: &ContactQuery<'_>,
-        by_params: bool,
-    ) -> WrenchJacobian;
-
-    /// [`QueryWrench::wrench`] with its derivative along a direction of the state's [`tangent`](crate::BodyState::tangent).
-    fn wrench_along(
-        &self,
-        p: &[f64],
-        query: &ContactQuery<'_>,
-        tangent: &[f64; 12],
-    ) -> [Vector6<f64>; 2];
-}
-
-/// A [`ContactLaw`] behind a pointer, whatever it is: forces at a contact, and their derivatives by forward mode. Implemented for every law.
-pub trait DynContactLaw: ContactLaw + QueryWrench {
+/// A [`ContactLaw`] behind a pointer, whatever it is: forces at a contact and wrenches of all, and their derivatives by forward mode.
+/// Loops over contacts are inside, where the law is known. Implemented for every law.
+pub trait DynContactLaw: ContactLaw {
     /// Force at one contact, with parameters `p`.
     fn force(&self, p: &[f64], contact: &ContactKinematics<f64>) -> ContactForce<f64>;
 
@@ -42,6 +21,25 @@ pub trait DynContactLaw: ContactLaw + QueryWrench {
         p: &[Fwd<6>],
         contact: &ContactKinematics<Fwd<6>>,
     ) -> ContactForce<Fwd<6>>;
+
+    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `query`, in the field's frame.
+    fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64>;
+
+    /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
+    fn wrench_jacobian(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        by_params: bool,
+    ) -> WrenchJacobian;
+
+    /// [`DynContactLaw::wrench`] with its derivative along a direction of the state's [`tangent`](crate::BodyState::tangent).
+    fn wrench_along(
+        &self,
+        p: &[f64],
+        query: &ContactQuery<'_>,
+        tangent: &[f64; 12],
+    ) -> [Vector6<f64>; 2];
 }
 
 impl dyn DynContactLaw {
@@ -66,9 +64,7 @@ impl<L: ContactLaw> DynContactLaw for L {
     ) -> ContactForce<Fwd<6>> {
         self.law(p, contact)
     }
-}
 
-impl<L: ContactLaw> QueryWrench for L {
     fn wrench(&self, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64> {
         wrench::wrench(self, p, query)
     }

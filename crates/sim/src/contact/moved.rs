@@ -32,9 +32,7 @@ impl<T: Scalar> MovedQuery<T> {
     #[inline(always)]
     pub(crate) fn lift(&self, touch: &ContactPoint, cutoff: f64) -> LiftedContact<T> {
         let constant = |v: &Vector3<f64>| v.map(T::constant);
-        let ContactPoint {
-            arm, lever, radius, velocity, smoothing, normal, length, hessian, ..
-        } = touch;
+        let ContactPoint { arm, lever, radius, velocity, normal, length, hessian, .. } = touch;
         let turned = self.turn.cross(&constant(arm));
         let place = self.position + turned;
         let along =
@@ -50,15 +48,7 @@ impl<T: Scalar> MovedQuery<T> {
             self.linear + self.angular.cross(&constant(lever)) + self.spin.cross(&lever_change);
         let (normal_now, velocity) = (constant(normal) + normal_change, constant(velocity) + moved);
         let depth = along(normal).times(*length);
-        let smoothed = |value: f64, slope: f64| depth.times(slope).plus(value);
-        let speed = velocity.dot(&normal_now);
-        let contact = ContactKinematics {
-            gap: smoothed(cutoff + smoothing.gap, smoothing.slope),
-            normal_speed: smoothed(smoothing.activation, smoothing.activation_slope) * speed,
-            slip: velocity - normal_now * speed,
-            normal: normal_now,
-            area: T::constant(touch.area),
-        };
+        let contact = touch.moved(cutoff, depth, normal_now, velocity, T::constant(touch.area));
         LiftedContact { contact, lever: constant(lever) + lever_change }
     }
 }

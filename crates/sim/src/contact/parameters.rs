@@ -1,7 +1,12 @@
 //! Parameters of laws: their values, and the one table that checks, registry, error messages and docs read.
 
+use smallvec::SmallVec;
+
 use super::error::LawError;
 use super::range::ParameterRange;
+
+/// Copy of the parameters of a law; up to eight without allocation.
+pub(crate) type ParamValues<T> = SmallVec<[T; 8]>;
 
 /// One of the numbers that a law is made from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -117,7 +122,7 @@ macro_rules! law_part {
             $($param:ident [$unit:tt] $range:ident $meaning:tt;)*
         }
         $(constants { $($constant:ident [$c_unit:tt] $c_range:ident $c_meaning:tt;)* })?
-        $(where $relation:path)?
+        $(where $relation:ident($($own:ident),*))?
     ) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,7 +149,9 @@ macro_rules! law_part {
                 let constants: <Self as Tabulated>::Constants<f64> = [$($(self.$constant),*)?];
                 Self::PARAMETERS.iter().zip(values).try_for_each(|(p, x)| p.check(*x))?;
                 Self::CONSTANTS.iter().zip(constants).try_for_each(|(p, x)| p.check(x))?;
-                $($relation(values)?;)?
+                #[allow(unused_variables)]
+                let [$($param),*] = *values;
+                $($relation($($own),*)?;)?
                 Ok(())
             }
         }

@@ -37,6 +37,12 @@ impl<S: Scalar> ContactForce<S> {
         Self { normal: S::zero(), tangential: Vector3::zeros() }
     }
 
+    /// Force as one vector, for the unit `normal`.
+    #[inline(always)]
+    pub(crate) fn along(&self, normal: &Vector3<S>) -> Vector3<S> {
+        normal * self.normal + self.tangential
+    }
+
     /// A force that is not a number. Never inlined: that costs the laws here up to 5 % of their instructions.
     #[cold]
     #[inline(never)]

@@ -5,9 +5,10 @@ use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::contact_query::{ContactPoint, ContactQuery};
+use super::dynamic::DynContactLaw;
 use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedQuery};
-use super::param_values::ParamValues;
+use super::parameters::ParamValues;
 use super::point::ContactKinematics;
 use crate::spatial::spatial;
 
@@ -22,35 +23,70 @@ pub struct WrenchJacobian {
     pub by_params: Vec<Vector6<f64>>,
 }
 
-/// A wrench as a function of the state's tangent, to first order about where it was found.
-pub(crate) struct LinearWrench {
-    pub(crate) value: [f64; 6],
-    pub(crate) by_state: [[f64; 12]; 6],
+impl WrenchJacobian {
+    /// True without a wrench and derivatives by the state.
+    pub(crate) fn is_zero(&self) -> bool {
+        self.wrench == Vector6::zeros() && self.by_state == [[0.0; 12]; 6]
+    }
 }
 
-impl LocalFunction<12, 6> for LinearWrench {
+/// Wrench as a function of the state's tangent, to first order about where it was found.
+impl LocalFunction<12, 6> for WrenchJacobian {
     #[inline]
     fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
         std::array::from_fn(|row| {
-            let sum = S::constant(self.value[row]);
+            let sum = S::constant(self.wrench[row]);
             let terms = tangent.iter().zip(&self.by_state[row]);
             terms.fold(sum, |sum, (direction, slope)| sum + direction.times(*slope))
         })
     }
 }
 
+/// Wrench of `query` as a function of the tangent of its body's state, to first order.
+pub(crate) struct WrenchFunction<'a> {
+    pub(crate) law: &'a dyn DynContactLaw,
+    pub(crate) p: &'a [f64],
+    pub(crate) query: &'a ContactQuery<'a>,
+}
+
+impl LocalFunction<12, 6> for WrenchFunction<'_> {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
+        self.law.wrench_jacobian(self.p, self.query, false).evaluate(tangent)
+    }
+
+    #[inline]
+    fn derivative_along(&self, _: [f64; 12], tangent: [f64; 12]) -> Option<([f64; 6], [f64; 6])> {
+        let [wrench, slope] = self.law.wrench_along(self.p, self.query, &tangent);
+        Some((wrench.into(), slope.into()))
+    }
+}
+
+/// Force and torque of all contacts of `query`, of each of which `force` says where it acts from the center of mass, and the force;
+/// none if a field fails, which must not look like free space.
+#[inline(always)]
+pub(crate) fn sum_forces<T: Scalar>(
+    query: &ContactQuery<'_>,
+    cutoff: f64,
+    pressing_only: bool,
+    mut force: impl FnMut(&ContactPoint) -> (Vector3<T>, Vector3<T>),
+) -> Option<Vector6<T>> {
+    let (mut forces, mut torques) = (Vector3::zeros(), Vector3::zeros());
+    let sound = query.for_each_contact(cutoff, pressing_only, |touch| {
+        let (lever, force) = force(touch);
+        forces += force;
+        torques += lever.cross(&force);
+    });
+    sound.then(|| spatial(&forces, &torques))
+}
+
 /// The sum of all contacts of `query`.
 pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], query: &ContactQuery<'_>) -> Vector6<f64> {
     let cutoff = law.cutoff();
-    let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-    let sound = query.for_each_contact(cutoff, true, |touch| {
-        let response = law.law(p, &touch.contact(cutoff));
-        let f = touch.normal * response.normal + response.tangential;
-        force += f;
-        torque += touch.lever.cross(&f);
+    let sum = sum_forces(query, cutoff, true, |touch| {
+        (touch.lever, law.law(p, &touch.contact(cutoff)).along(&touch.normal))
     });
-    // A field that fails must not look like free space.
-    if sound { spatial(&force, &torque) } else { Vector6::repeat(f64::NAN) }
+    sum.unwrap_or_else(|| Vector6::repeat(f64::NAN))
 }
 
 /// [`wrench`] with its derivative.
@@ -115,17 +151,12 @@ pub(crate) fn wrench_along<L: ContactLaw>(
     let cutoff = law.cutoff();
     let params: ParamValues<Fwd<1>> = p.iter().map(|&p| Fwd::constant(p)).collect();
     let moved = MovedQuery::new(query, &tangent.map(|x| Fwd { value: 0.0, derivative: [x] }));
-    let (mut force, mut torque) = (Vector3::<Fwd<1>>::zeros(), Vector3::<Fwd<1>>::zeros());
-    let sound = query.for_each_contact(cutoff, false, |touch| {
-        let LiftedContact { contact, lever, .. } = moved.lift(touch, cutoff);
-        let response = law.law(&params, &contact);
-        let f = contact.normal * response.normal + response.tangential;
-        force += f;
-        torque += lever.cross(&f);
+    let sum = sum_forces(query, cutoff, false, |touch| {
+        let LiftedContact { contact, lever } = moved.lift(touch, cutoff);
+        (lever, law.law(&params, &contact).along(&contact.normal))
     });
-    let all = spatial(&force, &torque);
-    let value = if sound { all.map(|x| x.value) } else { Vector6::repeat(f64::NAN) };
-    [value, all.map(|x| x.derivative[0])]
+    let all = sum.unwrap_or_else(|| Vector6::repeat(Fwd::constant(f64::NAN)));
+    [all.map(|x| x.value), all.map(|x| x.derivative[0])]
 }
 
 /// Term of round samples, whose lever turns with the normal. Never inlined: it is rare, and the rest then fits the
@@ -208,7 +239,7 @@ mod tests {
 
     use crate::contact::LeakSteps;
     use crate::contact::contact_query::ContactQuery;
-    use crate::contact::dynamic::QueryWrench;
+    use crate::contact::dynamic::DynContactLaw;
     use crate::contact::wrench::WrenchJacobian;
     use crate::scenes::{bowl, egg_on, floor, penalty};
     use crate::{BodyState, ContactLaw, GapSmoothing, Model, State, Surface};

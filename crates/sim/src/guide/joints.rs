@@ -53,7 +53,7 @@
 //! [`gradient`](prehend_autodiff::gradient) to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
 //!
 //! Reverse mode keeps kinematics and dynamics of an articulation as one node each, whose adjoint is in closed form.
-//! [`BackwardEuler`](crate::BackwardEuler) does not take joints. [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with
+//! [`BackwardEuler`](crate::integrator::BackwardEuler) does not take joints. [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with
 //! steps of 0.1 ms some ten times faster than the default. A closed grasp is stiffer than an open one: ask [`Model::check_time_step`] at a
 //! state in grasp, or the report whether it `is_fine`; contacts chatter under longer steps, and forces mean nothing then. Grasps need [`BristleFriction`](crate::BristleFriction), see
 //! [contacts that hold](super#contacts-that-hold): under [`Coulomb`](crate::Coulomb) with a slip scale of 1 cm/s a gripped box slides by 5 mm in two seconds.

@@ -30,7 +30,7 @@ use crate::time::Step;
 ///
 /// # Errors
 /// A force that jumps, as that of a damped contact does without smoothing, may leave the equations of an impact without a
-/// solution: [`SimulationError::Unsolved`](crate::SimulationError::Unsolved). [`SubStepped`](crate::SubStepped) then tries shorter steps; a softplus
+/// solution: [`SimulationError::Unsolved`](crate::SimulationError::Unsolved). [`SubStepped`](crate::integrator::SubStepped) then tries shorter steps; a softplus
 /// has no jumps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BackwardEuler;
@@ -46,11 +46,10 @@ impl Integrator for BackwardEuler {
         let states = state.rows();
         let values: Vec<BodyState> = states.iter().map(BodyState::value).collect();
         let plain = model.to_f64();
-        let lifted = plain.cast();
         let mut at_end = values.clone();
         plain.place_bodies(&mut at_end, step.end());
         let mut equations =
-            ImplicitStep { model: &plain, lifted: &lifted, states: &values, at_end, free, step };
+            ImplicitStep { model: &plain, leaky: &plain, states: &values, at_end, free, step };
         let solution = equations.solve()?;
         if S::ORDER == 0 {
             let velocity = |slot| velocity_at(&solution, slot).map(S::constant);
@@ -58,11 +57,8 @@ impl Integrator for BackwardEuler {
             return Ok(state.with(deflected(model, next, &equations.step), step.end()));
         }
         // Leaks are in derivatives only.
-        let mut leaky = lifted.clone();
-        for (leaky, pair) in leaky.contacts.iter_mut().zip(&model.contacts) {
-            leaky.smoothing = pair.smoothing;
-        }
-        equations.lifted = &leaky;
+        let leaky = model.map(S::value);
+        equations.leaky = &leaky;
         let (_, jacobian) = equations
             .linearize(&solution)
             .map_err(|_| equations.unsolved(equations.residual(&solution).norm(), 0))?;
@@ -104,7 +100,7 @@ fn carried<S: Scalar>(
     for (slot, &body) in equations.free.iter().enumerate() {
         let Some(rigid) = model.bodies[body].rigid() else { continue };
         let (state, wrench, dt) = (&states[body], &wrenches[body], equations.step.dt);
-        excesses.extend(excess(rigid, model, state, &velocity(slot), wrench, dt));
+        excesses.extend(excess(rigid, &model.gravity, state, &velocity(slot), wrench, dt));
     }
     let changes = S::solve(jacobian, &excesses);
     let velocity = |slot: usize| {

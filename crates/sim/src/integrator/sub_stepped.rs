@@ -23,7 +23,7 @@ use crate::time::Step;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, SubStepped, TimeSteps, Model};
+/// use prehend_sim::{Body, RigidBody, SemiImplicitEuler, TimeSteps, Model, integrator::SubStepped};
 ///
 /// let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
 /// model.add(Body::dynamic("stone", RigidBody::ball(1.0, 0.05)?));

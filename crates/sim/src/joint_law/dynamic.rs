@@ -4,8 +4,7 @@ use prehend_autodiff::{Fwd, Scalar};
 
 use super::JointLaw;
 use crate::contact::error::LawError;
-use crate::contact::param_values::ParamValues;
-use crate::contact::parameters::{ParameterArray, Parameters};
+use crate::contact::parameters::{ParamValues, ParameterArray, Parameters};
 
 mod sealed {
     pub trait Sealed {}

@@ -1,4 +1,4 @@
-//! Dry friction.
+//! Losses that are not linear: dry friction, and damping of the third degree.
 
 use prehend_autodiff::Scalar;
 
@@ -24,5 +24,21 @@ impl JointLaw for JointFriction {
 
     fn is_passive(&self) -> bool {
         true
+    }
+}
+
+law_part! {
+    /// A damper with force −(a v + b v|v| + c v³) by the rate v, as MuJoCo's polynomial dampers are.
+    pub struct PolynomialDamper: "damper with a force of the third degree" {
+        linear ["N m s/rad or N s/m"] Finite "a";
+        quadratic ["N m s²/rad² or N s²/m²"] Finite "b";
+        cubic ["N m s³/rad³ or N s³/m³"] Finite "c";
+    }
+}
+
+impl JointLaw for PolynomialDamper {
+    fn effort<S: Scalar>(&self, [a, b, c]: [S; 3], _: S, velocity: S) -> S {
+        let size = velocity.abs();
+        -(velocity * ((size * c + b) * size + a))
     }
 }

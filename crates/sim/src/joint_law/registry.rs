@@ -3,15 +3,10 @@
 use std::sync::Arc;
 
 use super::JointLaw;
-use super::damper::JointDamper;
 use super::dynamic::DynJointLaw;
 use super::friction::JointFriction;
-use super::limits::JointLimits;
-use super::motor::Motor;
-use super::position_servo::PositionServo;
-use super::slack_spring::SlackSpring;
-use super::spring::JointSpring;
-use super::velocity_servo::VelocityServo;
+use super::linear::{JointDamper, JointSpring, Motor, PositionServo, VelocityServo};
+use super::range::{JointLimits, SlackSpring};
 use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, ParameterArray, Tabulated};
 use crate::contact::registry::exactly;

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, SMatrix, Vector6};
 use prehend_autodiff::Fwd;
 
 use super::motions::{BodyMotion, of_free_body, of_link};
-use super::pair::Between;
 use crate::articulated::Kinematics;
 use crate::articulated::tree_factor::TreeFactor;
 use crate::body_state::Rows;
@@ -36,7 +35,7 @@ impl Generalized {
             bodies.zip(at.link_states()).for_each(|(body, state)| states[*body] = state);
         }
         let mut all = Self::empty(model, &trees);
-        all.add_forces(model, states, &trees, step);
+        let rates = all.add_forces(model, states, &trees, step);
         let efforts = all.add_joint_forces(model, states, &trees);
         for (tree, efforts) in trees.iter().zip(&efforts) {
             let accelerations = all.accelerate(tree, efforts);
@@ -45,6 +44,7 @@ impl Generalized {
                 all.wrenches.push(link.joint.rate_of_velocities(&accelerations[dofs]));
             }
         }
+        all.wrenches.extend(rates);
         all
     }
 
@@ -69,19 +69,23 @@ impl Generalized {
         Self { count, joints, wrenches, by_position, by_velocity, by_effort }
     }
 
-    /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates.
-    fn add_forces(&mut self, model: &Model, states: &Rows, trees: &[PosedTree<'_>], step: usize) {
-        let contacts = model.contacts.iter();
-        let contacts = contacts.filter_map(|pair| Between::contact(model, pair, states, step));
-        let bushings =
-            model.bushings.iter().map(|bushing| Between::bushing(model, bushing, states));
+    /// Adds contacts and bushings: their wrenches on bodies, and what follows along the coordinates. Returns the rates of deflections.
+    fn add_forces(
+        &mut self,
+        model: &Model,
+        states: &Rows,
+        trees: &[PosedTree<'_>],
+        step: usize,
+    ) -> Vec<Vector6<f64>> {
+        let mut rates = Vec::new();
         let mut motions: Vec<Option<Vec<BodyMotion>>> = Vec::new();
         motions.resize_with(model.bodies.len(), || None);
         let mut own = Vec::new();
         if !(model.contacts.is_empty() && model.bushings.is_empty()) {
             own = places(model, trees);
         }
-        for between in contacts.chain(bushings) {
+        for between in model.pair_jacobians(states, step) {
+            rates.extend(between.rate);
             for body in between.bodies {
                 motions[body].get_or_insert_with(|| match own[body.index()] {
                     Dofs::Free(first) => of_free_body(first),
@@ -101,6 +105,7 @@ impl Generalized {
                 }
             }
         }
+        rates
     }
 
     /// Adds, along the motions of one body, the change of a wrench with those of another.

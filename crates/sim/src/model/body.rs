@@ -6,11 +6,11 @@ use nalgebra::{Point3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
+use super::shaped_body::DensityShape;
 use super::trajectory::{self, Trajectory};
 use crate::body::RigidBody;
 use crate::body::error::BodyError;
 use crate::fields::Cuboid;
-use crate::shape::matter::DensityShape;
 use crate::surface::Surface;
 
 /// Body of a model: what moves it, and its surface and field for contact.

@@ -1,7 +1,6 @@
 //! Fastest rate of stiffness and damping of contacts and forces along joints.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Point3};
-use prehend_autodiff::Fwd;
 
 use super::Model;
 use super::joint_force::{ForceAxes, JointForce};
@@ -20,25 +19,19 @@ impl Model {
     }
 
     pub(crate) fn contact_frequency_of(&self, states: &Rows) -> f64 {
-        let lifted = self.with_touching(states, 0.0).to_f64().cast::<Fwd<12>>();
-        let constants: Vec<BodyState<Fwd<12>>> = states.iter().map(BodyState::cast).collect();
+        let near = self.with_touching(states, 0.0).to_f64();
         let UnitMotions { motions, roots, size } = self.unit_motions(states);
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
-        for Motions { body, first, by } in &motions {
-            let mut states = constants.clone();
-            states[*body] = states[*body].value().variables();
-            let wrenches = lifted.contact_wrenches(&states, 0);
-            for other in &motions {
-                let add = |matrix: &mut DMatrix<f64>, from: usize| {
-                    let wrench = &wrenches[other.body];
-                    let slopes = Matrix6::from_fn(|i, j| wrench[i].derivative[from + j]);
-                    let block = other.by.tr_mul(&(slopes * by));
-                    let (rows, columns) = block.shape();
-                    let mut view = matrix.view_mut((other.first, *first), (rows, columns));
+        for pair in near.pair_jacobians(states, 0) {
+            for (of, moving) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let ends = [of, moving].map(|end| motions[pair.bodies[end].index()].as_ref());
+                let [Some(own), Some(moved)] = ends else { continue };
+                for (matrix, from) in [(&mut stiffness, 0), (&mut damping, 6)] {
+                    let slopes = pair.by[of][moving].fixed_columns::<6>(from);
+                    let block = own.by.tr_mul(&(slopes * &moved.by));
+                    let mut view = matrix.view_mut((own.first, moved.first), block.shape());
                     view -= block;
-                };
-                add(&mut stiffness, 0);
-                add(&mut damping, 6);
+                }
             }
         }
         for (first, direction, slopes) in self.slopes_along_joints(states, &roots) {
@@ -70,10 +63,11 @@ impl Model {
     /// The motions of all bodies that forces move.
     fn unit_motions(&self, states: &Rows) -> UnitMotions {
         let (mut motions, mut roots, mut first) = (Vec::new(), Vec::new(), 0);
+        motions.resize_with(self.bodies.len(), || None);
         for body in self.free_bodies() {
             let root = self.inverse_mass_root(body, &states[body]);
             let by = Matrix6xX::from_columns(&root.column_iter().collect::<Vec<_>>());
-            motions.push(Motions { body, first, by });
+            motions[body.index()] = Some(Motions { first, by });
             first += 6;
         }
         for (own, joints) in self.articulated(states) {
@@ -82,7 +76,7 @@ impl Model {
             let root = at.inverse_mass_root();
             for (link, body) in own.bodies().iter().enumerate() {
                 let by = at.jacobian(link, &Point3::origin()) * &root;
-                motions.push(Motions { body: *body, first, by });
+                motions[body.index()] = Some(Motions { first, by });
             }
             roots.push((first, root));
             first += v.len();
@@ -122,8 +116,8 @@ impl Model {
 
 /// Motions of unit kinetic energy (½).
 struct UnitMotions {
-    /// For each body that forces move.
-    motions: Vec<Motions>,
+    /// Of each body, if forces move it.
+    motions: Vec<Option<Motions>>,
     /// For each articulation, the first of them, and the joints' velocities that they are.
     roots: Vec<(usize, DMatrix<f64>)>,
     /// Number of all.
@@ -132,7 +126,6 @@ struct UnitMotions {
 
 /// Motions of a body: its velocity and angular velocity by each of them.
 struct Motions {
-    body: BodyId,
     /// The first of them among those of all.
     first: usize,
     by: Matrix6xX<f64>,

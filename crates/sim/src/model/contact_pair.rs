@@ -8,7 +8,7 @@ use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::contact::param_values::ParamValues;
+use crate::contact::parameters::ParamValues;
 use crate::contact::range::ParameterRange;
 use crate::handle::BodyId;
 use crate::surface::Surface;

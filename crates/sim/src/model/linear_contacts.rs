@@ -1,13 +1,13 @@
 //! Wrenches of contacts, recorded as one node.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::Model;
 use super::contact_pair::ContactPair;
+use super::pair_wrench::weighted;
+use super::relative_motion::{LinearWrench, RelativeMotion, reaction};
 use crate::body_state::{BodyState, Rows, STATE};
-use crate::contact::contact_query::ContactQuery;
-use crate::contact::wrench::WrenchJacobian;
 use crate::handle::BodyId;
 use crate::spatial::spatial;
 
@@ -29,17 +29,11 @@ struct Touching {
     wrench: Vector6<f64>,
 }
 
-/// A contact and its derivatives.
+/// A contact.
 struct LinearContact {
     /// Places of the bodies with the samples and with the field.
     ends: [usize; 2],
-    /// Force and torque on the body with the samples, world frame.
-    force: Vector3<f64>,
-    torque: Vector3<f64>,
-    /// Derivatives of both along the axes of the field, by the tangent of the state that the field sees.
-    by_state: [[f64; 12]; 6],
-    /// Factor on those derivatives, which force and torque have already.
-    weight: f64,
+    wrench: LinearWrench,
 }
 
 impl LinearContacts {
@@ -58,28 +52,23 @@ impl LinearContacts {
         wrenches: &mut [Vector6<S>],
     ) {
         let ids = [pair.bodies.samples, pair.bodies.field];
-        let Some(query) = model.contact_query(pair, model.relative_value(pair, states)) else {
-            return;
-        };
-        let query = ContactQuery { smoothing: pair.smoothing.at_step(step), ..query };
-        let (WrenchJacobian { wrench, by_state, .. }, slopes) = model.linearized(pair, &query);
+        let Some(query) = model.contact_query_at(pair, states, step) else { return };
+        let varies = pair.params().iter().any(|x| !x.is_constant());
+        let found = pair.law().wrench_jacobian(&pair.param_values(), &query, varies);
+        let slopes = model.slopes(pair, &query, &Vector6::zeros(), &found.by_params);
         let [samples, field] = ids.map(|id| states[id].value().pose);
         let axes = field.rotation.to_rotation_matrix();
         let offset = samples.translation.vector - field.translation.vector;
         if let Some(slopes) = slopes {
-            let axes = axes.cast::<S>();
-            let part =
-                |from: usize| axes * Vector3::from_fn(|i, _| slopes[from + i].times(pair.weight));
-            let (force, torque) = (part(0), part(3));
-            let turned = torque + offset.map(S::constant).cross(&force);
-            wrenches[ids[0].index()] += spatial(&force, &torque);
-            wrenches[ids[1].index()] -= spatial(&force, &turned);
+            let [force, torque] = weighted(&axes, &slopes, pair.weight);
+            let [on_samples, on_field] = reaction(&force, &torque, &offset.map(S::constant));
+            wrenches[ids[0].index()] += on_samples;
+            wrenches[ids[1].index()] += on_field;
         }
-        if wrench == Vector6::zeros() && by_state == [[0.0; 12]; 6] {
+        if found.is_zero() {
             return;
         }
-        let along = |from: usize| axes * (wrench.fixed_rows::<3>(from) * pair.weight);
-        let (force, torque) = (along(0), along(3));
+        let wrench = LinearWrench::new(&found, &axes, pair.weight);
         let ends = ids.map(|id| {
             *self.places[id.index()].get_or_insert_with(|| {
                 let (state, wrench) = (states[id].value(), Vector6::zeros());
@@ -87,10 +76,10 @@ impl LinearContacts {
                 self.bodies.len() - 1
             })
         });
-        self.bodies[ends[0]].wrench += spatial(&force, &torque);
-        self.bodies[ends[1]].wrench -= spatial(&force, &(torque + offset.cross(&force)));
-        let weight = pair.weight;
-        self.contacts.push(LinearContact { ends, force, torque, by_state, weight });
+        for (end, wrench) in ends.into_iter().zip(wrench.on_both(&offset)) {
+            self.bodies[end].wrench += wrench;
+        }
+        self.contacts.push(LinearContact { ends, wrench });
     }
 
     /// Adds to `wrenches` what was added, with derivatives by `states`.
@@ -152,79 +141,13 @@ impl CustomVjp for ContactsNode {
                 continue;
             }
             let [samples, field] = contact.ends.map(|end| &self.states[end]);
-            let adjoints = contact.vjp([&samples.0, &field.0], of(0), of(1));
+            let motion = RelativeMotion::new([samples.0, field.0]);
+            let adjoints = motion.adjoints(&contact.wrench, [of(0), of(1)]);
             for ((state, first), adjoint) in [samples, field].into_iter().zip(&adjoints) {
                 if let Some(first) = *first {
                     adjoint.add_to(state, &mut input_adjoints[first..first + STATE]);
                 }
             }
         }
-    }
-}
-
-/// Adjoints of a state's place, left turn and velocities.
-struct StateAdjoint {
-    place: Vector3<f64>,
-    turn: Vector3<f64>,
-    linear: Vector3<f64>,
-    angular: Vector3<f64>,
-}
-
-impl LinearContact {
-    /// Adjoints of the states of both bodies, from those of force and torque on each: the transpose of what
-    /// [`PairFunction`](super::pair_function::PairFunction) describes, and of the wrench on the body with the field, −f and −(τ + r×f).
-    fn vjp(
-        &self,
-        [samples, field]: [&BodyState; 2],
-        [force_s, torque_s]: [Vector3<f64>; 2],
-        [force_f, torque_f]: [Vector3<f64>; 2],
-    ) -> [StateAdjoint; 2] {
-        let r = samples.pose.translation.vector - field.pose.translation.vector;
-        let u = samples.linear - field.linear - field.angular.cross(&r);
-        let spin = samples.angular - field.angular;
-        let axes: Matrix3<f64> = field.pose.rotation.to_rotation_matrix().into_inner();
-        let force = force_s - force_f - torque_f.cross(&r);
-        let torque = torque_s - torque_f;
-        let (f, t) = (axes.tr_mul(&force) * self.weight, axes.tr_mul(&torque) * self.weight);
-        let mut seen = [0.0; 12];
-        for (row, adjoint) in self.by_state.iter().zip([f.x, f.y, f.z, t.x, t.y, t.z]) {
-            for (seen, slope) in seen.iter_mut().zip(row) {
-                *seen += slope * adjoint;
-            }
-        }
-        let part = |i: usize| axes * Vector3::new(seen[i], seen[i + 1], seen[i + 2]);
-        let (place, turn, linear, angular) = (part(0), part(3), part(6), part(9));
-        let moved = place - linear.cross(&field.angular) - self.force.cross(&torque_f);
-        let turned = place.cross(&r) - turn
-            + linear.cross(&u)
-            + angular.cross(&spin)
-            + self.force.cross(&force)
-            + self.torque.cross(&torque);
-        [
-            StateAdjoint { place: moved, turn, linear, angular },
-            StateAdjoint {
-                place: -moved,
-                turn: turned,
-                linear: -linear,
-                angular: linear.cross(&r) - angular,
-            },
-        ]
-    }
-}
-
-impl StateAdjoint {
-    /// Adds the adjoints of the coordinates of `state`. Its left turn is θ = 2 (w δv − δw v + v×δv) of a quaternion of vector v and
-    /// scalar w.
-    fn add_to(&self, state: &BodyState, coordinates: &mut [f64]) {
-        let q = state.pose.rotation.coords;
-        let v = Vector3::new(q.x, q.y, q.z);
-        let by_vector = (self.turn * q.w + self.turn.cross(&v)) * 2.0;
-        let by_scalar = -2.0 * v.dot(&self.turn);
-        for (from, part) in
-            [(0, &self.place), (3, &by_vector), (7, &self.linear), (10, &self.angular)]
-        {
-            coordinates[from..from + 3].iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
-        }
-        coordinates[6] += by_scalar;
     }
 }

@@ -2,23 +2,19 @@
 
 use std::sync::Arc;
 
-use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::Model;
 use super::contact_pair::ContactPair;
 use super::linear_contacts::LinearContacts;
-use super::pair_function::Relation;
-use super::relative_state::RelativeState;
+use super::relative_motion::{RelativeMotion, reaction};
 use crate::body_state::{BodyState, Rows};
 use crate::contact::bristle_function::BristleFunction;
-use crate::contact::bristles::Bristles;
 use crate::contact::contact_query::ContactQuery;
-use crate::contact::wrench::{LinearWrench, WrenchJacobian};
-use crate::contact::wrench_function::WrenchFunction;
+use crate::contact::wrench::WrenchFunction;
 use crate::shape::lifted::LiftedField;
 use crate::shape::variable::{LANES, Lane, VariableShapes};
-use crate::spatial::spatial;
 use crate::state::State;
 
 /// Wrenches of a contact.
@@ -71,18 +67,17 @@ impl<S: Scalar> Model<S> {
         wrenches.resize(self.joint_places().end, Vector6::zeros());
         let mut linear = LinearContacts::new(if S::RECORDED { self.bodies.len() } else { 0 });
         for pair in &self.contacts {
-            let PairWrench { on_samples, on_field, .. } =
-                if let Some(bristles) = pair.law().bristles() {
-                    let deflection = states.get(wrenches.len());
-                    let effect = self.bristle_wrench(pair, states, bristles, deflection, step);
-                    wrenches.push(effect.rate);
-                    effect
-                } else if S::RECORDED {
-                    linear.add(self, pair, states, step, &mut wrenches);
-                    continue;
-                } else {
-                    self.memoryless_wrench(pair, states, step)
-                };
+            let has_bristles = pair.law().bristles().is_some();
+            if S::RECORDED && !has_bristles {
+                linear.add(self, pair, states, step, &mut wrenches);
+                continue;
+            }
+            let deflection = if has_bristles { states.get(wrenches.len()) } else { None };
+            let PairWrench { on_samples, on_field, rate } =
+                self.pair_wrench(pair, states, deflection, step);
+            if has_bristles {
+                wrenches.push(rate);
+            }
             wrenches[pair.bodies.samples] += on_samples;
             wrenches[pair.bodies.field] += on_field;
         }
@@ -101,13 +96,60 @@ impl<S: Scalar> Model<S> {
         deflection: Option<&BodyState<S>>,
         step: usize,
     ) -> PairWrench<S> {
-        match pair.law().bristles() {
-            Some(bristles) => self.bristle_wrench(pair, states, bristles, deflection, step),
-            None => self.memoryless_wrench(pair, states, step),
+        let Some(query) = &self.contact_query_at(pair, states, step) else {
+            return PairWrench::default();
+        };
+        let (law, p) = (pair.law().as_ref(), &pair.param_values());
+        let ids = [pair.bodies.samples, pair.bodies.field];
+        if S::ORDER == 0 && law.bristles().is_none() {
+            let local: [S; 6] = law.wrench(p, query).map(S::constant).into();
+            let [force, torque] = along_axes(&states[ids[1]].pose.rotation, &local, pair.weight);
+            return Self::on_both(pair, states, force, torque);
         }
+        let shifted = ids.map(|id| self.shifted(id, states));
+        let ends = [0, 1].map(|end| match &shifted[end] {
+            Some((state, _)) => state,
+            None => &states[ids[end]],
+        });
+        let from_com = shifted[0].as_ref().map(|(_, from_com)| from_com);
+        let axes = || ends[1].value().pose.rotation.to_rotation_matrix();
+        let varies = pair.params().iter().any(|x| !x.is_constant());
+        if let Some(bristles) = law.bristles() {
+            let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
+            let at = deflection.map(S::value);
+            let function = BristleFunction { law, p, query, bristles, deflection: at };
+            let com = self.bodies[ids[1]].com().coords.map(S::value);
+            let ([mut force, mut torque], mut rate) =
+                bristle_wrench(&function, pair.weight, &com, ends, from_com, &deflection);
+            let by_params = if varies { function.by_parameters() } else { Vec::new() };
+            if let Some(slopes) = self.slopes(pair, query, &at, &by_params) {
+                let [by_force, by_torque] = weighted(&axes(), &slopes, pair.weight);
+                (force, torque) = (force + by_force, torque + by_torque);
+                rate += Vector6::from_column_slice(&slopes[6..]);
+            }
+            return PairWrench { rate, ..Self::on_both(pair, states, force, torque) };
+        }
+        let motion = RelativeMotion::new(ends.map(BodyState::value));
+        let none = &Vector6::zeros();
+        let ([mut force, mut torque], slopes) = if varies {
+            let jacobian = law.wrench_jacobian(p, query, true);
+            let own = motion.wrench(&jacobian, pair.weight, ends);
+            (own, self.slopes(pair, query, none, &jacobian.by_params))
+        } else {
+            let own = motion.wrench(&WrenchFunction { law, p, query }, pair.weight, ends);
+            (own, self.slopes::<6>(pair, query, none, &[]))
+        };
+        if let Some(slopes) = slopes {
+            let [by_force, by_torque] = weighted(&axes(), &slopes, pair.weight);
+            (force, torque) = (force + by_force, torque + by_torque);
+        }
+        if let Some(from_com) = from_com {
+            torque += from_com.cross(&force);
+        }
+        Self::on_both(pair, states, force, torque)
     }
 
-    /// Magnitude of the force of `pair` without a memory \[N\].
+    /// Force of `pair` with undeflected bristles \[N\].
     pub(crate) fn force(&self, pair: &ContactPair<S>, states: &Rows<S>) -> f64 {
         let Some(query) = &self.contact_query_at(pair, states, 1) else { return 0.0 };
         let (law, p) = (pair.law().as_ref(), &pair.param_values());
@@ -122,8 +164,8 @@ impl<S: Scalar> Model<S> {
         pair.weight * wrench.fixed_rows::<3>(0).norm()
     }
 
-    /// The samples of `pair` beside its field in a step, if there are both.
-    pub(super) fn contact_query_at<'a>(
+    /// Samples of `pair` beside its field in a step, if there are both.
+    pub(crate) fn contact_query_at<'a>(
         &'a self,
         pair: &'a ContactPair<S>,
         states: &Rows<S>,
@@ -133,103 +175,18 @@ impl<S: Scalar> Model<S> {
         Some(ContactQuery { smoothing: pair.smoothing.at_step(step), ..query })
     }
 
-    /// Wrenches of `pair`, which has bristles, with its `deflection`.
-    fn bristle_wrench(
-        &self,
-        pair: &ContactPair<S>,
-        states: &Rows<S>,
-        bristles: Bristles,
-        deflection: Option<&BodyState<S>>,
-        step: usize,
-    ) -> PairWrench<S> {
-        let Some(query) = self.contact_query_at(pair, states, step) else {
-            return PairWrench::default();
-        };
-        let deflection = deflection.map_or_else(Vector6::zeros, BodyState::deflection);
-        let seen = self.relative_state(pair, states);
-        let (wrench, rate) = local_bristles(pair, &seen, &query, bristles, deflection);
-        let mut slopes = [S::zero(); 12];
-        if S::ORDER > 0 {
-            self.add_slopes_by_dimensions(pair, &query, &deflection, &mut slopes);
-        }
-        let rate = Vector6::from_fn(|i, _| rate[i] + slopes[6 + i]);
-        let wrench = std::array::from_fn(|i| wrench[i] + slopes[i]);
-        let axes = states[pair.bodies.field].pose.rotation;
-        PairWrench { rate, ..self.pair_wrench_along(pair, states, &axes, wrench) }
-    }
-
-    /// Wrenches of `pair` without a memory.
-    fn memoryless_wrench(
-        &self,
-        pair: &ContactPair<S>,
-        states: &Rows<S>,
-        step: usize,
-    ) -> PairWrench<S> {
-        let Some(query) = &self.contact_query_at(pair, states, step) else {
-            return PairWrench::default();
-        };
-        let law = pair.law().as_ref();
-        let values = pair.param_values();
-        if S::ORDER == 0 {
-            let axes = &states[pair.bodies.field].pose.rotation;
-            return self.pair_wrench_along(
-                pair,
-                states,
-                axes,
-                law.wrench(&values, query).map(S::constant).into(),
-            );
-        }
-        let ends = [pair.bodies.samples, pair.bodies.field];
-        let shifted = ends.map(|id| self.shifted(id, states));
-        let [samples, field] =
-            [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
-        let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
-        let (all, slopes) = if pair.params().iter().all(|x| x.is_constant()) {
-            let function = at.function(WrenchFunction { law, p: &values, query });
-            (function.of(samples, field), self.slopes(pair, query, &[]))
-        } else {
-            let (WrenchJacobian { wrench, by_state, .. }, slopes) = self.linearized(pair, query);
-            let function = at.function(LinearWrench { value: wrench.into(), by_state });
-            (function.of(samples, field), slopes)
-        };
-        let [fx, fy, fz, tx, ty, tz] = all;
-        let (mut force, mut torque) = (Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz));
-        if let Some(slopes) = slopes {
-            let axes = at.field.pose.rotation.cast();
-            let part = |from: usize| Vector3::from_fn(|i, _| slopes[from + i].times(pair.weight));
-            (force, torque) = (force + axes * part(0), torque + axes * part(3));
-        }
-        if let Some((_, from_com)) = &shifted[0] {
-            torque += from_com.cross(&force);
-        }
-        self.on_both(pair, states, force, torque)
-    }
-
-    /// Wrenches of the `wrench` of `pair` along the `axes` of its field.
-    fn pair_wrench_along(
-        &self,
-        pair: &ContactPair<S>,
-        states: &Rows<S>,
-        axes: &UnitQuaternion<S>,
-        wrench: [S; 6],
-    ) -> PairWrench<S> {
-        let [fx, fy, fz, tx, ty, tz] = wrench.map(|x| x.times(pair.weight));
-        self.on_both(pair, states, axes * Vector3::new(fx, fy, fz), axes * Vector3::new(tx, ty, tz))
-    }
-
     /// Wrenches of a force and torque on the body with the samples, about its center of mass.
     #[inline]
     fn on_both(
-        &self,
         pair: &ContactPair<S>,
         states: &Rows<S>,
         force: Vector3<S>,
         torque: Vector3<S>,
     ) -> PairWrench<S> {
-        let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
-        let offset = state.pose.translation.vector - base.pose.translation.vector;
-        let on_field = spatial(&-force, &-(torque + offset.cross(&force)));
-        PairWrench { on_samples: spatial(&force, &torque), on_field, rate: Vector6::zeros() }
+        let [samples, field] = [pair.bodies.samples, pair.bodies.field].map(|id| &states[id]);
+        let offset = samples.pose.translation.vector - field.pose.translation.vector;
+        let [on_samples, on_field] = reaction(&force, &torque, &offset);
+        PairWrench { on_samples, on_field, rate: Vector6::zeros() }
     }
 
     /// Adds the derivatives by the dimensions of its shapes to those of the wrench of `query`, which is `pair`, and of its rate.
@@ -237,7 +194,7 @@ impl<S: Scalar> Model<S> {
         &self,
         pair: &ContactPair<S>,
         query: &ContactQuery<'_>,
-        deflection: &Vector6<S>,
+        deflection: &Vector6<f64>,
         sums: &mut [S; 12],
     ) {
         let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
@@ -271,7 +228,7 @@ impl<S: Scalar> Model<S> {
             match law.bristles() {
                 None => slopes[..6].copy_from_slice(&shapes.wrench(law, &values)),
                 Some(bristles) => {
-                    let deflection = deflection.map(S::value);
+                    let deflection = *deflection;
                     let function = BristleFunction { law, p: &values, query, bristles, deflection };
                     slopes = shapes.bristles(&function);
                 }
@@ -288,35 +245,22 @@ impl<S: Scalar> Model<S> {
         }
     }
 
-    /// Wrench of `pair`, which is `query`, without a memory, with derivatives by the relative state; and its change with
-    /// parameters and dimensions, if any vary: tangents, along the axes of the field.
-    pub(super) fn linearized(
+    /// Change of the wrench of `pair`, which has these derivatives by its parameters, and of the rate of its deflection, with those and
+    /// with dimensions, if any vary: tangents, along the axes of the field.
+    pub(super) fn slopes<const N: usize>(
         &self,
         pair: &ContactPair<S>,
         query: &ContactQuery<'_>,
-    ) -> (WrenchJacobian, Option<[S; 12]>) {
-        let values = pair.param_values();
-        let vary = !pair.params().iter().all(|x| x.is_constant());
-        let jacobian = pair.law().wrench_jacobian(&values, query, vary);
-        let slopes = self.slopes(pair, query, &jacobian.by_params);
-        (jacobian, slopes)
-    }
-
-    /// Change of the wrench of `pair`, which has these derivatives by its parameters, with those and with dimensions, if any vary.
-    fn slopes(
-        &self,
-        pair: &ContactPair<S>,
-        query: &ContactQuery<'_>,
-        by_params: &[Vector6<f64>],
+        deflection: &Vector6<f64>,
+        by_params: &[SVector<f64, N>],
     ) -> Option<[S; 12]> {
         let mut slopes = [S::zero(); 12];
-        for (by_param, p) in by_params.iter().zip(pair.params()) {
-            let moved = p.plus(-p.value());
+        for (by_param, moved) in by_params.iter().zip(changes(pair.params())) {
             for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
                 *component += moved.times(*slope);
             }
         }
-        self.add_slopes_by_dimensions(pair, query, &Vector6::zeros(), &mut slopes);
+        self.add_slopes_by_dimensions(pair, query, deflection, &mut slopes);
         let any = !slopes.iter().all(|x| x.is_constant_zero());
         any.then_some(slopes)
     }
@@ -338,39 +282,47 @@ impl<S: Scalar> Model<S> {
     }
 }
 
-/// The wrench of a contact with bristles along the axes of its field, and the rate of its deflection.
-fn local_bristles<S: Scalar>(
-    pair: &ContactPair<S>,
-    seen: &RelativeState<S>,
-    query: &ContactQuery<'_>,
-    bristles: Bristles,
-    deflection: Vector6<S>,
-) -> ([S; 6], Vector6<S>) {
-    let law = pair.law().as_ref();
-    let values = pair.param_values();
-    let at = deflection.map(|x| x.value());
-    let split = |all: [S; 12]| -> ([S; 6], Vector6<S>) {
-        (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))
-    };
-    let function = BristleFunction { law, p: &values, query, bristles, deflection: at };
-    let tangent = seen.state.tangent();
-    let change = |i: usize| if i < 12 { tangent[i] } else { deflection[i - 12].plus(-at[i - 12]) };
-    let mut all = match &seen.from_com {
-        None => S::local(&function, std::array::from_fn::<S, 18, _>(change)),
+/// Force and torque of a contact with bristles on the body with the samples, and the rate of its deflection, by what states, the place of
+/// their point `from_com` and the deflection carry; the field's center of mass is `com` of its body frame.
+///
+/// The tangent is that of [`BodyState::relative_to`]: default steps follow its last digits.
+pub(super) fn bristle_wrench<T: Scalar>(
+    function: &BristleFunction<'_>,
+    weight: f64,
+    com: &Vector3<f64>,
+    ends: [&BodyState<T>; 2],
+    from_com: Option<&Vector3<T>>,
+    deflection: &Vector6<T>,
+) -> ([Vector3<T>; 2], Vector6<T>) {
+    let frame = ends[1].shifted(&com.map(|x| T::constant(-x)));
+    let seen = ends[0].relative_to(&frame).tangent();
+    let at = &function.deflection;
+    let change = |i: usize| if i < 12 { seen[i] } else { deflection[i - 12].plus(-at[i - 12]) };
+    let axes = &ends[1].pose.rotation;
+    let local = match from_com.map(|from_com| axes.inverse_transform_vector(from_com)) {
+        None => T::local(function, std::array::from_fn::<T, 18, _>(change)),
         Some(from_com) => {
             let change = |i: usize| if i < 18 { change(i) } else { from_com[i - 18] };
-            S::local(&function, std::array::from_fn::<S, 21, _>(change))
+            T::local(function, std::array::from_fn::<T, 21, _>(change))
         }
     };
-    let moved = changes(pair.params());
-    if !moved.iter().all(|p| p.is_constant_zero()) {
-        for (moved, column) in moved.iter().zip(function.by_parameters()) {
-            for (component, slope) in all.iter_mut().zip(column) {
-                *component += moved.times(slope);
-            }
-        }
-    }
-    split(all)
+    (along_axes(axes, &local, weight), Vector6::from_column_slice(&local[6..]))
+}
+
+/// Force and torque along the axes of the model, weighted, of those along the `axes` of a field.
+#[inline]
+fn along_axes<T: Scalar>(axes: &UnitQuaternion<T>, local: &[T], weight: f64) -> [Vector3<T>; 2] {
+    [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
+}
+
+/// Force and torque along the axes of the model, weighted, of tangents along the `axes` of a field.
+pub(super) fn weighted<S: Scalar>(
+    axes: &Rotation3<f64>,
+    local: &[S; 12],
+    weight: f64,
+) -> [Vector3<S>; 2] {
+    let axes = axes.cast::<S>();
+    [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
 }
 
 /// Zeros that carry the derivatives of `params`.

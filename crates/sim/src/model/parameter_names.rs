@@ -95,7 +95,9 @@ mod tests {
     use crate::articulated::{Joint, Link};
     use crate::joint_law::JointSpring;
     use crate::scenes::{egg_on, floor, penalty};
-    use crate::{Body, Bushing, BushingStiffness, ContactBodies, GapSmoothing, RigidBody, Shape};
+    use crate::{
+        Body, Bushing, ContactBodies, GapSmoothing, RigidBody, Shape, model::BushingStiffness,
+    };
 
     #[test]
     fn every_parameter_has_a_name_of_its_own() {

@@ -108,7 +108,7 @@ mod tests {
 
     use super::*;
     use crate::scenes::{egg_on, floor};
-    use crate::{BodyError, GapSmoothing};
+    use crate::{GapSmoothing, error::BodyError};
 
     #[test]
     fn parameters_come_back() {

@@ -60,8 +60,7 @@ impl Model {
                     contact.slip +=
                         bristles.slip(&(across(&touch.normal, &touch.lever) * deflection));
                 }
-                let response = law.force(&p, &contact);
-                let force = touch.normal * response.normal + response.tangential;
+                let force = law.force(&p, &contact).along(&touch.normal);
                 add(touch.lever, touch.normal, contact.gap, force);
             });
             if !is_sound {

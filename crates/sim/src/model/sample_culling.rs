@@ -94,8 +94,8 @@ mod tests {
 
     use crate::scenes::{bowl, egg_on, floor};
     use crate::{
-        BackwardEuler, Body, ContactBodies, GapSmoothing, Integrator, Model, RigidBody,
-        RungeKutta4, SemiImplicitEuler, State, Surface, TimeSteps,
+        Body, ContactBodies, GapSmoothing, Integrator, Model, RigidBody, RungeKutta4,
+        SemiImplicitEuler, State, Surface, TimeSteps, integrator::BackwardEuler,
     };
 
     fn assert_same(integrator: &impl Integrator, gap: f64, dt: f64, steps: usize) {

@@ -7,7 +7,21 @@ use prehend_autodiff::Scalar;
 use super::body::{Body, Motion};
 use crate::shape::Shape;
 use crate::shape::error::ShapeError;
-use crate::shape::matter::DensityShape;
+
+/// Shape and density of a body.
+#[derive(Clone)]
+pub(crate) struct DensityShape<S: Scalar> {
+    pub(crate) shape: Shape<S>,
+    /// \[kg/m³\], unless it is fixed.
+    pub(crate) density: Option<S>,
+}
+
+impl<S: Scalar> DensityShape<S> {
+    /// Shape and density with each number mapped by `f`.
+    pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> DensityShape<T> {
+        DensityShape { shape: self.shape.map(&f), density: self.density.map(f) }
+    }
+}
 
 impl<S: Scalar> Body<S> {
     /// A body of uniform `density` \[kg/m³\] that forces move, with the mass properties, samples and field of `shape`. Its body frame is

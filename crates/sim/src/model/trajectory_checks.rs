@@ -85,7 +85,7 @@ mod tests {
     use prehend_autodiff::Fwd;
 
     use super::*;
-    use crate::{Body, Trajectory};
+    use crate::{Body, model::Trajectory};
 
     #[test]
     fn trajectories_that_carry_derivatives_are_refused() {

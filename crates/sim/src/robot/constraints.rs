@@ -6,11 +6,10 @@ use nalgebra::DMatrix;
 
 use crate::articulated::tree_factor::TreeFactor;
 use crate::error::BuildError;
-use crate::joint_law::damper::JointDamper;
 use crate::joint_law::dynamic::DynJointLaw;
 use crate::joint_law::friction::JointFriction;
-use crate::joint_law::limits::JointLimits;
-use crate::joint_law::spring::JointSpring;
+use crate::joint_law::linear::{JointDamper, JointSpring};
+use crate::joint_law::range::JointLimits;
 use crate::model::Model;
 use crate::model::joint_force::JointAxis;
 

@@ -9,6 +9,7 @@ use prehend_geometry::Moments;
 use super::round::{Core, Round};
 use super::rows::rows;
 use super::solid::{Convex, RoundSample};
+use crate::magnitude::SMALLEST;
 
 /// A capsule along any axis around any center, by the half length of its segment and its radius.
 ///
@@ -36,6 +37,16 @@ impl Convex for Capsule {
     fn round<T: Scalar>(&self, dimensions: &[T]) -> Round<T> {
         let Self { center, axis, .. } = *self;
         Round { core: Core::Segment { center, axis, half: dimensions[0] }, border: dimensions[1] }
+    }
+
+    /// Its segment may be a point.
+    fn least(&self, name: &str) -> f64 {
+        if name == "half_height" { 0.0 } else { SMALLEST }
+    }
+
+    /// Its samples are a row.
+    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
+        Some(([0.0, 0.0, dimensions[0]], self.spacing))
     }
 
     fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {

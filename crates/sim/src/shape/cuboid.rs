@@ -58,6 +58,18 @@ impl Convex for RoundCuboid {
         Round { core, border: rounding.border() }
     }
 
+    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
+        Some(([dimensions[0], dimensions[1], dimensions[2]], self.spacing))
+    }
+
+    fn border(&self) -> Option<Edges> {
+        Some(self.border)
+    }
+
+    fn deepest(&self, dimensions: &[f64]) -> Option<f64> {
+        Some(dimensions[..3].iter().copied().fold(f64::INFINITY, f64::min))
+    }
+
     fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {
         let rounding = self.border.rounding(dimensions);
         let (flat, radius) = (self.half_extents(dimensions, rounding.inset()), rounding.samples());

@@ -145,7 +145,7 @@ fn mesh(
 ) -> Result<(ShapeKind, Vec<f64>), ShapeError> {
     let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(|p| vector(*p).into()).collect();
     let mesh = TriMesh::new(vertices, mesh.indices().to_vec());
-    Ok((ShapeKind::Ground(super::mesh::mesh(&mesh, options)?), Vec::new()))
+    Ok((ShapeKind::Ground(Ground::mesh(&mesh, options)?), Vec::new()))
 }
 
 fn compound(

@@ -17,7 +17,7 @@ use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
 use super::solid::{Convex, RoundSample};
 use crate::fields::INSET;
-use crate::magnitude::{LARGEST, SMALLEST};
+use crate::magnitude::LARGEST;
 use crate::surface::check_spacing;
 
 /// Kind of a shape, without the values of its dimensions.
@@ -93,65 +93,26 @@ impl ShapeKind {
         }, all => LiftedField::Parts(all.lifted_parts(dimensions)))
     }
 
-    /// Half the extents of the box that holds a lattice of samples, and the distance of these \[m\].
-    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
-        match self {
-            Self::Ball(_) | Self::Ground(_) | Self::Compound(_) => None,
-            Self::Cuboid(cuboid) => {
-                Some(([dimensions[0], dimensions[1], dimensions[2]], cuboid.spacing))
-            }
-            // Its samples are a row.
-            Self::Capsule(capsule) => Some(([0.0, 0.0, dimensions[0]], capsule.spacing)),
-            Self::Revolved(revolved) => {
-                Some(([dimensions[1], dimensions[1], dimensions[0]], revolved.spacing))
-            }
-            Self::Polyhedron(polyhedron) => {
-                let corners = dimensions[..3 * polyhedron.vertices].as_chunks::<3>().0;
-                let along = |axis: usize| {
-                    let places = corners.iter().map(|corner| corner[axis]);
-                    let span =
-                        places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min);
-                    0.5 * span
-                };
-                Some(([0, 1, 2].map(along), polyhedron.spacing))
-            }
-        }
-    }
-
     /// Checks that there is such a shape.
     pub(super) fn check(&self, dimensions: &[f64]) -> Result<(), ShapeError> {
-        if let Self::Compound(all) = self {
-            return all.parts(dimensions).try_for_each(|(part, own)| part.kind.check(own));
-        }
-        for (name, &value) in self.names().into_iter().zip(dimensions) {
-            // The segment of a capsule may be a point, a vertex may be anywhere.
-            let least = match self {
-                Self::Capsule(_) if name == "half_height" => 0.0,
-                Self::Polyhedron(_) if name.starts_with("vertex") => -LARGEST,
-                _ => SMALLEST,
-            };
-            if !(least..=LARGEST).contains(&value) {
-                return Err(ShapeError::Dimension { name, value });
-            }
-        }
-        if let Some((half_extents, spacing)) = self.lattice(dimensions) {
-            check_spacing(half_extents, spacing)?;
-        }
-        let (border, deepest) = match self {
-            Self::Ball(_) | Self::Capsule(_) | Self::Ground(_) | Self::Compound(_) => return Ok(()),
-            Self::Polyhedron(polyhedron) => {
-                (polyhedron.border, polyhedron.deepest(dimensions).ok_or(ShapeError::NotConvex)?)
-            }
-            Self::Cuboid(cuboid) => {
-                (cuboid.border, dimensions[..3].iter().copied().fold(f64::INFINITY, f64::min))
-            }
-            Self::Revolved(revolved) => (
-                revolved.border,
-                Revolved::deepest(revolved.outline, [dimensions[0], dimensions[1]]),
-            ),
-        };
-        check_rounding(border, dimensions, deepest)
+        each!(self, solid => check_solid(solid, dimensions), _ground => Ok(()), all => {
+            all.parts(dimensions).try_for_each(|(part, own)| part.kind.check(own))
+        })
     }
+}
+
+fn check_solid(solid: &impl Convex, dimensions: &[f64]) -> Result<(), ShapeError> {
+    for (name, &value) in solid.names().into_iter().zip(dimensions) {
+        if !(solid.least(&name)..=LARGEST).contains(&value) {
+            return Err(ShapeError::Dimension { name, value });
+        }
+    }
+    if let Some((half_extents, spacing)) = solid.lattice(dimensions) {
+        check_spacing(half_extents, spacing)?;
+    }
+    let Some(border) = solid.border() else { return Ok(()) };
+    let deepest = solid.deepest(dimensions).ok_or(ShapeError::NotConvex)?;
+    check_rounding(border, dimensions, deepest)
 }
 
 /// Checks that samples leave something of a solid that an inset of `deepest` \[m\] makes nothing of.

@@ -11,6 +11,7 @@ use super::lattice::{MeshFace, lattice};
 use super::polytope::{Facet, Polytope};
 use super::round::{Core, Round};
 use super::solid::{Convex, RoundSample};
+use crate::magnitude::{LARGEST, SMALLEST};
 
 /// A convex polyhedron, by its vertices.
 ///
@@ -92,20 +93,6 @@ impl Polyhedron {
         };
         self.faces.iter().flat_map(fan).collect()
     }
-
-    /// Largest depth to which its faces can be moved in \[m\]; none if it is not convex.
-    pub(crate) fn deepest(&self, dimensions: &[f64]) -> Option<f64> {
-        let vertices = self.vertices(dimensions);
-        let planes = self.planes(&vertices);
-        let middle = middle(&vertices);
-        let depth = |plane: &Plane<f64>, point: &Point3<f64>| plane.1 - plane.0.dot(&point.coords);
-        let depths = planes.iter().map(|(_, plane)| depth(plane, &middle));
-        let deepest = depths.fold(f64::INFINITY, f64::min);
-        let size = vertices.iter().map(|v| (v - middle).norm()).fold(0.0, f64::max);
-        let below =
-            |v: &Point3<f64>| planes.iter().all(|(_, plane)| depth(plane, v) >= -FLAT * size);
-        (deepest > 0.0 && vertices.iter().all(below)).then_some(deepest)
-    }
 }
 
 /// The faces of the hull of `points` as vertices counterclockwise from outside, triangles in one plane together. Parry's own are
@@ -139,16 +126,25 @@ pub(super) fn flat_faces(points: &[Point3<f64>]) -> Option<Vec<Vec<usize>>> {
         face.dedup();
         let sum = face.iter().fold(Vector3::zeros(), |sum, &i| sum + points[i].coords);
         let center = Point3::from(sum / face.len() as f64);
-        let along = points[face[0]] - center;
-        let across = normal.cross(&along);
-        let angle = |i: usize| {
-            let offset = points[i] - center;
-            offset.dot(&across).atan2(offset.dot(&along))
-        };
-        face.sort_by(|&a, &b| angle(a).total_cmp(&angle(b)));
+        let angle = angle_about(center, &normal, points[face[0]]);
+        face.sort_by(|&a, &b| angle(&points[a]).total_cmp(&angle(&points[b])));
         face
     };
     Some(faces.into_iter().map(in_order).collect())
+}
+
+/// Angle of points about a `center` and `normal`, counterclockwise from `first`.
+fn angle_about<T: Scalar>(
+    center: Point3<f64>,
+    normal: &Vector3<f64>,
+    first: Point3<f64>,
+) -> impl Fn(&Point3<T>) -> f64 {
+    let along = first - center;
+    let across = normal.cross(&along);
+    move |point| {
+        let offset = point.map(T::value) - center;
+        offset.dot(&across).atan2(offset.dot(&along))
+    }
 }
 
 fn middle<T: Scalar>(points: &[Point3<T>]) -> Point3<f64> {
@@ -191,12 +187,7 @@ fn sort_around<T: Scalar>(corners: &mut Vec<Point3<T>>, normal: &Vector3<f64>) {
             kept.push(*corner);
         }
     }
-    let along = first - middle;
-    let across = normal.cross(&along);
-    let angle = |p: &Point3<T>| {
-        let offset = p.map(T::value) - middle;
-        offset.dot(&across).atan2(offset.dot(&along))
-    };
+    let angle = angle_about(middle, normal, first);
     kept.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
     *corners = kept;
 }
@@ -223,6 +214,37 @@ impl Convex for Polyhedron {
         let rounding = self.border.rounding(dimensions);
         let (core, _) = self.inset(dimensions, rounding.core());
         Round { core: Core::Polytope(core), border: rounding.border() }
+    }
+
+    /// A vertex may be anywhere.
+    fn least(&self, name: &str) -> f64 {
+        if name.starts_with("vertex") { -LARGEST } else { SMALLEST }
+    }
+
+    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
+        let corners = self.vertices(dimensions);
+        let along = |axis: usize| {
+            let places = corners.iter().map(|corner| corner[axis]);
+            0.5 * (places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min))
+        };
+        Some(([0, 1, 2].map(along), self.spacing))
+    }
+
+    fn border(&self) -> Option<Edges> {
+        Some(self.border)
+    }
+
+    fn deepest(&self, dimensions: &[f64]) -> Option<f64> {
+        let vertices = self.vertices(dimensions);
+        let planes = self.planes(&vertices);
+        let middle = middle(&vertices);
+        let depth = |plane: &Plane<f64>, point: &Point3<f64>| plane.1 - plane.0.dot(&point.coords);
+        let depths = planes.iter().map(|(_, plane)| depth(plane, &middle));
+        let deepest = depths.fold(f64::INFINITY, f64::min);
+        let size = vertices.iter().map(|v| (v - middle).norm()).fold(0.0, f64::max);
+        let below =
+            |v: &Point3<f64>| planes.iter().all(|(_, plane)| depth(plane, v) >= -FLAT * size);
+        (deepest > 0.0 && vertices.iter().all(below)).then_some(deepest)
     }
 
     fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {

@@ -66,15 +66,6 @@ impl Revolved {
             }
         }
     }
-
-    /// The least inset that leaves nothing \[m\].
-    pub(crate) fn deepest(outline: Outline, [half, radius]: [f64; 2]) -> f64 {
-        match outline {
-            Outline::Cylinder => half.min(radius),
-            // The incircle of the section.
-            Outline::Cone => 2.0 * half * radius / (radius + (2.0 * half).hypot(radius)),
-        }
-    }
 }
 
 impl Convex for Revolved {
@@ -98,6 +89,23 @@ impl Convex for Revolved {
         let rounding = self.border.rounding(dimensions);
         let corners = self.corners(dimensions, rounding.core());
         Round { core: Core::Profile(Profile::new(&corners)), border: rounding.border() }
+    }
+
+    fn lattice(&self, dimensions: &[f64]) -> Option<([f64; 3], f64)> {
+        Some(([dimensions[1], dimensions[1], dimensions[0]], self.spacing))
+    }
+
+    fn border(&self) -> Option<Edges> {
+        Some(self.border)
+    }
+
+    fn deepest(&self, dimensions: &[f64]) -> Option<f64> {
+        let [half, radius] = [dimensions[0], dimensions[1]];
+        Some(match self.outline {
+            Outline::Cylinder => half.min(radius),
+            // The incircle of the section.
+            Outline::Cone => 2.0 * half * radius / (radius + (2.0 * half).hypot(radius)),
+        })
     }
 
     fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>> {

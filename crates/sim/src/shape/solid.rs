@@ -4,7 +4,9 @@ use nalgebra::Point3;
 use prehend_autodiff::Scalar;
 use prehend_geometry::Moments;
 
+use super::border::Edges;
 use super::round::Round;
+use crate::magnitude::SMALLEST;
 
 /// A ball that touches others where they are nearest: its center and radius \[m\] and the area that it stands for \[m²\].
 #[derive(Clone, Copy, Debug)]
@@ -27,4 +29,24 @@ pub(crate) trait Convex {
 
     /// Samples of its surface.
     fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<RoundSample<T>>;
+
+    /// Smallest value of the dimension called `name`.
+    fn least(&self, _name: &str) -> f64 {
+        SMALLEST
+    }
+
+    /// Half the extents of the box that holds a lattice of samples, and the distance of these \[m\].
+    fn lattice(&self, _dimensions: &[f64]) -> Option<([f64; 3], f64)> {
+        None
+    }
+
+    /// Rounding of its edges, if it has edges.
+    fn border(&self) -> Option<Edges> {
+        None
+    }
+
+    /// Least inset of its faces that leaves nothing \[m\], if it is convex.
+    fn deepest(&self, _dimensions: &[f64]) -> Option<f64> {
+        Some(f64::INFINITY)
+    }
 }

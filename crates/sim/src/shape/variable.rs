@@ -1,13 +1,13 @@
 //! Derivatives of contacts by the dimensions of the shapes that touch.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::contact::bristle_function::BristleFunction;
 use crate::contact::contact_query::{ContactPoint, ContactQuery};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::moved::LiftedContact;
-use crate::contact::point::ContactKinematics;
+use crate::contact::wrench::sum_forces;
 use crate::shape::lifted::LiftedField;
 use crate::shape::solid::RoundSample;
 
@@ -31,15 +31,11 @@ impl VariableShapes<'_> {
     /// Force and torque about the center of mass, along the axes of the field, of a law with parameters `p`.
     pub(crate) fn wrench(&self, law: &dyn DynContactLaw, p: &[f64]) -> [Lane; 6] {
         let p: Vec<Lane> = p.iter().map(|&p| Fwd::constant(p)).collect();
-        let (mut force, mut torque) = (Vector3::<Lane>::zeros(), Vector3::<Lane>::zeros());
-        self.query.for_each_contact(law.cutoff(), false, |touch| {
+        let sum = sum_forces(self.query, law.cutoff(), false, |touch| {
             let LiftedContact { contact, lever } = self.lift(touch, law.cutoff());
-            let response = law.force_with_derivative(&p, &contact);
-            let own = contact.normal * response.normal + response.tangential;
-            force += own;
-            torque += lever.cross(&own);
+            (lever, law.force_with_derivative(&p, &contact).along(&contact.normal))
         });
-        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+        sum.unwrap_or_else(|| Vector6::repeat(Fwd::constant(f64::NAN))).into()
     }
 
     /// [`wrench`](Self::wrench) of a contact with bristles, then the rate of its deflection.
@@ -67,20 +63,11 @@ impl VariableShapes<'_> {
         let (distance, gradient) = self.field.at(&place).unwrap_or_else(nowhere);
         let change = distance - radius;
         let change = change.plus(-change.value);
-        let smoothed = |value: f64, slope: f64| change.times(slope).plus(value);
         let normal = gradient / gradient.norm();
         let lever = arm - normal * radius;
         let velocity =
             constant(&self.query.state.linear) + constant(&self.query.state.angular).cross(&lever);
-        let speed = velocity.dot(&normal);
-        let s = &touch.smoothing;
-        let contact = ContactKinematics {
-            gap: smoothed(cutoff + s.gap, s.slope),
-            normal_speed: smoothed(s.activation, s.activation_slope) * speed,
-            slip: velocity - normal * speed,
-            normal,
-            area,
-        };
+        let contact = touch.moved(cutoff, change, normal, velocity, area);
         LiftedContact { contact, lever }
     }
 }

@@ -4,7 +4,7 @@ use prehend_geometry::VolumeError;
 use prehend_geometry::closest::ClosestError;
 use prehend_geometry::robot::RobotError;
 use prehend_sim::contact::LawError;
-use prehend_sim::{BodyError, SimulationError};
+use prehend_sim::{SimulationError, error::BodyError};
 use thiserror::Error;
 
 use crate::error::RefineError;

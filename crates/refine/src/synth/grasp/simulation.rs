@@ -7,9 +7,9 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics,
-    DynContactLaw, GapSmoothing, Integrator, Model, SemiImplicitEuler, SimulationError, State,
-    Step, SubStepped, Surface,
+    Body, BodyId, BodyState, BuildError, ContactBodies, ContactKinematics, DynContactLaw,
+    GapSmoothing, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, Surface,
+    integrator::{BackwardEuler, SubStepped},
 };
 
 use super::grasper::Grasper;

@@ -22,10 +22,10 @@ law_part! {
     constants {
         slip_scale ["m/s"] Positive "slip speed that regularizes it";
     }
-    where kinetic_at_most_static
+    where kinetic_at_most_static(friction, kinetic_friction)
 }
 
-fn kinetic_at_most_static(&[friction, kinetic, _]: &[f64; 3]) -> Result<(), LawError> {
+fn kinetic_at_most_static(friction: f64, kinetic: f64) -> Result<(), LawError> {
     let (name, range) = ("kinetic_friction", "at most the friction at rest");
     if kinetic <= friction { Ok(()) } else { Err(LawError::Range { name, range, value: kinetic }) }
 }

@@ -13,6 +13,7 @@ use crate::body_state::{BodyState, Rows};
 use crate::error::{Result, SimulationError};
 use crate::handle::BodyId;
 use crate::model::Model;
+use crate::model::pair_jacobian::PairJacobian;
 use crate::time::Step;
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
@@ -25,14 +26,14 @@ pub(super) fn arrived<S: Scalar>(state: &BodyState<S>, velocity: &[S; 6], dt: f6
 /// `velocity` at the end of the step less what momentum and `wrench` there make it.
 pub(super) fn excess<S: Scalar>(
     body: &RigidBody<S>,
-    model: &Model<S>,
+    gravity: &Vector3<S>,
     state: &BodyState<S>,
     velocity: &[S; 6],
     wrench: &Vector6<S>,
     dt: f64,
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
-    let (linear, momentum) = body.apply_impulse(state, wrench, &model.gravity, S::constant(dt));
+    let (linear, momentum) = body.apply_impulse(state, wrench, gravity, S::constant(dt));
     let rotation = turned(&state.pose.rotation, &Vector3::new(wx, wy, wz).map(|w| w.times(dt)));
     let angular = body.angular(&rotation, &momentum);
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
@@ -43,7 +44,8 @@ pub(super) fn excess<S: Scalar>(
 /// The equations of a step, for the velocities of the free bodies, one after the other.
 pub(super) struct ImplicitStep<'a> {
     pub(super) model: &'a Model,
-    pub(super) lifted: &'a Model<Fwd<12>>,
+    /// The model with the contacts that count in derivatives.
+    pub(super) leaky: &'a Model,
     pub(super) states: &'a Rows,
     /// The states at the end, right for the bodies that are not free.
     pub(super) at_end: Vec<BodyState>,
@@ -80,7 +82,8 @@ impl ImplicitStep<'_> {
         for (slot, &body) in self.free.iter().enumerate() {
             let Some(rigid) = self.model.bodies[body].rigid() else { continue };
             let (state, velocity) = (&self.states[body], velocity_at(x, slot));
-            let excess = excess(rigid, self.model, state, &velocity, &wrenches[body], self.step.dt);
+            let gravity = &self.model.gravity;
+            let excess = excess(rigid, gravity, state, &velocity, &wrenches[body], self.step.dt);
             excesses.fixed_rows_mut::<6>(6 * slot).copy_from_slice(&excess);
         }
         excesses
@@ -107,13 +110,15 @@ impl ImplicitStep<'_> {
             entries.extend((0..36).map(|k| place(k % 6, k / 6)));
         };
         for (slot, &body) in self.free.iter().enumerate() {
-            let Some(rigid) = self.lifted.bodies[body].rigid() else { continue };
+            let Some(rigid) = self.model.bodies[body].rigid() else { continue };
             // The body's own velocity in lanes 0..6, the wrench on it in lanes 6..12.
             let at = velocity_at(x, slot);
-            let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
+            let velocity = std::array::from_fn(|i| Fwd::<12>::variable(at[i], i));
             let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
             let state = self.states[body].cast();
-            let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
+            let (rigid, gravity) =
+                (rigid.map(Fwd::constant), self.model.gravity.map(Fwd::constant));
+            let excess = excess(&rigid, &gravity, &state, &velocity, &wrench, self.step.dt);
             let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
             write(slot, slot, by(0));
             let by_wrench = by(6);
@@ -138,40 +143,30 @@ impl Equations for ImplicitStep<'_> {
     }
 
     fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored), ImplicitError> {
-        let dt = self.step.dt;
         let ends = self.ends(x);
         let mut slots = vec![None; ends.len()];
-        self.free.iter().enumerate().for_each(|(slot, &body)| slots[body] = Some(slot));
+        for (slot, &body) in self.free.iter().enumerate() {
+            let at = velocity_at(x, slot);
+            let velocity = std::array::from_fn(|i| Fwd::<6>::variable(at[i], i));
+            let moved = arrived(&self.states[body].cast(), &velocity, self.step.dt);
+            slots[body] = Some((slot, moved.sensitivity()));
+        }
         let mut wrenches: Vec<Vector6<f64>> =
             self.model.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = Blocks::new();
-        let mut states: Vec<BodyState<Fwd<12>>> = ends.iter().map(BodyState::cast).collect();
-        let mut deflections = ends[self.model.bodies.len()..].iter().map(BodyState::cast);
-        for pair in &self.lifted.contacts {
-            // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
-            let bodies = [pair.bodies.samples, pair.bodies.field];
-            for (body, lane) in bodies.into_iter().zip([0, 6]) {
-                if let Some(slot) = slots[body] {
-                    let at = velocity_at(x, slot);
-                    let velocity = std::array::from_fn(|i| Fwd::variable(at[i], lane + i));
-                    states[body] = arrived(&self.states[body].cast(), &velocity, dt);
-                }
-            }
-            let deflection = pair.law().bristles().and_then(|_| deflections.next());
-            let effect =
-                self.lifted.pair_wrench(pair, &states, deflection.as_ref(), self.step.index);
-            for (on, wrench) in bodies.into_iter().zip([effect.on_samples, effect.on_field]) {
-                wrenches[on] += wrench.map(|w| w.value);
-                let Some(row) = slots[on] else { continue };
-                for (body, lane) in bodies.into_iter().zip([0, 6]) {
-                    let Some(column) = slots[body] else { continue };
-                    let block = Matrix6::from_fn(|i, j| wrench[i].derivative[lane + j]);
+        for PairJacobian { bodies, on, by, .. } in self.leaky.pair_jacobians(&ends, self.step.index)
+        {
+            for ((body, on), by) in bodies.into_iter().zip(on).zip(by) {
+                wrenches[body] += on;
+                let Some((row, _)) = slots[body] else { continue };
+                for (body, by) in bodies.into_iter().zip(by) {
+                    let Some((column, moved)) = &slots[body] else { continue };
+                    let block = by * moved;
                     if block != Matrix6::zeros() {
-                        *by_velocity.entry((row, column)).or_default() += block;
+                        *by_velocity.entry((row, *column)).or_default() += block;
                     }
                 }
             }
-            bodies.into_iter().for_each(|body| states[body] = ends[body].cast());
         }
         let jacobian = self.jacobian(x, &wrenches, &by_velocity)?;
         Ok((self.excesses(x, &wrenches), jacobian))

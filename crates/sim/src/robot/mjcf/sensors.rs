@@ -74,6 +74,7 @@ impl MjcfRobot {
         quantity: &Quantity,
     ) -> Result<Vec<f64>, MjcfError> {
         let three = |v: Vector3<f64>| Ok(v.as_slice().to_vec());
+        let along = |along: &Along, k: usize| Ok(vec![self.along(model, state, along)?[k]]);
         match quantity {
             Quantity::JointPosition(joint) => {
                 let position = model.joint(state, self.sensors.joints[joint])?.position;
@@ -85,18 +86,10 @@ impl MjcfRobot {
             Quantity::JointVelocity(joint) => {
                 Ok(model.joint(state, self.sensors.joints[joint])?.velocity)
             }
-            Quantity::TendonLength(k) => {
-                Ok(self.along(model, state, &self.sensors.tendons[*k])?[..1].to_vec())
-            }
-            Quantity::TendonVelocity(k) => {
-                Ok(self.along(model, state, &self.sensors.tendons[*k])?[1..].to_vec())
-            }
-            Quantity::ActuatorLength(k) => {
-                Ok(self.along(model, state, &self.sensors.actuators[*k])?[..1].to_vec())
-            }
-            Quantity::ActuatorVelocity(k) => {
-                Ok(self.along(model, state, &self.sensors.actuators[*k])?[1..].to_vec())
-            }
+            Quantity::TendonLength(k) => along(&self.sensors.tendons[*k], 0),
+            Quantity::TendonVelocity(k) => along(&self.sensors.tendons[*k], 1),
+            Quantity::ActuatorLength(k) => along(&self.sensors.actuators[*k], 0),
+            Quantity::ActuatorVelocity(k) => along(&self.sensors.actuators[*k], 1),
             Quantity::Frame { part, frame, reference } => {
                 let own = self.moving(state, frame);
                 let base = reference.as_ref().map(|reference| self.moving(state, reference));

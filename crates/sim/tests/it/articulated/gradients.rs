@@ -2,7 +2,9 @@
 
 use prehend_autodiff::{Fwd, Scalar, gradient};
 use prehend_geometry::SplitMix64;
-use prehend_sim::{Integrator, Model, SemiImplicitEuler, State, StepCheckpointed, TimeSteps};
+use prehend_sim::{
+    Integrator, Model, SemiImplicitEuler, State, TimeSteps, integrator::StepCheckpointed,
+};
 
 use super::scenes::random_scene;
 

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::joint_law::{JointLimits, JointSpring};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, BodyState, Bushing, BushingStiffness, Model, Motion, RigidBody,
-    SimulationError, State, Step, TimeSteps,
+    Body, BodyId, BodyState, Bushing, Model, Motion, RigidBody, SimulationError, State, Step,
+    TimeSteps, integrator::BackwardEuler, model::BushingStiffness,
 };
 
 #[test]

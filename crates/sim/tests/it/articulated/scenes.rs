@@ -11,8 +11,8 @@ use prehend_sim::joint_law::{
     JointDamper, JointFriction, JointLimits, JointSpring, PositionServo, VelocityServo,
 };
 use prehend_sim::{
-    Body, BristleFriction, Bushing, BushingStiffness, ContactBodies, Coulomb, DynContactLaw,
-    GapSmoothing, KelvinVoigt, Law, Model, RigidBody, State, Surface,
+    Body, BristleFriction, Bushing, ContactBodies, Coulomb, DynContactLaw, GapSmoothing,
+    KelvinVoigt, Law, Model, RigidBody, State, Surface, model::BushingStiffness,
 };
 
 /// A nut on a thread.

@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::Energy;
 use prehend_sim::{
     Adaptive, Batch, ContactBodies, Integrator, Model, RungeKutta4, SemiImplicitEuler, State,
-    StepCheckpointed, TimeSteps,
+    TimeSteps, integrator::StepCheckpointed,
 };
 
 use super::scenes::{coulomb_law, random_link, random_scene};

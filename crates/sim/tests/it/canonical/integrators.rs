@@ -4,8 +4,8 @@ use std::f64::consts::SQRT_2;
 
 use prehend_autodiff::Fwd;
 use prehend_sim::{
-    BackwardEuler, BodyState, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError,
-    State, TimeSteps,
+    BodyState, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError, State,
+    TimeSteps, integrator::BackwardEuler,
 };
 
 /// An integrator.

@@ -1,7 +1,8 @@
 //! Contacts of all bodies by the default material.
 
 use nalgebra::{Vector3, Vector6};
-use prehend_sim::{Body, BodyId, Material, Model, PointContact, Shape, State};
+use prehend_sim::model::PointContact;
+use prehend_sim::{Body, BodyId, Material, Model, Shape, State};
 
 /// A floor across z, and a body of `shape` at `height` above it \[m\].
 fn above_floor(gravity: Vector3<f64>, shape: &Shape, height: f64) -> (Model, State) {

@@ -11,7 +11,7 @@ use prehend_sim::fields::{Cuboid, HalfSpace, Sphere};
 use prehend_sim::{
     Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
     DynContactLaw, GapSmoothing, Model, RigidBody, RungeKutta4, SemiImplicitEuler, Shape,
-    SimulationError, State, StepCheckpointed, Surface, TimeSteps,
+    SimulationError, State, Surface, TimeSteps, integrator::StepCheckpointed,
 };
 
 use super::scenes::{

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::mjcf::Model as MjcfModel;
 use prehend_sim::articulated::Joint;
 use prehend_sim::robot::{MjcfError, MjcfOptions};
-use prehend_sim::{BodyId, JointAxis, Model, ShapeOptions, TimeSteps};
+use prehend_sim::{BodyId, Model, ShapeOptions, TimeSteps, model::JointAxis};
 
 const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
     <geom name="ground" type="plane" size="1 1 .1"/>

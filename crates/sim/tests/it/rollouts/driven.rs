@@ -9,9 +9,11 @@ use prehend_autodiff::{Fwd, Recording, Scalar, Var, gradient};
 use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
-    Adaptive, BackwardEuler, Batch, Body, BodyState, BuildError, ContactBodies, GapSmoothing,
-    Integrator, Model, Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State,
-    Step, StepCheckpointed, SubStepped, Surface, TimeSteps, Trajectory,
+    Adaptive, Batch, Body, BodyState, BuildError, ContactBodies, GapSmoothing, Integrator, Model,
+    Motion, RigidBody, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step, Surface,
+    TimeSteps,
+    integrator::{BackwardEuler, StepCheckpointed, SubStepped},
+    model::Trajectory,
 };
 
 use super::gradients::coordinates;

@@ -11,10 +11,11 @@ use prehend_sim::contact::Stribeck;
 use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::joint_law::{JointFriction, JointLimits, JointSpring};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyState, BristleFriction, ContactBodies, ContactCalibration,
-    Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, Model,
-    RigidBody, RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape,
-    SimulationError, State, Step, SubStepped, Surface, TimeSteps,
+    Adaptive, Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, Coulomb,
+    DynContactLaw, GapSmoothing, HuntCrossley, Integrator, KelvinVoigt, Law, Model, RigidBody,
+    RolloutFunction, RolloutInputs, RungeKutta4, SemiImplicitEuler, Shape, SimulationError, State,
+    Step, Surface, TimeSteps,
+    integrator::{BackwardEuler, SubStepped},
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;

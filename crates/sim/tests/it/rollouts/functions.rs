@@ -3,7 +3,7 @@
 use prehend_autodiff::{Fwd, Recording, Scalar};
 use prehend_sim::{
     Adaptive, GapSmoothing, Integrator, Model, RolloutFunction, RolloutInputs, SemiImplicitEuler,
-    SimulationError, State, StepCheckpointed, TimeSteps,
+    SimulationError, State, TimeSteps, integrator::StepCheckpointed,
 };
 
 use crate::scenes::{bowl, egg_on};

@@ -13,8 +13,9 @@ use prehend_sim::contact::{LeakSteps, regularized_coulomb};
 use prehend_sim::fields::Sphere;
 use prehend_sim::{
     Adaptive, Body, BodyState, ContactBodies, ContactForce, ContactKinematics, ContactLaw,
-    ContactPair, DynContactLaw, GapSmoothing, Integrator, Model, Motion, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Step, StepCheckpointed, Surface, TimeSteps,
+    DynContactLaw, GapSmoothing, Integrator, Model, Motion, RigidBody, SemiImplicitEuler,
+    SimulationError, State, Step, Surface, TimeSteps, integrator::StepCheckpointed,
+    model::ContactPair,
 };
 use proptest::prelude::*;
 

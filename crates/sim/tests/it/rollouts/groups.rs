@@ -8,9 +8,9 @@ use prehend_autodiff::{Fwd, Recording, Var};
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::fields::{HalfSpace, Sphere};
 use prehend_sim::{
-    Adaptive, BackwardEuler, Body, BodyId, BodyState, BuildError, ContactBodies, GapSmoothing,
-    Integrator, Model, RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed,
-    SubStepped, Surface, TimeSteps,
+    Adaptive, Body, BodyId, BodyState, BuildError, ContactBodies, GapSmoothing, Integrator, Model,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps,
+    integrator::{BackwardEuler, StepCheckpointed, SubStepped},
 };
 
 use crate::scenes::{penalty, sticking};

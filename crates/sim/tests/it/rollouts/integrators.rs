@@ -7,8 +7,9 @@ use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 use prehend_autodiff::lie::so3_log;
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 use prehend_sim::{
-    BackwardEuler, Body, BodyState, GapSmoothing, Integrator, Model, Motion, RigidBody,
-    RungeKutta4, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, TimeSteps,
+    Body, BodyState, GapSmoothing, Integrator, Model, Motion, RigidBody, RungeKutta4,
+    SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps,
+    integrator::{BackwardEuler, SubStepped},
 };
 
 use crate::scenes::{bowl, egg_on, floor, on_ground, penalty, sticking};

@@ -13,7 +13,7 @@ use prehend_sim::contact::{GraspD, GraspDParameters};
 use prehend_sim::{
     Adaptive, Body, BodyState, BristleFriction, ContactBodies, Coulomb, DynContactLaw,
     GapSmoothing, HuntCrossley, KelvinVoigt, Law, Model, SemiImplicitEuler, Shape, ShapeOptions,
-    State, Step, StepCheckpointed, TimeSteps,
+    State, Step, TimeSteps, integrator::StepCheckpointed,
 };
 
 use super::catalog::{ROUND, SHARP, vector};

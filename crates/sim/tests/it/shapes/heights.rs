@@ -8,7 +8,7 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Ball, HeightField};
 use parry3d_f64::utils::Array2;
 use prehend_geometry::SplitMix64;
-use prehend_sim::{Body, Shape, ShapeError};
+use prehend_sim::{Body, Shape, error::ShapeError};
 
 use super::derivatives::errors;
 use super::rest::on;

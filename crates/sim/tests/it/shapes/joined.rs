@@ -7,7 +7,7 @@ use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Ball, Compound, Cuboid, HalfSpace, Shape as _, SharedShape, TriMesh};
 use prehend_geometry::SplitMix64;
-use prehend_sim::{Body, Shape, ShapeError, ShapeOptions};
+use prehend_sim::{Body, Shape, ShapeOptions, error::ShapeError};
 
 use super::catalog::vector;
 use super::derivatives::errors;

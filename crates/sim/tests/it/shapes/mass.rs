@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{self as parry, HalfSpace};
 use prehend_geometry::{DistanceField, Moments, SplitMix64};
-use prehend_sim::{Body, Shape, ShapeError};
+use prehend_sim::{Body, Shape, error::ShapeError};
 
 use super::catalog::{ROUND, SHARP};
 
