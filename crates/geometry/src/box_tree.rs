@@ -44,6 +44,14 @@ impl Bounds {
             && (1..3).all(|k| self.low[k] <= point[k] && point[k] <= self.high[k])
     }
 
+    /// The sides beyond which `point` lies, a bit each (Cohen and Sutherland's outcode).
+    pub(crate) fn beyond(&self, point: &Point3<f64>) -> u8 {
+        (0..3).fold(0, |code, k| {
+            let beyond = [point[k] < self.low[k], point[k] > self.high[k]];
+            code << 2 | u8::from(beyond[0]) << 1 | u8::from(beyond[1])
+        })
+    }
+
     /// The square of the longest distance from a point of it to one of the other.
     fn span_squared(&self, other: &Self) -> f64 {
         let longest = |k: usize| (self.high[k] - other.low[k]).max(other.high[k] - self.low[k]);
@@ -144,10 +152,6 @@ impl BoxTree {
                 self.nodes[children].bounds.joined(&self.nodes[children + 1].bounds)
             };
         }
-    }
-
-    pub(crate) fn bounds(&self) -> Bounds {
-        self.nodes[0].bounds
     }
 
     /// Hands every box that `wanted` accepts to `visit` by its place, until that answers false; `wanted` of a box

@@ -44,33 +44,55 @@ pub fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
             sides.push(([a.min(b), a.max(b)], side));
         }
     }
-    sides.sort_unstable();
+    // One comparison of numbers instead of five.
+    let rank = |([a, b], side): &([u32; 2], EdgeUse)| {
+        let ends = u128::from(*a) << 96 | u128::from(*b) << 64;
+        let of_face = u64::from(side.face) << 8 | u64::from(side.corner);
+        ends | u128::from(u64::from(side.forward) << 40 | of_face)
+    };
+    sides.sort_unstable_by_key(rank);
     sides
         .chunk_by(|x, y| x.0 == y.0)
         .map(|uses| Edge { vertices: uses[0].0, uses: uses.iter().map(|u| u.1).collect() })
         .collect()
 }
 
-/// Things that are joined one pair at a time (Tarjan 1975).
-struct Groups(Vec<u32>);
+/// Things with numbers, joined one pair at a time by known differences (union–find with potentials; Tarjan 1975).
+pub(crate) struct Groups {
+    /// A thing of smaller place, or the thing itself.
+    above: Vec<u32>,
+    /// The number of the thing less that of the one above it.
+    excess: Vec<i32>,
+}
 
 impl Groups {
-    fn new(things: usize) -> Self {
-        Self((0..things as u32).collect())
+    pub(crate) fn new(things: usize) -> Self {
+        Self { above: (0..things as u32).collect(), excess: vec![0; things] }
     }
 
-    /// The smallest of the things joined with `thing`.
-    fn root(&mut self, mut thing: u32) -> u32 {
-        while self.0[thing as usize] != thing {
-            self.0[thing as usize] = self.0[self.0[thing as usize] as usize];
-            thing = self.0[thing as usize];
+    /// The smallest of the things joined with `thing`, and the number of `thing` less that of it.
+    pub(crate) fn root(&mut self, thing: u32) -> (u32, i32) {
+        let (mut at, mut sum) = (thing as usize, 0);
+        loop {
+            let above = self.above[at] as usize;
+            if above == at {
+                return (at as u32, sum);
+            }
+            self.excess[at] += self.excess[above];
+            self.above[at] = self.above[above];
+            sum += self.excess[at];
+            at = self.above[at] as usize;
         }
-        thing
     }
 
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
+    /// Takes the number of `b` to be that of `a` and `difference`; known differences stay.
+    pub(crate) fn join(&mut self, a: u32, b: u32, difference: i32) {
+        let ((a, of_a), (b, of_b)) = (self.root(a), self.root(b));
+        let excess = of_a + difference - of_b;
+        let (low, high, excess) = if a < b { (a, b, excess) } else { (b, a, -excess) };
+        if low < high {
+            (self.above[high as usize], self.excess[high as usize]) = (low, excess);
+        }
     }
 }
 
@@ -78,13 +100,13 @@ impl Groups {
 pub(crate) fn components(edges: &[Edge], faces: usize) -> (Vec<u32>, usize) {
     let mut groups = Groups::new(faces);
     for edge in edges {
-        edge.uses.windows(2).for_each(|pair| groups.join(pair[0].face, pair[1].face));
+        edge.uses.windows(2).for_each(|pair| groups.join(pair[0].face, pair[1].face, 0));
     }
     let mut number = vec![u32::MAX; faces];
     let mut count = 0;
     let of = (0..faces as u32)
         .map(|f| {
-            let r = groups.root(f) as usize;
+            let r = groups.root(f).0 as usize;
             if number[r] == u32::MAX {
                 number[r] = count;
                 count += 1;
@@ -108,7 +130,7 @@ pub fn non_manifold_vertices(faces: &[[u32; 3]], edges: &[Edge]) -> Vec<u32> {
             3 * u.face + u32::from(corner)
         };
         for pair in edge.uses.windows(2) {
-            (0..2).for_each(|end| corners.join(at(&pair[0], end), at(&pair[1], end)));
+            (0..2).for_each(|end| corners.join(at(&pair[0], end), at(&pair[1], end), 0));
         }
     }
     let mut fans: Vec<u32> = faces
@@ -116,7 +138,7 @@ pub fn non_manifold_vertices(faces: &[[u32; 3]], edges: &[Edge]) -> Vec<u32> {
         .enumerate()
         .filter(|(_, face)| !is_collapsed(face))
         .flat_map(|(f, face)| [0, 1, 2].map(|k| (3 * f as u32 + k, face[k as usize])))
-        .filter_map(|(corner, vertex)| (corners.root(corner) == corner).then_some(vertex))
+        .filter_map(|(corner, vertex)| (corners.root(corner).0 == corner).then_some(vertex))
         .collect();
     fans.sort_unstable();
     let mut touching: Vec<u32> =

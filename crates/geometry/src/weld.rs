@@ -14,6 +14,12 @@ pub(crate) fn is_finite(v: &Point3<f64>) -> bool {
     v.iter().all(|c| c.is_finite())
 }
 
+/// Equal for equal positions alone.
+pub(crate) fn position_bits(v: &Point3<f64>) -> Vector3<u64> {
+    // Adding zero makes one of the two zeros.
+    v.coords.map(|c| (c + 0.0).to_bits())
+}
+
 fn finite_bounds(vertices: &[Point3<f64>]) -> Bounds {
     Bounds::of(vertices.iter().filter(|v| is_finite(v)))
 }
@@ -33,9 +39,7 @@ impl Weld {
         let mut known = HashMap::with_capacity(vertices.len());
         let mut weld = Self { positions: Vec::new(), index: Vec::with_capacity(vertices.len()) };
         for v in vertices {
-            // Adding zero makes one of the two zeros.
-            let bits = v.coords.map(|c| (c + 0.0).to_bits());
-            weld.index.push(*known.entry(bits).or_insert_with(|| {
+            weld.index.push(*known.entry(position_bits(v)).or_insert_with(|| {
                 weld.positions.push(*v);
                 weld.positions.len() as u32 - 1
             }));

@@ -44,7 +44,7 @@ pub fn register_depth(
         let place = depth_camera.unproject(x as f64, y as f64, f64::from(measured));
         let place = t_cam_depth * place;
         let seen = camera.project(&place)?;
-        Some(Corner { measured, seen: Vector3::new(seen.x, seen.y, 1.0 / place.z) })
+        Some(PixelCorner { measured, seen: Vector3::new(seen.x, seen.y, 1.0 / place.z) })
     };
     let line = |y: usize| (0..width).map(move |x| corner(x, y)).collect::<Vec<_>>();
     let mut above = line(0);
@@ -76,14 +76,14 @@ pub fn register_depth(
 }
 
 /// A measured pixel.
-struct Corner {
+struct PixelCorner {
     /// Its depth \[m\].
     measured: f32,
     /// Its column, its row and the inverse of its depth \[1/m\] in the other image.
     seen: Vector3<f64>,
 }
 
-impl Corner {
+impl PixelCorner {
     /// Draws the pixel that it falls on.
     fn draw(&self, image: &mut DepthImage) {
         let (x, y) = (self.seen.x.round(), self.seen.y.round());
@@ -94,7 +94,7 @@ impl Corner {
 }
 
 /// Draws the surface between three corners, if it is one.
-fn draw_triangle(corners: [&Corner; 3], image: &mut DepthImage) {
+fn draw_triangle(corners: [&PixelCorner; 3], image: &mut DepthImage) {
     let depths = corners.map(|corner| corner.measured);
     let nearest = depths.iter().copied().fold(f32::INFINITY, f32::min);
     let farthest = depths.iter().copied().fold(0.0, f32::max);

@@ -66,7 +66,7 @@ pub fn render_scene(
     // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
     let posed: Vec<Posed<'_>> =
         bodies.iter().map(|(model, pose)| Posed::new(model, &fine, pose, 0.0)).collect();
-    let nearest = Nearest::new(&posed, samples);
+    let nearest = NearestFaces::new(&posed, samples);
     let Region { x0, y0, x1, y1 } = nearest.region;
     let (inside_x, inside_y) = (x0 / samples..x1 / samples, y0 / samples..y1 / samples);
     let pixel = |x: usize, y: usize| {
@@ -128,8 +128,8 @@ fn point(posed: &Posed, face: u32, at: Vec2) -> SurfacePoint<f32> {
     }
 }
 
-/// Nearest face of each sample.
-struct Nearest {
+/// NearestFaces face of each sample.
+struct NearestFaces {
     /// The samples looked at: whole pixels.
     region: Region,
     inverse_z: Vec<f32>,
@@ -137,7 +137,7 @@ struct Nearest {
     face: Vec<u32>,
 }
 
-impl Nearest {
+impl NearestFaces {
     fn new(bodies: &[Posed], samples: usize) -> Self {
         let all = bodies.iter().map(|body| body.projected.region);
         let Region { x0, y0, x1, y1 } = all.fold(Region::EMPTY, |a, b| a.union(&b));

@@ -48,13 +48,13 @@ fn join_plain(mut parts: Vec<Part>) -> TriMesh {
 }
 
 /// An image as often beside and above itself as texture coordinates reach: whole numbers along u and v.
-struct Tile {
+struct TiledImage {
     image: Arc<Texture>,
     low: [f32; 2],
     high: [f32; 2],
 }
 
-impl Tile {
+impl TiledImage {
     fn of(image: Arc<Texture>, uvs: &[[f32; 2]]) -> Self {
         let mut tile = Self { image, low: [0.0; 2], high: [1.0; 2] };
         for (k, c) in uvs.iter().flat_map(|uv| uv.iter().enumerate()) {
@@ -82,11 +82,11 @@ impl Tile {
 /// Stacks the images of `parts` from the top down, each within a border of repeated pixels so that filtering does
 /// not mix neighbors, and moves the UVs along.
 fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>> {
-    let mut tiles: Vec<Tile> = Vec::new();
+    let mut tiles: Vec<TiledImage> = Vec::new();
     let mut tile_of = Vec::new();
     for part in &mut parts {
         let painted = part.texture.clone().zip(part.mesh.uvs.as_ref());
-        let tile = match painted.map(|(image, uvs)| Tile::of(image, uvs)) {
+        let tile = match painted.map(|(image, uvs)| TiledImage::of(image, uvs)) {
             Some(tile) if tile.size().iter().product::<usize>() <= MAX_PIXELS => tile,
             other => {
                 if other.is_some() {
@@ -95,7 +95,7 @@ fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>> {
                 }
                 part.mesh.uvs = Some(vec![[0.5; 2]; part.mesh.vertices.len()]);
                 let pixel = part.color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
-                Tile::of(Arc::new(Texture { width: 1, height: 1, pixels: vec![pixel] }), &[])
+                TiledImage::of(Arc::new(Texture { width: 1, height: 1, pixels: vec![pixel] }), &[])
             }
         };
         let known = tiles.iter().position(|own| own.is(&tile));
@@ -122,7 +122,7 @@ fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>> {
     }
     let atlas = Arc::new(Texture { width, height, pixels });
     for (part, tile) in parts.iter_mut().zip(tile_of) {
-        let Tile { image, low, high } = &tiles[tile];
+        let TiledImage { image, low, high } = &tiles[tile];
         let (w, h) = (image.width as f32, image.height as f32);
         for uv in part.mesh.uvs.iter_mut().flatten() {
             let from_top = top[tile] as f32 + 1.0 + (high[1] - uv[1]) * h;

@@ -7,9 +7,10 @@
 use std::path::PathBuf;
 
 use nalgebra::{Point3, Vector3};
-use urdf_rs::Geometry;
+use roxmltree::Node;
 
-use super::{Result, RobotError, origin};
+use super::urdf_reader::UrdfReader;
+use super::{Result, RobotError};
 use crate::closest;
 use crate::io::folder::{Folder, percent_decoded};
 use crate::io::load_shape;
@@ -20,20 +21,20 @@ use crate::shapes;
 /// Columns of facets around a cylinder, a capsule or a sphere.
 pub(super) const COLUMNS: usize = 48;
 
-/// One mesh a collision tag of `link`, in the link frame \[m\].
+/// One mesh a collision tag of the link `node`, in the link frame \[m\].
 pub(super) fn parts(
-    link: &urdf_rs::Link,
+    reader: &mut UrdfReader,
+    node: Node<'_, '_>,
     folder: Option<&Folder>,
     options: &ReadOptions,
-    warnings: &mut Vec<String>,
 ) -> Result<Vec<TriMesh>> {
-    let owner = || format!("link '{}'", link.name);
-    let mut parts = Vec::with_capacity(link.collision.len());
-    for collision in &link.collision {
-        let t_link_part = origin::isometry(&owner, &collision.origin)?;
-        match geometry(&link.name, &collision.geometry, folder, options) {
+    let link = node.attribute("name").unwrap_or_default();
+    let mut parts = Vec::new();
+    for collision in node.children().filter(|c| c.has_tag_name("collision")) {
+        let t_link_part = reader.origin(collision)?;
+        match geometry(reader, link, collision, folder, options) {
             Ok(mesh) => parts.push(mesh.transformed(&t_link_part)),
-            Err(error) if options.partial => warnings.push(format!("{error}: left out")),
+            Err(error) if options.partial => reader.warnings.push(format!("{error}: left out")),
             Err(error) => return Err(error),
         }
     }
@@ -41,11 +42,22 @@ pub(super) fn parts(
 }
 
 fn geometry(
+    reader: &mut UrdfReader,
     link: &str,
-    geometry: &Geometry,
+    collision: Node<'_, '_>,
     folder: Option<&Folder>,
     options: &ReadOptions,
 ) -> Result<TriMesh> {
+    let shape = reader.first(collision, "geometry").and_then(|g| g.first_element_child());
+    let unsupported = |kind: &str| RobotError::Shape {
+        link: link.to_owned(),
+        reason: format!("collision shapes of the kind '{kind}' are not supported"),
+    };
+    let shape = shape.ok_or_else(|| unsupported(""))?;
+    // Absent ones are no size, either.
+    let size = |reader: &UrdfReader, field: &str| -> Result<f64> {
+        Ok(reader.number(shape, field)?.unwrap_or(f64::NAN))
+    };
     let positive = |field: &'static str, sizes: &[f64]| {
         if sizes.iter().all(|s| s.is_finite() && *s > 0.0) {
             return Ok(());
@@ -53,27 +65,33 @@ fn geometry(
         let owner = format!("link '{link}'");
         Err(RobotError::Number { owner, field, requirement: "must be finite and positive" })
     };
-    match geometry {
-        Geometry::Box { size } => {
-            positive("box size", &size.0)?;
-            Ok(shapes::cuboid(Vector3::from(size.0)).welded())
+    match shape.tag_name().name() {
+        "box" => {
+            let size = reader.three(shape, "size")?.unwrap_or([f64::NAN; 3]);
+            positive("box size", &size)?;
+            Ok(shapes::cuboid(Vector3::from(size)).welded())
         }
-        Geometry::Cylinder { radius, length } => {
-            positive("cylinder size", &[*radius, *length])?;
-            Ok(shapes::cylinder(*radius, *length, COLUMNS).welded())
+        "sphere" => {
+            let radius = size(reader, "radius")?;
+            positive("sphere radius", &[radius])?;
+            Ok(shapes::sphere(radius, COLUMNS).welded())
         }
-        Geometry::Capsule { radius, length } => {
-            positive("capsule size", &[*radius, *length])?;
-            Ok(shapes::capsule(*radius, 0.5 * length, COLUMNS, COLUMNS / 4).welded())
+        kind @ ("cylinder" | "capsule") => {
+            let [radius, length] = [size(reader, "radius")?, size(reader, "length")?];
+            let is_capsule = kind == "capsule";
+            positive(if is_capsule { "capsule size" } else { "cylinder size" }, &[radius, length])?;
+            Ok(if is_capsule {
+                shapes::capsule(radius, 0.5 * length, COLUMNS, COLUMNS / 4).welded()
+            } else {
+                shapes::cylinder(radius, length, COLUMNS).welded()
+            })
         }
-        Geometry::Sphere { radius } => {
-            positive("sphere radius", &[*radius])?;
-            Ok(shapes::sphere(*radius, COLUMNS).welded())
-        }
-        Geometry::Mesh { filename, scale } => {
+        "mesh" => {
+            let filename = reader.text(shape, "filename")?;
+            let scale = reader.three(shape, "scale")?.unwrap_or([1.0; 3]);
             let error = |reason: String| RobotError::Mesh {
                 link: link.into(),
-                file: filename.clone(),
+                file: filename.to_owned(),
                 reason,
             };
             let named = |name: &str| resolve(name, folder, options);
@@ -82,7 +100,6 @@ fn geometry(
                 .map_err(error)?;
             let loaded = load_shape(&path).map_err(|e| error(e.to_string()))?;
             let mut mesh = TriMesh::new(loaded.vertices, loaded.faces);
-            let scale = scale.map_or([1.0; 3], |s| s.0);
             if !scale.iter().all(|s| s.is_finite() && *s != 0.0) {
                 return Err(error("scale must be finite and not zero".into()));
             }
@@ -97,6 +114,7 @@ fn geometry(
             }
             Ok(mesh)
         }
+        other => Err(unsupported(other)),
     }
 }
 

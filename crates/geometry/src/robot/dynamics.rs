@@ -1,32 +1,50 @@
 //! Mass and inertia of links, and damping, friction, speed and effort limits of joints, from URDF.
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::{Matrix3, Point3, Vector3};
+use roxmltree::Node;
 
-use super::origin::{finite, isometry};
+use super::urdf_reader::{UrdfReader, finite};
 use super::{Link, Result, RobotError};
 use crate::inertial::Inertial;
 use crate::mass::mass_properties;
 use crate::read_options::ReadOptions;
 
-/// Mass and inertia of `link` in its frame; `None` without an `inertial` tag, and where it is at the origin and all zeros, which
-/// reads the same.
-pub(super) fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>> {
-    let owner = || format!("link '{}'", link.name);
-    let urdf_rs::Inertial { origin, mass, inertia } = &link.inertial;
-    let urdf_rs::Inertia { ixx, ixy, ixz, iyy, iyz, izz } = *inertia;
-    let moments = [ixx, ixy, ixz, iyy, iyz, izz];
-    finite(&owner, "inertial mass", &[mass.value])?;
-    finite(&owner, "inertia", &moments)?;
-    if mass.value < 0.0 {
-        let (field, requirement) = ("inertial mass", "must not be negative");
-        return Err(RobotError::Number { owner: owner(), field, requirement });
+/// Mass and inertia of the link `node` in its frame; `None` without an `inertial` tag, and where it is at the origin and all
+/// zeros.
+pub(super) fn inertial(reader: &mut UrdfReader, node: Node<'_, '_>) -> Result<Option<Inertial>> {
+    let Some(node) = reader.first(node, "inertial") else { return Ok(None) };
+    let t_link_inertial = reader.origin(node)?;
+    let mass = match reader.first(node, "mass") {
+        Some(mass) => reader.number(mass, "value")?,
+        None => None,
+    };
+    if mass.is_none() {
+        reader.warn("its inertial has no mass: zero is taken");
     }
-    let t_link_inertial = isometry(&owner, origin)?;
-    if mass.value == 0.0 && moments == [0.0; 6] && origin.xyz.0 == [0.0; 3] {
+    let mass = mass.unwrap_or(0.0);
+    let (inertia, mut moments, mut missing) = (reader.first(node, "inertia"), [0.0; 6], Vec::new());
+    for (moment, field) in moments.iter_mut().zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]) {
+        match inertia.map(|inertia| reader.number(inertia, field)).transpose()?.flatten() {
+            Some(given) => *moment = given,
+            None => missing.push(field),
+        }
+    }
+    if !missing.is_empty() {
+        reader.warn(format!("its inertia has no {}: zero is taken", missing.join(", ")));
+    }
+    finite(&reader.owner, "inertial mass", &[mass])?;
+    finite(&reader.owner, "inertia", &moments)?;
+    if mass < 0.0 {
+        let (field, requirement) = ("inertial mass", "must not be negative");
+        return Err(RobotError::Number { owner: reader.owner.clone(), field, requirement });
+    }
+    let at_origin = t_link_inertial.translation.vector == Vector3::zeros();
+    if mass == 0.0 && moments == [0.0; 6] && at_origin {
         return Ok(None);
     }
+    let [ixx, ixy, ixz, iyy, iyz, izz] = moments;
     let inertia = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
-    let inertial = Inertial { mass: mass.value, com: Point3::origin(), inertia };
+    let inertial = Inertial { mass, com: Point3::origin(), inertia };
     Ok(Some(inertial.moved(&t_link_inertial)))
 }
 
@@ -59,25 +77,26 @@ fn is_possible(inertial: &Inertial) -> bool {
     is_extended && moments.min() >= -1e-9 * most.abs() && 2.0 * most <= sum * (1.0 + 1e-6)
 }
 
-/// Damping and dry friction of `joint`; `None` without a `dynamics` tag.
-pub(super) fn damping_and_friction(joint: &urdf_rs::Joint) -> Result<Option<(f64, f64)>> {
-    let Some(dynamics) = &joint.dynamics else { return Ok(None) };
-    let owner = || format!("joint '{}'", joint.name);
-    finite(&owner, "damping", &[dynamics.damping])?;
-    finite(&owner, "friction", &[dynamics.friction])?;
-    Ok(Some((dynamics.damping, dynamics.friction)))
+/// Damping and dry friction of the joint `node`; `None` without a `dynamics` tag.
+pub(super) fn damping_and_friction(
+    reader: &mut UrdfReader,
+    node: Node<'_, '_>,
+) -> Result<[Option<f64>; 2]> {
+    let Some(dynamics) = reader.first(node, "dynamics") else { return Ok([None; 2]) };
+    let number = |field: &'static str| -> Result<Option<f64>> {
+        let number = reader.number(dynamics, field)?.unwrap_or(0.0);
+        finite(&reader.owner, field, &[number])?;
+        Ok(Some(number))
+    };
+    Ok([number("damping")?, number("friction")?])
 }
 
 /// A limit of speed or effort. Zero is what stands where the tag or the attribute is missing, and a joint of no strength or
 /// speed is none; since URDF 1.2 it is infinity.
-pub(super) fn limit(
-    joint: &urdf_rs::Joint,
-    field: &'static str,
-    value: f64,
-) -> Result<Option<f64>> {
+pub(super) fn limit(owner: &str, field: &'static str, value: f64) -> Result<Option<f64>> {
     if value.is_nan() {
-        let owner = format!("joint '{}'", joint.name);
-        return Err(RobotError::Number { owner, field, requirement: "must be a number" });
+        let requirement = "must be a number";
+        return Err(RobotError::Number { owner: owner.into(), field, requirement });
     }
     Ok((value > 0.0 && value.is_finite()).then_some(value))
 }
@@ -86,7 +105,6 @@ pub(super) fn limit(
 mod tests {
     use super::super::KinematicTree;
     use super::*;
-    use nalgebra::Vector3;
 
     fn read(link: &str, joint: &str) -> Result<KinematicTree, String> {
         let xml = format!(

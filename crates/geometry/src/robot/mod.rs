@@ -6,15 +6,14 @@ mod collision;
 mod dynamics;
 mod error;
 mod kinematics;
-mod lenient;
 mod limits;
 mod mjcf;
-mod origin;
 mod posed;
 mod screw;
 mod shape;
 mod tree;
 mod urdf;
+mod urdf_reader;
 
 use std::collections::BTreeMap;
 

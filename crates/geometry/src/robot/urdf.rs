@@ -1,16 +1,16 @@
 //! From URDF text to a [`KinematicTree`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
 
-use nalgebra::{Unit, Vector3};
-use urdf_rs::JointType;
+use nalgebra::{Isometry3, Unit, Vector3};
+use roxmltree::Node;
 
-use super::origin::{finite, isometry};
+use super::urdf_reader::{UrdfReader, finite, parse};
 use super::{
-    Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, collision, dynamics, lenient,
-    limits, tree,
+    Drive, Joint, KinematicTree, Link, Motion, Result, RobotError, collision, dynamics, limits,
+    tree,
 };
 use crate::io::folder::Folder;
 use crate::io::read_plain;
@@ -54,98 +54,75 @@ impl KinematicTree {
 
     fn from_urdf(xml: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result<Self> {
         check_size(xml)?;
-        let (xml, mut warnings) = lenient::put_right(xml.trim_start(), options.partial)?;
-        let urdf = urdf_rs::read_from_string(&xml)
-            .map_err(|error| RobotError::Urdf { message: error.to_string() })?;
-        if urdf.links.is_empty() {
+        let document = parse(xml.trim_start())?;
+        let robot = document.root_element();
+        let (mut links, mut tags) = (Vec::new(), Vec::new());
+        let mut reader = UrdfReader::default();
+        for node in robot.children().filter(Node::is_element) {
+            let name = node.attribute("name").unwrap_or_default();
+            reader.owner = format!("{} '{name}'", node.tag_name().name());
+            match node.tag_name().name() {
+                "link" => {
+                    let inertial = dynamics::inertial(&mut reader, node)?;
+                    let parts = collision::parts(&mut reader, node, folder, options)?;
+                    let mut link = Link { name: name.into(), parts, inertial };
+                    dynamics::judge(&mut link, options, &mut reader.warnings);
+                    links.push(link);
+                }
+                "joint" => tags.push(JointTag::read(&mut reader, node)?),
+                _ => {}
+            }
+        }
+        if links.is_empty() {
             return Err(RobotError::Urdf { message: "the robot has no links".into() });
         }
-        tree::unique("link", urdf.links.iter().map(|l| &l.name))?;
-        tree::unique("joint", urdf.joints.iter().map(|j| &j.name))?;
-        let links = urdf
-            .links
-            .iter()
-            .map(|l| {
-                let (parts, inertial) =
-                    (collision::parts(l, folder, options, &mut warnings)?, dynamics::inertial(l)?);
-                let mut link = Link { name: l.name.clone(), parts, inertial };
-                dynamics::judge(&mut link, options, &mut warnings);
-                Ok(link)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let variables: Vec<String> = urdf
-            .joints
-            .iter()
-            .filter(|j| j.joint_type != JointType::Fixed && j.mimic.is_none())
-            .map(|j| j.name.clone())
-            .collect();
-        let by_name: BTreeMap<&str, &urdf_rs::Joint> =
-            urdf.joints.iter().map(|j| (j.name.as_str(), j)).collect();
-        let link_index = |joint: &urdf_rs::Joint, link: &str| {
+        let mut warnings = reader.warnings;
+        if options.partial {
+            let names: BTreeSet<String> = tags.iter().map(|tag| tag.name.clone()).collect();
+            for JointTag { name, mimic, .. } in &mut tags {
+                if let Some(gone) = mimic.take_if(|mimic| !names.contains(&mimic.leader)) {
+                    let what = format!("there is no joint '{}' that it could mimic", gone.leader);
+                    warnings.push(format!("joint '{name}': {what}: left out"));
+                }
+            }
+        }
+        tree::unique("link", links.iter().map(|l| &l.name))?;
+        tree::unique("joint", tags.iter().map(|j| &j.name))?;
+        let movers = tags.iter().filter(|j| j.motion != Motion::Fixed && j.mimic.is_none());
+        let variables: Vec<String> = movers.map(|j| j.name.clone()).collect();
+        let by_name: BTreeMap<&str, &JointTag> =
+            tags.iter().map(|tag| (tag.name.as_str(), tag)).collect();
+        let link_index = |joint: &str, link: &str| {
             links.iter().position(|l| l.name == link).ok_or_else(|| {
-                let joint = &joint.name;
                 RobotError::structure(format!(
                     "joint '{joint}' refers to link '{link}', which does not exist"
                 ))
             })
         };
-        let joints = urdf
-            .joints
-            .iter()
-            .map(|j| {
-                let owner = || format!("joint '{}'", j.name);
-                let motion = motion(j)?;
-                let axis = Vector3::from(j.axis.xyz.0);
-                let axis = if motion == Motion::Fixed {
-                    Vector3::x_axis()
-                } else {
-                    finite(&owner, "axis", &j.axis.xyz.0)?;
-                    Unit::try_new(axis, 1e-9).ok_or_else(|| RobotError::Number {
-                        owner: owner(),
-                        field: "axis",
-                        requirement: "must not be zero",
-                    })?
-                };
-                let limits = match j.joint_type {
-                    JointType::Revolute | JointType::Prismatic => {
-                        let l = &j.limit;
-                        if l.lower.is_nan() || l.upper.is_nan() {
-                            return Err(RobotError::Number {
-                                owner: owner(),
-                                field: "limit",
-                                requirement: "must be a number",
-                            });
-                        }
-                        // Against the format, some descriptions lack the tag: no limit is meant, not a joint that
-                        // cannot move.
-                        let absent = [l.lower, l.upper, l.effort, l.velocity] == [0.0; 4]
-                            || (l.lower, l.upper) == (f64::NEG_INFINITY, f64::INFINITY);
-                        (!absent).then_some((l.lower, l.upper))
-                    }
-                    _ => None,
-                };
-                let dynamics = dynamics::damping_and_friction(j)?;
-                Ok(Joint {
-                    name: j.name.clone(),
-                    motion,
-                    parent: link_index(j, &j.parent.link)?,
-                    child: link_index(j, &j.child.link)?,
-                    t_parent_joint: isometry(&owner, &j.origin)?,
-                    axis,
-                    limits,
-                    drive: drive(j, &by_name, &variables)?,
-                    damping: dynamics.map(|(damping, _)| damping),
-                    friction: dynamics.map(|(_, friction)| friction),
-                    velocity_limit: dynamics::limit(j, "limit velocity", j.limit.velocity)?,
-                    effort_limit: dynamics::limit(j, "limit effort", j.limit.effort)?,
-                })
+        let joint = |tag: &JointTag| {
+            let [damping, friction] = tag.damping_and_friction;
+            let [velocity_limit, effort_limit] = tag.speed_and_effort;
+            Ok(Joint {
+                name: tag.name.clone(),
+                motion: tag.motion,
+                parent: link_index(&tag.name, &tag.links[0])?,
+                child: link_index(&tag.name, &tag.links[1])?,
+                t_parent_joint: tag.origin,
+                axis: tag.axis,
+                limits: tag.limits,
+                drive: drive(tag, &by_name, &variables)?,
+                damping,
+                friction,
+                velocity_limit,
+                effort_limit,
             })
-            .collect::<Result<Vec<_>>>()?;
+        };
+        let joints = tags.iter().map(joint).collect::<Result<Vec<_>>>()?;
         let (order, root) = tree::order(&links, &joints)?;
         let ranges = limits::ranges(&joints, &variables)?;
         let floating = Vec::new();
         Ok(Self {
-            name: urdf.name,
+            name: robot.attribute("name").unwrap_or_default().into(),
             links,
             joints,
             order,
@@ -199,27 +176,114 @@ fn tag_end(text: &str) -> Option<usize> {
     })
 }
 
-fn motion(joint: &urdf_rs::Joint) -> Result<Motion> {
-    match joint.joint_type {
-        JointType::Fixed => Ok(Motion::Fixed),
-        JointType::Revolute | JointType::Continuous => Ok(Motion::Revolute),
-        JointType::Prismatic => Ok(Motion::Prismatic),
-        JointType::Floating | JointType::Planar | JointType::Spherical => {
-            Err(RobotError::UnsupportedJoint {
-                joint: joint.name.clone(),
-                kind: format!("{:?}", joint.joint_type).to_lowercase(),
-            })
+/// A joint as its element describes it.
+struct JointTag {
+    name: String,
+    motion: Motion,
+    /// Names of the parent and the child.
+    links: [String; 2],
+    origin: Isometry3<f64>,
+    axis: Unit<Vector3<f64>>,
+    limits: Option<(f64, f64)>,
+    speed_and_effort: [Option<f64>; 2],
+    damping_and_friction: [Option<f64>; 2],
+    mimic: Option<MimicTag>,
+}
+
+/// Position of the joint `leader` times a number and plus another.
+struct MimicTag {
+    leader: String,
+    multiplier: f64,
+    offset: f64,
+}
+
+impl JointTag {
+    fn read(reader: &mut UrdfReader, node: Node<'_, '_>) -> Result<Self> {
+        let [name, kind] = ["name", "type"].map(|f| node.attribute(f).unwrap_or_default());
+        let owner = reader.owner.clone();
+        let motion = match kind {
+            "fixed" => Motion::Fixed,
+            "revolute" | "continuous" => Motion::Revolute,
+            "prismatic" => Motion::Prismatic,
+            _ => {
+                let joint = name.to_owned();
+                return Err(RobotError::UnsupportedJoint { joint, kind: kind.into() });
+            }
+        };
+        let origin = reader.origin(node)?;
+        let mut link = |tag| match reader.first(node, tag) {
+            Some(link) => reader.text(link, "link").map(str::to_owned),
+            None => Err(RobotError::Urdf { message: format!("{owner}: it has no {tag}") }),
+        };
+        let links = [link("parent")?, link("child")?];
+        let axis = match reader.first(node, "axis") {
+            Some(axis) => reader.three(axis, "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
+            None => [1.0, 0.0, 0.0],
+        };
+        let axis = if motion == Motion::Fixed {
+            Vector3::x_axis()
+        } else {
+            finite(&owner, "axis", &axis)?;
+            Unit::try_new(Vector3::from(axis), 1e-9).ok_or_else(|| RobotError::Number {
+                owner: owner.clone(),
+                field: "axis",
+                requirement: "must not be zero",
+            })?
+        };
+        let limit = reader.first(node, "limit");
+        let number = |field: &str| -> Result<f64> {
+            let given = limit.map(|limit| reader.number(limit, field)).transpose()?;
+            Ok(given.flatten().unwrap_or(0.0))
+        };
+        let [lower, upper, effort, velocity] =
+            [number("lower")?, number("upper")?, number("effort")?, number("velocity")?];
+        let has_limits = matches!(kind, "revolute" | "prismatic");
+        if has_limits && (lower.is_nan() || upper.is_nan()) {
+            let (field, requirement) = ("limit", "must be a number");
+            return Err(RobotError::Number { owner, field, requirement });
         }
+        if lower > upper {
+            reader.warn(format!(
+                "its limits are from {lower} to {upper}, upside down: none is taken"
+            ));
+        }
+        // Against the format, some descriptions lack the tag: no limit is meant, not a joint that cannot move.
+        let absent = [lower, upper, effort, velocity] == [0.0; 4]
+            || (lower, upper) == (f64::NEG_INFINITY, f64::INFINITY);
+        let damping_and_friction = dynamics::damping_and_friction(reader, node)?;
+        let speed_and_effort = [
+            dynamics::limit(&owner, "limit velocity", velocity)?,
+            dynamics::limit(&owner, "limit effort", effort)?,
+        ];
+        let mimic = match reader.first(node, "mimic") {
+            Some(mimic) => Some(MimicTag {
+                leader: reader.text(mimic, "joint")?.to_owned(),
+                multiplier: reader.number(mimic, "multiplier")?.unwrap_or(1.0),
+                offset: reader.number(mimic, "offset")?.unwrap_or(0.0),
+            }),
+            None => None,
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            motion,
+            links,
+            origin,
+            axis,
+            limits: (has_limits && !absent && lower <= upper).then_some((lower, upper)),
+            speed_and_effort,
+            damping_and_friction,
+            mimic,
+        })
     }
 }
 
 /// Follows mimic tags to the joint that moves on its own, multiplying and adding along the way.
 fn drive(
-    joint: &urdf_rs::Joint,
-    by_name: &BTreeMap<&str, &urdf_rs::Joint>,
+    joint: &JointTag,
+    by_name: &BTreeMap<&str, &JointTag>,
     variables: &[String],
 ) -> Result<Drive> {
-    if joint.joint_type == JointType::Fixed {
+    if joint.motion == Motion::Fixed {
         return Ok(Drive::None);
     }
     let (mut multiplier, mut offset) = (1.0, 0.0);
@@ -235,12 +299,12 @@ fn drive(
                 }),
             };
         };
-        let (m, o) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
-        finite(&|| format!("joint '{}'", current.name), "mimic", &[m, o])?;
-        offset += multiplier * o;
-        multiplier *= m;
-        current = by_name.get(mimic.joint.as_str()).ok_or_else(|| RobotError::UnknownJoint {
-            joint: mimic.joint.clone(),
+        let owner = format!("joint '{}'", current.name);
+        finite(&owner, "mimic", &[mimic.multiplier, mimic.offset])?;
+        offset += multiplier * mimic.offset;
+        multiplier *= mimic.multiplier;
+        current = by_name.get(mimic.leader.as_str()).ok_or_else(|| RobotError::UnknownJoint {
+            joint: mimic.leader.clone(),
             by: format!("the mimic tag of joint '{}'", current.name),
         })?;
     }

@@ -4,7 +4,8 @@ use std::cell::Cell;
 
 use nalgebra::Point3;
 
-use super::chain::{Chain, SIDES};
+use super::chain::{Chain, NearFaces, SIDES};
+use super::winding::windings;
 use crate::predicates::{Plane, Side, edges_turn};
 
 /// Where an edge of one surface pierces a face of the other.
@@ -41,6 +42,10 @@ pub(super) struct FaceSegment {
 /// How the other surface lies to one of the two.
 #[derive(Debug)]
 pub(super) struct FaceCut {
+    /// Faces that share a point with the bounds of the other surface, in increasing order.
+    pub(super) faces: Vec<u32>,
+    /// For each of `faces`, whether its box meets that of a face of the other surface.
+    pub(super) met: Vec<bool>,
     /// Crossings of the sides of faces, by side, and in the order in which the side meets them.
     pub(super) crossings: Vec<EdgeCrossing>,
     /// How often the other surface winds about each vertex.
@@ -57,31 +62,48 @@ pub(super) struct Arrangement {
 impl Arrangement {
     /// Crosses `a` with `b`, which is moved infinitesimally where they only touch (see `crate::predicates`).
     pub(super) fn new(a: &Chain, b: &Chain) -> Self {
+        let regions = [a.region(&b.bounds), b.region(&a.bounds)];
+        let mut met = regions.each_ref().map(|region| vec![false; region.faces.len()]);
         let mut crossings = [Vec::new(), Vec::new()];
         let mut segments = Vec::new();
-        a.tree.each_meeting(&b.tree, |i, j| {
-            if let Some(found) = meet([a, b], [i, j], &mut crossings) {
-                segments.push(found);
-            }
+        regions[0].tree.each_meeting(&regions[1].tree, |i, j| {
+            (met[0][i], met[1][j]) = (true, true);
+            let faces = [regions[0].faces[i], regions[1].faces[j]];
+            segments.extend(meet([a, b], faces.map(|f| f as usize), &mut crossings));
         });
+        let [met_a, met_b] = met;
         let [of_a, of_b] = crossings;
-        Self { cuts: [cut(a, b, of_a, false), cut(b, a, of_b, true)], segments }
+        let [near_a, near_b] = regions;
+        let cuts = [cut(a, b, near_a, met_a, of_a, false), cut(b, a, near_b, met_b, of_b, true)];
+        Self { cuts, segments }
     }
 }
 
-fn cut(own: &Chain, other: &Chain, mut crossings: Vec<EdgeCrossing>, other_is_a: bool) -> FaceCut {
+fn cut(
+    own: &Chain,
+    other: &Chain,
+    region: NearFaces,
+    met: Vec<bool>,
+    mut crossings: Vec<EdgeCrossing>,
+    other_is_a: bool,
+) -> FaceCut {
     crossings.sort_unstable_by(|x, y| {
         // Both faces at an edge must agree on the order along it, also where points fall together.
         let order = x.along.total_cmp(&y.along).then(x.at.key.2.cmp(&y.at.key.2));
         let [from, to] = own.side(x.side);
         x.side.cmp(&y.side).then(if from < to { order } else { order.reverse() })
     });
-    let mut change = vec![0; 3 * own.faces.len()];
-    for crossing in &crossings {
-        change[crossing.side as usize] += crossing.change;
-    }
-    let windings = own.windings(other, &change, other_is_a);
-    FaceCut { crossings, windings }
+    let windings = windings(own, &region, other, &crossings, other_is_a);
+    FaceCut { faces: region.faces, met, crossings, windings }
+}
+
+/// Takes the crossings of the sides of `face` off the front of `crossings`.
+pub(super) fn crossings_of<'a>(
+    face: u32,
+    crossings: &mut &'a [EdgeCrossing],
+) -> &'a [EdgeCrossing] {
+    let count = crossings.iter().take_while(|c| c.side / 3 == face).count();
+    crossings.split_off(..count).unwrap_or_default()
 }
 
 /// Crosses face `i` of the first surface with face `j` of the second.

@@ -1,8 +1,9 @@
-//! A closed surface prepared for meeting another.
+//! A closed surface and the parts of it that matter to another.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::box_tree::{Bounds, BoxTree};
+use crate::mesh::TriMesh;
 use crate::predicates::Plane;
 
 /// Closed surfaces, taken as a chain: what counts is how often they wind about a point.
@@ -10,75 +11,76 @@ use crate::predicates::Plane;
 /// Nothing is asked of the faces but that along every edge as many run forward as back.
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
+    /// Positions \[m\], all of them used.
     pub(super) positions: Vec<Point3<f64>>,
     pub(super) faces: Vec<[u32; 3]>,
-    pub(super) tree: BoxTree,
-    /// A vertex of every connected piece.
-    roots: Vec<u32>,
-    /// The sides of faces that lead from the roots to all other vertices, every vertex after the one it is reached from.
-    steps: Vec<ChainStep>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct ChainStep {
-    from: u32,
-    to: u32,
-    /// The side of a face between them, three a face.
-    side: u32,
+    pub(super) bounds: Bounds,
 }
 
 /// The corners that the sides of a face join.
 pub(super) const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
+/// The faces of a chain that share a point with a box.
+pub(super) struct NearFaces {
+    /// For each vertex of the chain, the sides of the box beyond which it lies ([`Bounds::beyond`]).
+    pub(super) beyond: Vec<u8>,
+    /// Faces in increasing order.
+    pub(super) faces: Vec<u32>,
+    /// Boxes of `faces`, by their places there.
+    pub(super) tree: BoxTree,
+}
+
 impl Chain {
-    /// Faces whose corners differ, between positions that are all finite; at least one face.
-    pub(super) fn new(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Self {
-        let boxes: Vec<Bounds> = faces.iter().map(|f| bounds(&positions, f)).collect();
-        let tree = BoxTree::new(&boxes);
-        let (roots, steps) = spanning_forest(positions.len(), &faces);
-        Self { positions, faces, tree, roots, steps }
+    /// The surface of `faces` with the positions they use; corners of a face differ, and positions are all finite.
+    pub(super) fn new(
+        positions: &[Point3<f64>],
+        faces: impl IntoIterator<Item = [u32; 3]>,
+    ) -> Self {
+        let TriMesh { vertices, faces, .. } = TriMesh::compacted(positions, faces);
+        Self { bounds: Bounds::of(&vertices), positions: vertices, faces }
     }
 
     pub(super) fn triangle(&self, face: usize) -> [&Point3<f64>; 3] {
         self.faces[face].map(|v| &self.positions[v as usize])
     }
 
-    /// The vertices that a side of a face runs from and to.
+    /// The vertices that a side of a face, three a face, runs from and to.
     pub(super) fn side(&self, side: u32) -> [u32; 2] {
         SIDES[side as usize % 3].map(|corner| self.faces[side as usize / 3][corner])
     }
 
-    /// How often the surface winds about `point` of the other body; this is A where `is_a`.
-    pub(super) fn winding(&self, point: &Point3<f64>, is_a: bool) -> i32 {
-        let mut winding = 0;
-        self.tree.each(
-            |bounds| bounds.is_ahead_of(point),
-            |face| {
-                winding += Plane::new(self.triangle(face), is_a).along_x(point);
+    pub(super) fn region(&self, bounds: &Bounds) -> NearFaces {
+        let beyond: Vec<u8> = self.positions.iter().map(|p| bounds.beyond(p)).collect();
+        // A face apart from the box lies beyond one side of it with all corners.
+        let is_apart =
+            |f: &[u32; 3]| f.iter().fold(u8::MAX, |all, v| all & beyond[*v as usize]) != 0;
+        let near = self.faces.iter().enumerate().filter(|(_, f)| !is_apart(f));
+        let faces: Vec<u32> = near.map(|(f, _)| f as u32).collect();
+        let boxes: Vec<Bounds> =
+            faces.iter().map(|f| Bounds::of(self.triangle(*f as usize))).collect();
+        NearFaces { tree: BoxTree::new(&boxes), beyond, faces }
+    }
+
+    /// How often the surface winds about each of `points` of the other body; this is A where `is_a`.
+    pub(super) fn windings(&self, points: &[Point3<f64>], is_a: bool) -> Vec<i32> {
+        if points.is_empty() {
+            return Vec::new();
+        }
+        let mut beam = Bounds::of(points);
+        beam.high.x = f64::INFINITY;
+        let NearFaces { faces, tree, .. } = self.region(&beam);
+        let winding = |point: &Point3<f64>| {
+            let mut winding = 0;
+            let mut count = |i: usize| {
+                let triangle = self.triangle(faces[i] as usize);
+                winding += Plane::new(triangle, is_a).along_x(point);
                 true
-            },
-        );
-        winding
+            };
+            tree.each(|bounds| bounds.is_ahead_of(point), &mut count);
+            winding
+        };
+        points.iter().map(winding).collect()
     }
-
-    /// How often `other` winds about each vertex, given by how much that changes along every side of a face.
-    pub(super) fn windings(&self, other: &Self, change: &[i32], other_is_a: bool) -> Vec<i32> {
-        let mut windings = vec![0; self.positions.len()];
-        for &root in &self.roots {
-            windings[root as usize] = other.winding(&self.positions[root as usize], other_is_a);
-        }
-        for step in &self.steps {
-            let forward = self.side(step.side)[0] == step.from;
-            let change = change[step.side as usize];
-            windings[step.to as usize] =
-                windings[step.from as usize] + if forward { change } else { -change };
-        }
-        windings
-    }
-}
-
-fn bounds(positions: &[Point3<f64>], face: &[u32; 3]) -> Bounds {
-    Bounds::of(face.iter().map(|v| &positions[*v as usize]))
 }
 
 /// Volume under the faces \[m³\], of every part as often as they wind about it.
@@ -90,52 +92,4 @@ pub(super) fn volume(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> f64 {
         a.dot(&b.cross(&c)) / 6.0
     };
     faces.iter().map(of).sum()
-}
-
-fn spanning_forest(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<ChainStep>) {
-    // Sides at each vertex, by counting.
-    let mut start = vec![0_u32; vertices + 1];
-    for v in faces.iter().flatten() {
-        start[*v as usize + 1] += 2;
-    }
-    for v in 0..vertices {
-        start[v + 1] += start[v];
-    }
-    let mut place = start.clone();
-    let mut at = vec![0_u32; 6 * faces.len()];
-    for (f, face) in faces.iter().enumerate() {
-        for (k, corners) in SIDES.iter().enumerate() {
-            for corner in corners {
-                let place = &mut place[face[*corner] as usize];
-                at[*place as usize] = (3 * f + k) as u32;
-                *place += 1;
-            }
-        }
-    }
-    let mut seen = vec![false; vertices];
-    let (mut roots, mut steps) = (Vec::new(), Vec::with_capacity(vertices));
-    for root in 0..vertices {
-        // A vertex of no face bounds nothing.
-        if seen[root] || start[root] == start[root + 1] {
-            continue;
-        }
-        seen[root] = true;
-        roots.push(root as u32);
-        let mut next = steps.len();
-        let mut from = root as u32;
-        loop {
-            for &side in &at[start[from as usize] as usize..start[from as usize + 1] as usize] {
-                let face = faces[side as usize / 3];
-                let [a, b] = SIDES[side as usize % 3].map(|corner| face[corner]);
-                let to = if a == from { b } else { a };
-                if !seen[to as usize] {
-                    seen[to as usize] = true;
-                    steps.push(ChainStep { from, to, side });
-                }
-            }
-            let Some(step) = steps.get(next) else { break };
-            (from, next) = (step.to, next + 1);
-        }
-    }
-    (roots, steps)
 }

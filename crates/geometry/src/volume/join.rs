@@ -4,20 +4,22 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::arrangement::{Arrangement, FaceCut, Piercing};
+use super::arrangement::{Arrangement, FaceCut, Piercing, crossings_of};
 use super::chain::{Chain, SIDES};
 use super::polygon::fill;
-use crate::mesh::TriMesh;
 use crate::topology::is_collapsed;
+use crate::weld::position_bits;
 
 /// The surface that winds a + b − ab times about a point about which `a` and `b` wind a and b times.
 ///
 /// Each surface is taken 1 − w times where the other winds w times about it: once outside, not at all inside.
 /// Where rounding has let a surface cross itself, w may be any integer, and the result still closes.
+/// Faces whose boxes meet none of the other surface are taken over as they are.
 pub(super) fn union(a: &Chain, b: &Chain) -> Chain {
-    let offset = a.positions.len() as u32;
-    let mut points = Points { positions: a.positions.clone(), ids: HashMap::new() };
-    points.positions.extend_from_slice(&b.positions);
+    let offsets = [0, a.positions.len() as u32];
+    let positions = a.positions.iter().chain(&b.positions).copied().collect();
+    let mut points = Points { positions, ids: HashMap::new() };
+    let mut faces = UnionFaces { apart: Vec::new(), met: Vec::new() };
     let arrangement = Arrangement::new(a, b);
     let mut segments = [Vec::new(), Vec::new()];
     for segment in &arrangement.segments {
@@ -25,20 +27,22 @@ pub(super) fn union(a: &Chain, b: &Chain) -> Chain {
         segments[0].push((segment.faces[0], [to, from]));
         segments[1].push((segment.faces[1], [from, to]));
     }
-    let mut faces = Vec::with_capacity(a.faces.len() + b.faces.len());
-    for (k, (chain, offset)) in [(a, 0), (b, offset)].into_iter().enumerate() {
+    for (k, chain) in [a, b].into_iter().enumerate() {
         segments[k].sort_unstable();
-        outside(chain, &arrangement.cuts[k], &segments[k], offset, &mut points, &mut faces);
+        outside(chain, &arrangement.cuts[k], &segments[k], offsets[k], &mut points, &mut faces);
     }
-    tidied(points.positions, &faces)
+    let firsts = [offsets[1], (a.positions.len() + b.positions.len()) as u32];
+    let UnionFaces { mut apart, met } = faces;
+    apart.extend(tidied(&points.positions, firsts, met));
+    Chain::new(&points.positions, apart)
 }
 
-/// Both surfaces as one.
-pub(super) fn beside(a: &Chain, b: &Chain) -> Chain {
-    let offset = a.positions.len() as u32;
-    let positions = a.positions.iter().chain(&b.positions).copied().collect();
-    let theirs = b.faces.iter().map(|f| f.map(|v| v + offset));
-    Chain::new(positions, a.faces.iter().copied().chain(theirs).collect())
+/// Faces of a union.
+struct UnionFaces {
+    /// Faces whose boxes meet none of the other surface.
+    apart: Vec<[u32; 3]>,
+    /// All others, and their parts.
+    met: Vec<[u32; 3]>,
 }
 
 /// The vertices of both surfaces and the points at which they cross.
@@ -66,23 +70,26 @@ fn outside(
     segments: &[(u32, [u32; 2])],
     offset: u32,
     points: &mut Points,
-    faces: &mut Vec<[u32; 3]>,
+    faces: &mut UnionFaces,
 ) {
     let (mut crossings, mut segments) = (cut.crossings.as_slice(), segments);
+    let mut near = cut.faces.iter().zip(&cut.met).peekable();
     let mut edges = Vec::new();
     for (f, face) in chain.faces.iter().enumerate() {
-        let here = crossings.iter().take_while(|c| c.side as usize / 3 == f).count();
-        let (sides_cut, rest) = crossings.split_at(here);
-        crossings = rest;
-        let here = segments.iter().take_while(|s| s.0 as usize == f).count();
-        let (ways, rest) = segments.split_at(here);
-        segments = rest;
-        let weights = face.map(|v| 1 - cut.windings[v as usize]);
         let corners = face.map(|v| v + offset);
+        let Some((_, met)) = near.next_if(|(near, _)| **near as usize == f) else {
+            faces.apart.push(corners);
+            continue;
+        };
+        let sides_cut = crossings_of(f as u32, &mut crossings);
+        let here = segments.iter().take_while(|s| s.0 as usize == f).count();
+        let ways = segments.split_off(..here).unwrap_or_default();
+        let weights = face.map(|v| 1 - cut.windings[v as usize]);
         if sides_cut.is_empty() && ways.is_empty() {
             let [x, y, z] = corners;
             let turned = if weights[0] < 0 { [x, z, y] } else { corners };
-            faces.extend((0..weights[0].abs()).map(|_| turned));
+            let list = if *met { &mut faces.met } else { &mut faces.apart };
+            list.extend((0..weights[0].abs()).map(|_| turned));
             continue;
         }
         edges.clear();
@@ -102,17 +109,28 @@ fn outside(
         ways.iter().for_each(|(_, [from, to])| add(*from, *to, 1));
         let [p, q, r] = chain.triangle(f);
         let normal = (q - p).cross(&(r - p));
-        faces.extend(fill(&edges, |id| points.positions[id as usize], &normal));
+        faces.met.extend(fill(&edges, |id| points.positions[id as usize], &normal));
     }
 }
 
-/// Joins equal positions and drops faces without extent and pairs that cancel.
+/// Joins equal positions of different owners and drops faces without extent and pairs that cancel.
 ///
-/// Walls between touching bodies leave such pairs where both bodies have the same triangles.
-fn tidied(positions: Vec<Point3<f64>>, faces: &[[u32; 3]]) -> Chain {
-    let mesh = TriMesh::new(positions, faces.to_vec());
-    let weld = mesh.weld_within(0.0);
-    let mut named: Vec<([u32; 3], i32)> = (weld.faces(&mesh).into_iter())
+/// Owners of vertices are the first surface, from the first of `firsts` on the second one, and from the other one on their crossing.
+/// A vertex keeps its name where the position is of the same surface: faces that are not here may use it.
+/// Walls between touching bodies leave pairs that cancel where both bodies have the same triangles.
+fn tidied(positions: &[Point3<f64>], firsts: [u32; 2], faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let mut used: Vec<u32> = faces.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut names: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut known = HashMap::with_capacity(used.len());
+    for v in used {
+        let first = *known.entry(position_bits(&positions[v as usize])).or_insert(v);
+        if firsts[1] <= v || (first < firsts[0] && firsts[0] <= v) {
+            names[v as usize] = first;
+        }
+    }
+    let mut named: Vec<([u32; 3], i32)> = (faces.iter().map(|f| f.map(|v| names[v as usize])))
         .filter(|f| !is_collapsed(f))
         .map(|[a, b, c]| {
             let mut sorted = [a, b, c];
@@ -128,11 +146,5 @@ fn tidied(positions: Vec<Point3<f64>>, faces: &[[u32; 3]]) -> Chain {
         let face = if count < 0 { [a, c, b] } else { [a, b, c] };
         (0..count.abs()).map(move |_| face)
     });
-    compact(&weld.positions, &kept.collect::<Vec<_>>())
-}
-
-/// The surface of `faces` with the positions they use.
-pub(super) fn compact(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Chain {
-    let mesh = TriMesh::compacted(positions, faces.iter().copied());
-    Chain::new(mesh.vertices, mesh.faces)
+    kept.collect()
 }

@@ -26,9 +26,10 @@ mod polygon;
 mod reference;
 #[cfg(test)]
 pub(crate) mod tests;
+mod winding;
 
 use self::chain::{Chain, volume};
-use self::join::{beside, compact, union};
+use self::join::union;
 use self::overlap::overlap;
 use crate::mesh::TriMesh;
 use crate::topology::{components, edges, is_collapsed};
@@ -116,8 +117,7 @@ fn join(mut shells: Vec<Chain>) -> Option<Chain> {
         let mut rest = shells.into_iter();
         while let Some(a) = rest.next() {
             joined.push(match rest.next() {
-                Some(b) if a.tree.bounds().meets(&b.tree.bounds()) => union(&a, &b),
-                Some(b) => beside(&a, &b),
+                Some(b) => union(&a, &b),
                 None => a,
             });
         }
@@ -151,7 +151,7 @@ fn shells_of(mesh: &TriMesh, what: &str) -> Result<Vec<Chain>, VolumeError> {
     }
     let (shell_of, count) = components(&edges, faces.len());
     if count == 1 {
-        return Ok(vec![Chain::new(weld.positions, faces)]);
+        return Ok(vec![Chain::new(&weld.positions, faces)]);
     }
     let mut shells = vec![Vec::new(); count];
     for (face, shell) in faces.into_iter().zip(shell_of) {
@@ -163,14 +163,15 @@ fn shells_of(mesh: &TriMesh, what: &str) -> Result<Vec<Chain>, VolumeError> {
         .partition(|(volume, _)| *volume >= 0.0);
     // The smallest shell around a cavity is the one it is in.
     solid.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let chains: Vec<Chain> = solid.iter().map(|(_, faces)| compact(positions, faces)).collect();
+    let chain = |(_, faces): &(f64, Vec<[u32; 3]>)| Chain::new(positions, faces.iter().copied());
+    let chains: Vec<Chain> = solid.iter().map(chain).collect();
     if hollow.is_empty() {
         return Ok(chains);
     }
     for (_, faces) in hollow {
         let corner = positions[faces[0][0] as usize];
-        let around = chains.iter().position(|c| c.winding(&corner, true) > 0);
+        let around = chains.iter().position(|c| c.windings(&[corner], true)[0] > 0);
         solid[around.unwrap_or(chains.len() - 1)].1.extend(faces);
     }
-    Ok(solid.iter().map(|(_, faces)| compact(positions, faces)).collect())
+    Ok(solid.iter().map(chain).collect())
 }

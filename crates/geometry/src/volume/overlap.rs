@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::arrangement::{Arrangement, FaceCut};
+use super::arrangement::{Arrangement, FaceCut, crossings_of};
 use super::chain::{Chain, SIDES};
 
 /// Intersection volume ∫ w_a w_b of `a` and `b` with winding numbers w \[m³\].
@@ -12,8 +12,8 @@ use super::chain::{Chain, SIDES};
 /// its boundary of that over triangles with one corner of the face, in whatever order the boundary is met: no
 /// polygon is ever put together.
 pub(super) fn overlap(a: &Chain, b: &Chain) -> f64 {
-    let (ours, theirs) = (a.tree.bounds(), b.tree.bounds());
-    if !ours.meets(&theirs) {
+    let (ours, theirs) = (&a.bounds, &b.bounds);
+    if !ours.meets(theirs) {
         return 0.0;
     }
     // Close to what is measured, so that little is lost to rounding.
@@ -42,11 +42,10 @@ fn cone([o, p, q]: [Vector3<f64>; 3], weight: f64) -> f64 {
 fn inside(chain: &Chain, cut: &FaceCut, origin: &Point3<f64>) -> f64 {
     let mut sum = 0.0;
     let mut crossings = cut.crossings.as_slice();
-    for (f, face) in chain.faces.iter().enumerate() {
-        let here = crossings.iter().take_while(|c| c.side as usize / 3 == f).count();
-        let (of_face, rest) = crossings.split_at(here);
-        crossings = rest;
-        let weights = face.map(|v| cut.windings[v as usize]);
+    for &f in &cut.faces {
+        let of_face = crossings_of(f, &mut crossings);
+        let f = f as usize;
+        let weights = chain.faces[f].map(|v| cut.windings[v as usize]);
         if of_face.is_empty() && weights[0] == 0 {
             continue;
         }

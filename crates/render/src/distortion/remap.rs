@@ -21,7 +21,7 @@ pub struct Remap {
 const SAME_SURFACE: f32 = 0.01;
 
 /// Indices of four pixels around a position, and how much each counts in a bilinear mean.
-struct Cell {
+struct BilinearCell {
     corners: [usize; 4],
     shares: [f32; 4],
 }
@@ -64,7 +64,7 @@ impl Remap {
     pub fn rgb(&self, image: &RgbImage) -> Result<RgbImage, DistortionError> {
         self.check(image.width(), image.height())?;
         let pixel = |place: &[f32; 2]| {
-            let Some(Cell { corners, shares }) = self.cell(place) else { return [0.0; 3] };
+            let Some(BilinearCell { corners, shares }) = self.cell(place) else { return [0.0; 3] };
             let colors = corners.map(|at| image.pixels()[at]);
             [0, 1, 2].map(|k| colors.iter().zip(shares).map(|(c, share)| share * c[k]).sum())
         };
@@ -82,7 +82,7 @@ impl Remap {
         self.check(image.width(), image.height())?;
         let pixel = |place: &[f32; 2]| {
             let nearest = || self.nearest_pixel(place).map_or(0.0, |at| image.pixels()[at]);
-            let Some(Cell { corners, shares }) = self.cell(place) else { return nearest() };
+            let Some(BilinearCell { corners, shares }) = self.cell(place) else { return nearest() };
             let depths = corners.map(|at| image.pixels()[at]);
             let (near, far) =
                 depths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), &z| (a.min(z), b.max(z)));
@@ -126,7 +126,7 @@ impl Remap {
     }
 
     /// The pixels around a position of the source image.
-    fn cell(&self, &[x, y]: &[f32; 2]) -> Option<Cell> {
+    fn cell(&self, &[x, y]: &[f32; 2]) -> Option<BilinearCell> {
         let along = |p: f32, size: usize| {
             if !(-0.5..=size as f32 - 0.5).contains(&p) {
                 return None;
@@ -139,7 +139,7 @@ impl Remap {
         let (a, x0, x1) = along(x, self.source.width)?;
         let (b, y0, y1) = along(y, self.source.height)?;
         let corners = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)];
-        Some(Cell {
+        Some(BilinearCell {
             corners: corners.map(|(x, y)| y * self.source.width + x),
             shares: [(1.0 - b) * (1.0 - a), (1.0 - b) * a, b * (1.0 - a), b * a],
         })
