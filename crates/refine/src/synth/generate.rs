@@ -127,8 +127,8 @@ where
 fn check(subjects: &[SynthObject]) -> Result<(), SynthError> {
     let mut ids = BTreeSet::new();
     match subjects.iter().find(|s| !ids.insert(s.obj_id)) {
-        Some(s) => Err(SynthError::Argument(format!("two objects have the number {}", s.obj_id))),
-        None if ids.is_empty() => Err(SynthError::Argument("there are no objects".into())),
+        Some(s) => Err(SynthError::Refused(format!("two objects have the number {}", s.obj_id))),
+        None if ids.is_empty() => Err(SynthError::Refused("there are no objects".into())),
         None => Ok(()),
     }
 }
@@ -174,7 +174,7 @@ impl SceneJob<'_> {
         let mut failed = Vec::new();
         if !missing.is_empty() {
             let source = prepare()
-                .map_err(|reason| SynthError::Argument(format!("object {obj_id}: {reason}")))?;
+                .map_err(|reason| SynthError::Refused(format!("object {obj_id}: {reason}")))?;
             let attempt = |(grasp, images): (u32, Vec<u32>)| match self.moments(&source, grasp) {
                 Ok(moments) => self.frames(&moments, grasp, &images, &state).map(|()| None),
                 Err(reason) => {

@@ -62,7 +62,7 @@ impl SynthSettings {
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.
 ///
 /// # Errors
-/// [`SynthError::OtherSettings`], [`SynthError::Occupied`], or when the file cannot be read or written.
+/// [`SynthError::Refused`] if other settings or other files are there; or when the file cannot be read or written.
 pub(super) fn check_plan(
     dir: &Path,
     hand: &HandFiles,
@@ -74,14 +74,20 @@ pub(super) fn check_plan(
     if let Some(stored) = read_json::<Value>(&file)? {
         return match difference(&stored, &plan, "") {
             None => Ok(()),
-            Some(difference) => Err(SynthError::OtherSettings { file, difference }),
+            Some(difference) => Err(SynthError::refused(format!(
+                "{}: {difference}: give the same settings, or another folder",
+                file.display()
+            ))),
         };
     }
     let mut entries = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
     // A run that ended before it had a plan may have left a temporary file.
     if entries.any(|e| e.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".synth.json")))
     {
-        return Err(SynthError::Occupied(dir.to_owned()));
+        return Err(SynthError::refused(format!(
+            "{}: is not empty and has no synth.json: no dataset of ours to go on with",
+            dir.display()
+        )));
     }
     Ok(write_atomically(&file, format!("{plan:#}\n").as_bytes())?)
 }

@@ -22,7 +22,6 @@ mod pose;
 mod results;
 mod touch;
 
-pub use arrival::Stamp;
 pub use bodies::{Body, BodyKind, SceneBodies};
 pub(crate) use bodies::{BodyEntry, read_bodies, sigmas};
 pub use dataset::{Dataset, DatasetScene};
@@ -48,4 +47,4 @@ pub use results::{
     write_results,
 };
 pub(crate) use touch::TactileEntry;
-pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};
+pub use touch::{Tactile, TactileReading};
