@@ -9,6 +9,7 @@ use prehend_geometry::{GridCache, TriMesh};
 use crate::baselines::GradientKind;
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, Origin, ResultRow, SceneBodies,
+    present,
 };
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::{Robots, kept};
@@ -220,8 +221,10 @@ impl Assets {
         }
         let needs = |gradient| required.contains(&gradient);
         let needs_hand = needs(GradientKind::Physics) || needs(GradientKind::Tactile);
-        let stated = present(frame.bodies(), needs_hand)?;
-        let SceneBodies { gravity, mut bodies } = stated.unwrap_or_default();
+        let SceneBodies { gravity, mut bodies } = match needs_hand {
+            true => frame.bodies()?,
+            false => present(frame.bodies())?.unwrap_or_default(),
+        };
         if let Some(sought) = sought {
             let image = (sought.target.scene_id, sought.target.im_id);
             bodies.extend(self.neighbors.get(&image).into_iter().flatten().cloned());
@@ -231,7 +234,10 @@ impl Assets {
             return Ok(observation);
         }
         let origin = frame.bodies_entry();
-        let tactile = present(frame.tactile(), needs(GradientKind::Tactile))?;
+        let tactile = match needs(GradientKind::Tactile) {
+            true => frame.tactile()?,
+            false => present(frame.tactile())?.unwrap_or_default(),
+        };
         gravity.iter().try_for_each(check_gravity).map_err(|e| origin.fault("gravity", e))?;
         if gravity.is_none() && needs(GradientKind::Physics) {
             return Err(origin.fault("gravity", "is missing").into());
@@ -242,7 +248,6 @@ impl Assets {
                 self.object(obj_id)?;
             }
         }
-        let tactile = tactile.unwrap_or_default();
         observation.hand =
             self.robots.combined(&bodies, &tactile, &self.objects, &origin, "force")?;
         if observation.hand.is_none() && needs_hand {
@@ -250,14 +255,6 @@ impl Assets {
         }
         observation.place_views();
         Ok(observation)
-    }
-}
-
-/// Result of `read`; `None` where the file or its entry is missing and not `required`.
-fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>, DatasetError> {
-    match read {
-        Err(DatasetError::Missing { .. }) if !required => Ok(None),
-        read => read.map(Some),
     }
 }
 
@@ -271,12 +268,8 @@ fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>
 fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let name = models.mesh_path(id)?.display().to_string();
-    let info = match models.info(id) {
-        Ok(info) => Some(info),
-        // BOP does not require the list of an estimator's models.
-        Err(DatasetError::Missing { .. }) => None,
-        Err(broken) => return Err(broken.into()),
-    };
+    // BOP does not require the list of an estimator's models.
+    let info = present(models.info(id))?;
     let mass = info.as_ref().and_then(|info| info.mass);
     let place = info.as_ref().and_then(|info| info.center_of_mass.zip(info.inertia));
     let object = match mass.zip(place) {

@@ -11,17 +11,15 @@ use serde_json::json;
 
 use super::annotation::ImageEntries;
 use super::error::SynthError;
-use super::files::{
-    FRAME_FOLDERS, NAMES, read_json, remove_temporary, write_entries, write_models,
-};
+use super::files::{FRAME_FOLDERS, NAMES, remove_temporary, write_entries, write_models};
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
 use super::plan::{FrameUse, SynthObject, SynthSettings, check_plan, seed, sequence};
 use super::pose_noise::NoiseLevel;
 use super::sensor::{SensorRig, SimulatedLens};
 use crate::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, write_atomically,
-    write_results,
+    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, present, read_json,
+    write_atomically, write_results,
 };
 use crate::data::{Identity, Journal};
 
@@ -156,7 +154,7 @@ impl SceneJob<'_> {
         let frames = self.settings.frames.get();
         if !journal.exists() && NAMES.iter().any(|name| self.dir.join(name).exists()) {
             (self.progress)(u64::from(frames));
-            return Ok(read_json(&failures)?.unwrap_or_default());
+            return Ok(present(read_json(&failures))?.unwrap_or_default());
         }
         for folder in FRAME_FOLDERS {
             create_folder(&self.dir.join(folder))?;

@@ -11,10 +11,9 @@ use serde_json::{Map, Value, json};
 
 use super::annotation;
 use super::error::SynthError;
-use super::files::read_json;
 use super::hand_files::HandFiles;
 use super::sensor::{FilmSettings, SensorSettings};
-use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, present, read_json, write_atomically};
 use crate::data::identity::{fingerprint, program};
 use crate::scene::Object;
 
@@ -71,7 +70,7 @@ pub(super) fn check_plan(
 ) -> Result<(), SynthError> {
     let plan = describe(hand, subjects, settings);
     let file = dir.join("synth.json");
-    if let Some(stored) = read_json::<Value>(&file)? {
+    if let Some(stored) = present(read_json::<Value>(&file))? {
         return match difference(&stored, &plan, "") {
             None => Ok(()),
             Some(difference) => Err(SynthError::refused(format!(

@@ -27,7 +27,7 @@ pub(crate) use bodies::{BodyEntry, read_bodies, sigmas};
 pub use dataset::{Dataset, DatasetScene};
 pub use detections::Detections;
 pub use error::DatasetError;
-pub(crate) use error::Origin;
+pub(crate) use error::{Origin, present};
 pub use files::{check_writable, create_folder, write_atomically};
 pub(crate) use files::{lock, open_locked, read_bytes, read_text};
 pub use frame::DatasetImage;
